@@ -1,0 +1,37 @@
+/* Compositing: fragments of many ranks to one image on rank 0. Knows no cells, no trees, no scene.
+ *
+ * Pixels are owned in turn by ranks (comp_owner: plain arithmetic). Every rank sends each pixel owner its fragments
+ * (direct send), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels. Fragments
+ * need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The result is a function
+ * of the set of fragments alone: not of ranks, of order of arrival, nor of threads. */
+#ifndef COMP_COMP_H
+#define COMP_COMP_H
+
+#include <mpi.h>
+
+#include "error.h"
+#include "fragment.h"
+#include "image.h"
+
+/* Which rank of ranks owns pixel (of pixel_count pixels)? Runs of consecutive pixels go round, so that an object
+ * in the middle of the image is shared out. */
+int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
+
+/* Blend one pixel's fragments in place: sorted by (t_in, surface before volume, then bits), blended front to back
+ * over background (linear premultiplied RGBA). out_rgba gets 4 floats, out_depth the nearest surface's t_in or
+ * +infinity. Local; the whole rule of merging is here. */
+void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
+
+typedef struct comp_statistics {
+    int64_t sent_fragments; /* by this rank, own ones included */
+    int64_t sent_bytes;     /* to other ranks */
+    double exchange_ms, merge_ms, gather_ms;
+} comp_statistics;
+
+/* Collective over comm, on which only compositing talks. out->rgba and out->depth must be allocated on rank 0 (width
+ * and height set on all ranks) and are filled there; elsewhere they are not touched. items is reordered. An error on
+ * one rank (memory) is an error on all. statistics may be NULL. */
+insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], image *out,
+                             comp_statistics *statistics, base_error *error);
+
+#endif

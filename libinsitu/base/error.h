@@ -1,0 +1,17 @@
+/* How a room says what went wrong: a status and one message, filled by whoever decides, passed up unchanged. */
+#ifndef BASE_ERROR_H
+#define BASE_ERROR_H
+
+#include "insitu/status.h"
+
+typedef struct base_error {
+    insitu_status status;
+    char message[1024]; /* "" while status is INSITU_OK */
+} base_error;
+
+/* Record status and a printf-style message and return status. error may be NULL. The first error stays: a later
+ * one does not overwrite it. */
+insitu_status base_fail(base_error *error, insitu_status status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+#endif

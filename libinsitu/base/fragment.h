@@ -1,0 +1,29 @@
+/* What render makes and compositing merges: a stretch of one pixel's ray.
+ *
+ * A volume fragment covers the samples of one rank between t_in and t_out; a surface fragment has t_in == t_out, the
+ * hit. Fragments of one pixel, from any ranks, do not overlap, so sorting by t_in and blending front to back gives
+ * the picture. Colours are linear and premultiplied: over(front, back) = (C1 + T1 C2, T1 T2). */
+#ifndef BASE_FRAGMENT_H
+#define BASE_FRAGMENT_H
+
+#include <stdint.h>
+
+typedef struct fragment {
+    uint32_t pixel;      /* y * width + x, y = 0 at the top */
+    float t_in;          /* depth along the camera's axis, in scene units (render.h), of the first sample or the hit */
+    float t_out;         /* of the last sample; == t_in and kind bit set for a hit */
+    float colour[3];     /* premultiplied linear RGB */
+    float transmittance; /* 0 opaque .. 1 clear */
+    uint32_t kind;       /* FRAGMENT_VOLUME, or FRAGMENT_SURFACE + surface id (0, 1, ...) */
+} fragment;
+
+enum { FRAGMENT_VOLUME = 0, FRAGMENT_SURFACE = 1 };
+
+/* A growing list, memory from memory.h. */
+typedef struct fragment_list {
+    fragment *items;
+    int64_t count;
+    int64_t capacity;
+} fragment_list;
+
+#endif

@@ -1,0 +1,126 @@
+/* A rank's cells and values as the rooms below the session see them: the caller's own arrays behind inline
+ * accessors that know each array's element type and stride. Nothing is copied.
+ *
+ * A grid has been validated (indices in range, types known, coordinates finite) by whoever made it; the accessors
+ * check nothing. All geometry leaves here in double: rooms go to float32 only after subtracting an origin. */
+#ifndef BASE_GRID_H
+#define BASE_GRID_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { GRID_TET = 10, GRID_HEX = 12, GRID_WEDGE = 13, GRID_PYRAMID = 14, GRID_MAX_CELL_VERTICES = 8 };
+
+/* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
+typedef struct grid_array {
+    const char *data;
+    int64_t stride; /* bytes, never 0 */
+    bool is_wide;
+    bool is_integer;
+} grid_array;
+
+typedef struct grid {
+    int64_t vertex_count;
+    int64_t cell_count;
+    grid_array coordinates[3];
+    grid_array connectivity;
+    grid_array offsets;    /* data NULL: all cells are of cell_type */
+    const char *cell_types; /* NULL: all cells are of cell_type */
+    int64_t cell_types_stride;
+    int cell_types_bytes; /* 1, 4 or 8 */
+    int cell_type;
+    const char *ghosts; /* NULL: none */
+    int64_t ghosts_stride;
+} grid;
+
+/* One scalar per vertex or per cell, out of a field of several components. */
+typedef struct grid_field {
+    grid_array values; /* stride from tuple to tuple */
+    int64_t component_stride;
+    int component_count;
+    int component; /* 0 .. component_count - 1, or -1 for the magnitude */
+    bool is_cell_centred;
+} grid_field;
+
+static inline double grid_array_number(const grid_array *a, int64_t i)
+{
+    const char *p = a->data + i * a->stride;
+    if (!a->is_integer) return a->is_wide ? *(const double *)(const void *)p : (double)*(const float *)(const void *)p;
+    return a->is_wide ? (double)*(const int64_t *)(const void *)p : (double)*(const int32_t *)(const void *)p;
+}
+
+static inline int64_t grid_array_index(const grid_array *a, int64_t i)
+{
+    const char *p = a->data + i * a->stride;
+    return a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
+}
+
+static inline int grid_type_vertices(int cell_type)
+{
+    switch (cell_type) {
+    case GRID_TET: return 4;
+    case GRID_HEX: return 8;
+    case GRID_WEDGE: return 6;
+    case GRID_PYRAMID: return 5;
+    default: return 0;
+    }
+}
+
+static inline int grid_cell_type(const grid *g, int64_t cell)
+{
+    if (!g->cell_types) return g->cell_type;
+    const char *p = g->cell_types + cell * g->cell_types_stride;
+    if (g->cell_types_bytes == 1) return *(const unsigned char *)p;
+    return g->cell_types_bytes == 4 ? (int)*(const int32_t *)(const void *)p : (int)*(const int64_t *)(const void *)p;
+}
+
+/* The cell's vertex indices, in VTK's order; returns how many. */
+static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
+{
+    const int count = grid_type_vertices(grid_cell_type(g, cell));
+    const int64_t first = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
+    for (int i = 0; i < count; i++) vertices[i] = grid_array_index(&g->connectivity, first + i);
+    return count;
+}
+
+static inline void grid_vertex(const grid *g, int64_t vertex, double position[3])
+{
+    for (int axis = 0; axis < 3; axis++) position[axis] = grid_array_number(&g->coordinates[axis], vertex);
+}
+
+static inline bool grid_is_ghost(const grid *g, int64_t cell)
+{
+    return g->ghosts && g->ghosts[cell * g->ghosts_stride] != 0;
+}
+
+static inline double grid_field_value(const grid_field *f, int64_t i)
+{
+    if (f->component >= 0) {
+        grid_array a = f->values;
+        a.data += f->component * f->component_stride;
+        return grid_array_number(&a, i);
+    }
+    double sum = 0;
+    for (int c = 0; c < f->component_count; c++) {
+        grid_array a = f->values;
+        a.data += c * f->component_stride;
+        const double v = grid_array_number(&a, i);
+        sum += v * v;
+    }
+    return sqrt(sum);
+}
+
+/* The values at the cell's vertices (or the cell's own, count times). False where one is NaN or infinite: such a
+ * cell is not drawn. */
+static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count, double *values)
+{
+    bool finite = true;
+    for (int i = 0; i < count; i++) {
+        values[i] = grid_field_value(f, f->is_cell_centred ? cell : vertices[i]);
+        finite = finite && isfinite(values[i]);
+    }
+    return finite;
+}
+
+#endif

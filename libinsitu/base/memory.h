@@ -1,0 +1,36 @@
+/* All of the library's heap memory comes through here: 64-byte aligned, counted, and able to fail on purpose.
+ *
+ * The count is of the whole process (several sessions add up). Thread-safe. */
+#ifndef BASE_MEMORY_H
+#define BASE_MEMORY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* bytes of 64-byte aligned memory, or NULL. 0 bytes gives a pointer that may be freed. */
+void *base_alloc(size_t bytes);
+
+/* The same, zeroed. */
+void *base_calloc(size_t count, size_t size);
+
+/* Grow or shrink, contents kept; on failure NULL and the old block stays. NULL block: base_alloc. */
+void *base_realloc(void *block, size_t bytes);
+
+/* NULL is fine. */
+void base_free(void *block);
+
+/* A copy of a C string, or NULL. */
+char *base_strdup(const char *text);
+
+/* Bytes held now, and the most held since base_memory_reset_peak(). */
+int64_t base_memory_held(void);
+int64_t base_memory_peak(void);
+void base_memory_reset_peak(void);
+
+/* For tests: let the n-th allocation from now on fail (1: the next one), then work again; 0: none. */
+void base_memory_fail_nth(int64_t n);
+
+/* Allocations made since the process began: a test compares two steps. */
+int64_t base_memory_allocations(void);
+
+#endif

@@ -1,0 +1,175 @@
+/* libinsitu: pictures of a running simulation, from its own unstructured cells.
+ *
+ * Six calls: create a session from a scene file, hand over the mesh and the fields (borrowed, not copied), step,
+ * step, ..., destroy. Every function returns an insitu_status; none aborts, exits or prints to stdout.
+ *
+ *     insitu_session *s = NULL;
+ *     insitu_create(MPI_COMM_WORLD, "scene.yaml", &s);
+ *     insitu_set_mesh(s, "domain", &mesh);
+ *     insitu_set_field(s, "domain", &pressure);
+ *     insitu_step(s, cycle, time);
+ *     insitu_destroy(&s);
+ *
+ * Collective functions must be called by every rank of the communicator, in the same order. Local functions may
+ * be called by any rank at any time. One session is used by one thread at a time.
+ */
+#ifndef INSITU_INSITU_H
+#define INSITU_INSITU_H
+
+#include <mpi.h>
+#include <stdint.h>
+
+#include "insitu/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define INSITU_VERSION_MAJOR 0
+#define INSITU_VERSION_MINOR 1
+#define INSITU_VERSION_PATCH 0
+
+/* The element type of a borrowed array. */
+typedef enum insitu_type {
+    INSITU_FLOAT32 = 1,
+    INSITU_FLOAT64 = 2,
+    INSITU_INT32 = 3,
+    INSITU_INT64 = 4,
+    INSITU_UINT8 = 5
+} insitu_type;
+
+/* A borrowed array: the caller's memory, read only, never written or kept beyond what insitu_set_mesh() says. */
+typedef struct insitu_array {
+    const void *data;     /* first element; NULL: the array is not given. Aligned to its element type. */
+    insitu_type type;     /* of one element */
+    int64_t stride_bytes; /* from one element to the next; 0: packed, the size of the type. Any multiple of the size. */
+} insitu_array;
+
+/* Cell types by VTK's ids, vertices in VTK's order. */
+typedef enum insitu_cell_type {
+    INSITU_TET = 10,    /* 4 vertices */
+    INSITU_HEX = 12,    /* 8 vertices: the lower quad around, then the upper quad above it */
+    INSITU_WEDGE = 13,  /* 6 vertices: one triangle, then the other; either winding */
+    INSITU_PYRAMID = 14 /* 5 vertices: the quad around, then the apex */
+} insitu_cell_type;
+
+/* What of a mesh or a field differs from the last time it was set. The safe default is everything. */
+enum {
+    INSITU_CHANGED_NOTHING = 0,
+    INSITU_CHANGED_TOPOLOGY = 1, /* cells, their types, ghost flags: the tree is built again */
+    INSITU_CHANGED_GEOMETRY = 2, /* coordinates: the tree's bounds are refitted */
+    INSITU_CHANGED_VALUES = 4,   /* a field's values: the tree's ranges are refitted */
+    INSITU_CHANGED_ALL = 7
+};
+
+/* One rank's part of a mesh. All arrays are borrowed until the next insitu_step() returns or the mesh is set
+ * again under the same name, whichever is later: they must stay valid while a step may read them, and a step
+ * reads the values they hold then. Fill with insitu_mesh_defaults() first. */
+typedef struct insitu_mesh {
+    int64_t vertex_count;        /* >= 0 */
+    insitu_array coordinates[3]; /* x, y, z: float32 or float64, vertex_count each. Interleaved xyz is three arrays
+                                    of stride 3 elements: see insitu_mesh_interleaved(). */
+    insitu_array vertex_ids;     /* optional, int32 or int64: ids unique over all ranks, to match the vertices that
+                                    ranks share; not given: vertices match by bitwise equal coordinates */
+    int64_t cell_count;          /* >= 0; at most 4294967294 */
+    insitu_cell_type cell_type;  /* of every cell, where cell_types is not given */
+    insitu_array cell_types;     /* optional, uint8, int32 or int64, cell_count: VTK's ids, for mixed cells */
+    int64_t connectivity_count;  /* elements in connectivity */
+    insitu_array connectivity;   /* int32 or int64, connectivity_count: the cells' vertex indices from 0, one cell
+                                    after the other */
+    insitu_array offsets;        /* int32 or int64, cell_count + 1: where each cell begins in connectivity, the last
+                                    is connectivity_count. Not needed where all cells are of one type. */
+    insitu_array ghosts;         /* optional, uint8, cell_count: cells with a nonzero flag are not drawn */
+    unsigned changed;            /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
+} insitu_mesh;
+
+/* Whether a field has one value a vertex or one a cell. */
+typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1 } insitu_centring;
+
+/* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
+typedef struct insitu_field {
+    const char *name;               /* copied; the name by which scenes ask for it */
+    insitu_centring centring;       /* vertex by default */
+    int64_t count;                  /* tuples: the mesh's vertex_count or cell_count */
+    int component_count;            /* >= 1; 1 by default. The scene picks one, or the magnitude. */
+    int64_t component_stride_bytes; /* from one component to the next; 0: packed, interleaved */
+    insitu_array values;            /* float32, float64, int32 or int64. stride_bytes is from tuple to tuple; 0:
+                                       component_count elements */
+    unsigned changed;               /* INSITU_CHANGED_VALUES or NOTHING; ALL by default */
+} insitu_field;
+
+/* What the last step did, on this rank unless said otherwise. Times are wall-clock milliseconds. */
+typedef struct insitu_report {
+    int64_t cycle;
+    double time;
+    int images;             /* drawn in this step; 0 when none was due */
+    double total_ms;        /* the whole insitu_step() */
+    double prepare_ms;      /* agreeing, validating, bounds, recentring */
+    double build_ms;        /* trees built */
+    double refit_ms;        /* trees refitted */
+    double surface_ms;      /* isosurfaces traced */
+    double volume_ms;       /* volumes traced */
+    double composite_ms;    /* fragments exchanged, merged and gathered, waiting included */
+    double write_ms;        /* images written, on rank 0 */
+    int64_t cells;          /* handed over, ghosts included */
+    int64_t cells_ghost;    /* not drawn: flagged as ghosts */
+    int64_t cells_unusable; /* not drawn: a field value that is not finite */
+    int64_t cells_inverted; /* drawn right all the same: left-handed, by the sign of the corner volumes' sum */
+    int64_t rays;           /* primary rays traced */
+    int64_t fragments;      /* sent to pixel owners, own ones included */
+    int64_t map_failures;   /* inverse maps that did not converge and fell back to linear interpolation */
+    int64_t bytes_borrowed; /* of the caller's arrays in use */
+    int64_t bytes_copied;   /* of the caller's data held in copies, with reasons in copied_why */
+    int64_t bytes_trees;    /* of all trees held */
+    int64_t bytes_peak;     /* most bytes the library held at once in this step */
+    const char *copied_why; /* "" or a list of what was copied and why; valid until the next step */
+    const char *left_out;   /* "" or a list of what the scene does not need and was not computed; as above */
+    const char *warnings;   /* "" or one warning a line; as above */
+} insitu_report;
+
+typedef struct insitu_session insitu_session;
+
+/* Fill in defaults: nothing given, everything changed. Local. */
+INSITU_API void insitu_mesh_defaults(insitu_mesh *mesh);
+INSITU_API void insitu_field_defaults(insitu_field *field);
+
+/* Set mesh->coordinates for interleaved x y z (row-major, vertices × 3), packed. type is INSITU_FLOAT32 or
+ * INSITU_FLOAT64. Local. */
+INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insitu_type type);
+
+/* Open a session. Collective over comm, which is duplicated; its error handler is left alone. scene_file is read on
+ * rank 0 only, and read again when it changes on disk. On an error *out is NULL on every rank, and the message is
+ * insitu_error(NULL). MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
+INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
+
+/* Hand over this rank's part of the mesh called name: borrowed arrays, checked when a step needs them. Local. Ranks
+ * that have no part of it need not call it; meshes of different names are drawn together. A mesh with
+ * INSITU_CHANGED_TOPOLOGY drops the fields set on it before. NULL for mesh takes it away. */
+INSITU_API insitu_status insitu_set_mesh(insitu_session *session, const char *name, const insitu_mesh *mesh);
+
+/* Hand over this rank's part of a field on the mesh called mesh, which must be set. Local. */
+INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *mesh, const insitu_field *field);
+
+/* Draw what is due at this cycle and time. Collective. Where nothing is due it costs one small reduction. An error
+ * on any rank is returned on every rank, with the rank and the place in the message; images that could be drawn
+ * are drawn, and the session stays usable: the simulation goes on. */
+INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, double time);
+
+/* What the last step did. Local. Valid until the next step; all zero before the first; NULL for a NULL session. */
+INSITU_API const insitu_report *insitu_last_report(const insitu_session *session);
+
+/* The message of the last call on the session that failed, "" if none did. Local. Valid until the next call on the
+ * session. NULL: the message of the last insitu_create() or insitu_destroy() of this thread that failed. */
+INSITU_API const char *insitu_error(const insitu_session *session);
+
+/* Close a session and set *session to NULL. Collective. NULL, or a pointer to NULL, is fine. */
+INSITU_API insitu_status insitu_destroy(insitu_session **session);
+
+/* The name of a status, as in "INSITU_ERROR_MESH". Local. */
+INSITU_API const char *insitu_status_name(insitu_status status);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,118 @@
+/* The scene file: what to draw, when, and where to put it. Read from YAML text by a schema (libcyaml); docs/scene.md is
+ * drawn from the same schema. Colours in the file are sRGB in [0, 1]; they are linear here. */
+#ifndef SESSION_SCENE_H
+#define SESSION_SCENE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "error.h"
+
+typedef enum scene_colour_map { SCENE_VIRIDIS, SCENE_INFERNO, SCENE_COOL_TO_WARM, SCENE_GREY } scene_colour_map;
+
+/* Which scalar of a field: the magnitude, or component n. Default: component 0 of a field of one, else magnitude. */
+enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
+
+typedef struct scene_field {
+    char *name;
+    int component; /* 0 .., or one of the above */
+    int line;      /* of the scene file, for messages about the field */
+} scene_field;
+
+typedef struct scene_range {
+    bool is_fixed; /* else from the data, over all ranks, at each drawn step */
+    double low, high;
+} scene_range;
+
+typedef struct scene_opacity_point {
+    double at;     /* 0 .. 1 of the range; rising */
+    float opacity; /* 0 .. 1, per unit_distance */
+} scene_opacity_point;
+
+typedef struct scene_material {
+    float ambient, diffuse, specular, shininess;
+} scene_material;
+
+typedef struct scene_isosurface {
+    scene_field field;
+    int value_count; /* 1 .. 16 */
+    double *values;
+    float *colours; /* value_count × 3, linear: those given, the last repeated; or a default cycle */
+    bool has_colour_by;
+    scene_field colour_by;
+    scene_colour_map colour_map;
+    scene_range colour_range;
+    float opacity;
+    scene_material material;
+    int root_steps; /* 0 .. 64; 2 by default */
+} scene_isosurface;
+
+typedef struct scene_volume {
+    scene_field field;
+    scene_colour_map colour_map;
+    scene_range range;
+    int opacity_count; /* 1 .. 32 */
+    scene_opacity_point *opacity;
+    double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */
+} scene_volume;
+
+typedef struct scene_light {
+    double direction[3]; /* towards the light; camera axes (right, up, backward) unless in_world; unit length */
+    bool in_world;
+    float colour[3]; /* linear, intensity included */
+} scene_light;
+
+typedef struct scene_camera {
+    bool is_automatic; /* eye and focal from the global bounds, looking along -direction */
+    double eye[3], focal[3];
+    double direction[3]; /* automatic: from the focal point towards the eye */
+    double up[3];
+    double angle; /* vertical, degrees; 40 by default */
+    double zoom;  /* automatic: 1 fits the bounds' sphere; larger is nearer */
+} scene_camera;
+
+typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
+
+typedef struct scene_output {
+    char *path; /* {cycle}, {cycle:06}, {name} are replaced; relative to the working directory of rank 0 */
+    scene_format format; /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
+} scene_output;
+
+typedef struct scene_image {
+    char *name;
+    int line;
+    int width, height; /* 1 .. 32768; 1280 × 720 by default */
+    scene_camera camera;
+    float background[4]; /* linear premultiplied RGBA */
+    int isosurface_count;
+    scene_isosurface *isosurfaces;
+    int volume_count; /* at most 4 */
+    scene_volume *volumes;
+    int light_count; /* 1 .. 8; a default head light and fill light where none is given */
+    scene_light *lights;
+    double step;       /* sample distance in scene units; 0: by step_cells */
+    double step_cells; /* in mean cell sizes: cube root of bounds' volume over cells; 0.5 by default */
+    int sample_group;  /* 1 .. 64; 16 by default */
+    bool jitter;       /* true by default */
+    int frames;        /* accumulated; 1 by default, 1 .. 4096 */
+    int output_count;  /* >= 1 */
+    scene_output *outputs;
+    int every; /* drawn at cycles that are multiples of it; 1 by default */
+} scene_image;
+
+typedef struct scene {
+    int threads; /* per rank; 0: the cores there are, shared by the ranks of a node */
+    int image_count;
+    scene_image *images;
+} scene;
+
+/* Parse text (size bytes; file_name for messages). On an error *out is zeroed and the message reads
+ * "file:line: key: what is wrong, what was expected". */
+insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene *out, base_error *error);
+
+void scene_free(scene *s);
+
+/* Replace {cycle}, {cycle:0N} and {name} of pattern. The result is from base_alloc(), NULL where memory ran out. */
+char *scene_output_path(const char *pattern, const char *name, long long cycle);
+
+#endif

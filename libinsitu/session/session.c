@@ -1,0 +1,1 @@
+#include "insitu/insitu.h"

@@ -1,0 +1,106 @@
+/* The min-max bounding volume hierarchy: a binary tree over a grid's cells whose nodes hold the bounds of their
+ * cells and the range of a scalar on them (thesis, section 4.2). Knows no MPI and no pixels.
+ *
+ * The nodes stand in one array, root first, siblings side by side, so that one reference finds both. A leaf holds
+ * at most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32, rounded
+ * outward from the double values. A cell that is a ghost is not in the tree; one that has a value that is not
+ * finite has the empty range (+inf, -inf) and so is never met. */
+#ifndef MMBVH_MMBVH_H
+#define MMBVH_MMBVH_H
+
+#include "error.h"
+#include "grid.h"
+
+enum { MMBVH_MAX_LEAF = 7 };
+
+typedef struct mmbvh_node {
+    float lower[3];
+    float range_low;
+    float upper[3];
+    float range_high;
+    uint64_t count : 3; /* cells in a leaf; 0: an inner node */
+    uint64_t ref : 61;  /* leaf: first entry in cells; inner: the left child's index, the right one follows */
+} mmbvh_node;           /* 40 bytes, as the thesis's figure 4.1 */
+
+typedef struct mmbvh {
+    mmbvh_node *nodes;
+    int64_t node_count;   /* 0 for no cells at all */
+    uint32_t *cells;      /* cell indices (or mesh indices in a parent tree), leaf by leaf */
+    int64_t cell_count;
+    double origin[3];     /* bounds are of (position - origin) * scale */
+    double scale;
+    double built_cost;    /* SAH cost when built: refitted trees are compared with it */
+    int64_t unusable_cells; /* cells with the empty range in the nodes' own ranges */
+} mmbvh;
+
+/* Ranges of one field: the nodes' own (stride 40) or an array of pairs beside the tree (stride 8). */
+typedef struct mmbvh_ranges {
+    const char *low;  /* of node 0 */
+    const char *high;
+    int64_t stride;   /* bytes from node to node */
+} mmbvh_ranges;
+
+typedef struct mmbvh_options {
+    int threads; /* >= 1; 0: as many as OpenMP would take */
+} mmbvh_options;
+
+/* Build over the grid's cells (ghosts left out) with the ranges of field (NULL: all ranges (-inf, +inf)). Binned SAH,
+ * parallel; the same tree for any number of threads. On success *out owns the memory: free it with mmbvh_free(). On
+ * an error *out is zeroed. */
+insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
+                          const mmbvh_options *options, mmbvh *out, base_error *error);
+
+/* Build over boxes (a parent tree over meshes): lower/upper are count × 3, ranges count × 2 (low, high). */
+insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const float *ranges, int64_t count,
+                                const mmbvh_options *options, mmbvh *out, base_error *error);
+
+void mmbvh_free(mmbvh *tree);
+
+/* New values, same cells: the nodes' own ranges again. Parallel, no allocation that lasts. */
+insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *field, const mmbvh_options *options);
+
+/* Moved vertices, same cells: the bounds again, ranges untouched. */
+insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options *options);
+
+/* Ranges of a further field over the same tree: pairs is node_count × 2 floats, the caller's memory, written.
+ * unusable gets the number of cells with a value that is not finite. */
+insitu_status mmbvh_compute_ranges(const mmbvh *tree, const grid *g, const grid_field *field,
+                                   const mmbvh_options *options, float *pairs, int64_t *unusable);
+
+static inline mmbvh_ranges mmbvh_own_ranges(const mmbvh *tree)
+{
+    mmbvh_ranges r = {0};
+    if (tree->node_count) {
+        r.low = (const char *)&tree->nodes[0].range_low;
+        r.high = (const char *)&tree->nodes[0].range_high;
+        r.stride = (int64_t)sizeof(mmbvh_node);
+    }
+    return r;
+}
+
+static inline mmbvh_ranges mmbvh_pair_ranges(const float *pairs)
+{
+    mmbvh_ranges r = {(const char *)pairs, (const char *)(pairs + 1), 2 * (int64_t)sizeof(float)};
+    return r;
+}
+
+/* SAH cost of the tree as it stands: the expected number of boxes and cells a random ray that meets the root tests
+ * (each box 1, each cell 1). */
+double mmbvh_cost(const mmbvh *tree);
+
+typedef struct mmbvh_statistics {
+    int64_t leaves;
+    int depth;            /* of the deepest leaf, root 1 */
+    double cells_a_leaf;  /* mean */
+    double sibling_overlap; /* mean over inner nodes: surface area of the children's intersection over their union's */
+    double cost;          /* mmbvh_cost() */
+    int64_t bytes;        /* nodes and cell indices */
+} mmbvh_statistics;
+
+/* Prove the tree: every non-ghost cell in exactly one leaf, counts within 1..7, every node's bounds and range contain
+ * those of its children and its cells, siblings adjacent, every node reached once. The first violation is the
+ * error. g, field may be NULL (a parent tree): then only the structure is proved. out may be NULL. */
+insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_statistics *out,
+                          base_error *error);
+
+#endif

@@ -1,0 +1,134 @@
+/* Local cells to local fragments: camera, layers, and the one call that draws a frame. Knows no MPI.
+ *
+ * A ray through pixel (x, y) is p(z) = eye + offset + z (forward + slope), where z is the depth along the camera's
+ * axis: perspective cameras have the slope, orthographic ones the offset. The ray's parameter everywhere is
+ * t = (z - depth_origin) * scale, so that float32 t has its resolution where the cells are. Samples of a volume
+ * stand at distances (k + jitter) * step from the eye (perspective) or the eye's plane (orthographic), k = 0, 1, ...
+ *
+ * What a frame makes is a function of the cells and the job alone: not of the rank that holds a cell, of the order of
+ * the cells, of the trees, nor of the number of threads. */
+#ifndef RENDER_RENDER_H
+#define RENDER_RENDER_H
+
+#include "fragment.h"
+#include "mmbvh.h"
+
+typedef struct render_camera {
+    double eye[3];
+    double right[3], up[3], forward[3]; /* orthonormal, right-handed: right × up = -forward */
+    double half_height;                 /* perspective: tangent of half the vertical angle; else half the height */
+    bool is_orthographic;
+    int width, height;
+} render_camera;
+
+/* Camera at eye that looks at focal. vertical_degrees is the whole vertical angle, in (0, 180). False where eye equals
+ * focal, or up is parallel to the view. */
+bool render_camera_look_at(render_camera *camera, const double eye[3], const double focal[3], const double up[3],
+                           double vertical_degrees, int width, int height);
+
+/* The ray through the centre of pixel (x, y): p(z) = base + z * direction, z >= 0. direction has length 1 along
+ * forward, not 1 overall. */
+void render_camera_ray(const render_camera *camera, int x, int y, double base[3], double direction[3]);
+
+/* Where float32 numbers live: positions are taken relative to origin and multiplied by scale, a power of two that
+ * brings the scene to a size near 1. The trees' origin and scale are the same. */
+typedef struct render_space {
+    double origin[3];
+    double scale;
+    double depth_origin; /* z at which t = 0 */
+} render_space;
+
+/* Colour and opacity of a value: colours are a table of linear RGB, evenly spaced over [low, high], interpolated linearly,
+ * clamped outside; opacity is piecewise linear through points of rising value (two of the same value make a step),
+ * constant outside. Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
+typedef struct render_transfer {
+    double low, high;
+    int colour_count; /* >= 2 */
+    const float *colours; /* colour_count × 3 */
+    int opacity_count; /* 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, which have none */
+    const double *opacity_values;
+    const float *opacities;
+    double unit_distance; /* scene units, > 0 */
+} render_transfer;
+
+enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 16, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
+
+typedef struct render_light {
+    double direction[3]; /* from the surface towards the light; unit length; world */
+    float colour[3];     /* linear, intensity included */
+} render_light;
+
+/* Blinn-Phong: colour * (ambient + sum diffuse max(0, n.l)) + sum specular max(0, n.h)^shininess, n towards the eye. */
+typedef struct render_material {
+    float ambient, diffuse, specular, shininess;
+} render_material;
+
+/* One field over all parts: fields[i] and ranges[i] belong to parts[i]. ranges[i].low NULL: not on that part. */
+typedef struct render_field {
+    const grid_field *fields;
+    const mmbvh_ranges *ranges;
+} render_field;
+
+typedef struct render_surface_layer {
+    render_field field; /* vertex-centred */
+    int value_count;
+    const double *values;          /* isovalues */
+    const float *colours;          /* value_count × 3, linear; where colour_map is NULL */
+    render_field colour_field;     /* where colour_map is given: vertex- or cell-centred; ranges not looked at */
+    const render_transfer *colour_map;
+    float opacity;                 /* 0 .. 1; 1 ends the ray */
+    render_material material;
+    int root_steps;                /* N of Neubauer's method (thesis, 4.3.3), 0 .. 64 */
+} render_surface_layer;
+
+typedef struct render_volume_layer {
+    render_field field;
+    const render_transfer *transfer;
+} render_volume_layer;
+
+/* A mesh of this rank. */
+typedef struct render_part {
+    const grid *cells;
+    const mmbvh *tree; /* over cells; its origin and scale are the space's */
+} render_part;
+
+typedef struct render_job {
+    render_camera camera;
+    render_space space;
+    const render_part *parts;
+    int part_count;
+    const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
+    const render_surface_layer *surfaces;
+    int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
+    const render_volume_layer *volumes;
+    int volume_count;
+    const render_light *lights;
+    int light_count;
+    double step;      /* distance between samples, scene units, > 0; volumes only */
+    int sample_group; /* N of the sample position packets (thesis, 4.4.1), 1 .. 64 */
+    bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
+    int frame;        /* 0 .. : which of the accumulated frames this is */
+    bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */
+    int threads;      /* >= 1; 0: as many as OpenMP would take */
+} render_job;
+
+typedef struct render_statistics {
+    int64_t rays;
+    int64_t map_failures;
+    double surface_ms, volume_ms;
+} render_statistics;
+
+/* The offset in [0, 1) of a pixel's samples in a frame. */
+double render_jitter(uint32_t pixel, uint32_t frame);
+
+/* Trace every pixel of the camera against this rank's parts and append what is seen to out (memory from memory.h;
+ * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
+insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics,
+                           base_error *error);
+
+/* The instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may force a lower one
+ * than the machine's best; a name that is unknown or not to be had is ignored, with render_isa_warning() telling. */
+const char *render_isa(void);
+const char *render_isa_warning(void);
+
+#endif
