@@ -1,1 +1,81 @@
+/* The three phases of compositing: fragments to the owners of their pixels, merging there, pixels to rank 0. Each ends
+ * with all ranks of one mind, so that a rank that ran out of memory stops the others where it stopped. Memory
+ * is given back as soon as its phase is over: at the peak a rank holds its own fragments, those of the pixels it owns,
+ * and the finished pixels. One rank alone merges its list where it lies. */
 #include "comp.h"
+
+#include "comp_agree.h"
+#include "comp_bucket.h"
+#include "comp_exchange.h"
+#include "comp_gather.h"
+#include "memory.h"
+
+static double milliseconds_since(double start)
+{
+    return 1e3 * (MPI_Wtime() - start);
+}
+
+static insitu_status merge_alone(const comp_layout *layout, fragment_list *items, const float background[4], image *out,
+                                 comp_statistics *statistics, base_error *error)
+{
+    const double start = MPI_Wtime();
+    int64_t starts[2];
+    if (!comp_bucket_by_owner(layout, items->items, items->count, starts))
+        return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
+    comp_pixels_clear(out, background);
+    const insitu_status status = comp_pixels_merge(layout, 0, items, background, out, NULL, error);
+    statistics->merge_ms = milliseconds_since(start);
+    return status;
+}
+
+static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, int rank, fragment_list *owned,
+                                      const float background[4], image *out, comp_statistics *statistics,
+                                      base_error *error)
+{
+    const double start = MPI_Wtime();
+    comp_pixel_list finished = {NULL, 0};
+    image *const here = rank == 0 ? out : NULL;
+    if (here) comp_pixels_clear(here, background);
+    insitu_status status = comp_pixels_merge(layout, rank, owned, background, here, &finished, error);
+    base_free(owned->items);
+    status = comp_agree(comm, status, error);
+    statistics->merge_ms = milliseconds_since(start);
+    if (status == INSITU_OK) {
+        const double gather_start = MPI_Wtime();
+        status = comp_gather(comm, &finished, comp_message_pixels, out, &statistics->sent_bytes, error);
+        statistics->gather_ms = milliseconds_since(gather_start);
+    }
+    base_free(finished.items);
+    return status;
+}
+
+static insitu_status composite(MPI_Comm comm, fragment_list *items, const float background[4], image *out,
+                               comp_statistics *statistics, base_error *error)
+{
+    int rank = 0, ranks = 1;
+    MPI_Comm_rank(comm, &rank);
+    MPI_Comm_size(comm, &ranks);
+    const int64_t pixel_count = (int64_t)out->width * out->height;
+    if (out->width < 1 || out->height < 1 || pixel_count > UINT32_MAX)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "compositing: no image of %d by %d pixels", out->width,
+                         out->height);
+    const comp_layout layout = comp_layout_of((uint32_t)pixel_count, ranks);
+    statistics->sent_fragments = items->count;
+    if (ranks == 1) return merge_alone(&layout, items, background, out, statistics, error);
+    const double start = MPI_Wtime();
+    fragment_list owned = {NULL, 0, 0};
+    const insitu_status status =
+        comp_exchange_direct(comm, &layout, items, comp_message_fragments, &owned, &statistics->sent_bytes, error);
+    statistics->exchange_ms = milliseconds_since(start);
+    if (status != INSITU_OK) return status;
+    return merge_and_gather(comm, &layout, rank, &owned, background, out, statistics, error);
+}
+
+insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], image *out,
+                             comp_statistics *statistics, base_error *error)
+{
+    comp_statistics unwanted;
+    if (!statistics) statistics = &unwanted;
+    *statistics = (comp_statistics){0};
+    return composite(comm, items, background, out, statistics, error);
+}

@@ -1,0 +1,83 @@
+/* A counting sort without a second copy, for lists that may be most of a rank's spare memory.
+ *
+ * Keys are counted, and ends[k] becomes the end of bucket k. Then a cursor i walks the list. The fragment it meets is
+ * lifted, goes to --ends[its key], the one that lay there is lifted in turn, and so on until one lands at i:
+ *
+ *     | placed           | i | not yet met      ...  bucket k:  not yet filled | filled |
+ *                                                                              ^ ends[k]
+ *
+ * Left of i all is placed. A fragment met at i >= ends[its key] lies in the filled part of its bucket: were it beyond
+ * the bucket, the bucket would lie left of i and be full, so nothing of that key would be left to meet. So one array
+ * of counters does, and in the end it holds each bucket's start.
+ *
+ * Order within a bucket is arbitrary; comp_merge_pixel() orders a pixel's fragments totally.
+ *
+ * Two passes, by slice and then by pixel within the slice, beat one by pixel: the first streams to few places, the
+ * second works in cache, and slices can be dealt to threads. */
+#include "comp_bucket.h"
+
+#include <string.h>
+
+typedef uint32_t key_function(const comp_layout *layout, uint32_t pixel);
+
+static inline uint32_t slice_of(const comp_layout *layout, uint32_t pixel)
+{
+    return comp_layout_index(layout, pixel) >> comp_slice_shift;
+}
+
+static inline uint32_t place_in_slice(const comp_layout *layout, uint32_t pixel)
+{
+    return comp_layout_index(layout, pixel) & (comp_slice_pixels - 1);
+}
+
+static inline void count_keys(const comp_layout *layout, const fragment *items, int64_t count, int64_t *ends,
+                              int64_t keys, key_function *key)
+{
+    memset(ends, 0, (size_t)keys * sizeof *ends);
+    for (int64_t i = 0; i < count; i++) ends[key(layout, items[i].pixel)]++;
+    for (int64_t k = 1; k < keys; k++) ends[k] += ends[k - 1];
+}
+
+static inline void place(const comp_layout *layout, fragment *items, int64_t count, int64_t *ends, key_function *key)
+{
+    for (int64_t i = 0; i < count; i++) {
+        if (i >= ends[key(layout, items[i].pixel)]) continue;
+        fragment lifted = items[i];
+        for (int64_t to = -1; to != i;) {
+            to = --ends[key(layout, lifted.pixel)];
+            const fragment next = items[to];
+            items[to] = lifted;
+            lifted = next;
+        }
+    }
+}
+
+bool comp_bucket_by_owner(const comp_layout *layout, fragment *items, int64_t count, int64_t *starts)
+{
+    for (int64_t i = 0; i < count; i++)
+        if (items[i].pixel >= layout->pixel_count) return false;
+    starts[layout->ranks] = count;
+    count_keys(layout, items, count, starts, layout->ranks, comp_layout_owner);
+    if (layout->ranks == 1)
+        starts[0] = 0;
+    else
+        place(layout, items, count, starts, comp_layout_owner);
+    return true;
+}
+
+void comp_bucket_by_slice(const comp_layout *layout, fragment *items, int64_t count, int64_t *starts, int64_t slices)
+{
+    starts[slices] = count;
+    count_keys(layout, items, count, starts, slices, slice_of);
+    place(layout, items, count, starts, slice_of);
+}
+
+int64_t comp_bucket_by_pixel(const comp_layout *layout, fragment *items, int64_t count)
+{
+    int64_t ends[comp_slice_pixels];
+    count_keys(layout, items, count, ends, comp_slice_pixels, place_in_slice);
+    int64_t pixels = ends[0] > 0;
+    for (int64_t k = 1; k < comp_slice_pixels; k++) pixels += ends[k] > ends[k - 1];
+    place(layout, items, count, ends, place_in_slice);
+    return pixels;
+}

@@ -1,0 +1,104 @@
+/* The whole rule of merging: one pixel's fragments, whoever made them and in whatever order they came, to one colour.
+ *
+ * The order is total, down to the last bit of a fragment: what compares equal is the same. So the blend, whose
+ * rounding depends on the order, is a function of the set alone. Depth alone decides wherever depths differ;
+ * where a surface and a volume begin at the same depth the surface is in front, being the nearer end of a stretch. */
+#include "comp.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { insertion_limit = 24 };
+
+/* Bits that rise with the value, for all floats: NaN too has its place. */
+static uint32_t rising_bits(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+}
+
+static int compare_numbers(uint32_t a, uint32_t b)
+{
+    return (a > b) - (a < b);
+}
+
+static int compare_rest(const fragment *a, const fragment *b)
+{
+    const float of_a[] = {a->t_in, a->t_out, a->transmittance, a->colour[0], a->colour[1], a->colour[2]};
+    const float of_b[] = {b->t_in, b->t_out, b->transmittance, b->colour[0], b->colour[1], b->colour[2]};
+    int order = compare_numbers(a->kind, b->kind);
+    for (int i = 0; !order && i < 6; i++) order = compare_numbers(rising_bits(of_a[i]), rising_bits(of_b[i]));
+    return order;
+}
+
+/* Negative where a is in front of b. */
+static int compare(const fragment *a, const fragment *b)
+{
+    if (a->t_in < b->t_in) return -1;
+    if (a->t_in > b->t_in) return 1;
+    if (a->t_in != b->t_in) {
+        const int order = compare_numbers(rising_bits(a->t_in), rising_bits(b->t_in));
+        if (order) return order;
+    }
+    const int order = (b->kind >= FRAGMENT_SURFACE) - (a->kind >= FRAGMENT_SURFACE);
+    return order ? order : compare_rest(a, b);
+}
+
+static void insertion_sort(fragment *items, int64_t count)
+{
+    for (int64_t i = 1; i < count; i++) {
+        const fragment moving = items[i];
+        int64_t to = i;
+        for (; to > 0 && compare(&moving, &items[to - 1]) < 0; to--) items[to] = items[to - 1];
+        items[to] = moving;
+    }
+}
+
+static void sift_down(fragment *items, int64_t root, int64_t count)
+{
+    const fragment moving = items[root];
+    for (int64_t child; (child = 2 * root + 1) < count; root = child) {
+        if (child + 1 < count && compare(&items[child], &items[child + 1]) < 0) child++;
+        if (compare(&moving, &items[child]) >= 0) break;
+        items[root] = items[child];
+    }
+    items[root] = moving;
+}
+
+/* A heap sort: no memory, no recursion, and no bad case when a partition leaves thousands in a pixel. */
+static void sort(fragment *items, int64_t count)
+{
+    if (count <= insertion_limit) {
+        insertion_sort(items, count);
+        return;
+    }
+    for (int64_t root = count / 2; root-- > 0;) sift_down(items, root, count);
+    for (int64_t last = count - 1; last > 0; last--) {
+        const fragment behind_all = items[0];
+        items[0] = items[last];
+        items[last] = behind_all;
+        sift_down(items, 0, last);
+    }
+}
+
+static float nearest_surface(const fragment *sorted, int64_t count)
+{
+    for (int64_t i = 0; i < count; i++)
+        if (sorted[i].kind >= FRAGMENT_SURFACE) return sorted[i].t_in;
+    return INFINITY;
+}
+
+void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
+{
+    if (count > 1) sort(items, count);
+    float colour[3] = {0, 0, 0};
+    float transmittance = 1;
+    for (int64_t i = 0; i < count && transmittance != 0; i++) {
+        for (int c = 0; c < 3; c++) colour[c] += transmittance * items[i].colour[c];
+        transmittance *= items[i].transmittance;
+    }
+    for (int c = 0; c < 3; c++) out_rgba[c] = colour[c] + transmittance * background[c];
+    out_rgba[3] = 1 - transmittance + transmittance * background[3];
+    *out_depth = nearest_surface(items, count);
+}

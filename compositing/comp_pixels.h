@@ -1,0 +1,33 @@
+/* From one owner's fragments to its finished pixels. */
+#ifndef COMP_COMP_PIXELS_H
+#define COMP_COMP_PIXELS_H
+
+#include "comp_schedule.h"
+#include "error.h"
+#include "fragment.h"
+#include "image.h"
+
+/* As it travels to rank 0. */
+typedef struct comp_pixel {
+    uint32_t pixel;
+    float depth;
+    float rgba[4];
+} comp_pixel;
+
+typedef struct comp_pixel_list {
+    comp_pixel *items; /* base_free() */
+    int64_t count;
+} comp_pixel_list;
+
+/* Every pixel of out becomes background, without depth. Local. */
+void comp_pixels_clear(image *out, const float background[4]);
+
+void comp_pixels_store(image *out, const comp_pixel *from);
+
+/* Merge the pixels that have fragments; all of fragments belong to pixels that rank owns, and are reordered. Where out
+ * is given they are written there, else they become *finished, rising by owned index. Local. On an error out and
+ * finished are left alone. */
+insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
+                                const float background[4], image *out, comp_pixel_list *finished, base_error *error);
+
+#endif

@@ -1,0 +1,33 @@
+/* Who owns which pixel, in plain arithmetic: no MPI, no memory, so that it can be tried for any number of ranks.
+ *
+ * Pixels are cut into runs of 2^run_shift consecutive ones, and runs go round the ranks. An owner counts its pixels
+ * from 0, run after run: the owned index. */
+#ifndef COMP_COMP_SCHEDULE_H
+#define COMP_COMP_SCHEDULE_H
+
+#include <stdint.h>
+
+typedef struct comp_layout {
+    uint32_t pixel_count;
+    uint32_t ranks; /* >= 1 */
+    uint32_t run_shift;
+} comp_layout;
+
+comp_layout comp_layout_of(uint32_t pixel_count, int ranks);
+
+static inline uint32_t comp_layout_owner(const comp_layout *layout, uint32_t pixel)
+{
+    return (pixel >> layout->run_shift) % layout->ranks;
+}
+
+/* The pixel's owned index on its owner: 0 .. comp_layout_owned(owner) - 1, rising with the pixel. */
+static inline uint32_t comp_layout_index(const comp_layout *layout, uint32_t pixel)
+{
+    const uint32_t within = pixel & ((1u << layout->run_shift) - 1);
+    return (((pixel >> layout->run_shift) / layout->ranks) << layout->run_shift) + within;
+}
+
+/* How many pixels rank owns. */
+uint32_t comp_layout_owned(const comp_layout *layout, int rank);
+
+#endif
