@@ -1,0 +1,402 @@
+/* Compositing without MPI: the rule of merging against a reference in double and closed forms, the owners' arithmetic
+ * for many more ranks than a machine has, and the sort that both rest on. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "comp.h"
+#include "comp_bucket.h"
+#include "comp_schedule.h"
+
+enum { most_fragments = 200 };
+
+static const float black[4] = {0, 0, 0, 0};
+static const float blue[4] = {0.125f, 0.25f, 0.5f, 0.75f};
+static const double half_ulp = 0x1p-24; /* of a float in [0.5, 1) */
+
+static uint64_t state;
+
+static uint32_t next_random(void)
+{
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return (uint32_t)(state >> 32);
+}
+
+static float next_unit(void)
+{
+    return (float)(next_random() >> 8) * 0x1p-24f;
+}
+
+static fragment random_fragment(void)
+{
+    fragment f = {.t_in = next_unit(), .transmittance = next_unit()};
+    f.t_out = f.t_in + next_unit();
+    for (int c = 0; c < 3; c++) f.colour[c] = next_unit() * (1 - f.transmittance);
+    f.kind = next_random() % 4 == 0 ? FRAGMENT_SURFACE + next_random() % 3 : FRAGMENT_VOLUME;
+    return f;
+}
+
+static void shuffle(fragment *items, int count)
+{
+    for (int i = count - 1; i > 0; i--) {
+        const int j = (int)(next_random() % (uint32_t)(i + 1));
+        const fragment moved = items[i];
+        items[i] = items[j];
+        items[j] = moved;
+    }
+}
+
+static int by_depth(const void *a, const void *b)
+{
+    const float of_a = ((const fragment *)a)->t_in, of_b = ((const fragment *)b)->t_in;
+    return (of_a > of_b) - (of_a < of_b);
+}
+
+/* Each step of the blend rounds a product and a sum of colour and a product of transmittance, all at most 1: three
+ * half units a step, and three for the background. */
+static double tolerance(int count)
+{
+    return 3.0 * (count + 1) * half_ulp;
+}
+
+static void reference(const fragment *items, int count, const float background[4], double rgba[4])
+{
+    fragment sorted[most_fragments];
+    memcpy(sorted, items, (size_t)count * sizeof *items);
+    qsort(sorted, (size_t)count, sizeof *sorted, by_depth);
+    double t = 1;
+    rgba[0] = rgba[1] = rgba[2] = 0;
+    for (int i = 0; i < count; i++) {
+        for (int c = 0; c < 3; c++) rgba[c] += t * (double)sorted[i].colour[c];
+        t *= (double)sorted[i].transmittance;
+    }
+    for (int c = 0; c < 3; c++) rgba[c] += t * (double)background[c];
+    rgba[3] = 1 - t + t * (double)background[3];
+}
+
+static void merge_without_fragments_is_background(void **context)
+{
+    (void)context;
+    float rgba[4], depth;
+    comp_merge_pixel(NULL, 0, blue, rgba, &depth);
+    assert_memory_equal(rgba, blue, sizeof rgba);
+    assert_true(isinf(depth) && depth > 0);
+}
+
+static void merge_matches_double_reference(void **context)
+{
+    (void)context;
+    state = 1;
+    for (int trial = 0; trial < 2000; trial++) {
+        fragment items[most_fragments];
+        const int count = trial % 100;
+        float rgba[4], depth, nearest = INFINITY;
+        double expected[4];
+        for (int i = 0; i < count; i++) {
+            items[i] = random_fragment();
+            items[i].t_in = (float)(i * 37 % 101) + 0.5f * next_unit(); /* all distinct: 101 is prime */
+            if (items[i].kind >= FRAGMENT_SURFACE) nearest = fminf(nearest, items[i].t_in);
+        }
+        reference(items, count, blue, expected);
+        comp_merge_pixel(items, count, blue, rgba, &depth);
+        for (int c = 0; c < 4; c++) assert_true(fabs((double)rgba[c] - expected[c]) <= tolerance(count));
+        assert_true(depth == nearest);
+    }
+}
+
+static void merge_of_equal_slabs_is_a_power(void **context)
+{
+    (void)context;
+    for (int count = 1; count <= most_fragments; count++) {
+        fragment items[most_fragments];
+        float rgba[4], depth;
+        for (int i = 0; i < count; i++) {
+            const float q = 0.96875f; /* so that 1 - q is exact */
+            const float t = (float)((i * 7) % count);
+            items[i] = (fragment){.t_in = t, .t_out = t + 1, .colour = {1 - q, 0, (1 - q) / 2}, .transmittance = q};
+        }
+        comp_merge_pixel(items, count, black, rgba, &depth);
+        const double alpha = 1 - pow(0.96875, count);
+        assert_true(fabs((double)rgba[0] - alpha) <= tolerance(count));
+        assert_true(rgba[1] == 0);
+        assert_true(fabs((double)rgba[2] - alpha / 2) <= tolerance(count));
+        assert_true(fabs((double)rgba[3] - alpha) <= tolerance(count));
+        assert_true(isinf(depth));
+    }
+}
+
+static void opaque_surface_hides_what_is_behind(void **context)
+{
+    (void)context;
+    state = 2;
+    for (int trial = 0; trial < 500; trial++) {
+        fragment all[most_fragments], seen[most_fragments];
+        const fragment wall = {
+            .t_in = 0.5f, .t_out = 0.5f, .colour = {0.25f, 0.5f, 1}, .kind = FRAGMENT_SURFACE, .transmittance = 0};
+        int seen_count = 0;
+        const int count = 1 + trial % 60;
+        all[0] = seen[seen_count++] = wall;
+        for (int i = 1; i < count; i++) {
+            all[i] = random_fragment();
+            if (all[i].t_in == 0.5f) all[i].t_in = 0.75f;
+            if (all[i].t_in < 0.5f) seen[seen_count++] = all[i];
+        }
+        float rgba[4], depth, seen_rgba[4], seen_depth;
+        comp_merge_pixel(all, count, blue, rgba, &depth);
+        comp_merge_pixel(seen, seen_count, black, seen_rgba, &seen_depth);
+        assert_memory_equal(rgba, seen_rgba, sizeof rgba);
+        assert_true(rgba[3] == 1);
+        assert_true(depth == seen_depth && depth <= 0.5f);
+    }
+}
+
+static void surface_is_before_volume_at_equal_depth(void **context)
+{
+    (void)context;
+    const fragment wall = {.t_in = 2, .t_out = 2, .colour = {1, 0, 0}, .kind = FRAGMENT_SURFACE};
+    const fragment fog = {.t_in = 2, .t_out = 3, .colour = {0, 0.5f, 0}, .transmittance = 0.5f};
+    for (int order = 0; order < 2; order++) {
+        fragment items[2] = {order ? wall : fog, order ? fog : wall};
+        float rgba[4], depth;
+        comp_merge_pixel(items, 2, blue, rgba, &depth);
+        const float red[4] = {1, 0, 0, 1};
+        assert_memory_equal(rgba, red, sizeof rgba);
+        assert_true(depth == 2);
+    }
+}
+
+static void depth_is_of_the_surface_though_fog_is_opaque(void **context)
+{
+    (void)context;
+    fragment items[] = {{.t_in = 1, .t_out = 2, .colour = {0.5f, 0.5f, 0.5f}, .transmittance = 0},
+                        {.t_in = 9, .t_out = 9, .transmittance = 0.5f, .kind = FRAGMENT_SURFACE + 1},
+                        {.t_in = 4, .t_out = 4, .transmittance = 0.5f, .kind = FRAGMENT_SURFACE + 2}};
+    float rgba[4], depth;
+    comp_merge_pixel(items, 3, blue, rgba, &depth);
+    assert_true(depth == 4);
+    assert_true(rgba[0] == 0.5f && rgba[3] == 1);
+}
+
+static fragment over(const fragment *front, const fragment *back)
+{
+    fragment both = {.t_in = front->t_in, .t_out = back->t_out};
+    for (int c = 0; c < 3; c++) both.colour[c] = front->colour[c] + front->transmittance * back->colour[c];
+    both.transmittance = front->transmittance * back->transmittance;
+    return both;
+}
+
+static void joining_neighbours_changes_rounding_alone(void **context)
+{
+    (void)context;
+    state = 3;
+    for (int trial = 0; trial < 500; trial++) {
+        fragment fine[most_fragments], coarse[most_fragments];
+        const int count = 2 + trial % 50;
+        int joined = 0;
+        for (int i = 0; i < count; i++) {
+            fine[i] = random_fragment();
+            fine[i].kind = FRAGMENT_VOLUME;
+            fine[i].t_in = (float)i;
+            fine[i].t_out = (float)i + 1;
+            if (joined > 0 && next_random() % 2)
+                coarse[joined - 1] = over(&coarse[joined - 1], &fine[i]);
+            else
+                coarse[joined++] = fine[i];
+        }
+        float rgba[4], depth, joined_rgba[4];
+        comp_merge_pixel(fine, count, blue, rgba, &depth);
+        comp_merge_pixel(coarse, joined, blue, joined_rgba, &depth);
+        for (int c = 0; c < 4; c++) assert_true(fabs((double)rgba[c] - (double)joined_rgba[c]) <= 2 * tolerance(count));
+    }
+}
+
+/* Ties of every kind: equal depths, both zeros, equal fragments but for one field, equal fragments. */
+static fragment tied_fragment(void)
+{
+    fragment f = random_fragment();
+    f.t_in = (float)(next_random() % 3);
+    if (f.t_in == 0 && next_random() % 2) f.t_in = -0.0f;
+    f.t_out = (float)(3 + next_random() % 2);
+    if (next_random() % 2) f.transmittance = 0.5f;
+    if (next_random() % 2) f.colour[0] = f.colour[1] = f.colour[2] = 0.25f;
+    return f;
+}
+
+static void permutations_give_the_same_bits(void **context)
+{
+    (void)context;
+    state = 4;
+    for (int trial = 0; trial < 300; trial++) {
+        fragment items[most_fragments], sorted[most_fragments];
+        const int count = 2 + trial % (most_fragments - 1);
+        float rgba[4], depth, again_rgba[4], again_depth;
+        for (int i = 0; i < count; i++) items[i] = tied_fragment();
+        if (count > 3) items[count - 1] = items[0];
+        comp_merge_pixel(items, count, blue, rgba, &depth);
+        memcpy(sorted, items, (size_t)count * sizeof *items);
+        for (int again = 0; again < 10; again++) {
+            shuffle(items, count);
+            comp_merge_pixel(items, count, blue, again_rgba, &again_depth);
+            assert_memory_equal(rgba, again_rgba, sizeof rgba);
+            assert_memory_equal(&depth, &again_depth, sizeof depth);
+            assert_memory_equal(sorted, items, (size_t)count * sizeof *items);
+        }
+    }
+}
+
+static void check_layout(uint32_t pixel_count, int ranks)
+{
+    const comp_layout layout = comp_layout_of(pixel_count, ranks);
+    const uint32_t run = 1u << layout.run_shift;
+    uint32_t *owned = calloc((size_t)ranks, sizeof *owned);
+    assert_non_null(owned);
+    for (uint32_t pixel = 0; pixel < pixel_count; pixel++) {
+        const int owner = comp_owner(pixel, pixel_count, ranks);
+        assert_in_range(owner, 0, ranks - 1);
+        assert_int_equal(comp_layout_index(&layout, pixel), owned[owner]);
+        owned[owner]++;
+    }
+    uint32_t least = UINT32_MAX, most = 0;
+    for (int rank = 0; rank < ranks; rank++) {
+        assert_int_equal(comp_layout_owned(&layout, rank), owned[rank]);
+        if (owned[rank] < least) least = owned[rank];
+        if (owned[rank] > most) most = owned[rank];
+    }
+    assert_true(run <= 64);
+    assert_true(most - least <= run);
+    if (pixel_count >= (uint32_t)ranks) assert_true(least > 0);
+    free(owned);
+}
+
+static void owners_share_all_pixels_evenly(void **context)
+{
+    (void)context;
+    const int ranks[] = {1, 2, 3, 4, 7, 64, 1000, 4096, 65537, 100000};
+    const uint32_t pixels[] = {1, 2, 63, 64, 65, 333, 640 * 480, 1021 * 769};
+    for (size_t r = 0; r < sizeof ranks / sizeof *ranks; r++)
+        for (size_t p = 0; p < sizeof pixels / sizeof *pixels; p++) check_layout(pixels[p], ranks[r]);
+}
+
+static void owners_of_the_largest_image_add_up(void **context)
+{
+    (void)context;
+    const int ranks[] = {1, 2, 3, 7, 99999, 100000};
+    for (size_t r = 0; r < sizeof ranks / sizeof *ranks; r++) {
+        const comp_layout layout = comp_layout_of(UINT32_MAX, ranks[r]);
+        uint64_t sum = 0;
+        for (int rank = 0; rank < ranks[r]; rank++) sum += comp_layout_owned(&layout, rank);
+        assert_true(sum == UINT32_MAX);
+        const uint32_t last = UINT32_MAX - 1;
+        const int owner = comp_owner(last, UINT32_MAX, ranks[r]);
+        assert_true(comp_layout_index(&layout, last) == comp_layout_owned(&layout, owner) - 1);
+    }
+}
+
+/* Fragments of the pixels of one owner, or of all with owner -1, numbered in t_out. */
+static int fill_pixels(fragment *items, int count, const comp_layout *layout, int owner)
+{
+    int filled = 0;
+    while (filled < count) {
+        const uint32_t pixel = next_random() % layout->pixel_count;
+        if (owner >= 0 && (int)comp_layout_owner(layout, pixel) != owner) continue;
+        items[filled] = (fragment){.pixel = pixel, .t_in = (float)pixel, .t_out = (float)filled};
+        filled++;
+    }
+    return filled;
+}
+
+static void check_same_set(const fragment *items, int count)
+{
+    char *met = calloc((size_t)count, 1);
+    assert_non_null(met);
+    for (int i = 0; i < count; i++) {
+        const int number = (int)items[i].t_out;
+        assert_false(met[number]);
+        met[number] = 1;
+        assert_true((uint32_t)items[i].t_in == items[i].pixel);
+    }
+    free(met);
+}
+
+static void bucket_by_owner_keeps_the_set(void **context)
+{
+    (void)context;
+    enum { count = 5000 };
+    static fragment items[count];
+    state = 5;
+    for (int ranks = 1; ranks < 20; ranks++) {
+        const comp_layout layout = comp_layout_of(10007, ranks);
+        int64_t starts[21];
+        fill_pixels(items, count, &layout, -1);
+        assert_true(comp_bucket_by_owner(&layout, items, count, starts));
+        assert_int_equal(starts[0], 0);
+        assert_int_equal(starts[ranks], count);
+        for (int rank = 0; rank < ranks; rank++)
+            for (int64_t i = starts[rank]; i < starts[rank + 1]; i++)
+                assert_int_equal(comp_layout_owner(&layout, items[i].pixel), rank);
+        check_same_set(items, count);
+    }
+}
+
+static void bucket_refuses_a_pixel_beyond_the_image(void **context)
+{
+    (void)context;
+    const comp_layout layout = comp_layout_of(100, 2);
+    fragment items[3] = {{.pixel = 99}, {.pixel = 100}, {.pixel = 0}};
+    int64_t starts[3];
+    assert_false(comp_bucket_by_owner(&layout, items, 3, starts));
+    assert_true(comp_bucket_by_owner(&layout, items, 1, starts));
+}
+
+static void bucket_by_slice_and_pixel_sorts(void **context)
+{
+    (void)context;
+    enum { count = 20000, most_slices = 64 };
+    static fragment items[count];
+    state = 6;
+    for (int ranks = 1; ranks <= 3; ranks++) {
+        const comp_layout layout = comp_layout_of(60013, ranks);
+        const int owner = ranks - 1;
+        const int64_t slices = (comp_layout_owned(&layout, owner) + comp_slice_pixels - 1) / comp_slice_pixels;
+        int64_t starts[most_slices + 1], pixels = 0;
+        fill_pixels(items, count, &layout, owner);
+        comp_bucket_by_slice(&layout, items, count, starts, slices);
+        assert_int_equal(starts[0], 0);
+        assert_int_equal(starts[slices], count);
+        for (int64_t s = 0; s < slices; s++)
+            pixels += comp_bucket_by_pixel(&layout, items + starts[s], starts[s + 1] - starts[s]);
+        int64_t distinct = 1;
+        for (int i = 1; i < count; i++) {
+            assert_true(items[i].pixel >= items[i - 1].pixel);
+            distinct += items[i].pixel != items[i - 1].pixel;
+        }
+        assert_int_equal(pixels, distinct);
+        check_same_set(items, count);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(merge_without_fragments_is_background),
+        cmocka_unit_test(merge_matches_double_reference),
+        cmocka_unit_test(merge_of_equal_slabs_is_a_power),
+        cmocka_unit_test(opaque_surface_hides_what_is_behind),
+        cmocka_unit_test(surface_is_before_volume_at_equal_depth),
+        cmocka_unit_test(depth_is_of_the_surface_though_fog_is_opaque),
+        cmocka_unit_test(joining_neighbours_changes_rounding_alone),
+        cmocka_unit_test(permutations_give_the_same_bits),
+        cmocka_unit_test(owners_share_all_pixels_evenly),
+        cmocka_unit_test(owners_of_the_largest_image_add_up),
+        cmocka_unit_test(bucket_by_owner_keeps_the_set),
+        cmocka_unit_test(bucket_refuses_a_pixel_beyond_the_image),
+        cmocka_unit_test(bucket_by_slice_and_pixel_sorts),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

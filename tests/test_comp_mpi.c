@@ -1,0 +1,288 @@
+/* Compositing across ranks: whatever way a set of fragments is dealt, rank 0's picture is, bit for bit, the serial
+ * merge of the union; and what fails on one rank fails on all.
+ *
+ * Every rank makes the whole set and keeps its share. Verdicts are reduced before they are asserted, so that a failing
+ * rank does not leave the others waiting. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "comp.h"
+#include "comp_exchange.h"
+#include "comp_gather.h"
+#include "memory.h"
+
+typedef enum dealing { deal_random, deal_checkerboard, deal_blocks, deal_all_to_first, deal_all_to_last } dealing;
+
+static MPI_Comm comm;
+static int own_rank, rank_count;
+static const float background[4] = {0.125f, 0.25f, 0.5f, 0.75f};
+
+static uint32_t hash(uint32_t x)
+{
+    x = (x ^ (x >> 16)) * 0x7feb352du;
+    x = (x ^ (x >> 15)) * 0x846ca68bu;
+    return x ^ (x >> 16);
+}
+
+static float unit(uint32_t x)
+{
+    return (float)(hash(x) >> 8) * 0x1p-24f;
+}
+
+static void assert_everywhere(bool well, const char *what)
+{
+    int mine = well, all = 0;
+    if (!well) fprintf(stderr, "rank %d of %d: not so: %s\n", own_rank, rank_count, what);
+    assert_int_equal(MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_LAND, comm), MPI_SUCCESS);
+    assert_true(all);
+}
+
+/* Depths repeat, so that ties are met; most pixels of a large image have none or a few. */
+static fragment make_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
+{
+    const uint32_t key = hash(seed) + 16 * i;
+    fragment f = {.pixel = hash(key) % pixel_count, .t_in = floorf(50 * unit(key + 1)), .transmittance = unit(key + 2)};
+    f.kind = hash(key + 3) % 3 == 0 ? FRAGMENT_SURFACE + hash(key + 4) % 2 : FRAGMENT_VOLUME;
+    f.t_out = f.kind == FRAGMENT_VOLUME ? f.t_in + 1 : f.t_in;
+    for (uint32_t c = 0; c < 3; c++) f.colour[c] = (1 - f.transmittance) * unit(key + 5 + c);
+    return f;
+}
+
+static int dealt_to(dealing how, uint32_t i, const fragment *f, int width, uint32_t count)
+{
+    const uint32_t x = f->pixel % (uint32_t)width, y = f->pixel / (uint32_t)width, ranks = (uint32_t)rank_count;
+    switch (how) {
+    case deal_checkerboard: return (int)((x / 4 + y / 4 + (uint32_t)f->t_in) % ranks);
+    case deal_blocks: return (int)((uint64_t)i * ranks / count);
+    case deal_all_to_first: return 0;
+    case deal_all_to_last: return rank_count - 1;
+    case deal_random: break;
+    }
+    return (int)(hash(i + 77) % ranks);
+}
+
+static int by_pixel(const void *a, const void *b)
+{
+    const uint32_t of_a = ((const fragment *)a)->pixel, of_b = ((const fragment *)b)->pixel;
+    return (of_a > of_b) - (of_a < of_b);
+}
+
+static void serial_merge(fragment *all, int64_t count, image *out)
+{
+    const int64_t pixels = (int64_t)out->width * out->height;
+    if (count) qsort(all, (size_t)count, sizeof *all, by_pixel);
+    int64_t i = 0;
+    for (int64_t p = 0; p < pixels; p++) {
+        const int64_t first = i;
+        while (i < count && all[i].pixel == p) i++;
+        comp_merge_pixel(all ? all + first : NULL, i - first, background, out->rgba + 4 * p, out->depth + p);
+    }
+}
+
+static image make_image(int width, int height)
+{
+    const size_t pixels = (size_t)width * (size_t)height;
+    image made = {width, height, base_alloc(16 * pixels), base_alloc(4 * pixels)};
+    assert_true(made.rgba && made.depth);
+    memset(made.rgba, 0xa5, 16 * pixels);
+    memset(made.depth, 0xa5, 4 * pixels);
+    return made;
+}
+
+static void free_image(image *old)
+{
+    base_free(old->rgba);
+    base_free(old->depth);
+}
+
+static bool same_image(const image *a, const image *b)
+{
+    const size_t pixels = (size_t)a->width * (size_t)a->height;
+    return memcmp(a->rgba, b->rgba, 16 * pixels) == 0 && memcmp(a->depth, b->depth, 4 * pixels) == 0;
+}
+
+typedef struct setting {
+    fragment_list own;
+    image expected, out; /* out on rank 0 only has arrays */
+    int64_t count;       /* of all ranks */
+} setting;
+
+static setting make_setting(int width, int height, uint32_t count, dealing how, uint32_t seed)
+{
+    setting s = {.count = count, .expected = make_image(width, height), .out = {width, height, NULL, NULL}};
+    if (own_rank == 0) s.out = make_image(width, height);
+    fragment *all = count ? base_alloc(count * sizeof *all) : NULL;
+    s.own.items = count ? base_alloc(count * sizeof *all) : NULL;
+    assert_true(!count || (all && s.own.items));
+    for (uint32_t i = 0; i < count; i++) {
+        all[i] = make_fragment(i, seed, (uint32_t)width * (uint32_t)height);
+        if (dealt_to(how, i, &all[i], width, count) == own_rank) s.own.items[s.own.count++] = all[i];
+    }
+    s.own.capacity = count;
+    serial_merge(all, count, &s.expected);
+    base_free(all);
+    return s;
+}
+
+static void free_setting(setting *s)
+{
+    base_free(s->own.items);
+    free_image(&s->expected);
+    free_image(&s->out);
+}
+
+static void check_composite(int width, int height, uint32_t count, dealing how, uint32_t seed)
+{
+    setting s = make_setting(width, height, count, how, seed);
+    comp_statistics statistics;
+    base_error error = {INSITU_OK, ""};
+    const int64_t held = base_memory_held();
+    const insitu_status status = comp_composite(comm, &s.own, background, &s.out, &statistics, &error);
+    assert_everywhere(status == INSITU_OK && error.message[0] == '\0', "composite succeeds");
+    assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
+    assert_everywhere(base_memory_held() == held, "nothing is left allocated");
+    assert_everywhere(statistics.sent_fragments == s.own.count, "fragments are counted");
+    assert_everywhere(rank_count > 1 || statistics.sent_bytes == 0, "one rank sends nothing");
+    free_setting(&s);
+}
+
+static void composite_equals_serial_merge(void **context)
+{
+    (void)context;
+    const int sizes[][2] = {{1, 1}, {1, 7}, {65, 3}, {101, 67}, {257, 131}};
+    const uint32_t counts[] = {0, 1, 2, 50, 3000, 60000};
+    uint32_t seed = 1;
+    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
+        for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
+            for (dealing how = deal_random; how <= deal_all_to_last; how++)
+                check_composite(sizes[s][0], sizes[s][1], counts[c], how, seed++);
+}
+
+static void statistics_count_what_travelled(void **context)
+{
+    (void)context;
+    setting s = make_setting(64 * rank_count, 1, 1000, deal_all_to_last, 5);
+    comp_statistics statistics;
+    const insitu_status status = comp_composite(comm, &s.own, background, &s.out, &statistics, NULL);
+    assert_everywhere(status == INSITU_OK, "composite succeeds");
+    int64_t foreign = 0, touched = 0;
+    for (int64_t i = 0; i < s.own.count; i++) foreign += (int)(s.own.items[i].pixel / 64) != own_rank;
+    for (int p = 64 * own_rank; own_rank > 0 && p < 64 * (own_rank + 1); p++)
+        touched += memcmp(s.expected.rgba + 4 * p, background, sizeof background) != 0;
+    const int64_t expected = foreign * (int64_t)sizeof(fragment) + touched * (int64_t)sizeof(comp_pixel);
+    assert_everywhere(statistics.sent_bytes == expected, "bytes are those of foreign fragments and touched pixels");
+    free_setting(&s);
+}
+
+static bool owns_all_of(const fragment_list *owned, const comp_layout *layout)
+{
+    for (int64_t i = 0; i < owned->count; i++)
+        if ((int)comp_layout_owner(layout, owned->items[i].pixel) != own_rank) return false;
+    return true;
+}
+
+static void long_messages_are_cut(void **context)
+{
+    (void)context;
+    setting s = make_setting(101, 67, 5000, deal_random, 9);
+    const comp_layout layout = comp_layout_of(101 * 67, rank_count);
+    fragment_list owned = {NULL, 0, 0};
+    int64_t bytes = 0, all = 0;
+    insitu_status status = comp_exchange_direct(comm, &layout, &s.own, 3, &owned, &bytes, NULL);
+    assert_everywhere(status == INSITU_OK, "exchange in messages of 3 succeeds");
+    assert_everywhere(owns_all_of(&owned, &layout), "an owner has its pixels only");
+    MPI_Allreduce(&owned.count, &all, 1, MPI_INT64_T, MPI_SUM, comm);
+    assert_everywhere(all == s.count, "no fragment is lost");
+    image *const here = own_rank == 0 ? &s.out : NULL;
+    comp_pixel_list finished = {NULL, 0};
+    if (here) comp_pixels_clear(here, background);
+    status = comp_pixels_merge(&layout, own_rank, &owned, background, here, &finished, NULL);
+    assert_everywhere(status == INSITU_OK, "merge succeeds");
+    status = comp_gather(comm, &finished, 5, &s.out, &bytes, NULL);
+    assert_everywhere(status == INSITU_OK, "gather in messages of 5 succeeds");
+    assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
+    base_free(finished.items);
+    base_free(owned.items);
+    free_setting(&s);
+}
+
+/* Every allocation of every rank fails once; after the last the picture is right again. */
+static void failed_allocation_is_an_error_on_all(void **context)
+{
+    (void)context;
+    for (int victim = 0; victim < rank_count; victim++) {
+        setting s = make_setting(65, 33, 3000, deal_random, 21);
+        const int64_t held = base_memory_held();
+        int64_t n = 1;
+        for (insitu_status status = INSITU_ERROR_MEMORY; status != INSITU_OK; n++) {
+            base_error error = {INSITU_OK, ""};
+            if (own_rank == victim) base_memory_fail_nth(n);
+            status = comp_composite(comm, &s.own, background, &s.out, NULL, &error);
+            base_memory_fail_nth(0);
+            int lowest = 0, highest = 0, mine = (int)status;
+            MPI_Allreduce(&mine, &lowest, 1, MPI_INT, MPI_MIN, comm);
+            MPI_Allreduce(&mine, &highest, 1, MPI_INT, MPI_MAX, comm);
+            assert_everywhere(lowest == highest, "all ranks return the same status");
+            assert_everywhere(status == INSITU_OK || status == INSITU_ERROR_MEMORY, "the status is of memory");
+            assert_everywhere((status == INSITU_OK) == (error.message[0] == '\0'), "an error has a message");
+            assert_everywhere(base_memory_held() == held, "nothing is left allocated");
+        }
+        assert_everywhere(n > 2, "some allocation could fail");
+        assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is right afterwards");
+        free_setting(&s);
+    }
+}
+
+static void pixel_beyond_the_image_is_an_error_on_all(void **context)
+{
+    (void)context;
+    setting s = make_setting(8, 8, 100, deal_random, 33);
+    fragment stray = {.pixel = 64};
+    fragment_list bad = own_rank == rank_count - 1 ? (fragment_list){&stray, 1, 1} : s.own;
+    base_error error = {INSITU_OK, ""};
+    const insitu_status status = comp_composite(comm, &bad, background, &s.out, NULL, &error);
+    assert_everywhere(status == INSITU_ERROR_INTERNAL, "a stray pixel is refused");
+    char name[32];
+    snprintf(name, sizeof name, "rank %d", rank_count - 1);
+    assert_everywhere(own_rank == rank_count - 1 || strstr(error.message, name), "the message names the rank");
+    free_setting(&s);
+}
+
+static void image_without_pixels_is_refused(void **context)
+{
+    (void)context;
+    image none = {0, 4, NULL, NULL}, huge = {65536, 65536, NULL, NULL};
+    fragment_list items = {NULL, 0, 0};
+    assert_everywhere(comp_composite(comm, &items, background, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
+    assert_everywhere(comp_composite(comm, &items, background, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");
+}
+
+int main(int argc, char **argv)
+{
+    MPI_Init(&argc, &argv);
+    MPI_Comm_dup(MPI_COMM_WORLD, &comm);
+    MPI_Comm_set_errhandler(comm, MPI_ERRORS_RETURN);
+    MPI_Comm_rank(comm, &own_rank);
+    MPI_Comm_size(comm, &rank_count);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(composite_equals_serial_merge),
+        cmocka_unit_test(statistics_count_what_travelled),
+        cmocka_unit_test(long_messages_are_cut),
+        cmocka_unit_test(failed_allocation_is_an_error_on_all),
+        cmocka_unit_test(pixel_beyond_the_image_is_an_error_on_all),
+        cmocka_unit_test(image_without_pixels_is_refused),
+    };
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    MPI_Comm_free(&comm);
+    MPI_Finalize();
+    return failed;
+}
