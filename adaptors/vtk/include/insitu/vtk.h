@@ -1,0 +1,74 @@
+/* Hand over VTK data sets as they are: the adaptor borrows VTK's own arrays wherever libinsitu can read them, converts
+ * where it cannot, and says in bytes what it converted and why. For C++ codes that hold their mesh in VTK.
+ *
+ *     insitu_vtk_adaptor *adaptor = NULL;
+ *     insitu_vtk_create(session, &adaptor);
+ *     insitu_vtk_set(adaptor, "domain", grid, NULL);
+ *     insitu_step(session, cycle, time);
+ *     ...
+ *     insitu_vtk_destroy(&adaptor);
+ *     insitu_destroy(&session);
+ *
+ * Taken are vtkUnstructuredGrid and composite data sets of them (multiblock, partitioned data set collections, AMR):
+ * the leaves of a composite become the meshes "name/0", "name/1", ..., numbered in the order of VTK's iterator, empty
+ * leaves counted. All numeric point and cell arrays become fields.
+ *
+ *  - Points: float or double borrowed, whether interleaved (AOS) or a component apart (SOA); others copied to double.
+ *  - Cells 10, 12, 13, 14: borrowed, with 32- or 64-bit storage.
+ *  - Voxels (11): drawn as hexahedra; a copy of the connectivity.
+ *  - Pentagonal and hexagonal prisms (15, 16): split into a hexahedron and a wedge, or two hexahedra; copied.
+ *  - Quadratic and higher-order 3-D cells: drawn by their corners as linear cells, with a warning; copied.
+ *  - Polyhedra and what else is left of 3-D cells: not drawn, with a warning; flat, line and point cells: not drawn.
+ *  - Fields: float, double and 32- or 64-bit signed integers borrowed; other types copied.
+ *  - vtkGhostType of the cells: duplicate, hidden and refined cells are not drawn. Hidden points are ignored.
+ *
+ * No function throws, and none changes a data set. */
+#ifndef INSITU_VTK_H
+#define INSITU_VTK_H
+
+#include "insitu/insitu.h"
+
+class vtkDataObject;
+
+extern "C" {
+
+typedef struct insitu_vtk_adaptor insitu_vtk_adaptor;
+
+/* What insitu_vtk_set() did with one data set, on this rank. */
+typedef struct insitu_vtk_report {
+    int meshes;              /* handed over: 1, or the leaves with cells to draw */
+    int fields;              /* handed over, over all meshes */
+    int64_t cells;           /* handed over, after splitting, ghosts included */
+    int64_t cells_split;     /* prisms, as VTK counts them, that were split */
+    int64_t cells_linear;    /* quadratic and higher-order cells drawn by their corners */
+    int64_t cells_flat;      /* not drawn: of less than 3 dimensions */
+    int64_t cells_not_drawn; /* not drawn: polyhedra, other 3-D cells that are not known, cells with too few points */
+    int64_t bytes_borrowed;  /* of VTK's arrays handed over as they are */
+    int64_t bytes_copied;    /* of arrays converted, held until the mesh is set again */
+    const char *copied_why;  /* "" or one "what: why (bytes)" a line; valid until the next call on the adaptor */
+    const char *warnings;    /* "" or one warning a line; as above */
+} insitu_vtk_report;
+
+/* An adaptor for a session, which must outlive it. On an error *out is NULL. Local. */
+INSITU_API insitu_status insitu_vtk_create(insitu_session *session, insitu_vtk_adaptor **out);
+
+/* Set the mesh (or, for a composite, the meshes) called name and all its fields from data. Meshes that an earlier call
+ * set under the name and that data no longer has are taken away; NULL for data takes all away. The adaptor holds
+ * references to the arrays, so that data itself may go; their values must stay until the next insitu_step() returns.
+ * report may be NULL; it is filled on an error too. Local.
+ *
+ * INSITU_ERROR_ARGUMENT: data is of a class that is not taken. INSITU_ERROR_MESH: data has 3-D cells and none can be
+ * drawn, or it is not well formed. Others as insitu_set_mesh() and insitu_set_field(). */
+INSITU_API insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data,
+                                        insitu_vtk_report *report);
+
+/* The message of the last call on the adaptor that failed, "" if none did. Valid until the next call. Local. */
+INSITU_API const char *insitu_vtk_error(const insitu_vtk_adaptor *adaptor);
+
+/* Take the adaptor's meshes away from the session, let go of the arrays and set *adaptor to NULL. Local. NULL, or a
+ * pointer to NULL, is fine. */
+INSITU_API void insitu_vtk_destroy(insitu_vtk_adaptor **adaptor);
+
+} // extern "C"
+
+#endif

@@ -1,0 +1,350 @@
+/* The face of the VTK adaptor: which meshes a data object is, what each is made of, and how long what was made must
+ * live. A session reads borrowed arrays during a step, so everything a mesh was built from (references to VTK's arrays,
+ * conversions) stays in one `part` under the mesh's name until the session has taken a new mesh of that name or has
+ * been told that there is none. */
+#include "insitu/vtk.h"
+
+#include <exception>
+#include <map>
+#include <new>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <vtkCellData.h>
+#include <vtkCompositeDataIterator.h>
+#include <vtkCompositeDataSet.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+
+#include "vtk_arrays.h"
+#include "vtk_cells.h"
+
+using namespace insitu_vtk;
+
+namespace
+{
+
+/* One mesh as it is handed over. Field names live in VTK's arrays, and the session copies them. */
+struct part {
+    hold held;
+    insitu_mesh mesh;
+    std::vector<insitu_field> fields;
+};
+
+/* A failure on its way to the C face. */
+struct failure {
+    insitu_status status;
+    std::string message;
+};
+
+/* Over all leaves of one insitu_vtk_set(). */
+struct outcome {
+    tally count;
+    cell_counts cells;
+    int64_t cells_set = 0;
+    int meshes = 0;
+    int fields = 0;
+    std::set<std::string> names; // of the meshes set
+};
+
+} // namespace
+
+struct insitu_vtk_adaptor {
+    insitu_session *session = nullptr;
+    std::map<std::string, std::map<std::string, part>> parts; // by the name of the call, then of the mesh
+    std::string error, copied_why, warnings;
+};
+
+namespace
+{
+
+constexpr unsigned char ghosts_not_drawn =
+    vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
+
+/* Ghost flags: VTK's byte has bits that hide a cell and bits that only describe it. VTK's own array serves where it
+ * holds nothing but the former, and none is needed where nothing is hidden. */
+void set_ghosts(vtkUnstructuredGrid *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
+{
+    vtkUnsignedCharArray *ghosts = grid->GetCellGhostArray();
+    if (!ghosts || ghosts->GetNumberOfValues() != grid->GetNumberOfCells()) return;
+    const unsigned char *flags = ghosts->GetPointer(0);
+    const vtkIdType flag_count = ghosts->GetNumberOfValues();
+    unsigned all = 0;
+    for (vtkIdType i = 0; i < flag_count; i++) all |= flags[i];
+    if ((all & ghosts_not_drawn) == 0) return;
+    if (cells.is_one_to_one && (all & ~static_cast<unsigned>(ghosts_not_drawn)) == 0) {
+        p.held.objects.emplace_back(ghosts);
+        p.mesh.ghosts = {flags, INSITU_UINT8, 0};
+        count.bytes_borrowed += cells.count;
+        return;
+    }
+    auto *copy = reinterpret_cast<unsigned char *>(p.held.allocate(static_cast<size_t>(cells.count)));
+    for (int64_t i = 0; i < cells.count; i++) {
+        const int64_t from = cells.is_one_to_one ? i : cells.source[static_cast<size_t>(i)];
+        copy[i] = (flags[from] & ghosts_not_drawn) != 0;
+    }
+    p.mesh.ghosts = {copy, INSITU_UINT8, 0};
+    count.copied(what + " ghosts", "flags that hide a cell picked out", cells.count);
+}
+
+void add_field(const char *name, insitu_centring centring, const array_view &view, part &p)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = name;
+    field.centring = centring;
+    field.count = view.tuple_count;
+    field.component_count = view.component_count;
+    field.component_stride_bytes = view.component_stride_bytes;
+    field.values = {view.data, view.type, view.tuple_stride_bytes};
+    p.fields.push_back(field);
+}
+
+bool has_field(const part &p, const std::string &name)
+{
+    for (const insitu_field &field : p.fields)
+        if (name == field.name) return true;
+    return false;
+}
+
+/* A numeric array with a name, of the right length, which is not a flag of VTK's own. */
+bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, tally &count)
+{
+    const std::string name = array && array->GetName() ? array->GetName() : "";
+    if (name.empty() || name == vtkDataSetAttributes::GhostArrayName()) return false;
+    if (array->GetNumberOfTuples() == expected && array->GetNumberOfComponents() > 0) return true;
+    count.warn(what + ": array '" + name + "' has " + std::to_string(array->GetNumberOfTuples()) +
+               " tuples, expected " + std::to_string(expected) + ": left out");
+    return false;
+}
+
+void add_point_fields(vtkUnstructuredGrid *grid, const std::string &what, tally &count, part &p)
+{
+    vtkPointData *data = grid->GetPointData();
+    for (int i = 0; i < data->GetNumberOfArrays(); i++) {
+        vtkDataArray *array = data->GetArray(i);
+        if (!is_field(array, grid->GetNumberOfPoints(), what, count)) continue;
+        const std::string field = what + " field '" + array->GetName() + "'";
+        p.held.objects.emplace_back(array);
+        add_field(array->GetName(), INSITU_VERTEX, view_array(array, field, p.held, count), p);
+    }
+}
+
+void add_cell_fields(vtkUnstructuredGrid *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
+{
+    vtkCellData *data = grid->GetCellData();
+    for (int i = 0; i < data->GetNumberOfArrays(); i++) {
+        vtkDataArray *array = data->GetArray(i);
+        if (!is_field(array, grid->GetNumberOfCells(), what, count)) continue;
+        const std::string field = what + " field '" + array->GetName() + "'";
+        if (has_field(p, array->GetName())) {
+            count.warn(field + " of the cells left out: the points have one of that name");
+            continue;
+        }
+        p.held.objects.emplace_back(array);
+        if (cells.is_one_to_one) {
+            add_field(array->GetName(), INSITU_CELL, view_array(array, field, p.held, count), p);
+            continue;
+        }
+        hold passing;
+        tally not_kept;
+        const array_view picked = gather(view_array(array, field, passing, not_kept), cells.source, p.held);
+        count.copied(field, "cells split or left out", picked.tuple_count * picked.tuple_stride_bytes);
+        add_field(array->GetName(), INSITU_CELL, picked, p);
+    }
+}
+
+/* Fill p from grid. p.mesh.cell_count stays 0 where there is nothing to draw. */
+void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out, part &p)
+{
+    const std::string what = "mesh '" + name + "'";
+    insitu_mesh_defaults(&p.mesh);
+    cell_list cells;
+    cell_counts counts;
+    tally count;
+    std::string error;
+    if (!view_cells(grid, what, p.held, count, p.mesh, cells, counts, error)) throw failure{INSITU_ERROR_MESH, error};
+    warn_about_cells(counts, what, out.count);
+    out.cells.split += counts.split;
+    out.cells.linear += counts.linear;
+    out.cells.flat += counts.flat;
+    out.cells.not_drawn += counts.not_drawn;
+    if (cells.count == 0) return;
+
+    vtkPoints *points = grid->GetPoints();
+    if (!points || points->GetNumberOfPoints() == 0) throw failure{INSITU_ERROR_MESH, what + ": cells without points"};
+    p.mesh.vertex_count = points->GetNumberOfPoints();
+    view_points(points->GetData(), what + " points", p.held, count, p.mesh.coordinates);
+    set_ghosts(grid, cells, what, count, p);
+    add_point_fields(grid, what, count, p);
+    add_cell_fields(grid, cells, what, count, p);
+
+    out.count.bytes_borrowed += count.bytes_borrowed;
+    out.count.bytes_copied += count.bytes_copied;
+    if (!count.copied_why.empty())
+        out.count.copied_why += (out.count.copied_why.empty() ? "" : "\n") + count.copied_why;
+    if (!count.warnings.empty()) out.count.warn(count.warnings);
+    out.cells_set += cells.count;
+}
+
+void check(insitu_vtk_adaptor *adaptor, insitu_status status)
+{
+    if (status != INSITU_OK) throw failure{status, insitu_error(adaptor->session)};
+}
+
+void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
+              vtkUnstructuredGrid *grid, outcome &out)
+{
+    part fresh;
+    make_part(grid, name, out, fresh);
+    if (fresh.mesh.cell_count == 0) return;
+    out.names.insert(name);
+    part &kept = parts[name];
+    check(adaptor, insitu_set_mesh(adaptor->session, name.c_str(), &fresh.mesh));
+    kept = std::move(fresh);
+    out.meshes++;
+    for (const insitu_field &field : kept.fields) {
+        check(adaptor, insitu_set_field(adaptor->session, name.c_str(), &field));
+        out.fields++;
+    }
+}
+
+/* Every leaf, the empty ones too, so that a leaf has one number on all ranks. */
+void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
+                vtkCompositeDataSet *composite, outcome &out)
+{
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    it->SkipEmptyNodesOff();
+    int64_t number = 0;
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem(), number++) {
+        vtkDataObject *leaf = it->GetCurrentDataObject();
+        if (!leaf) continue;
+        const std::string leaf_name = name + "/" + std::to_string(number);
+        if (auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf))
+            set_leaf(adaptor, parts, leaf_name, grid, out);
+        else
+            out.count.warn("mesh '" + leaf_name + "': a " + leaf->GetClassName() + " is not drawn");
+    }
+}
+
+void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
+              vtkDataObject *data, outcome &out)
+{
+    if (!data) return;
+    if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data))
+        set_leaf(adaptor, parts, name, grid, out);
+    else if (auto *composite = vtkCompositeDataSet::SafeDownCast(data))
+        set_leaves(adaptor, parts, name, composite, out);
+    else
+        throw failure{INSITU_ERROR_ARGUMENT,
+                      "mesh '" + name + "': a " + data->GetClassName() +
+                          " is not taken, expected a vtkUnstructuredGrid or a composite of them"};
+}
+
+/* Take away what an earlier call set and this one did not. */
+void remove_others(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::set<std::string> &names)
+{
+    for (auto it = parts.begin(); it != parts.end();) {
+        if (names.count(it->first) > 0) {
+            ++it;
+            continue;
+        }
+        check(adaptor, insitu_set_mesh(adaptor->session, it->first.c_str(), nullptr));
+        it = parts.erase(it);
+    }
+}
+
+void set_all(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data, outcome &out)
+{
+    if (!name || !name[0]) throw failure{INSITU_ERROR_ARGUMENT, "insitu_vtk_set: a mesh needs a name"};
+    std::map<std::string, part> &parts = adaptor->parts[name];
+    set_data(adaptor, parts, name, data, out);
+    remove_others(adaptor, parts, out.names);
+    if (out.cells_set == 0 && out.cells.not_drawn > 0)
+        throw failure{INSITU_ERROR_MESH, "mesh '" + std::string(name) + "': none of its " +
+                                             std::to_string(out.cells.not_drawn) +
+                                             " cells can be drawn: " + out.count.warnings};
+}
+
+void fill_report(insitu_vtk_adaptor *adaptor, outcome &out, insitu_vtk_report *report)
+{
+    adaptor->copied_why = std::move(out.count.copied_why);
+    adaptor->warnings = std::move(out.count.warnings);
+    if (!report) return;
+    *report = {out.meshes,
+               out.fields,
+               out.cells_set,
+               out.cells.split,
+               out.cells.linear,
+               out.cells.flat,
+               out.cells.not_drawn,
+               out.count.bytes_borrowed,
+               out.count.bytes_copied,
+               adaptor->copied_why.c_str(),
+               adaptor->warnings.c_str()};
+}
+
+/* Run body and turn whatever it throws into a status and a message. */
+template <typename Body> insitu_status guarded(insitu_vtk_adaptor *adaptor, Body body) noexcept
+{
+    try {
+        adaptor->error.clear();
+        try {
+            body();
+            return INSITU_OK;
+        } catch (const failure &f) {
+            adaptor->error = f.message;
+            return f.status;
+        } catch (const std::bad_alloc &) {
+            adaptor->error = "out of memory";
+            return INSITU_ERROR_MEMORY;
+        } catch (const std::exception &e) {
+            adaptor->error = e.what();
+            return INSITU_ERROR_INTERNAL;
+        }
+    } catch (...) {
+        return INSITU_ERROR_MEMORY;
+    }
+}
+
+} // namespace
+
+insitu_status insitu_vtk_create(insitu_session *session, insitu_vtk_adaptor **out)
+{
+    if (!out) return INSITU_ERROR_ARGUMENT;
+    *out = nullptr;
+    if (!session) return INSITU_ERROR_ARGUMENT;
+    auto *adaptor = new (std::nothrow) insitu_vtk_adaptor;
+    if (!adaptor) return INSITU_ERROR_MEMORY;
+    adaptor->session = session;
+    *out = adaptor;
+    return INSITU_OK;
+}
+
+insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data,
+                             insitu_vtk_report *report)
+{
+    if (report) *report = {0, 0, 0, 0, 0, 0, 0, 0, 0, "", ""};
+    if (!adaptor) return INSITU_ERROR_ARGUMENT;
+    outcome out;
+    const insitu_status status = guarded(adaptor, [&] { set_all(adaptor, name, data, out); });
+    fill_report(adaptor, out, report);
+    return status;
+}
+
+const char *insitu_vtk_error(const insitu_vtk_adaptor *adaptor)
+{
+    return adaptor ? adaptor->error.c_str() : "no adaptor given";
+}
+
+void insitu_vtk_destroy(insitu_vtk_adaptor **adaptor)
+{
+    if (!adaptor || !*adaptor) return;
+    for (const auto &[name, parts] : (*adaptor)->parts)
+        for (const auto &[mesh, held] : parts) (void)insitu_set_mesh((*adaptor)->session, mesh.c_str(), nullptr);
+    delete *adaptor;
+    *adaptor = nullptr;
+}

@@ -1,0 +1,262 @@
+/* VTK keeps numbers in many array classes, and almost all data come in two of them: AOS (tuples one after another) and
+ * SOA (one block a component). Both are pointers and strides to libinsitu, for the element types it knows:
+ *
+ *     AOS   x0 y0 z0 x1 y1 z1 ...       tuple stride 3 elements, component stride 1
+ *     SOA   x0 x1 ... | y0 y1 ... | z0 z1 ...    tuple stride 1, component stride the distance between blocks
+ *
+ * A field has one component stride, so the blocks of an SOA array must lie evenly in memory to be borrowed; coordinates
+ * are three arrays of their own, and may lie anywhere. Whatever else there is (shorts, characters, unsigned integers,
+ * bits, arrays computed on access) is copied: integers to an integer type that holds every value where there is one,
+ * else to double. */
+#include "vtk_arrays.h"
+
+#include <cstring>
+
+#include <vtkAOSDataArrayTemplate.h>
+#include <vtkDataArray.h>
+#include <vtkSOADataArrayTemplate.h>
+
+namespace insitu_vtk
+{
+
+namespace
+{
+
+template <typename T> struct type_of;
+template <> struct type_of<float> {
+    static constexpr insitu_type value = INSITU_FLOAT32;
+};
+template <> struct type_of<double> {
+    static constexpr insitu_type value = INSITU_FLOAT64;
+};
+template <> struct type_of<int32_t> {
+    static constexpr insitu_type value = INSITU_INT32;
+};
+template <> struct type_of<int64_t> {
+    static constexpr insitu_type value = INSITU_INT64;
+};
+
+/* long and long long are both 64 bits wide and different types to VTK. */
+template <typename T> constexpr insitu_type element_type()
+{
+    if constexpr (std::is_integral_v<T>)
+        return sizeof(T) == 4 ? INSITU_INT32 : INSITU_INT64;
+    else
+        return type_of<T>::value;
+}
+
+array_view shape_of(vtkDataArray *array, insitu_type type)
+{
+    array_view view;
+    view.type = type;
+    view.tuple_count = array->GetNumberOfTuples();
+    view.component_count = array->GetNumberOfComponents();
+    view.component_stride_bytes = type_size(type);
+    view.tuple_stride_bytes = view.component_count * type_size(type);
+    return view;
+}
+
+template <typename T> bool borrow_aos(vtkDataArray *array, array_view &view)
+{
+    auto *typed = vtkAOSDataArrayTemplate<T>::FastDownCast(array);
+    if (!typed) return false;
+    view = shape_of(array, element_type<T>());
+    view.data = typed->GetPointer(0);
+    return true;
+}
+
+/* The bytes from one block to the next where all blocks lie evenly and rising, else 0. */
+template <typename T> int64_t even_stride(vtkSOADataArrayTemplate<T> *array)
+{
+    auto address = [array](int c) { return reinterpret_cast<uintptr_t>(array->GetComponentArrayPointer(c)); };
+    const int components = array->GetNumberOfComponents();
+    if (components == 1) return sizeof(T);
+    if (address(1) <= address(0) || (address(1) - address(0)) % sizeof(T) != 0) return 0;
+    const uintptr_t stride = address(1) - address(0);
+    for (int c = 2; c < components; c++)
+        if (address(c) - address(c - 1) != stride) return 0;
+    return static_cast<int64_t>(stride);
+}
+
+template <typename T> bool borrow_soa(vtkDataArray *array, array_view &view)
+{
+    auto *typed = vtkSOADataArrayTemplate<T>::FastDownCast(array);
+    if (!typed || array->GetNumberOfTuples() == 0) return false;
+    const int64_t stride = even_stride(typed);
+    if (stride == 0) return false;
+    view = shape_of(array, element_type<T>());
+    view.data = typed->GetComponentArrayPointer(0);
+    view.tuple_stride_bytes = sizeof(T);
+    view.component_stride_bytes = stride;
+    return true;
+}
+
+template <typename T> bool borrow(vtkDataArray *array, array_view &view)
+{
+    return borrow_aos<T>(array, view) || borrow_soa<T>(array, view);
+}
+
+/* Copy values of VTK's type From as To, a type that holds them all. */
+template <typename From, typename To> bool convert(vtkDataArray *array, hold &held, array_view &view)
+{
+    auto *typed = vtkAOSDataArrayTemplate<From>::FastDownCast(array);
+    if (!typed) return false;
+    view = shape_of(array, element_type<To>());
+    const int64_t count = view.tuple_count * view.component_count;
+    auto *to = reinterpret_cast<To *>(held.allocate(static_cast<size_t>(count) * sizeof(To)));
+    const From *from = typed->GetPointer(0);
+    for (int64_t i = 0; i < count; i++) to[i] = static_cast<To>(from[i]);
+    view.data = to;
+    return true;
+}
+
+/* Any array at all, through VTK's own access by double. */
+template <typename To> array_view convert_any(vtkDataArray *array, hold &held)
+{
+    array_view view = shape_of(array, element_type<To>());
+    const size_t count = static_cast<size_t>(view.tuple_count) * static_cast<size_t>(view.component_count);
+    auto *to = reinterpret_cast<To *>(held.allocate(count * sizeof(To)));
+    view.data = to;
+    for (int64_t i = 0; i < view.tuple_count; i++)
+        for (int c = 0; c < view.component_count; c++) *to++ = static_cast<To>(array->GetComponent(i, c));
+    return view;
+}
+
+array_view copy_array(vtkDataArray *array, hold &held)
+{
+    array_view view;
+    if (convert<char, int32_t>(array, held, view) || convert<signed char, int32_t>(array, held, view) ||
+        convert<unsigned char, int32_t>(array, held, view) || convert<short, int32_t>(array, held, view) ||
+        convert<unsigned short, int32_t>(array, held, view) || convert<unsigned int, int64_t>(array, held, view))
+        return view;
+    if (array->GetDataType() == VTK_FLOAT) return convert_any<float>(array, held);
+    return convert_any<double>(array, held);
+}
+
+int64_t bytes_of(const array_view &view)
+{
+    return view.tuple_count * view.component_count * type_size(view.type);
+}
+
+/* Whether the elements are of a type that is only laid out in a way that cannot be borrowed. */
+bool is_known_type(vtkDataArray *array)
+{
+    const int type = array->GetDataType();
+    return type == VTK_FLOAT || type == VTK_DOUBLE || type == VTK_INT || type == VTK_LONG || type == VTK_LONG_LONG ||
+           type == VTK_ID_TYPE;
+}
+
+const char *type_name(insitu_type type)
+{
+    switch (type) {
+    case INSITU_FLOAT32: return "float32";
+    case INSITU_FLOAT64: return "float64";
+    case INSITU_INT32: return "int32";
+    case INSITU_INT64: return "int64";
+    default: return "uint8";
+    }
+}
+
+std::string why_copied(vtkDataArray *array, const array_view &copy)
+{
+    if (is_known_type(array)) return "components not laid out evenly";
+    return std::string(array->GetDataTypeAsString()) + " values to " + type_name(copy.type);
+}
+
+template <typename T> bool borrow_soa_points(vtkDataArray *points, insitu_array coordinates[3])
+{
+    auto *typed = vtkSOADataArrayTemplate<T>::FastDownCast(points);
+    if (!typed) return false;
+    for (int c = 0; c < 3; c++) coordinates[c] = {typed->GetComponentArrayPointer(c), element_type<T>(), sizeof(T)};
+    return true;
+}
+
+} // namespace
+
+std::byte *hold::allocate(size_t bytes)
+{
+    copies.push_back(std::make_unique<std::byte[]>(bytes > 0 ? bytes : 1));
+    return copies.back().get();
+}
+
+void tally::copied(const std::string &what, const std::string &why, int64_t bytes)
+{
+    bytes_copied += bytes;
+    if (!copied_why.empty()) copied_why += '\n';
+    copied_why += what + ": " + why + " (" + std::to_string(bytes) + " bytes)";
+}
+
+void tally::warn(const std::string &text)
+{
+    if (('\n' + warnings + '\n').find('\n' + text + '\n') != std::string::npos) return;
+    if (!warnings.empty()) warnings += '\n';
+    warnings += text;
+}
+
+const std::byte *array_view::element(int64_t tuple, int component) const
+{
+    return static_cast<const std::byte *>(data) + tuple * tuple_stride_bytes + component * component_stride_bytes;
+}
+
+insitu_array array_view::component(int index) const
+{
+    return {element(0, index), type, tuple_stride_bytes};
+}
+
+int64_t type_size(insitu_type type)
+{
+    switch (type) {
+    case INSITU_UINT8: return 1;
+    case INSITU_FLOAT32:
+    case INSITU_INT32: return 4;
+    default: return 8;
+    }
+}
+
+array_view view_array(vtkDataArray *array, const std::string &what, hold &held, tally &count)
+{
+    array_view view;
+    if (borrow<float>(array, view) || borrow<double>(array, view) || borrow<int>(array, view) ||
+        borrow<long>(array, view) || borrow<long long>(array, view)) {
+        held.objects.emplace_back(array);
+        count.bytes_borrowed += bytes_of(view);
+        return view;
+    }
+    view = copy_array(array, held);
+    count.copied(what, why_copied(array, view), bytes_of(view));
+    return view;
+}
+
+void view_points(vtkDataArray *points, const std::string &what, hold &held, tally &count, insitu_array coordinates[3])
+{
+    if (borrow_soa_points<float>(points, coordinates) || borrow_soa_points<double>(points, coordinates)) {
+        held.objects.emplace_back(points);
+        count.bytes_borrowed += points->GetNumberOfTuples() * 3 * type_size(coordinates[0].type);
+        return;
+    }
+    array_view view;
+    if (borrow_aos<float>(points, view) || borrow_aos<double>(points, view)) {
+        held.objects.emplace_back(points);
+        count.bytes_borrowed += bytes_of(view);
+    } else {
+        view = convert_any<double>(points, held);
+        count.copied(what, std::string(points->GetDataTypeAsString()) + " coordinates to float64", bytes_of(view));
+    }
+    for (int c = 0; c < 3; c++) coordinates[c] = view.component(c);
+}
+
+array_view gather(const array_view &view, const std::vector<int64_t> &source, hold &held)
+{
+    const auto size = static_cast<size_t>(type_size(view.type));
+    array_view packed = view;
+    packed.tuple_count = static_cast<int64_t>(source.size());
+    packed.component_stride_bytes = type_size(view.type);
+    packed.tuple_stride_bytes = view.component_count * type_size(view.type);
+    std::byte *to = held.allocate(source.size() * static_cast<size_t>(packed.tuple_stride_bytes));
+    packed.data = to;
+    for (const int64_t tuple : source)
+        for (int c = 0; c < view.component_count; c++, to += size) std::memcpy(to, view.element(tuple, c), size);
+    return packed;
+}
+
+} // namespace insitu_vtk

@@ -1,0 +1,296 @@
+/* A recipe says, for each type of cell that VTK has and libinsitu draws, which linear cells stand for it and which of
+ * its points are their vertices. Where every cell of a grid is its own recipe (tets, hexes, wedges, pyramids) VTK's
+ * arrays are handed over untouched; one cell that is not makes a new list of all.
+ *
+ * A voxel differs from a hexahedron by the order of its points. A pentagonal prism is cut along the quad that joins its
+ * points 0, 3, 8, 5, a hexagonal one along 0, 3, 9, 6; the two parts share that quad, so the cut is conforming inside
+ * the cell. Higher-order cells list their corners first, in the order of the linear cell. */
+#include "vtk_cells.h"
+
+#include <array>
+
+#include <vtkCellArray.h>
+#include <vtkCellTypes.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+
+namespace insitu_vtk
+{
+
+namespace
+{
+
+enum class kind { not_drawn, flat, as_it_is, reordered, split, linear };
+
+struct piece {
+    uint8_t type;
+    uint8_t vertex_count;
+    std::array<uint8_t, 8> vertices; // of the cell's points
+};
+
+struct recipe {
+    kind what = kind::not_drawn;
+    int needed_points = 0;
+    int piece_count = 0;
+    std::array<piece, 2> pieces{};
+};
+
+constexpr piece tet = {INSITU_TET, 4, {0, 1, 2, 3}};
+constexpr piece hex = {INSITU_HEX, 8, {0, 1, 2, 3, 4, 5, 6, 7}};
+constexpr piece wedge = {INSITU_WEDGE, 6, {0, 1, 2, 3, 4, 5}};
+constexpr piece pyramid = {INSITU_PYRAMID, 5, {0, 1, 2, 3, 4}};
+constexpr piece voxel = {INSITU_HEX, 8, {0, 1, 3, 2, 4, 5, 7, 6}};
+
+using recipe_table = std::array<recipe, 256>;
+
+void add(recipe_table &table, kind what, const piece &of, std::initializer_list<int> types)
+{
+    for (const int type : types) table[static_cast<size_t>(type)] = {what, of.vertex_count, 1, {of, piece{}}};
+}
+
+recipe_table make_recipes()
+{
+    recipe_table table;
+    add(table, kind::as_it_is, tet, {VTK_TETRA});
+    add(table, kind::as_it_is, hex, {VTK_HEXAHEDRON});
+    add(table, kind::as_it_is, wedge, {VTK_WEDGE});
+    add(table, kind::as_it_is, pyramid, {VTK_PYRAMID});
+    add(table, kind::reordered, voxel, {VTK_VOXEL});
+    add(table, kind::linear, tet, {VTK_QUADRATIC_TETRA, VTK_LAGRANGE_TETRAHEDRON, VTK_BEZIER_TETRAHEDRON});
+    add(table, kind::linear, hex,
+        {VTK_QUADRATIC_HEXAHEDRON, VTK_TRIQUADRATIC_HEXAHEDRON, VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON,
+         VTK_LAGRANGE_HEXAHEDRON, VTK_BEZIER_HEXAHEDRON});
+    add(table, kind::linear, wedge,
+        {VTK_QUADRATIC_WEDGE, VTK_QUADRATIC_LINEAR_WEDGE, VTK_BIQUADRATIC_QUADRATIC_WEDGE, VTK_LAGRANGE_WEDGE,
+         VTK_BEZIER_WEDGE});
+    add(table, kind::linear, pyramid,
+        {VTK_QUADRATIC_PYRAMID, VTK_TRIQUADRATIC_PYRAMID, VTK_LAGRANGE_PYRAMID, VTK_BEZIER_PYRAMID});
+    table[VTK_PENTAGONAL_PRISM] = {
+        kind::split, 10, 2, {{{INSITU_HEX, 8, {0, 1, 2, 3, 5, 6, 7, 8}}, {INSITU_WEDGE, 6, {0, 3, 4, 5, 8, 9}}}}};
+    table[VTK_HEXAGONAL_PRISM] = {
+        kind::split, 12, 2, {{{INSITU_HEX, 8, {0, 1, 2, 3, 6, 7, 8, 9}}, {INSITU_HEX, 8, {0, 3, 4, 5, 6, 9, 10, 11}}}}};
+    for (const int type : {VTK_EMPTY_CELL,
+                           VTK_VERTEX,
+                           VTK_POLY_VERTEX,
+                           VTK_LINE,
+                           VTK_POLY_LINE,
+                           VTK_TRIANGLE,
+                           VTK_TRIANGLE_STRIP,
+                           VTK_POLYGON,
+                           VTK_PIXEL,
+                           VTK_QUAD,
+                           VTK_QUADRATIC_EDGE,
+                           VTK_QUADRATIC_TRIANGLE,
+                           VTK_QUADRATIC_QUAD,
+                           VTK_QUADRATIC_POLYGON,
+                           VTK_BIQUADRATIC_QUAD,
+                           VTK_QUADRATIC_LINEAR_QUAD,
+                           VTK_BIQUADRATIC_TRIANGLE,
+                           VTK_CUBIC_LINE,
+                           VTK_PARAMETRIC_CURVE,
+                           VTK_PARAMETRIC_SURFACE,
+                           VTK_PARAMETRIC_TRI_SURFACE,
+                           VTK_PARAMETRIC_QUAD_SURFACE,
+                           VTK_HIGHER_ORDER_EDGE,
+                           VTK_HIGHER_ORDER_TRIANGLE,
+                           VTK_HIGHER_ORDER_QUAD,
+                           VTK_HIGHER_ORDER_POLYGON,
+                           VTK_LAGRANGE_CURVE,
+                           VTK_LAGRANGE_TRIANGLE,
+                           VTK_LAGRANGE_QUADRILATERAL,
+                           VTK_BEZIER_CURVE,
+                           VTK_BEZIER_TRIANGLE,
+                           VTK_BEZIER_QUADRILATERAL})
+        table[static_cast<size_t>(type)].what = kind::flat;
+    return table;
+}
+
+const recipe_table &recipes()
+{
+    static const recipe_table table = make_recipes();
+    return table;
+}
+
+/* VTK's arrays of one grid, raw. */
+template <typename Id> struct raw_cells {
+    const uint8_t *types;
+    const Id *offsets;
+    const Id *connectivity;
+    int64_t count;
+
+    int64_t size(int64_t cell) const { return static_cast<int64_t>(offsets[cell + 1] - offsets[cell]); }
+};
+
+/* Sizes of the new list, and what is said of it. */
+struct new_size {
+    int64_t cells = 0;
+    int64_t vertices = 0;
+    bool is_one_to_one = true;
+};
+
+template <typename Id> new_size count_new(const raw_cells<Id> &raw, cell_counts &counts)
+{
+    new_size size;
+    for (int64_t i = 0; i < raw.count; i++) {
+        const recipe &r = recipes()[raw.types[i]];
+        const bool is_drawn = r.piece_count > 0 && raw.size(i) >= r.needed_points;
+        if (r.what == kind::flat)
+            counts.flat++;
+        else if (!is_drawn)
+            counts.not_drawn++, counts.left_out[raw.types[i]]++;
+        if (is_drawn && r.what == kind::split) counts.split++;
+        if (is_drawn && r.what == kind::linear) counts.linear++;
+        const int pieces = is_drawn ? r.piece_count : 0;
+        size.cells += pieces;
+        for (int p = 0; p < pieces; p++) size.vertices += r.pieces[static_cast<size_t>(p)].vertex_count;
+        if (pieces != 1) size.is_one_to_one = false;
+    }
+    return size;
+}
+
+template <typename Id>
+void fill_new(const raw_cells<Id> &raw, uint8_t *types, int64_t *offsets, Id *connectivity,
+              std::vector<int64_t> *source)
+{
+    int64_t at = 0;
+    for (int64_t i = 0; i < raw.count; i++) {
+        const recipe &r = recipes()[raw.types[i]];
+        if (raw.size(i) < r.needed_points) continue;
+        for (int p = 0; p < r.piece_count; p++) {
+            const piece &q = r.pieces[static_cast<size_t>(p)];
+            *types++ = q.type;
+            *offsets++ = at;
+            for (size_t v = 0; v < q.vertex_count; v++)
+                connectivity[at++] = raw.connectivity[raw.offsets[i] + q.vertices[v]];
+            if (source) source->push_back(i);
+        }
+    }
+    *offsets = at;
+}
+
+/* "voxels reordered, prisms split" of what is there. */
+std::string why_converted(const std::array<int64_t, 256> &by_type)
+{
+    const char *const reasons[] = {
+        "some cells not drawn", "flat cells left out", "",
+        "voxels reordered",     "prisms split",        "higher-order cells by their corners"};
+    std::array<bool, 6> has{};
+    for (size_t type = 0; type < 256; type++)
+        if (by_type[type] > 0) has[static_cast<size_t>(recipes()[type].what)] = true;
+    std::string why;
+    for (size_t k = 0; k < has.size(); k++)
+        if (has[k] && reasons[k][0]) why += (why.empty() ? "" : ", ") + std::string(reasons[k]);
+    return why.empty() ? "cells with too few points left out" : why;
+}
+
+template <typename Id>
+void convert_cells(const raw_cells<Id> &raw, const std::string &why, const std::string &what, hold &held, tally &count,
+                   insitu_mesh &mesh, cell_list &cells, cell_counts &counts)
+{
+    const new_size size = count_new(raw, counts);
+    cells.count = size.cells;
+    cells.is_one_to_one = size.is_one_to_one;
+    if (!cells.is_one_to_one) cells.source.reserve(static_cast<size_t>(size.cells));
+    if (size.cells == 0) return;
+
+    auto *types = reinterpret_cast<uint8_t *>(held.allocate(static_cast<size_t>(size.cells)));
+    auto *offsets = reinterpret_cast<int64_t *>(held.allocate(static_cast<size_t>(size.cells + 1) * 8));
+    auto *connectivity = reinterpret_cast<Id *>(held.allocate(static_cast<size_t>(size.vertices) * sizeof(Id)));
+    fill_new(raw, types, offsets, connectivity, cells.is_one_to_one ? nullptr : &cells.source);
+
+    mesh.cell_count = size.cells;
+    mesh.cell_types = {types, INSITU_UINT8, 0};
+    mesh.offsets = {offsets, INSITU_INT64, 0};
+    mesh.connectivity = {connectivity, sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64, 0};
+    mesh.connectivity_count = size.vertices;
+    count.copied(what + " cells", why,
+                 size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)));
+}
+
+/* All cells are drawn as they are: VTK's arrays, and of one type in one size neither types nor offsets. */
+template <typename Id>
+void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::array<int64_t, 256> &by_type,
+                  int64_t connectivity_count, hold &held, tally &count, insitu_mesh &mesh)
+{
+    const auto id_type = sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64;
+    held.objects.emplace_back(grid->GetCells());
+    mesh.cell_count = raw.count;
+    mesh.connectivity = {raw.connectivity, id_type, 0};
+    mesh.connectivity_count = connectivity_count;
+    count.bytes_borrowed += connectivity_count * static_cast<int64_t>(sizeof(Id));
+    const recipe &first = recipes()[raw.types[0]];
+    if (by_type[raw.types[0]] == raw.count && grid->GetCells()->IsHomogeneous() == first.needed_points) {
+        mesh.cell_type = static_cast<insitu_cell_type>(raw.types[0]);
+        return;
+    }
+    held.objects.emplace_back(grid->GetCellTypesArray());
+    mesh.cell_types = {raw.types, INSITU_UINT8, 0};
+    mesh.offsets = {raw.offsets, id_type, 0};
+    count.bytes_borrowed += raw.count + (raw.count + 1) * static_cast<int64_t>(sizeof(Id));
+}
+
+template <typename Array>
+bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, const std::string &what, hold &held,
+                tally &count, insitu_mesh &mesh, cell_list &cells, cell_counts &counts, std::string &error)
+{
+    using id = typename Array::ValueType;
+    const raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0), offsets->GetPointer(0),
+                               connectivity->GetPointer(0), grid->GetNumberOfCells()};
+    const int64_t connectivity_count = connectivity->GetNumberOfValues();
+    std::array<int64_t, 256> by_type{};
+    bool is_as_it_is = true;
+    for (int64_t i = 0; i < raw.count; i++) {
+        by_type[raw.types[i]]++;
+        const recipe &r = recipes()[raw.types[i]];
+        if (raw.offsets[i] < 0 || raw.offsets[i] > raw.offsets[i + 1] || raw.offsets[i + 1] > connectivity_count) {
+            error = what + ": cell " + std::to_string(i) + ": offsets " + std::to_string(raw.offsets[i]) + ", " +
+                    std::to_string(raw.offsets[i + 1]) + " are not within the connectivity's " +
+                    std::to_string(connectivity_count) + " entries";
+            return false;
+        }
+        is_as_it_is = is_as_it_is && r.what == kind::as_it_is && raw.size(i) == r.needed_points;
+    }
+    if (is_as_it_is) {
+        cells.count = raw.count;
+        borrow_cells(grid, raw, by_type, connectivity_count, held, count, mesh);
+    } else {
+        convert_cells(raw, why_converted(by_type), what, held, count, mesh, cells, counts);
+    }
+    return true;
+}
+
+} // namespace
+
+bool view_cells(vtkUnstructuredGrid *grid, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
+                cell_list &cells, cell_counts &counts, std::string &error)
+{
+    vtkCellArray *array = grid->GetCells();
+    vtkUnsignedCharArray *types = grid->GetCellTypesArray();
+    if (!array || array->GetNumberOfCells() == 0) return true;
+    if (!types || types->GetNumberOfValues() != array->GetNumberOfCells()) {
+        error = what + ": " + std::to_string(array->GetNumberOfCells()) + " cells but " +
+                std::to_string(types ? types->GetNumberOfValues() : 0) + " cell types";
+        return false;
+    }
+    if (array->IsStorage64Bit())
+        return view_typed(grid, array->GetOffsetsArray64(), array->GetConnectivityArray64(), what, held, count, mesh,
+                          cells, counts, error);
+    return view_typed(grid, array->GetOffsetsArray32(), array->GetConnectivityArray32(), what, held, count, mesh, cells,
+                      counts, error);
+}
+
+void warn_about_cells(const cell_counts &counts, const std::string &what, tally &count)
+{
+    if (counts.linear > 0)
+        count.warn(what + ": " + std::to_string(counts.linear) +
+                   " higher-order cells drawn by their corners as linear ones");
+    for (const auto &[type, number] : counts.left_out) {
+        const char *why = recipes()[static_cast<size_t>(type)].piece_count > 0 ? " with too few points" : "";
+        count.warn(what + ": " + std::to_string(number) + " cells of type " + std::to_string(type) + " (" +
+                   vtkCellTypes::GetClassNameFromTypeId(type) + ")" + why + " are not drawn");
+    }
+    if (counts.flat > 0)
+        count.warn(what + ": " + std::to_string(counts.flat) + " cells of less than 3 dimensions are not drawn");
+}
+
+} // namespace insitu_vtk

@@ -1,0 +1,654 @@
+/* What the VTK adaptor hands over: VTK's own pointers where it may, right conversions where it must. The session is a
+ * stub that records. Volumes of split and reordered cells are compared with those computed here from the corner
+ * positions; everything else is compared element by element with what VTK holds. */
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkDoubleArray.h>
+#include <vtkFloatArray.h>
+#include <vtkIdTypeArray.h>
+#include <vtkIntArray.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkPartitionedDataSet.h>
+#include <vtkPartitionedDataSetCollection.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkSOADataArrayTemplate.h>
+#include <vtkShortArray.h>
+#include <vtkTypeInt32Array.h>
+#include <vtkTypeInt64Array.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+
+#include "insitu/vtk.h"
+#include "test_vtk_session_stub.h"
+
+// cmocka defines fail as a macro, so it comes after all C++ headers.
+extern "C" {
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+}
+
+namespace
+{
+
+using point = std::array<double, 3>;
+
+struct fixture {
+    insitu_session session;
+    insitu_vtk_adaptor *adaptor = nullptr;
+    insitu_vtk_report report{};
+
+    fixture() { assert_int_equal(insitu_vtk_create(&session, &adaptor), INSITU_OK); }
+    ~fixture() { insitu_vtk_destroy(&adaptor); }
+    fixture(const fixture &) = delete;
+    fixture &operator=(const fixture &) = delete;
+
+    insitu_status set(vtkDataObject *data) { return insitu_vtk_set(adaptor, "m", data, &report); }
+    const stub_mesh &mesh(const std::string &name = "m") { return session.meshes.at(name); }
+};
+
+/* A grid of single cells, each with its own points: a regular prism or what the points say. */
+void add_cell(vtkUnstructuredGrid *grid, int type, const std::vector<point> &points)
+{
+    if (!grid->GetPoints()) {
+        vtkNew<vtkPoints> p;
+        p->SetDataTypeToDouble();
+        grid->SetPoints(p);
+    }
+    std::vector<vtkIdType> ids;
+    for (const point &x : points) ids.push_back(grid->GetPoints()->InsertNextPoint(x.data()));
+    grid->InsertNextCell(type, static_cast<vtkIdType>(ids.size()), ids.data());
+}
+
+std::vector<point> prism(int sides)
+{
+    std::vector<point> p;
+    for (int layer = 0; layer < 2; layer++)
+        for (int i = 0; i < sides; i++) {
+            const double a = 2 * M_PI * i / sides;
+            p.push_back({std::cos(a) + 0.1 * layer, std::sin(a), 0.7 * layer});
+        }
+    return p;
+}
+
+const std::vector<point> cube = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                 {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+const std::vector<point> corner = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+const std::vector<point> roof = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+const std::vector<point> pyramid = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}};
+
+int64_t integer_at(const insitu_array &a, int64_t i)
+{
+    switch (a.type) {
+    case INSITU_UINT8: return static_cast<const uint8_t *>(a.data)[i];
+    case INSITU_INT32: return static_cast<const int32_t *>(a.data)[i];
+    default: return static_cast<const int64_t *>(a.data)[i];
+    }
+}
+
+point vertex(const insitu_mesh &m, int64_t i)
+{
+    point p;
+    for (size_t c = 0; c < 3; c++) {
+        const auto *at = static_cast<const char *>(m.coordinates[c].data) + i * m.coordinates[c].stride_bytes;
+        p[c] = m.coordinates[c].type == INSITU_FLOAT32 ? static_cast<double>(*reinterpret_cast<const float *>(at))
+                                                       : *reinterpret_cast<const double *>(at);
+    }
+    return p;
+}
+
+double tet_volume(const point &a, const point &b, const point &c, const point &d)
+{
+    auto minus = [](const point &p, const point &q) { return point{p[0] - q[0], p[1] - q[1], p[2] - q[2]}; };
+    const point u = minus(b, a), v = minus(c, a), w = minus(d, a);
+    return (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
+            u[2] * (v[0] * w[1] - v[1] * w[0])) /
+           6;
+}
+
+/* The signed volume of cell i of a mesh, by tets; exact up to rounding where faces are flat. VTK's order: a hex has its
+ * lower quad counterclockwise seen from above; wedges come in both windings, so their magnitude is taken. */
+double cell_volume(const insitu_mesh &m, int64_t i)
+{
+    const int64_t begin = m.offsets.data ? integer_at(m.offsets, i) : 0;
+    auto v = [&](int64_t k) { return vertex(m, integer_at(m.connectivity, begin + k)); };
+    switch (integer_at(m.cell_types, i)) {
+    case INSITU_TET: return tet_volume(v(0), v(1), v(2), v(3));
+    case INSITU_PYRAMID: return tet_volume(v(0), v(1), v(2), v(4)) + tet_volume(v(0), v(2), v(3), v(4));
+    case INSITU_WEDGE:
+        return std::fabs(tet_volume(v(0), v(1), v(2), v(3)) + tet_volume(v(1), v(2), v(3), v(4)) +
+                         tet_volume(v(2), v(3), v(4), v(5)));
+    default:
+        return tet_volume(v(0), v(1), v(3), v(4)) + tet_volume(v(1), v(2), v(3), v(6)) +
+               tet_volume(v(1), v(6), v(4), v(5)) + tet_volume(v(3), v(4), v(6), v(7)) +
+               tet_volume(v(1), v(3), v(4), v(6));
+    }
+}
+
+/* Volumes here are sums of a few products of numbers of size 1. */
+constexpr double rounding = 1e-14;
+
+void plain_grid_is_borrowed(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TETRA, corner);
+    add_cell(grid, VTK_HEXAHEDRON, cube);
+    add_cell(grid, VTK_WEDGE, roof);
+    add_cell(grid, VTK_PYRAMID, pyramid);
+    vtkNew<vtkFloatArray> velocity;
+    velocity->SetName("v");
+    velocity->SetNumberOfComponents(3);
+    velocity->SetNumberOfTuples(grid->GetNumberOfPoints());
+    velocity->Fill(1);
+    grid->GetPointData()->AddArray(velocity);
+    vtkNew<vtkIntArray> block;
+    block->SetName("block");
+    block->SetNumberOfTuples(4);
+    block->Fill(7);
+    grid->GetCellData()->AddArray(block);
+
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    const insitu_mesh &m = f.mesh().mesh;
+    auto *points = vtkDoubleArray::SafeDownCast(grid->GetPoints()->GetData());
+    for (int c = 0; c < 3; c++) {
+        assert_ptr_equal(m.coordinates[c].data, points->GetPointer(c));
+        assert_int_equal(m.coordinates[c].stride_bytes, 24);
+        assert_int_equal(m.coordinates[c].type, INSITU_FLOAT64);
+    }
+    assert_int_equal(m.vertex_count, grid->GetNumberOfPoints());
+    assert_int_equal(m.cell_count, 4);
+    assert_ptr_equal(m.cell_types.data, grid->GetCellTypesArray()->GetPointer(0));
+    assert_ptr_equal(m.connectivity.data, grid->GetCells()->GetConnectivityArray64()->GetPointer(0));
+    assert_ptr_equal(m.offsets.data, grid->GetCells()->GetOffsetsArray64()->GetPointer(0));
+    assert_int_equal(m.offsets.type, INSITU_INT64);
+    assert_int_equal(m.connectivity_count, 4 + 8 + 6 + 5);
+    assert_null(m.ghosts.data);
+
+    const insitu_field &v = f.mesh().fields.at("v");
+    assert_ptr_equal(v.values.data, velocity->GetPointer(0));
+    assert_int_equal(v.values.type, INSITU_FLOAT32);
+    assert_int_equal(v.values.stride_bytes, 12);
+    assert_int_equal(v.component_stride_bytes, 4);
+    assert_int_equal(v.component_count, 3);
+    assert_int_equal(v.centring, INSITU_VERTEX);
+    assert_int_equal(v.count, grid->GetNumberOfPoints());
+    const insitu_field &b = f.mesh().fields.at("block");
+    assert_ptr_equal(b.values.data, block->GetPointer(0));
+    assert_int_equal(b.values.type, INSITU_INT32);
+    assert_int_equal(b.centring, INSITU_CELL);
+
+    assert_int_equal(f.report.bytes_copied, 0);
+    assert_string_equal(f.report.copied_why, "");
+    assert_string_equal(f.report.warnings, "");
+    const int64_t expected = 23 * 24 + 23 * 8 + 5 * 8 + 4 + 23 * 12 + 4 * 4;
+    assert_int_equal(f.report.bytes_borrowed, expected);
+}
+
+void one_type_of_32_bits_is_borrowed_without_types(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TETRA, corner);
+    add_cell(grid, VTK_TETRA, corner);
+    assert_true(grid->GetCells()->ConvertTo32BitStorage());
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    const insitu_mesh &m = f.mesh().mesh;
+    assert_int_equal(m.cell_type, INSITU_TET);
+    assert_null(m.cell_types.data);
+    assert_null(m.offsets.data);
+    assert_int_equal(m.connectivity.type, INSITU_INT32);
+    assert_ptr_equal(m.connectivity.data, grid->GetCells()->GetConnectivityArray32()->GetPointer(0));
+    assert_int_equal(f.report.bytes_copied, 0);
+}
+
+void components_apart_are_borrowed(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TETRA, corner);
+    vtkNew<vtkSOADataArrayTemplate<float>> xyz;
+    xyz->SetNumberOfComponents(3);
+    xyz->SetNumberOfTuples(4);
+    for (int i = 0; i < 4; i++)
+        for (int c = 0; c < 3; c++)
+            xyz->SetTypedComponent(i, c, static_cast<float>(corner[static_cast<size_t>(i)][static_cast<size_t>(c)]));
+    grid->GetPoints()->SetData(xyz);
+
+    float even[12] = {};
+    vtkNew<vtkSOADataArrayTemplate<float>> velocity;
+    velocity->SetName("even");
+    velocity->SetNumberOfComponents(3);
+    for (int c = 0; c < 3; c++) velocity->SetArray(c, even + 4 * c, 4, true, true);
+    grid->GetPointData()->AddArray(velocity);
+
+    double uneven[20];
+    for (int i = 0; i < 20; i++) uneven[i] = i;
+    vtkNew<vtkSOADataArrayTemplate<double>> other;
+    other->SetName("uneven");
+    other->SetNumberOfComponents(3);
+    const int at[3] = {0, 4, 13};
+    for (int c = 0; c < 3; c++) other->SetArray(c, uneven + at[c], 4, true, true);
+    grid->GetPointData()->AddArray(other);
+
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    for (int c = 0; c < 3; c++) {
+        assert_ptr_equal(f.mesh().mesh.coordinates[c].data, xyz->GetComponentArrayPointer(c));
+        assert_int_equal(f.mesh().mesh.coordinates[c].type, INSITU_FLOAT32);
+    }
+    const insitu_field &e = f.mesh().fields.at("even");
+    assert_ptr_equal(e.values.data, even);
+    assert_int_equal(e.values.stride_bytes, 4);
+    assert_int_equal(e.component_stride_bytes, 16);
+    const insitu_field &u = f.mesh().fields.at("uneven");
+    const auto *copy = static_cast<const double *>(u.values.data);
+    for (int i = 0; i < 4; i++)
+        for (int c = 0; c < 3; c++) assert_true(copy[i * 3 + c] == at[c] + i);
+    assert_int_equal(f.report.bytes_copied, 4 * 3 * 8);
+    assert_non_null(strstr(f.report.copied_why, "'uneven'"));
+    assert_non_null(strstr(f.report.copied_why, "evenly"));
+}
+
+void other_value_types_are_copied_and_declared(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TETRA, corner);
+    vtkNew<vtkShortArray> shorts;
+    shorts->SetName("s");
+    vtkNew<vtkIdTypeArray> ids;
+    ids->SetName("ids");
+    vtkNew<vtkUnsignedCharArray> bytes;
+    bytes->SetName("b");
+    for (int i = 0; i < 4; i++) {
+        shorts->InsertNextValue(static_cast<short>(-300 + i));
+        ids->InsertNextValue((int64_t{1} << 60) + i);
+        bytes->InsertNextValue(static_cast<unsigned char>(250 + i));
+    }
+    for (vtkDataArray *a :
+         {static_cast<vtkDataArray *>(shorts), static_cast<vtkDataArray *>(ids), static_cast<vtkDataArray *>(bytes)})
+        grid->GetPointData()->AddArray(a);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(integer_at(f.mesh().fields.at("s").values, i), -300 + i);
+        assert_int_equal(integer_at(f.mesh().fields.at("b").values, i), 250 + i);
+    }
+    assert_ptr_equal(f.mesh().fields.at("ids").values.data, ids->GetPointer(0));
+    assert_int_equal(f.mesh().fields.at("ids").values.type, INSITU_INT64);
+    assert_int_equal(f.report.bytes_copied, 2 * 4 * 4);
+    assert_non_null(strstr(f.report.copied_why, "short values to int32"));
+    assert_non_null(strstr(f.report.copied_why, "unsigned char values to int32"));
+}
+
+void integer_points_become_doubles(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_HEXAHEDRON, cube);
+    vtkNew<vtkIntArray> xyz;
+    xyz->SetNumberOfComponents(3);
+    for (const point &p : cube) xyz->InsertNextTuple(p.data());
+    grid->GetPoints()->SetData(xyz);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    for (size_t i = 0; i < 8; i++) assert_true(vertex(f.mesh().mesh, static_cast<int64_t>(i)) == cube[i]);
+    assert_int_equal(f.report.bytes_copied, 8 * 3 * 8);
+}
+
+void voxel_becomes_a_right_handed_hexahedron(void **)
+{
+    std::vector<point> p;
+    for (int k = 0; k < 2; k++)
+        for (int j = 0; j < 2; j++)
+            for (int i = 0; i < 2; i++) p.push_back({2.0 * i, 3.0 * j, 1.0 * k});
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_VOXEL, p);
+    add_cell(grid, VTK_TETRA, corner);
+    vtkNew<vtkIntArray> id;
+    id->SetName("id");
+    id->InsertNextValue(5);
+    id->InsertNextValue(6);
+    grid->GetCellData()->AddArray(id);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_int_equal(f.report.cells, 2);
+    assert_int_equal(integer_at(f.mesh().mesh.cell_types, 0), INSITU_HEX);
+    assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - 6) < rounding);
+    assert_true(std::fabs(cell_volume(f.mesh().mesh, 1) - 1.0 / 6) < rounding);
+    assert_ptr_equal(f.mesh().fields.at("id").values.data, id->GetPointer(0));
+    assert_int_equal(f.report.bytes_copied, 2 + 3 * 8 + 12 * 8);
+    assert_non_null(strstr(f.report.copied_why, "voxels reordered"));
+}
+
+void prisms_split_into_parts_that_fill_them(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_PENTAGONAL_PRISM, prism(5));
+    add_cell(grid, VTK_HEXAGONAL_PRISM, prism(6));
+    vtkNew<vtkFloatArray> value;
+    value->SetName("c");
+    value->SetNumberOfComponents(2);
+    for (float v : {1.f, 2.f, 3.f, 4.f}) value->InsertNextValue(v);
+    grid->GetCellData()->AddArray(value);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    const insitu_mesh &m = f.mesh().mesh;
+    assert_int_equal(m.cell_count, 4);
+    assert_int_equal(f.report.cells_split, 2);
+    const int types[4] = {INSITU_HEX, INSITU_WEDGE, INSITU_HEX, INSITU_HEX};
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(integer_at(m.cell_types, i), types[i]);
+        assert_true(cell_volume(m, i) > 0);
+    }
+    for (int sides = 5; sides <= 6; sides++) {
+        const int64_t first = sides == 5 ? 0 : 2;
+        const double expected = 0.7 * sides / 2.0 * std::sin(2 * M_PI / sides);
+        assert_true(std::fabs(cell_volume(m, first) + cell_volume(m, first + 1) - expected) < rounding);
+    }
+    const insitu_field &c = f.mesh().fields.at("c");
+    const float expected[8] = {1, 2, 1, 2, 3, 4, 3, 4};
+    assert_int_equal(c.count, 4);
+    assert_memory_equal(c.values.data, expected, sizeof expected);
+    assert_non_null(strstr(f.report.copied_why, "prisms split"));
+}
+
+void quadratic_cells_are_their_corners_with_a_warning(void **)
+{
+    std::vector<point> p = corner;
+    for (int i = 0; i < 6; i++) p.push_back({0.5, 0.5, 0.1 * i});
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_QUADRATIC_TETRA, p);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_int_equal(f.report.cells_linear, 1);
+    for (int i = 0; i < 4; i++) assert_int_equal(integer_at(f.mesh().mesh.connectivity, i), i);
+    assert_int_equal(f.mesh().mesh.connectivity_count, 4);
+    assert_non_null(strstr(f.report.warnings, "1 higher-order cells"));
+}
+
+void every_higher_order_type_has_its_linear_one(void **)
+{
+    const struct {
+        int type, points, linear;
+    } cases[] = {{24, 10, 10}, {25, 20, 12}, {26, 15, 13}, {27, 13, 14}, {29, 27, 12}, {31, 12, 13}, {32, 18, 13},
+                 {33, 24, 12}, {37, 19, 14}, {71, 10, 10}, {72, 27, 12}, {73, 18, 13}, {74, 14, 14}};
+    for (const auto &c : cases) {
+        vtkNew<vtkUnstructuredGrid> grid;
+        add_cell(grid, c.type, std::vector<point>(static_cast<size_t>(c.points), point{0, 0, 0}));
+        fixture f;
+        assert_int_equal(f.set(grid), INSITU_OK);
+        assert_int_equal(integer_at(f.mesh().mesh.cell_types, 0), c.linear);
+        assert_int_equal(f.report.cells_linear, 1);
+    }
+}
+
+void flat_cells_are_left_out_and_fields_follow(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TRIANGLE, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    add_cell(grid, VTK_TETRA, corner);
+    add_cell(grid, VTK_LINE, {{0, 0, 0}, {1, 0, 0}});
+    add_cell(grid, VTK_PYRAMID, pyramid);
+    vtkNew<vtkDoubleArray> value;
+    value->SetName("c");
+    for (int i = 0; i < 4; i++) value->InsertNextValue(i);
+    grid->GetCellData()->AddArray(value);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_int_equal(f.report.cells, 2);
+    assert_int_equal(f.report.cells_flat, 2);
+    const auto *c = static_cast<const double *>(f.mesh().fields.at("c").values.data);
+    assert_true(c[0] == 1 && c[1] == 3);
+    assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - 1.0 / 6) < rounding);
+    assert_true(std::fabs(cell_volume(f.mesh().mesh, 1) - 1.0 / 3) < rounding);
+    assert_non_null(strstr(f.report.warnings, "2 cells of less than 3 dimensions"));
+}
+
+void add_polyhedron(vtkUnstructuredGrid *grid)
+{
+    if (!grid->GetPoints()) {
+        vtkNew<vtkPoints> p;
+        grid->SetPoints(p);
+    }
+    vtkIdType ids[4];
+    for (size_t i = 0; i < 4; i++) ids[i] = grid->GetPoints()->InsertNextPoint(corner[i].data());
+    const vtkIdType faces[16] = {3, ids[0], ids[1], ids[2], 3, ids[0], ids[1], ids[3],
+                                 3, ids[1], ids[2], ids[3], 3, ids[0], ids[2], ids[3]};
+    grid->InsertNextCell(VTK_POLYHEDRON, 4, ids, 4, faces);
+}
+
+void only_polyhedra_is_an_error_with_their_number(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_polyhedron(grid);
+    add_polyhedron(grid);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_ERROR_MESH);
+    assert_non_null(strstr(insitu_vtk_error(f.adaptor), "none of its 2 cells"));
+    assert_int_equal(f.report.cells_not_drawn, 2);
+    assert_true(f.session.meshes.empty());
+}
+
+void some_polyhedra_are_warned_about(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_polyhedron(grid);
+    add_cell(grid, VTK_TETRA, corner);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_int_equal(f.report.cells, 1);
+    assert_int_equal(integer_at(f.mesh().mesh.connectivity, 0), 4);
+    assert_non_null(strstr(f.report.warnings, "1 cells of type 42"));
+}
+
+void ghost_flags_that_hide_are_handed_over(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    for (int i = 0; i < 4; i++) add_cell(grid, VTK_TETRA, corner);
+    vtkNew<vtkUnsignedCharArray> ghosts;
+    ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
+    for (const unsigned char flag : std::initializer_list<unsigned char>{0, 1, 32, 0}) ghosts->InsertNextValue(flag);
+    grid->GetCellData()->AddArray(ghosts);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_ptr_equal(f.mesh().mesh.ghosts.data, ghosts->GetPointer(0));
+    assert_true(f.mesh().fields.empty());
+
+    ghosts->SetValue(3, vtkDataSetAttributes::EXTERIORCELL);
+    assert_int_equal(f.set(grid), INSITU_OK);
+    const int64_t expected[4] = {0, 1, 1, 0};
+    for (int i = 0; i < 4; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
+    assert_int_equal(f.report.bytes_copied, 4);
+
+    ghosts->Fill(vtkDataSetAttributes::LOWCONNECTIVITYCELL);
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_null(f.mesh().mesh.ghosts.data);
+}
+
+void ghost_flags_follow_split_cells(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TETRA, corner);
+    add_cell(grid, VTK_HEXAGONAL_PRISM, prism(6));
+    vtkNew<vtkUnsignedCharArray> ghosts;
+    ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
+    for (const unsigned char flag : std::initializer_list<unsigned char>{0, 1}) ghosts->InsertNextValue(flag);
+    grid->GetCellData()->AddArray(ghosts);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    const int64_t expected[3] = {0, 1, 1};
+    for (int i = 0; i < 3; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
+}
+
+void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
+{
+    vtkNew<vtkUnstructuredGrid> a, b;
+    add_cell(a, VTK_TETRA, corner);
+    add_cell(b, VTK_HEXAHEDRON, cube);
+    vtkNew<vtkPolyData> flat;
+    vtkNew<vtkMultiBlockDataSet> inner, outer;
+    inner->SetBlock(0, nullptr);
+    inner->SetBlock(1, b);
+    outer->SetBlock(0, a);
+    outer->SetBlock(1, inner);
+    outer->SetBlock(2, flat);
+    fixture f;
+    assert_int_equal(f.set(outer), INSITU_OK);
+    assert_int_equal(f.report.meshes, 2);
+    assert_int_equal(f.session.meshes.size(), 2);
+    assert_int_equal(f.mesh("m/0").mesh.cell_type, INSITU_TET);
+    assert_int_equal(f.mesh("m/2").mesh.cell_type, INSITU_HEX);
+    assert_non_null(strstr(f.report.warnings, "vtkPolyData"));
+
+    outer->SetBlock(0, nullptr);
+    assert_int_equal(f.set(outer), INSITU_OK);
+    assert_int_equal(f.session.meshes.size(), 1);
+    assert_int_equal(f.mesh("m/2").mesh.cell_type, INSITU_HEX);
+
+    vtkNew<vtkPartitionedDataSet> partitions;
+    partitions->SetPartition(0, a);
+    partitions->SetPartition(1, b);
+    vtkNew<vtkPartitionedDataSetCollection> collection;
+    collection->SetPartitionedDataSet(0, partitions);
+    assert_int_equal(f.set(collection), INSITU_OK);
+    assert_int_equal(f.session.meshes.size(), 2);
+    assert_int_equal(f.set(nullptr), INSITU_OK);
+    assert_true(f.session.meshes.empty());
+}
+
+void arrays_outlive_the_data_set(void **)
+{
+    fixture f;
+    {
+        vtkNew<vtkUnstructuredGrid> grid;
+        add_cell(grid, VTK_HEXAHEDRON, cube);
+        vtkNew<vtkFloatArray> value;
+        value->SetName("a name that is long enough to be on the heap of the array");
+        for (int i = 0; i < 8; i++) value->InsertNextValue(static_cast<float>(i));
+        grid->GetPointData()->AddArray(value);
+        assert_int_equal(f.set(grid), INSITU_OK);
+    }
+    for (size_t i = 0; i < 8; i++) assert_true(vertex(f.mesh().mesh, static_cast<int64_t>(i)) == cube[i]);
+    const insitu_field &v = f.mesh().fields.begin()->second;
+    for (int i = 0; i < 8; i++) assert_true(static_cast<const float *>(v.values.data)[i] == static_cast<float>(i));
+}
+
+void one_name_at_points_and_cells_warns(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TETRA, corner);
+    vtkNew<vtkFloatArray> at_points, at_cells, wrong;
+    at_points->SetName("t");
+    at_points->SetNumberOfTuples(4);
+    at_points->Fill(0);
+    at_cells->SetName("t");
+    at_cells->SetNumberOfTuples(1);
+    at_cells->Fill(0);
+    wrong->SetName("wrong");
+    wrong->SetNumberOfTuples(3);
+    wrong->Fill(0);
+    grid->GetPointData()->AddArray(at_points);
+    grid->GetPointData()->AddArray(wrong);
+    grid->GetCellData()->AddArray(at_cells);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_int_equal(f.mesh().fields.size(), 1);
+    assert_int_equal(f.mesh().fields.at("t").centring, INSITU_VERTEX);
+    assert_non_null(strstr(f.report.warnings, "'t' of the cells left out"));
+    assert_non_null(strstr(f.report.warnings, "'wrong' has 3 tuples, expected 4"));
+}
+
+void malformed_data_is_refused(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    vtkNew<vtkPoints> points;
+    grid->SetPoints(points);
+    vtkNew<vtkTypeInt64Array> offsets, connectivity;
+    for (int64_t v : {0, 4, 9}) offsets->InsertNextValue(v);
+    for (int64_t v : {0, 1, 2, 3, 0, 1, 2, 3}) connectivity->InsertNextValue(v);
+    vtkNew<vtkCellArray> cells;
+    cells->SetData(offsets, connectivity);
+    vtkNew<vtkUnsignedCharArray> types;
+    types->InsertNextValue(VTK_TETRA);
+    types->InsertNextValue(VTK_TETRA);
+    grid->SetCells(types, cells);
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_ERROR_MESH);
+    assert_non_null(strstr(insitu_vtk_error(f.adaptor), "cell 1"));
+
+    offsets->SetValue(2, 7);
+    add_cell(grid, VTK_TETRA, corner);
+    assert_int_equal(insitu_vtk_set(f.adaptor, "", grid, nullptr), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(insitu_vtk_set(nullptr, "m", grid, nullptr), INSITU_ERROR_ARGUMENT);
+    vtkNew<vtkPolyData> flat;
+    assert_int_equal(f.set(flat), INSITU_ERROR_ARGUMENT);
+    assert_non_null(strstr(insitu_vtk_error(f.adaptor), "vtkPolyData"));
+}
+
+void empty_grid_is_no_mesh(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    fixture f;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_int_equal(f.report.meshes, 0);
+    assert_true(f.session.meshes.empty());
+}
+
+void errors_of_the_session_are_passed_on(void **)
+{
+    vtkNew<vtkUnstructuredGrid> grid;
+    add_cell(grid, VTK_TETRA, corner);
+    vtkNew<vtkFloatArray> value;
+    value->SetName("t");
+    value->SetNumberOfTuples(4);
+    value->Fill(0);
+    grid->GetPointData()->AddArray(value);
+    fixture f;
+    f.session.next_field_status = INSITU_ERROR_FIELD;
+    assert_int_equal(f.set(grid), INSITU_ERROR_FIELD);
+    assert_string_equal(insitu_vtk_error(f.adaptor), "stub");
+    f.session.next_mesh_status = INSITU_ERROR_MEMORY;
+    assert_int_equal(f.set(grid), INSITU_ERROR_MEMORY);
+    f.session.next_mesh_status = f.session.next_field_status = INSITU_OK;
+    assert_int_equal(f.set(grid), INSITU_OK);
+    assert_string_equal(insitu_vtk_error(f.adaptor), "");
+}
+
+} // namespace
+
+int main()
+{
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(plain_grid_is_borrowed),
+        cmocka_unit_test(one_type_of_32_bits_is_borrowed_without_types),
+        cmocka_unit_test(components_apart_are_borrowed),
+        cmocka_unit_test(other_value_types_are_copied_and_declared),
+        cmocka_unit_test(integer_points_become_doubles),
+        cmocka_unit_test(voxel_becomes_a_right_handed_hexahedron),
+        cmocka_unit_test(prisms_split_into_parts_that_fill_them),
+        cmocka_unit_test(quadratic_cells_are_their_corners_with_a_warning),
+        cmocka_unit_test(every_higher_order_type_has_its_linear_one),
+        cmocka_unit_test(flat_cells_are_left_out_and_fields_follow),
+        cmocka_unit_test(only_polyhedra_is_an_error_with_their_number),
+        cmocka_unit_test(some_polyhedra_are_warned_about),
+        cmocka_unit_test(ghost_flags_that_hide_are_handed_over),
+        cmocka_unit_test(ghost_flags_follow_split_cells),
+        cmocka_unit_test(leaves_of_composites_are_meshes_and_go_when_they_are_gone),
+        cmocka_unit_test(arrays_outlive_the_data_set),
+        cmocka_unit_test(one_name_at_points_and_cells_warns),
+        cmocka_unit_test(malformed_data_is_refused),
+        cmocka_unit_test(empty_grid_is_no_mesh),
+        cmocka_unit_test(errors_of_the_session_are_passed_on),
+    };
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

@@ -1,0 +1,21 @@
+/* A session that only records what it is given, to see what the VTK adaptor hands over. */
+#ifndef TEST_VTK_SESSION_STUB_H
+#define TEST_VTK_SESSION_STUB_H
+
+#include <map>
+#include <string>
+
+#include "insitu/insitu.h"
+
+struct stub_mesh {
+    insitu_mesh mesh;
+    std::map<std::string, insitu_field> fields;
+};
+
+struct insitu_session {
+    std::map<std::string, stub_mesh> meshes;
+    insitu_status next_mesh_status = INSITU_OK;  // what insitu_set_mesh() returns for a mesh
+    insitu_status next_field_status = INSITU_OK; // what insitu_set_field() returns
+};
+
+#endif
