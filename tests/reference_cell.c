@@ -1,0 +1,444 @@
+/* A cell in double.
+ *
+ * Crossings: the line is sheared upright, x - base - slope z, after which it is the z axis, and a triangle is crossed
+ * when the origin of the plane is inside its shadow by the even-odd rule: of the triangle's edges, count those that the
+ * positive u axis crosses. An edge is judged the same from both of its triangles (its end below the axis comes first),
+ * and a closed surface has every edge in two triangles, so the number of crossings is even whatever the rounding.
+ *
+ * Inside: one Newton solver for the isoparametric map of every kind, given its shape functions. A pyramid's map is
+ * singular at its apex, but homogeneous about it: the point is moved along its line from the apex to the height of the
+ * base's centre, solved there, and the weight of the base scaled back. */
+#include "reference_cell.h"
+
+#include "grid.h"
+
+#include <string.h>
+
+typedef struct cell_faces {
+    int count;
+    int vertices[6][4]; /* the fourth is -1 for a triangle */
+} cell_faces;
+
+static const cell_faces *faces_of(int type)
+{
+    static const cell_faces tet = {4, {{0, 1, 2, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {0, 2, 3, -1}}};
+    static const cell_faces hex = {
+        6, {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
+    static const cell_faces wedge = {5, {{0, 1, 2, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}}};
+    static const cell_faces pyramid = {5, {{0, 1, 2, 3}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}}};
+    return type == GRID_TET ? &tet : type == GRID_HEX ? &hex : type == GRID_WEDGE ? &wedge : &pyramid;
+}
+
+static bool comes_before(const double *a, const double *b)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (a[axis] != b[axis]) return a[axis] < b[axis];
+    return false;
+}
+
+/* The face's triangles: one, or two about the diagonal from the smallest vertex. */
+static int split_face(const reference_cell *cell, const int *face, int triangles[2][3])
+{
+    if (face[3] < 0) {
+        memcpy(triangles[0], face, sizeof triangles[0]);
+        return 1;
+    }
+    int least = 0;
+    for (int i = 1; i < 4; i++)
+        if (comes_before(cell->world[face[i]], cell->world[face[least]])) least = i;
+    for (int half = 0; half < 2; half++) {
+        triangles[half][0] = face[least];
+        triangles[half][1] = face[(least + 1 + half) % 4];
+        triangles[half][2] = face[(least + 2 + half) % 4];
+    }
+    return 2;
+}
+
+static void shear(const reference_line *line, const double *p, double out[2])
+{
+    for (int axis = 0; axis < 2; axis++) out[axis] = p[axis] - line->base[axis] - line->slope[axis] * p[2];
+}
+
+static long double cross(const double *a, const double *b)
+{
+    return (long double)a[0] * (long double)b[1] - (long double)a[1] * (long double)b[0];
+}
+
+/* Does the positive u axis cross the edge? */
+static bool axis_crosses(const double *a, const double *b)
+{
+    if ((a[1] >= 0) == (b[1] >= 0)) return false;
+    return a[1] < 0 ? cross(a, b) > 0 : cross(b, a) > 0;
+}
+
+static double edge_length(const double *a, const double *b)
+{
+    return hypot(a[0] - b[0], a[1] - b[1]);
+}
+
+/* Barycentric coordinates of the line in a triangle; thirds where the triangle is seen edge-on. */
+static void triangle_weights(const reference_cell *cell, const reference_line *line, const int *triangle,
+                             double weights[3])
+{
+    double p[3][2];
+    for (int i = 0; i < 3; i++) shear(line, cell->position[triangle[i]], p[i]);
+    const long double e[3] = {cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])};
+    const long double area = e[0] + e[1] + e[2];
+    for (int i = 0; i < 3; i++) weights[i] = area != 0 ? (double)(e[i] / area) : 1.0 / 3;
+}
+
+static bool triangle_crossed(const reference_cell *cell, const reference_line *line, const int *triangle,
+                             reference_crossing *out)
+{
+    double p[3][2], weights[3];
+    for (int i = 0; i < 3; i++) shear(line, cell->position[triangle[i]], p[i]);
+    if ((axis_crosses(p[0], p[1]) + axis_crosses(p[1], p[2]) + axis_crosses(p[2], p[0])) % 2 == 0) return false;
+    triangle_weights(cell, line, triangle, weights);
+    memset(out, 0, sizeof *out);
+    for (int i = 0; i < 3; i++) {
+        out->z += weights[i] * cell->position[triangle[i]][2];
+        for (int axis = 0; axis < 3; axis++) out->world[axis] += weights[i] * cell->world[triangle[i]][axis];
+    }
+    return true;
+}
+
+int reference_crossings(const reference_cell *cell, const reference_line *line,
+                        reference_crossing crossings[REFERENCE_MAX_CROSSINGS])
+{
+    const cell_faces *faces = faces_of(cell->type);
+    int count = 0;
+    for (int face = 0; face < faces->count; face++) {
+        int triangles[2][3];
+        const int halves = split_face(cell, faces->vertices[face], triangles);
+        for (int half = 0; half < halves; half++) {
+            reference_crossing found;
+            if (!triangle_crossed(cell, line, triangles[half], &found)) continue;
+            found.face = face;
+            int at = count++;
+            for (; at > 0 && crossings[at - 1].z > found.z; at--) crossings[at] = crossings[at - 1];
+            crossings[at] = found;
+        }
+    }
+    return count;
+}
+
+/* The axis that the quad's plane is projected along. */
+static int dropped_axis(const double *const p[4])
+{
+    double a[3], b[3];
+    for (int axis = 0; axis < 3; axis++) {
+        a[axis] = p[2][axis] - p[0][axis];
+        b[axis] = p[3][axis] - p[1][axis];
+    }
+    const double n[3] = {fabs(a[1] * b[2] - a[2] * b[1]), fabs(a[2] * b[0] - a[0] * b[2]),
+                         fabs(a[0] * b[1] - a[1] * b[0])};
+    return n[0] >= n[1] && n[0] >= n[2] ? 0 : n[1] >= n[2] ? 1 : 2;
+}
+
+static double beyond_unit(double u)
+{
+    return u < 0 ? -u : u > 1 ? u - 1 : 0;
+}
+
+static double clamp_unit(double u)
+{
+    return u < 0 ? 0 : u > 1 ? 1 : u;
+}
+
+/* Given w, the u of a + u b + w c + u w d = 0 from the better conditioned of its two equations. */
+static double solve_u(const double *a, const double *b, const double *c, const double *d, double w)
+{
+    const double x = b[0] + w * d[0], y = b[1] + w * d[1];
+    const int axis = fabs(x) >= fabs(y) ? 0 : 1;
+    const double below = axis ? y : x;
+    return below != 0 ? -(a[axis] + w * c[axis]) / below : 0.5;
+}
+
+/* The (u, w) nearest to the unit square with a + u b + w c + u w d = 0: eliminating u leaves a quadratic in w. */
+static void solve_bilinear(const double *a, const double *b, const double *c, const double *d, double *u, double *w)
+{
+    const double qa = (double)cross(d, c), qb = (double)(cross(b, c) + cross(d, a)), qc = (double)cross(b, a);
+    const double root = sqrt(fmax(qb * qb - 4 * qa * qc, 0)), h = -0.5 * (qb + (qb < 0 ? -root : root));
+    const double candidates[2] = {h != 0 ? qc / h : 0.5, qa != 0 ? h / qa : (double)INFINITY};
+    double best = (double)INFINITY;
+    *u = *w = 0.5;
+    for (int i = 0; i < 2; i++) {
+        if (!isfinite(candidates[i])) continue;
+        const double v = solve_u(a, b, c, d, candidates[i]);
+        const double beyond = beyond_unit(candidates[i]) + beyond_unit(v);
+        if (beyond >= best) continue;
+        best = beyond;
+        *u = v;
+        *w = candidates[i];
+    }
+}
+
+static double quad_value(const double *const p[4], const double *values, const double point[3])
+{
+    const int drop = dropped_axis(p), axes[2] = {drop == 0 ? 1 : 0, drop == 2 ? 1 : 2};
+    double a[2], b[2], c[2], d[2], u, w;
+    for (int i = 0; i < 2; i++) {
+        const int k = axes[i];
+        a[i] = p[0][k] - point[k];
+        b[i] = p[1][k] - p[0][k];
+        c[i] = p[3][k] - p[0][k];
+        d[i] = p[0][k] - p[1][k] + p[2][k] - p[3][k];
+    }
+    solve_bilinear(a, b, c, d, &u, &w);
+    u = clamp_unit(u);
+    w = clamp_unit(w);
+    return (1 - w) * ((1 - u) * values[0] + u * values[1]) + w * ((1 - u) * values[3] + u * values[2]);
+}
+
+double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
+                            const double *values)
+{
+    const int *face = faces_of(cell->type)->vertices[crossing->face];
+    if (face[3] < 0) {
+        double weights[3], value = 0;
+        triangle_weights(cell, line, face, weights);
+        for (int i = 0; i < 3; i++) value += weights[i] * values[face[i]];
+        return value;
+    }
+    const double *corners[4];
+    double corner_values[4];
+    for (int i = 0; i < 4; i++) {
+        corners[i] = cell->world[face[i]];
+        corner_values[i] = values[face[i]];
+    }
+    return quad_value(corners, corner_values, crossing->world);
+}
+
+static double segment_distance(const double *a, const double *b)
+{
+    const double length = edge_length(a, b);
+    if (length == 0) return hypot(a[0], a[1]);
+    const double along = clamp_unit(-(a[0] * (b[0] - a[0]) + a[1] * (b[1] - a[1])) / (length * length));
+    return hypot(a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1]));
+}
+
+double reference_edge_distance(const reference_cell *cell, const reference_line *line)
+{
+    const cell_faces *faces = faces_of(cell->type);
+    double least = (double)INFINITY;
+    for (int face = 0; face < faces->count; face++) {
+        const int sides = faces->vertices[face][3] < 0 ? 3 : 4;
+        for (int i = 0; i < sides; i++) {
+            double a[2], b[2];
+            shear(line, cell->position[faces->vertices[face][i]], a);
+            shear(line, cell->position[faces->vertices[face][(i + 1) % sides]], b);
+            least = fmin(least, segment_distance(a, b));
+        }
+    }
+    return least;
+}
+
+/* One vertex's weight and its derivatives by the parameters. */
+typedef struct shape_function {
+    double n, d[3];
+} shape_function;
+
+static void tet_shape(const double *p, shape_function *s)
+{
+    s[0] = (shape_function){1 - p[0] - p[1] - p[2], {-1, -1, -1}};
+    s[1] = (shape_function){p[0], {1, 0, 0}};
+    s[2] = (shape_function){p[1], {0, 1, 0}};
+    s[3] = (shape_function){p[2], {0, 0, 1}};
+}
+
+/* Corner i of the unit square, around. */
+static shape_function square_shape(int i, double r, double s)
+{
+    const bool right = i == 1 || i == 2, upper = i >= 2;
+    const double a = right ? r : 1 - r, b = upper ? s : 1 - s;
+    return (shape_function){a * b, {right ? b : -b, upper ? a : -a, 0}};
+}
+
+/* A weight over the base times one over the height. */
+static shape_function times_height(shape_function base, double height, double slope)
+{
+    return (shape_function){base.n * height, {base.d[0] * height, base.d[1] * height, base.n * slope}};
+}
+
+static void hex_shape(const double *p, shape_function *s)
+{
+    for (int i = 0; i < 4; i++) {
+        const shape_function base = square_shape(i, p[0], p[1]);
+        s[i] = times_height(base, 1 - p[2], -1);
+        s[i + 4] = times_height(base, p[2], 1);
+    }
+}
+
+static void wedge_shape(const double *p, shape_function *s)
+{
+    const shape_function base[3] = {{1 - p[0] - p[1], {-1, -1, 0}}, {p[0], {1, 0, 0}}, {p[1], {0, 1, 0}}};
+    for (int i = 0; i < 3; i++) {
+        s[i] = times_height(base[i], 1 - p[2], -1);
+        s[i + 3] = times_height(base[i], p[2], 1);
+    }
+}
+
+static void pyramid_shape(const double *p, shape_function *s)
+{
+    for (int i = 0; i < 4; i++) s[i] = times_height(square_shape(i, p[0], p[1]), 1 - p[2], -1);
+    s[4] = (shape_function){p[2], {0, 0, 1}};
+}
+
+static void cell_shape(int type, const double *p, shape_function *s)
+{
+    switch (type) {
+    case GRID_TET: tet_shape(p, s); break;
+    case GRID_HEX: hex_shape(p, s); break;
+    case GRID_WEDGE: wedge_shape(p, s); break;
+    default: pyramid_shape(p, s); break;
+    }
+}
+
+/* x of the 3 × 3 system whose columns are a, b, c, by Cramer's rule. */
+static bool solve3(const double *a, const double *b, const double *c, const double *right, double x[3])
+{
+    const double *m[3] = {a, b, c};
+    double cofactor[3][3];
+    for (int i = 0; i < 3; i++) {
+        const double *p = m[(i + 1) % 3], *q = m[(i + 2) % 3];
+        for (int k = 0; k < 3; k++) cofactor[i][k] = p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3];
+    }
+    const double determinant = a[0] * cofactor[0][0] + a[1] * cofactor[0][1] + a[2] * cofactor[0][2];
+    if (determinant == 0 || !isfinite(determinant)) return false;
+    for (int i = 0; i < 3; i++)
+        x[i] = (right[0] * cofactor[i][0] + right[1] * cofactor[i][1] + right[2] * cofactor[i][2]) / determinant;
+    return true;
+}
+
+/* The map's columns dP/dparameter and what is left of point - P(parameter). */
+static void map_at(const reference_cell *cell, const double *parameter, const double *point, double columns[3][3],
+                   double left[3])
+{
+    shape_function s[8];
+    cell_shape(cell->type, parameter, s);
+    for (int axis = 0; axis < 3; axis++) {
+        left[axis] = point[axis];
+        for (int k = 0; k < 3; k++) columns[k][axis] = 0;
+        for (int i = 0; i < cell->count; i++) {
+            left[axis] -= s[i].n * cell->position[i][axis];
+            for (int k = 0; k < 3; k++) columns[k][axis] += s[i].d[k] * cell->position[i][axis];
+        }
+    }
+}
+
+static double length3(const double *v)
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+static double cell_extent(const reference_cell *cell)
+{
+    double extent = 0;
+    for (int i = 1; i < cell->count; i++)
+        for (int axis = 0; axis < 3; axis++)
+            extent = fmax(extent, fabs(cell->position[i][axis] - cell->position[0][axis]));
+    return extent;
+}
+
+static bool newton(const reference_cell *cell, const double *point, double parameter[3])
+{
+    const double tolerance = 1e-13 * cell_extent(cell);
+    for (int step = 0; step < 60; step++) {
+        double columns[3][3], left[3], move[3];
+        map_at(cell, parameter, point, columns, left);
+        if (!solve3(columns[0], columns[1], columns[2], left, move)) return false;
+        const double length = length3(move), limit = length > 0.5 ? 0.5 / length : 1;
+        for (int k = 0; k < 3; k++) parameter[k] += limit * move[k];
+        if (length3(left) <= tolerance || length < 1e-14) return isfinite(length);
+    }
+    return false;
+}
+
+static double beyond_cell(const double *parameter)
+{
+    return fmax(beyond_unit(parameter[0]), fmax(beyond_unit(parameter[1]), beyond_unit(parameter[2])));
+}
+
+/* Newton from the cell's centre, and from elsewhere where that fails or leads far out: of several solutions the one
+ * nearest to the cell. */
+static bool invert(const reference_cell *cell, const double *point, double parameter[3])
+{
+    static const double starts[9][3] = {{0.4, 0.4, 0.5},  {0.1, 0.1, 0.1},  {0.9, 0.05, 0.1},
+                                        {0.05, 0.9, 0.1}, {0.9, 0.9, 0.1},  {0.1, 0.1, 0.9},
+                                        {0.9, 0.05, 0.9}, {0.05, 0.9, 0.9}, {0.9, 0.9, 0.9}};
+    double best = (double)INFINITY;
+    for (int i = 0; i < 9 && best > 0.1; i++) {
+        double p[3];
+        memcpy(p, starts[i], sizeof p);
+        if (!newton(cell, point, p) || beyond_cell(p) >= best) continue;
+        best = beyond_cell(p);
+        memcpy(parameter, p, sizeof p);
+    }
+    return isfinite(best);
+}
+
+/* Move point along its line from the apex to the base centre's height; scale is how much farther that is. */
+static bool project_from_apex(const reference_cell *cell, const double *point, double moved[3], double *scale)
+{
+    const double *apex = cell->position[4];
+    double axis[3], from[3], height = 0, here = 0;
+    for (int k = 0; k < 3; k++) {
+        axis[k] = -apex[k];
+        for (int i = 0; i < 4; i++) axis[k] += cell->position[i][k] / 4;
+        from[k] = point[k] - apex[k];
+        height += axis[k] * axis[k];
+        here += axis[k] * from[k];
+    }
+    if (here <= 1e-14 * height) return false;
+    *scale = height / here;
+    for (int k = 0; k < 3; k++) moved[k] = apex[k] + *scale * from[k];
+    return true;
+}
+
+static void gradient_at(const reference_cell *cell, const double *parameter, const double *values, double gradient[3])
+{
+    shape_function s[8];
+    double columns[3][3], rows[3][3], unused[3], slope[3] = {0, 0, 0};
+    cell_shape(cell->type, parameter, s);
+    map_at(cell, parameter, parameter, columns, unused);
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < cell->count; i++) slope[k] += s[i].d[k] * values[i];
+    for (int k = 0; k < 3; k++)
+        for (int axis = 0; axis < 3; axis++) rows[axis][k] = columns[k][axis];
+    if (!solve3(rows[0], rows[1], rows[2], slope, gradient)) gradient[0] = gradient[1] = gradient[2] = 0;
+}
+
+static double value_at(const reference_cell *cell, const double *parameter, const double *values)
+{
+    shape_function s[8];
+    double value = 0;
+    cell_shape(cell->type, parameter, s);
+    for (int i = 0; i < cell->count; i++) value += s[i].n * values[i];
+    return value;
+}
+
+static bool interpolate_pyramid(const reference_cell *cell, const double *point, const double *values, double *value,
+                                double *gradient)
+{
+    double moved[3], parameter[3], scale;
+    *value = values[4];
+    if (!project_from_apex(cell, point, moved, &scale)) return true;
+    if (!invert(cell, moved, parameter)) return false;
+    if (gradient) gradient_at(cell, parameter, values, gradient);
+    parameter[2] = 1 - (1 - parameter[2]) / scale;
+    *value = value_at(cell, parameter, values);
+    return true;
+}
+
+bool reference_interpolate(const reference_cell *cell, const double point[3], const double *values, double *value,
+                           double gradient[3])
+{
+    double parameter[3];
+    *value = 0;
+    if (gradient) gradient[0] = gradient[1] = gradient[2] = 0;
+    if (cell->type == GRID_PYRAMID) return interpolate_pyramid(cell, point, values, value, gradient);
+    if (!invert(cell, point, parameter)) return false;
+    if (gradient) gradient_at(cell, parameter, values, gradient);
+    *value = value_at(cell, parameter, values);
+    return true;
+}

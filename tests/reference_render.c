@@ -1,0 +1,457 @@
+/* The brute-force renderer.
+ *
+ * Vertices are taken to camera coordinates in double once. Then, for a ray, every cell that is not a ghost and whose
+ * sheared box holds the ray gives its intervals [z_in, z_out); each interval gives hits of the surface layers and the
+ * samples of the volume layers it owns. All are gathered, sorted by depth and blended. Only margins are kept of cells
+ * that the ray misses. */
+#include "reference_render.h"
+
+#include "reference_cell.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Something on the ray: a hit, or a sample whose colour is its own. */
+typedef struct event {
+    double depth;
+    bool is_sample;
+    int order; /* surface id or volume layer */
+    double transmittance;
+    reference_hit hit; /* of a sample: colour alone */
+} event;
+
+struct reference_scene {
+    const render_job *job;
+    double **positions; /* of each part's vertices, × 3, camera coordinates */
+};
+
+/* One ray under way. */
+typedef struct trace {
+    const reference_scene *scene;
+    reference_line line;
+    double direction[3]; /* world; length 1 along forward */
+    double length;       /* of direction where distances are along the ray, else 1 */
+    double jitter;
+    int64_t count, capacity;
+    event *events;
+    reference_ray *out;
+} trace;
+
+/* A cell on a ray with its part. */
+typedef struct placed_cell {
+    const render_part *part;
+    int part_index;
+    int64_t index;
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    reference_cell cell;
+    double size;
+} placed_cell;
+
+static void *reserve(void *block, size_t bytes)
+{
+    void *p = realloc(block, bytes ? bytes : 1);
+    if (!p) {
+        fprintf(stderr, "reference: out of memory\n");
+        exit(1);
+    }
+    return p;
+}
+
+static double dot(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static bool normalize(double *v)
+{
+    const double length = sqrt(dot(v, v));
+    for (int axis = 0; axis < 3 && length > 0; axis++) v[axis] /= length;
+    return length > 0;
+}
+
+reference_scene *reference_create(const render_job *job)
+{
+    const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
+    reference_scene *scene = reserve(NULL, sizeof *scene);
+    scene->job = job;
+    scene->positions = reserve(NULL, sizeof *scene->positions * (size_t)job->part_count);
+    for (int i = 0; i < job->part_count; i++) {
+        const grid *g = job->parts[i].cells;
+        double *p = scene->positions[i] = reserve(NULL, 3 * sizeof *p * (size_t)g->vertex_count);
+        for (int64_t v = 0; v < g->vertex_count; v++) {
+            double world[3];
+            grid_vertex(g, v, world);
+            for (int axis = 0; axis < 3; axis++) world[axis] -= job->camera.eye[axis];
+            for (int axis = 0; axis < 3; axis++) p[3 * v + axis] = dot(axes[axis], world);
+        }
+    }
+    return scene;
+}
+
+void reference_free(reference_scene *scene)
+{
+    if (!scene) return;
+    for (int i = 0; i < scene->job->part_count; i++) free(scene->positions[i]);
+    free(scene->positions);
+    free(scene);
+}
+
+static event *add_event(trace *t)
+{
+    if (t->count == t->capacity) {
+        t->capacity = 2 * t->capacity + 64;
+        t->events = reserve(t->events, (size_t)t->capacity * sizeof *t->events);
+    }
+    event *e = &t->events[t->count++];
+    memset(e, 0, sizeof *e);
+    return e;
+}
+
+static void lessen(double *margin, double by)
+{
+    *margin = fmin(*margin, by);
+}
+
+/* ---- transfer ---- */
+
+static void table_colour(const render_transfer *transfer, double value, double colour[3])
+{
+    const double range = transfer->high - transfer->low;
+    double x = range > 0 ? (value - transfer->low) / range : 0;
+    x = (x < 0 ? 0 : x > 1 ? 1 : x) * (transfer->colour_count - 1);
+    const int i = x >= transfer->colour_count - 1 ? transfer->colour_count - 2 : (int)x;
+    for (int c = 0; c < 3; c++) {
+        const double a = (double)transfer->colours[3 * i + c], b = (double)transfer->colours[3 * i + 3 + c];
+        colour[c] = a + (x - i) * (b - a);
+    }
+}
+
+static double table_opacity(const render_transfer *transfer, double value)
+{
+    const double *at = transfer->opacity_values;
+    const float *opacity = transfer->opacities;
+    const int last = transfer->opacity_count - 1;
+    if (value < at[0]) return (double)opacity[0];
+    for (int i = 0; i < last; i++)
+        if (value < at[i + 1])
+            return (double)opacity[i] +
+                   (value - at[i]) / (at[i + 1] - at[i]) * ((double)opacity[i + 1] - (double)opacity[i]);
+    return (double)opacity[last];
+}
+
+/* ---- surfaces ---- */
+
+static void shade(const trace *t, const render_material *m, const double base[3], const double normal[3],
+                  double colour[3])
+{
+    double view[3] = {-t->direction[0], -t->direction[1], -t->direction[2]};
+    double diffuse[3], specular[3] = {0, 0, 0};
+    normalize(view);
+    for (int c = 0; c < 3; c++) diffuse[c] = (double)m->ambient;
+    for (int i = 0; i < t->scene->job->light_count; i++) {
+        const render_light *light = &t->scene->job->lights[i];
+        double half[3];
+        for (int axis = 0; axis < 3; axis++) half[axis] = light->direction[axis] + view[axis];
+        normalize(half);
+        const double facing = fmax(0, dot(normal, light->direction));
+        const double shine = pow(fmax(0, dot(normal, half)), (double)m->shininess);
+        for (int c = 0; c < 3; c++) {
+            diffuse[c] += (double)light->colour[c] * (double)m->diffuse * facing;
+            specular[c] += (double)light->colour[c] * (double)m->specular * shine;
+        }
+    }
+    for (int c = 0; c < 3; c++) colour[c] = base[c] * diffuse[c] + specular[c];
+}
+
+static void line_at(const trace *t, double z, double point[3])
+{
+    for (int axis = 0; axis < 2; axis++) point[axis] = t->line.base[axis] + t->line.slope[axis] * z;
+    point[2] = z;
+}
+
+static double value_along(trace *t, const placed_cell *c, const double *values, double z)
+{
+    double point[3], value;
+    line_at(t, z, point);
+    if (!reference_interpolate(&c->cell, point, values, &value, NULL)) t->out->map_failed = true;
+    return value;
+}
+
+/* The root between the interval's ends, whose sides of iso are given. */
+static double bisect(trace *t, const placed_cell *c, const double *values, double iso, double z_in, double z_out,
+                     bool side_in)
+{
+    double low = z_in, high = z_out;
+    for (int step = 0; step < 60; step++) {
+        const double middle = 0.5 * (low + high);
+        if (middle <= low || middle >= high) break;
+        if ((value_along(t, c, values, middle) >= iso) == side_in)
+            low = middle;
+        else
+            high = middle;
+    }
+    return 0.5 * (low + high);
+}
+
+/* More sign changes than the one that the ends promise? */
+static bool is_ambiguous(trace *t, const placed_cell *c, const double *values, double iso, double z_in, double z_out,
+                         bool side_in)
+{
+    enum { PIECES = 24 };
+    bool side = side_in;
+    int changes = 0;
+    for (int i = 0; i <= PIECES; i++) {
+        const double z = z_in + (z_out - z_in) * ((1e-9 + i) / (PIECES + 2e-9));
+        const bool now = value_along(t, c, values, z) >= iso;
+        if (i == 0 && now != side_in) return true;
+        changes += now != side;
+        side = now;
+    }
+    return changes != 1;
+}
+
+static void range_of(const double *values, int count, double *low, double *high)
+{
+    *low = *high = values[0];
+    for (int i = 1; i < count; i++) {
+        *low = fmin(*low, values[i]);
+        *high = fmax(*high, values[i]);
+    }
+}
+
+static void to_world(const render_camera *camera, const double v[3], double world[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        world[axis] = camera->right[axis] * v[0] + camera->up[axis] * v[1] + camera->forward[axis] * v[2];
+}
+
+static void surface_colour(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index,
+                           const double point[3], double colour[3])
+{
+    for (int k = 0; k < 3; k++) colour[k] = layer->colour_map ? 0 : (double)layer->colours[3 * value_index + k];
+    if (!layer->colour_map) return;
+    double values[8], value;
+    grid_cell_values(&layer->colour_field.fields[c->part_index], c->index, c->vertices, c->cell.count, values);
+    if (!reference_interpolate(&c->cell, point, values, &value, NULL)) t->out->map_failed = true;
+    table_colour(layer->colour_map, value, colour);
+}
+
+static void add_hit(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, int surface,
+                    const double *values, double depth)
+{
+    double point[3], value, gradient[3], colour[3], low, high;
+    event *e = add_event(t);
+    e->depth = e->hit.depth = depth;
+    e->order = e->hit.surface = surface;
+    e->hit.opacity = (double)layer->opacity;
+    e->transmittance = 1 - e->hit.opacity;
+    line_at(t, depth, point);
+    reference_interpolate(&c->cell, point, values, &value, gradient);
+    to_world(&t->scene->job->camera, gradient, e->hit.normal);
+    const double steepness = sqrt(dot(gradient, gradient));
+    normalize(e->hit.normal);
+    const double along = dot(e->hit.normal, t->direction) / sqrt(dot(t->direction, t->direction));
+    for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
+    range_of(values, c->cell.count, &low, &high);
+    e->hit.conditioning = 1 / fabs(along);
+    e->hit.softness = (high - low) / (steepness * c->size) / fabs(along);
+    surface_colour(t, c, layer, value_index, point, colour);
+    shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
+}
+
+static void cross_surface(trace *t, const placed_cell *c, const render_surface_layer *layer, int first_surface,
+                          const double *values, const reference_crossing ends[2])
+{
+    double face[2], low, high;
+    range_of(values, c->cell.count, &low, &high);
+    for (int i = 0; i < 2; i++) face[i] = reference_face_value(&c->cell, &t->line, &ends[i], values);
+    for (int i = 0; i < layer->value_count; i++) {
+        const double iso = layer->values[i];
+        for (int end = 0; end < 2 && high > low; end++)
+            lessen(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
+        const bool side = face[0] >= iso;
+        if (side == (face[1] >= iso) || ends[1].z < 0) continue;
+        const double z = bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
+        if (is_ambiguous(t, c, values, iso, ends[0].z, ends[1].z, side)) t->out->ambiguous = true;
+        lessen(&t->out->eye_margin, fabs(z) / c->size);
+        if (z >= 0) add_hit(t, c, layer, i, first_surface + i, values, z);
+    }
+}
+
+static void cross_surfaces(trace *t, const placed_cell *c, const reference_crossing ends[2])
+{
+    const render_job *job = t->scene->job;
+    for (int layer = 0, first = 0; layer < job->surface_count; first += job->surfaces[layer++].value_count) {
+        const render_surface_layer *s = &job->surfaces[layer];
+        double values[8];
+        if (!s->field.ranges[c->part_index].low) continue;
+        if (grid_cell_values(&s->field.fields[c->part_index], c->index, c->vertices, c->cell.count, values))
+            cross_surface(t, c, s, first, values, ends);
+    }
+}
+
+/* ---- volumes ---- */
+
+static void add_sample(trace *t, const render_transfer *transfer, int layer, double depth, double value)
+{
+    const double opacity = table_opacity(transfer, value);
+    double colour[3];
+    t->out->samples++;
+    if (opacity <= 0) return;
+    event *e = add_event(t);
+    e->depth = depth;
+    e->is_sample = true;
+    e->order = layer;
+    e->transmittance = pow(1 - opacity, t->scene->job->step / transfer->unit_distance);
+    table_colour(transfer, value, colour);
+    for (int c = 0; c < 3; c++) e->hit.colour[c] = colour[c];
+}
+
+static void cross_volume(trace *t, const placed_cell *c, int layer, const double *values,
+                         const reference_crossing ends[2])
+{
+    const double spacing = t->scene->job->step / t->length;
+    int64_t k = (int64_t)floor(ends[0].z / spacing - t->jitter) - 1;
+    for (k = k < 0 ? 0 : k;; k++) {
+        const double z = ((double)k + t->jitter) * spacing;
+        lessen(&t->out->sample_margin, fmin(fabs(z - ends[0].z), fabs(z - ends[1].z)) / c->size);
+        if (z >= ends[1].z) break;
+        if (z < ends[0].z) continue;
+        add_sample(t, t->scene->job->volumes[layer].transfer, layer, z, value_along(t, c, values, z));
+    }
+}
+
+static void cross_volumes(trace *t, const placed_cell *c, const reference_crossing ends[2])
+{
+    const render_job *job = t->scene->job;
+    for (int layer = 0; layer < job->volume_count; layer++) {
+        const render_field *field = &job->volumes[layer].field;
+        double values[8];
+        if (!field->ranges[c->part_index].low) continue;
+        if (grid_cell_values(&field->fields[c->part_index], c->index, c->vertices, c->cell.count, values))
+            cross_volume(t, c, layer, values, ends);
+    }
+}
+
+/* ---- the ray ---- */
+
+static void place_cell(const reference_scene *scene, int part, int64_t index, placed_cell *c)
+{
+    double low[3], high[3], volume = 1, longest = 0;
+    c->part = &scene->job->parts[part];
+    c->part_index = part;
+    c->index = index;
+    c->cell.type = grid_cell_type(c->part->cells, index);
+    c->cell.count = grid_cell_vertices(c->part->cells, index, c->vertices);
+    for (int i = 0; i < c->cell.count; i++) {
+        grid_vertex(c->part->cells, c->vertices[i], c->cell.world[i]);
+        memcpy(c->cell.position[i], scene->positions[part] + 3 * c->vertices[i], sizeof c->cell.position[i]);
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        low[axis] = high[axis] = c->cell.world[0][axis];
+        for (int i = 1; i < c->cell.count; i++) {
+            low[axis] = fmin(low[axis], c->cell.world[i][axis]);
+            high[axis] = fmax(high[axis], c->cell.world[i][axis]);
+        }
+        longest = fmax(longest, high[axis] - low[axis]);
+    }
+    for (int axis = 0; axis < 3; axis++) volume *= fmax(high[axis] - low[axis], 1e-3 * longest);
+    c->size = longest > 0 ? cbrt(volume) : 1;
+}
+
+/* Does the ray pass the sheared box of the cell, widened by a little? */
+static bool is_near(const trace *t, int part, int64_t index)
+{
+    const grid *g = t->scene->job->parts[part].cells;
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(g, index, vertices);
+    for (int axis = 0; axis < 2; axis++) {
+        double low = (double)INFINITY, high = -(double)INFINITY;
+        for (int i = 0; i < count; i++) {
+            const double *p = t->scene->positions[part] + 3 * vertices[i];
+            const double u = p[axis] - t->line.base[axis] - t->line.slope[axis] * p[2];
+            low = fmin(low, u);
+            high = fmax(high, u);
+        }
+        const double slack = 1e-3 * (high - low) + 1e-6;
+        if (low > slack || high < -slack) return false;
+    }
+    return true;
+}
+
+static void cross_cell(trace *t, int part, int64_t index)
+{
+    placed_cell c;
+    reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
+    if (grid_is_ghost(t->scene->job->parts[part].cells, index) || !is_near(t, part, index)) return;
+    place_cell(t->scene, part, index, &c);
+    lessen(&t->out->edge_margin, reference_edge_distance(&c.cell, &t->line) / c.size);
+    const int count = reference_crossings(&c.cell, &t->line, crossings);
+    for (int i = 0; i + 1 < count; i += 2) {
+        cross_surfaces(t, &c, crossings + i);
+        cross_volumes(t, &c, crossings + i);
+    }
+}
+
+static int compare_events(const void *left, const void *right)
+{
+    const event *a = left, *b = right;
+    if (a->depth != b->depth) return a->depth < b->depth ? -1 : 1;
+    if (a->is_sample != b->is_sample) return a->is_sample ? 1 : -1;
+    return a->order - b->order;
+}
+
+static void blend(double rgb[3], double *transmittance, const event *e)
+{
+    for (int c = 0; c < 3; c++) rgb[c] += *transmittance * (1 - e->transmittance) * e->hit.colour[c];
+    *transmittance *= e->transmittance;
+}
+
+static void blend_events(trace *t, const float background[4])
+{
+    reference_ray *out = t->out;
+    double transmittance = 1;
+    out->volume_transmittance = 1;
+    if (t->count) qsort(t->events, (size_t)t->count, sizeof *t->events, compare_events);
+    for (int64_t i = 0; i < t->count; i++) {
+        const event *e = &t->events[i];
+        blend(out->rgba, &transmittance, e);
+        if (e->is_sample) {
+            blend(out->volume_rgb, &out->volume_transmittance, e);
+            continue;
+        }
+        if (out->hit_count < REFERENCE_MAX_HITS) out->hits[out->hit_count++] = e->hit;
+        if (e->hit.opacity >= 1) break;
+    }
+    for (int c = 0; c < 3; c++) out->rgba[c] += transmittance * (double)background[c];
+    out->rgba[3] = 1 - transmittance * (1 - (double)background[3]);
+}
+
+static void begin_ray(trace *t, const reference_scene *scene, int x, int y)
+{
+    const render_camera *camera = &scene->job->camera;
+    const double *axes[2] = {camera->right, camera->up};
+    double base[3], from_eye[3];
+    render_camera_ray(camera, x, y, base, t->direction);
+    for (int axis = 0; axis < 3; axis++) from_eye[axis] = base[axis] - camera->eye[axis];
+    for (int axis = 0; axis < 2; axis++) {
+        t->line.base[axis] = dot(axes[axis], from_eye);
+        t->line.slope[axis] = dot(axes[axis], t->direction);
+    }
+    t->length = camera->is_orthographic ? 1 : sqrt(dot(t->direction, t->direction));
+    const uint32_t pixel = (uint32_t)(y * camera->width + x);
+    t->jitter = scene->job->jitter ? render_jitter(pixel, (uint32_t)scene->job->frame) : 0.5;
+}
+
+void reference_trace(const reference_scene *scene, int x, int y, const float background[4], reference_ray *out)
+{
+    trace t = {.scene = scene, .out = out};
+    memset(out, 0, sizeof *out);
+    out->edge_margin = out->value_margin = out->sample_margin = out->eye_margin = (double)INFINITY;
+    begin_ray(&t, scene, x, y);
+    for (int part = 0; part < scene->job->part_count; part++)
+        for (int64_t cell = 0; cell < scene->job->parts[part].cells->cell_count; cell++) cross_cell(&t, part, cell);
+    blend_events(&t, background);
+    free(t.events);
+}

@@ -1,0 +1,47 @@
+/* The brute-force renderer: every ray against every cell, in double, no tree. It draws a render_job as the kernels do
+ * and says of each ray how near it came to a decision that rounding could turn. */
+#ifndef REFERENCE_RENDER_H
+#define REFERENCE_RENDER_H
+
+#include "render.h"
+
+typedef struct reference_hit {
+    double depth;
+    int surface;      /* counted over the values of all layers */
+    double normal[3]; /* world, towards the eye */
+    double colour[3]; /* shaded, not premultiplied */
+    double opacity;
+    double conditioning; /* |gradient| / |its component along the ray|: how an error of position becomes one of depth */
+    double softness;     /* (range of the cell's values) / (|gradient| × cell size) × conditioning: the same of the
+                            field's rounding, in cell sizes per range */
+} reference_hit;
+
+enum { REFERENCE_MAX_HITS = 64 };
+
+typedef struct reference_ray {
+    int hit_count;                          /* up to the first opaque one */
+    reference_hit hits[REFERENCE_MAX_HITS]; /* by depth */
+    double volume_rgb[3];                   /* all samples in front of the first opaque hit, surfaces left out */
+    double volume_transmittance;
+    int64_t samples;
+    double rgba[4]; /* the whole over the background */
+
+    /* How near to another answer, in cell sizes (cube root of the cell's box) or of the range of the cell's values: */
+    double edge_margin;   /* between the ray and an edge of a cell */
+    double value_margin;  /* between a face's value and an isovalue */
+    double sample_margin; /* between a sample and the cell interval's ends */
+    double eye_margin;    /* between a hit and the eye's plane */
+    bool ambiguous;       /* a cell met more than one root, or its interpolant at a face has the other side of the
+                             isovalue than the face: the first hit is then a matter of the root finder */
+    bool map_failed;      /* an inverse map had no solution */
+} reference_ray;
+
+typedef struct reference_scene reference_scene;
+
+/* job is borrowed. */
+reference_scene *reference_create(const render_job *job);
+void reference_free(reference_scene *scene);
+
+void reference_trace(const reference_scene *scene, int x, int y, const float background[4], reference_ray *out);
+
+#endif
