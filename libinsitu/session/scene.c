@@ -1,1 +1,197 @@
+/* Reading a scene: the document is checked against the schema, libcyaml loads it into the file's own structs, and those
+ * become a struct scene, in which every default is filled in and every colour is linear.
+ *
+ * libcyaml and strtod() read numbers by the locale. A simulation may run under one with a decimal comma; the thread is
+ * put into the C locale while a scene is read, and back. */
 #include "scene.h"
+
+#include <locale.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "colour_map.h"
+#include "memory.h"
+#include "scene_convert.h"
+
+insitu_status scene_no_memory(const scene_document *d)
+{
+    return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", d->file_name);
+}
+
+/* ---- libcyaml ---- */
+
+static void *cyaml_memory(void *context, void *block, size_t size)
+{
+    (void)context;
+    if (size) return base_realloc(block, size);
+    base_free(block);
+    return NULL;
+}
+
+/* The first line libcyaml logs says what it does not like; a backtrace follows. */
+static void keep_first_line(cyaml_log_t level, void *context, const char *format, va_list arguments)
+{
+    base_error *first = context;
+    (void)level;
+    if (first->message[0] == '\0') vsnprintf(first->message, sizeof first->message, format, arguments);
+}
+
+static cyaml_config_t reader_settings(base_error *log)
+{
+    return (cyaml_config_t){.log_fn = keep_first_line,
+                            .log_ctx = log,
+                            .mem_fn = cyaml_memory,
+                            .log_level = CYAML_LOG_ERROR,
+                            .flags = CYAML_CFG_NO_ALIAS};
+}
+
+/* What the document check lets pass, libcyaml reads; were the two ever to disagree, its own words are passed on. */
+static insitu_status load_file(const scene_document *d, const char *text, size_t size, scene_file **file)
+{
+    base_error log = {.status = INSITU_OK};
+    const cyaml_config_t settings = reader_settings(&log);
+    const cyaml_err_t result =
+        cyaml_load_data((const uint8_t *)text, size, &settings, &scene_top_value, (cyaml_data_t **)file, NULL);
+    if (result == CYAML_OK) return INSITU_OK;
+    if (result == CYAML_ERR_OOM) return scene_no_memory(d);
+    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:1: %s (%.400s)", d->file_name, cyaml_strerror(result),
+                     log.message);
+}
+
+static void free_file(scene_file *file)
+{
+    const cyaml_config_t settings = reader_settings(&(base_error){.status = INSITU_OK});
+    cyaml_free(&settings, &scene_top_value, file, 0);
+}
+
+/* ---- images ---- */
+
+static insitu_status convert_name(const scene_document *d, const char *path, const scene *s, const char *name,
+                                  scene_image *out)
+{
+    if (strchr(name, '/')) return scene_bad(d, path, "name", "\"%s\" holds a /, expected a name without", name);
+    for (const scene_image *other = s->images; other < out; other++) {
+        if (strcmp(other->name, name) == 0) {
+            return scene_bad(d, path, "name", "\"%s\" is the name of the image in line %d too, expected another", name,
+                             other->line);
+        }
+    }
+    out->name = base_strdup(name);
+    return out->name ? INSITU_OK : scene_no_memory(d);
+}
+
+static void convert_background(const scene_file_image *in, float background[4])
+{
+    static const double standard[4] = {0.08, 0.09, 0.11, 1};
+    const double *given = in->background ? in->background : standard;
+    const float alpha = in->background && in->background_count < 4 ? 1 : (float)given[3];
+    for (int i = 0; i < 3; i++) background[i] = alpha * colour_linear_from_srgb((float)given[i]);
+    background[3] = alpha;
+}
+
+static insitu_status convert_sampling(const scene_document *d, const char *path, const scene_file_sampling *in,
+                                      scene_image *out)
+{
+    static const scene_file_sampling none;
+    if (!in) in = &none;
+    out->step = in->step ? *in->step : 0;
+    out->step_cells = in->step_cells ? *in->step_cells : 0.5;
+    out->sample_group = in->group ? *in->group : 16;
+    out->jitter = in->jitter ? *in->jitter : true;
+    out->frames = in->frames ? *in->frames : 1;
+    if (!in->step || !in->step_cells) return INSITU_OK;
+    return scene_bad(d, path, "sampling.step", "given beside step_cells, expected one of the two");
+}
+
+static insitu_status convert_image(const scene_document *d, const char *path, const scene_file_image *in,
+                                   const scene *s, scene_image *out)
+{
+    char camera_path[SCENE_PATH_SIZE];
+    snprintf(camera_path, sizeof camera_path, "%s.camera", path);
+    out->line = scene_document_line(d, path);
+    out->width = in->size ? in->size[0] : 1280;
+    out->height = in->size ? in->size[1] : 720;
+    out->every = in->every ? *in->every : 1;
+    convert_background(in, out->background);
+    insitu_status status = convert_name(d, path, s, in->name, out);
+    if (status == INSITU_OK) status = scene_convert_camera(d, camera_path, in->camera, &out->camera);
+    if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
+    if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
+    if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
+    if (status == INSITU_OK) status = scene_convert_outputs(d, path, in, out);
+    return status;
+}
+
+static insitu_status convert_file(const scene_document *d, const scene_file *in, scene *out)
+{
+    out->threads = in->threads ? *in->threads : 0;
+    out->images = base_calloc((size_t)in->images_count, sizeof *out->images);
+    if (!out->images) return scene_no_memory(d);
+    out->image_count = in->images_count;
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < in->images_count && status == INSITU_OK; i++) {
+        char path[32];
+        snprintf(path, sizeof path, "images[%d]", i);
+        status = convert_image(d, path, &in->images[i], out, &out->images[i]);
+    }
+    return status == INSITU_OK ? scene_check_outputs(d, out) : status;
+}
+
+/* ---- the whole ---- */
+
+static insitu_status parse_in_c_locale(const char *text, size_t size, const char *file_name, scene *out,
+                                       base_error *error)
+{
+    scene_document document;
+    scene_file *file = NULL;
+    insitu_status status = scene_document_open(&document, text, size, file_name, error);
+    if (status != INSITU_OK) return status;
+    status = scene_document_check(&document);
+    if (status == INSITU_OK) status = load_file(&document, text, size, &file);
+    if (status == INSITU_OK) status = convert_file(&document, file, out);
+    free_file(file);
+    scene_document_close(&document);
+    return status;
+}
+
+insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene *out, base_error *error)
+{
+    base_error unheard = {.status = INSITU_OK};
+    *out = (scene){0};
+    const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
+    if (!c_numbers) return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
+    const locale_t before = uselocale(c_numbers);
+    const insitu_status status = parse_in_c_locale(text, size, file_name, out, error ? error : &unheard);
+    uselocale(before);
+    freelocale(c_numbers);
+    if (status != INSITU_OK) scene_free(out);
+    return status;
+}
+
+static void free_image(scene_image *image)
+{
+    for (int i = 0; i < image->isosurface_count; i++) {
+        scene_isosurface *surface = &image->isosurfaces[i];
+        base_free(surface->field.name);
+        base_free(surface->colour_by.name);
+        base_free(surface->values);
+        base_free(surface->colours);
+    }
+    for (int i = 0; i < image->volume_count; i++) {
+        base_free(image->volumes[i].field.name);
+        base_free(image->volumes[i].opacity);
+    }
+    for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);
+    base_free(image->name);
+    base_free(image->isosurfaces);
+    base_free(image->volumes);
+    base_free(image->lights);
+    base_free(image->outputs);
+}
+
+void scene_free(scene *s)
+{
+    for (int i = 0; i < s->image_count; i++) free_image(&s->images[i]);
+    base_free(s->images);
+    *s = (scene){0};
+}

@@ -1,0 +1,355 @@
+/* A scene file is read three times over, it being small: as events, to refuse what could hurt (depth, and aliases,
+ * which can make a few lines stand for billions of nodes) before anything grows; as a tree, which is held against the
+ * schema, because only here are a value, its key and its line together for a message a person can use; and then by
+ * libcyaml into structs (scene.c), which by then has nothing left to refuse. */
+#include "scene_document.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { path_size = 256, quote_size = 48 };
+
+static insitu_status bad_line(const scene_document *d, size_t line, const char *what)
+{
+    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%zu: %s", d->file_name, line, what);
+}
+
+/* ---- text to tree ---- */
+
+static size_t lines_before(const char *text, size_t size, size_t offset)
+{
+    size_t lines = 0;
+    for (size_t i = 0; i < size && i < offset; i++) lines += text[i] == '\n';
+    return lines;
+}
+
+static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text, size_t size)
+{
+    if (parser->error == YAML_MEMORY_ERROR) {
+        return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
+    }
+    const bool is_encoding = parser->error == YAML_READER_ERROR; /* such errors know an offset, but no line */
+    const size_t line = is_encoding ? lines_before(text, size, parser->problem_offset) : parser->problem_mark.line;
+    char what[300];
+    snprintf(what, sizeof what, "not valid YAML: %.100s%s%.100s", parser->problem ? parser->problem : "unreadable",
+             parser->context ? " " : "", parser->context ? parser->context : "");
+    return bad_line(d, line + 1, what);
+}
+
+static const char *event_fault(const yaml_event_t *event, int *depth, int *documents)
+{
+    const yaml_char_t *anchor = NULL, *tag = NULL;
+    switch (event->type) {
+    case YAML_ALIAS_EVENT: return "an alias (*) is not allowed in a scene, expected the value itself";
+    case YAML_DOCUMENT_START_EVENT:
+        return ++*documents > 1 ? "a second document begins (---), expected one a file" : NULL;
+    case YAML_SCALAR_EVENT: anchor = event->data.scalar.anchor, tag = event->data.scalar.tag; break;
+    case YAML_SEQUENCE_START_EVENT:
+        anchor = event->data.sequence_start.anchor, tag = event->data.sequence_start.tag, ++*depth;
+        break;
+    case YAML_MAPPING_START_EVENT:
+        anchor = event->data.mapping_start.anchor, tag = event->data.mapping_start.tag, ++*depth;
+        break;
+    case YAML_SEQUENCE_END_EVENT:
+    case YAML_MAPPING_END_EVENT: --*depth; break;
+    default: break;
+    }
+    if (anchor) return "an anchor (&) is not allowed in a scene, expected the value alone";
+    if (tag) return "a tag (!) is not allowed in a scene, expected the value alone";
+    return *depth > SCENE_MAX_DEPTH ? "lists and mappings stand in each other too deep, expected at most 16 levels"
+                                    : NULL;
+}
+
+static insitu_status scan_events(const scene_document *d, const char *text, size_t size)
+{
+    yaml_parser_t parser;
+    if (!yaml_parser_initialize(&parser)) {
+        return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
+    }
+    yaml_parser_set_input_string(&parser, (const unsigned char *)text, size);
+    insitu_status status = INSITU_OK;
+    int depth = 0, documents = 0;
+    for (bool is_end = false; status == INSITU_OK && !is_end;) {
+        yaml_event_t event;
+        if (!yaml_parser_parse(&parser, &event)) {
+            status = bad_syntax(d, &parser, text, size);
+            break;
+        }
+        const char *fault = event_fault(&event, &depth, &documents);
+        if (fault) status = bad_line(d, event.start_mark.line + 1, fault);
+        is_end = event.type == YAML_STREAM_END_EVENT;
+        yaml_event_delete(&event);
+    }
+    yaml_parser_delete(&parser);
+    if (status == INSITU_OK && documents == 0) status = bad_line(d, 1, "the file is empty, expected the key images");
+    return status;
+}
+
+insitu_status scene_document_open(scene_document *d, const char *text, size_t size, const char *file_name,
+                                  base_error *error)
+{
+    *d = (scene_document){.file_name = file_name, .error = error};
+    if (size > SCENE_MAX_BYTES) {
+        return base_fail(error, INSITU_ERROR_SCENE, "%.300s:1: the file has %zu bytes, expected at most %d", file_name,
+                         size, SCENE_MAX_BYTES);
+    }
+    insitu_status status = scan_events(d, text, size);
+    if (status != INSITU_OK) return status;
+
+    yaml_parser_t parser;
+    if (!yaml_parser_initialize(&parser)) {
+        return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", file_name);
+    }
+    yaml_parser_set_input_string(&parser, (const unsigned char *)text, size);
+    if (!yaml_parser_load(&parser, &d->yaml)) status = bad_syntax(d, &parser, text, size);
+    yaml_parser_delete(&parser);
+    return status;
+}
+
+void scene_document_close(scene_document *d)
+{
+    yaml_document_delete(&d->yaml);
+}
+
+/* ---- nodes ---- */
+
+static yaml_node_t *node_of(const scene_document *d, int index)
+{
+    return yaml_document_get_node((yaml_document_t *)&d->yaml, index);
+}
+
+static int line_of(const yaml_node_t *node)
+{
+    return (int)node->start_mark.line + 1;
+}
+
+static int item_count(const yaml_node_t *list)
+{
+    return (int)(list->data.sequence.items.top - list->data.sequence.items.start);
+}
+
+static const char *text_of(const yaml_node_t *scalar)
+{
+    return (const char *)scalar->data.scalar.value;
+}
+
+/* What stands in the file, short enough for a message and free of control characters. */
+static void quote(const yaml_node_t *node, char quoted[quote_size])
+{
+    if (node->type == YAML_SEQUENCE_NODE) {
+        snprintf(quoted, quote_size, "a list");
+    } else if (node->type == YAML_MAPPING_NODE) {
+        snprintf(quoted, quote_size, "a mapping");
+    } else if (node->data.scalar.length == 0) {
+        snprintf(quoted, quote_size, "nothing");
+    } else {
+        const bool is_long = node->data.scalar.length > 36;
+        snprintf(quoted, quote_size, "\"%.36s%s\"", text_of(node), is_long ? "..." : "");
+        for (char *c = quoted; *c; c++) {
+            if ((unsigned char)*c < ' ' || *c == 127) *c = '?';
+        }
+    }
+}
+
+static const yaml_node_pair_t *find_pair(const scene_document *d, const yaml_node_t *mapping, const char *name,
+                                         size_t length)
+{
+    for (const yaml_node_pair_t *p = mapping->data.mapping.pairs.start; p < mapping->data.mapping.pairs.top; p++) {
+        const yaml_node_t *key = node_of(d, p->key);
+        const bool is_it = key->type == YAML_SCALAR_NODE && key->data.scalar.length == length &&
+                           memcmp(key->data.scalar.value, name, length) == 0;
+        if (is_it) return p;
+    }
+    return NULL;
+}
+
+int scene_document_line(const scene_document *d, const char *path)
+{
+    const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
+    int line = line_of(node);
+    while (*path) {
+        if (*path == '[') {
+            char *end;
+            const long index = strtol(path + 1, &end, 10);
+            if (node->type != YAML_SEQUENCE_NODE || index >= item_count(node)) return line;
+            node = node_of(d, node->data.sequence.items.start[index]);
+            line = line_of(node);
+            path = end + 1;
+        } else {
+            path += *path == '.';
+            const size_t length = strcspn(path, ".[");
+            if (node->type != YAML_MAPPING_NODE) return line;
+            const yaml_node_pair_t *pair = find_pair(d, node, path, length);
+            if (!pair) return line;
+            line = line_of(node_of(d, pair->key));
+            node = node_of(d, pair->value);
+            path += length;
+        }
+    }
+    return line;
+}
+
+insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
+{
+    char path[path_size], what[sizeof d->error->message / 2];
+    snprintf(path, sizeof path, "%s%s%s", parent, *parent && *key && *key != '[' ? "." : "", key);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(what, sizeof what, format, arguments);
+    va_end(arguments);
+    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%s%s", d->file_name, scene_document_line(d, path),
+                     path, *path ? ": " : "", what);
+}
+
+/* ---- tree against schema ---- */
+
+static insitu_status bad_value(const scene_document *d, const char *path, const yaml_node_t *node,
+                               const cyaml_schema_value_t *value, const scene_key *key)
+{
+    char quoted[quote_size], expected[SCENE_WORDS_SIZE];
+    quote(node, quoted);
+    scene_value_words(value, key, expected);
+    return scene_bad(d, path, "", "%s is not allowed, expected %s", quoted, expected);
+}
+
+/* Decimal only: libcyaml would take 010 for 8. */
+static bool read_whole_number(const char *text, double *number)
+{
+    const char *digits = text + (*text == '-' || *text == '+');
+    const size_t count = strspn(digits, "0123456789");
+    if (count == 0 || digits[count] || (count > 1 && digits[0] == '0')) return false;
+    *number = strtod(text, NULL);
+    return true;
+}
+
+static bool read_number(const char *text, double *number)
+{
+    char *end;
+    if (text[strspn(text, "+-.0123456789eE")]) return false; /* no nan, inf, hexadecimal */
+    *number = strtod(text, &end);
+    return end != text && !*end && isfinite(*number);
+}
+
+static bool is_in_range(double number, const scene_key *key)
+{
+    if (key->low == 0 && key->high == 0) return true;
+    if (key->is_low_excluded ? number <= key->low : number < key->low) return false;
+    return key->is_high_excluded ? number < key->high : number <= key->high;
+}
+
+static bool is_choice(const char *text, const cyaml_schema_value_t *value)
+{
+    for (uint32_t i = 0; i < value->enumeration.count; i++) {
+        if (strcmp(text, value->enumeration.strings[i].str) == 0) return true;
+    }
+    return false;
+}
+
+static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t *value, const scene_key *key)
+{
+    if (node->type != YAML_SCALAR_NODE) return false;
+    const char *text = text_of(node);
+    const size_t length = strlen(text);
+    if (length != node->data.scalar.length) return false; /* a NUL inside */
+    double number;
+    switch (value->type) {
+    case CYAML_INT: return read_whole_number(text, &number) && is_in_range(number, key);
+    case CYAML_FLOAT: return read_number(text, &number) && is_in_range(number, key);
+    case CYAML_BOOL: return strcmp(text, "true") == 0 || strcmp(text, "false") == 0;
+    case CYAML_ENUM: return is_choice(text, value);
+    default: return length >= value->string.min && length <= value->string.max;
+    }
+}
+
+static insitu_status check_value(const scene_document *d, const char *path, const yaml_node_t *node,
+                                 const cyaml_schema_value_t *value, const scene_key *key);
+
+static insitu_status check_list(const scene_document *d, const char *path, const yaml_node_t *node,
+                                const cyaml_schema_value_t *value, const scene_key *key)
+{
+    if (node->type != YAML_SEQUENCE_NODE) return bad_value(d, path, node, value, key);
+    const int count = item_count(node);
+    if ((uint32_t)count < value->sequence.min || (uint32_t)count > value->sequence.max) {
+        char expected[SCENE_WORDS_SIZE];
+        scene_value_words(value, key, expected);
+        return scene_bad(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
+    }
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < count && status == INSITU_OK; i++) {
+        char item_path[path_size];
+        snprintf(item_path, sizeof item_path, "%s[%d]", path, i);
+        status = check_value(d, item_path, node_of(d, node->data.sequence.items.start[i]), value->sequence.entry, key);
+    }
+    return status;
+}
+
+static insitu_status bad_key(const scene_document *d, const char *path, const yaml_node_t *name,
+                             const scene_mapping *mapping, const char *fault)
+{
+    const scene_key holder = {.child = mapping};
+    const cyaml_schema_value_t value = {.type = CYAML_MAPPING};
+    char quoted[quote_size], expected[SCENE_WORDS_SIZE];
+    quote(name, quoted);
+    scene_value_words(&value, &holder, expected);
+    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:%d: %s%sthe key %s is %s, expected %s", d->file_name,
+                     line_of(name), path, *path ? ": " : "", quoted, fault, expected);
+}
+
+static insitu_status check_pair(const scene_document *d, const char *path, const yaml_node_pair_t *pair,
+                                const scene_mapping *mapping, unsigned *seen)
+{
+    const yaml_node_t *name = node_of(d, pair->key);
+    int i = 0;
+    while (mapping->fields[i].key &&
+           (name->type != YAML_SCALAR_NODE || strcmp(text_of(name), mapping->fields[i].key) != 0)) {
+        i++;
+    }
+    if (!mapping->fields[i].key) return bad_key(d, path, name, mapping, "unknown");
+    if (*seen & 1u << i) return bad_key(d, path, name, mapping, "given twice");
+    *seen |= 1u << i;
+    char value_path[path_size];
+    snprintf(value_path, sizeof value_path, "%s%s%s", path, *path ? "." : "", mapping->fields[i].key);
+    return check_value(d, value_path, node_of(d, pair->value), &mapping->fields[i].value, &mapping->keys[i]);
+}
+
+static insitu_status check_mapping(const scene_document *d, const char *path, const yaml_node_t *node,
+                                   const scene_mapping *mapping)
+{
+    unsigned seen = 0;
+    insitu_status status = INSITU_OK;
+    const yaml_node_pair_t *end = node->data.mapping.pairs.top;
+    for (const yaml_node_pair_t *p = node->data.mapping.pairs.start; p < end && status == INSITU_OK; p++) {
+        status = check_pair(d, path, p, mapping, &seen);
+    }
+    for (int i = 0; mapping->fields[i].key && status == INSITU_OK; i++) {
+        if (seen & 1u << i || mapping->fields[i].value.flags & CYAML_FLAG_OPTIONAL) continue;
+        char expected[SCENE_WORDS_SIZE];
+        scene_value_words(&mapping->fields[i].value, &mapping->keys[i], expected);
+        status = scene_bad(d, path, mapping->fields[i].key, "missing, expected %s", expected);
+    }
+    return status;
+}
+
+static insitu_status check_value(const scene_document *d, const char *path, const yaml_node_t *node,
+                                 const cyaml_schema_value_t *value, const scene_key *key)
+{
+    switch (value->type) {
+    case CYAML_MAPPING:
+        if (node->type != YAML_MAPPING_NODE) return bad_value(d, path, node, value, key);
+        return check_mapping(d, path, node, key->child);
+    case CYAML_SEQUENCE:
+    case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key);
+    default: return is_scalar_right(node, value, key) ? INSITU_OK : bad_value(d, path, node, value, key);
+    }
+}
+
+insitu_status scene_document_check(const scene_document *d)
+{
+    const scene_key key = {.child = &scene_top};
+    const yaml_node_t *root = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
+    return check_value(d, "", root, &scene_top_value, &key);
+}

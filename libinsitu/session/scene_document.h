@@ -1,0 +1,39 @@
+/* A scene file as a tree of YAML nodes with their lines: where its errors are found and worded, before and beside what
+ * libcyaml reads. */
+#ifndef SESSION_SCENE_DOCUMENT_H
+#define SESSION_SCENE_DOCUMENT_H
+
+#include <yaml.h>
+
+#include "error.h"
+#include "scene_schema.h"
+
+typedef struct scene_document {
+    const char *file_name; /* borrowed */
+    base_error *error;     /* borrowed; where messages go */
+    yaml_document_t yaml;
+} scene_document;
+
+/* Read text into *d: one YAML document, of bounded size and depth, without anchors, aliases and tags. On an error there
+ * is nothing to close. Numbers are read in the thread's locale, which must be one with a decimal point, from here on.
+ */
+insitu_status scene_document_open(scene_document *d, const char *text, size_t size, const char *file_name,
+                                  base_error *error);
+
+void scene_document_close(scene_document *d);
+
+/* Hold the document against the schema: keys known, given once, none missing; types, counts and ranges right. */
+insitu_status scene_document_check(const scene_document *d);
+
+/* The line (from 1) of a path such as "images[0].size[1]"; of as much of it as there is. */
+int scene_document_line(const scene_document *d, const char *path);
+
+/* Record "file:line: parent.key: ..." and return INSITU_ERROR_SCENE. key may be "", meaning the parent itself. */
+insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/* What may stand at a key, in words: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1". */
+enum { SCENE_WORDS_SIZE = 400 };
+void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
+
+#endif

@@ -1,0 +1,229 @@
+/* The parts of an image that say what is drawn: isosurfaces and volumes. */
+#include "scene_convert.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "colour_map.h"
+#include "memory.h"
+
+enum { max_isovalues = 16, max_volumes = 4 };
+
+/* Neighbours in the cycle differ in hue and lightness both, and the first ones also to eyes that do not tell red
+ * from green. */
+static const float cycle[max_isovalues][3] = {
+    {0.25F, 0.55F, 0.85F}, {0.95F, 0.65F, 0.20F}, {0.20F, 0.65F, 0.50F}, {0.85F, 0.35F, 0.25F},
+    {0.95F, 0.88F, 0.35F}, {0.60F, 0.45F, 0.80F}, {0.55F, 0.80F, 0.95F}, {0.88F, 0.55F, 0.75F},
+    {0.55F, 0.40F, 0.30F}, {0.65F, 0.85F, 0.45F}, {0.25F, 0.35F, 0.60F}, {0.95F, 0.78F, 0.65F},
+    {0.15F, 0.50F, 0.30F}, {0.75F, 0.70F, 0.85F}, {0.60F, 0.20F, 0.40F}, {0.75F, 0.75F, 0.75F}};
+
+static insitu_status convert_component(const scene_document *d, const char *path, const char *text, int *component)
+{
+    static const struct {
+        const char *word;
+        int component;
+    } words[] = {{"magnitude", SCENE_COMPONENT_MAGNITUDE}, {"x", 0}, {"y", 1}, {"z", 2}};
+    *component = SCENE_COMPONENT_DEFAULT;
+    if (!text) return INSITU_OK;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+        if (strcmp(text, words[i].word) == 0) {
+            *component = words[i].component;
+            return INSITU_OK;
+        }
+    }
+    const size_t digits = strspn(text, "0123456789");
+    if (digits == 0 || digits > 3 || text[digits]) {
+        return scene_bad(d, path, "component",
+                         "\"%s\" is not allowed, expected magnitude, x, y, z or a number from 0 to 999", text);
+    }
+    *component = (int)strtol(text, NULL, 10);
+    return INSITU_OK;
+}
+
+static insitu_status convert_field(const scene_document *d, const char *path, const char *name, const char *component,
+                                   scene_field *out)
+{
+    char field_path[SCENE_PATH_SIZE + 8];
+    snprintf(field_path, sizeof field_path, "%s.field", path);
+    out->line = scene_document_line(d, field_path);
+    out->name = base_strdup(name);
+    return out->name ? convert_component(d, path, component, &out->component) : scene_no_memory(d);
+}
+
+static insitu_status convert_range(const scene_document *d, const char *path, const double *in, scene_range *out)
+{
+    if (!in) return INSITU_OK;
+    *out = (scene_range){true, in[0], in[1]};
+    if (in[0] < in[1]) return INSITU_OK;
+    return scene_bad(d, path, "range", "[%g, %g] does not rise, expected [low, high] with low < high", in[0], in[1]);
+}
+
+static insitu_status convert_values(const scene_document *d, const char *path, const scene_file_isosurface *in,
+                                    scene_isosurface *out)
+{
+    for (int i = 0; i < in->values_count; i++) {
+        for (int j = 0; j < i; j++) {
+            if (in->values[i] != in->values[j]) continue;
+            char key[32];
+            snprintf(key, sizeof key, "values[%d]", i);
+            return scene_bad(d, path, key, "%g is there twice, expected each value once", in->values[i]);
+        }
+    }
+    out->values = base_alloc((size_t)in->values_count * sizeof *out->values);
+    if (!out->values) return scene_no_memory(d);
+    memcpy(out->values, in->values, (size_t)in->values_count * sizeof *out->values);
+    out->value_count = in->values_count;
+    return INSITU_OK;
+}
+
+/* first: isovalues of earlier layers, so that two layers do not start on one colour. */
+static insitu_status convert_colours(const scene_document *d, const char *path, const scene_file_isosurface *in,
+                                     int first, scene_isosurface *out)
+{
+    if (in->colours && in->colour_by) {
+        return scene_bad(d, path, "colours", "given beside colour_by, expected one of the two");
+    }
+    if (in->colours_count > in->values_count) {
+        return scene_bad(d, path, "colours", "%d colours for %d values, expected no more than values",
+                         in->colours_count, in->values_count);
+    }
+    out->colours = base_alloc((size_t)in->values_count * 3 * sizeof *out->colours);
+    if (!out->colours) return scene_no_memory(d);
+    for (int i = 0; i < in->values_count; i++) {
+        const int given = i < in->colours_count ? i : in->colours_count - 1;
+        for (int c = 0; c < 3; c++) {
+            const float srgb = in->colours ? (float)in->colours[given][c] : cycle[(first + i) % max_isovalues][c];
+            out->colours[3 * i + c] = colour_linear_from_srgb(srgb);
+        }
+    }
+    return INSITU_OK;
+}
+
+static insitu_status convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
+                                       scene_isosurface *out)
+{
+    if (!in) return INSITU_OK;
+    char colour_by_path[SCENE_PATH_SIZE];
+    snprintf(colour_by_path, sizeof colour_by_path, "%s.colour_by", path);
+    out->has_colour_by = true;
+    out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
+    insitu_status status = convert_range(d, colour_by_path, in->range, &out->colour_range);
+    if (status == INSITU_OK) status = convert_field(d, colour_by_path, in->field, in->component, &out->colour_by);
+    return status;
+}
+
+static float given_or(const double *given, float otherwise)
+{
+    return given ? (float)*given : otherwise;
+}
+
+static scene_material convert_material(const scene_file_material *in)
+{
+    static const scene_file_material none;
+    if (!in) in = &none;
+    return (scene_material){given_or(in->ambient, 0.15F), given_or(in->diffuse, 0.75F), given_or(in->specular, 0.25F),
+                            given_or(in->shininess, 32)};
+}
+
+static insitu_status convert_isosurface(const scene_document *d, const char *path, const scene_file_isosurface *in,
+                                        int first_value, scene_isosurface *out)
+{
+    out->opacity = given_or(in->opacity, 1);
+    out->material = convert_material(in->material);
+    out->root_steps = in->root_steps ? *in->root_steps : 2;
+    insitu_status status = convert_field(d, path, in->field, in->component, &out->field);
+    if (status == INSITU_OK) status = convert_values(d, path, in, out);
+    if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);
+    if (status == INSITU_OK) status = convert_colour_by(d, path, in->colour_by, out);
+    return status;
+}
+
+static insitu_status convert_opacity(const scene_document *d, const char *path, const scene_file_volume *in,
+                                     scene_volume *out)
+{
+    static const double ramp[2][2] = {{0, 0}, {1, 0.9}};
+    const int count = in->opacity ? in->opacity_count : 2;
+    const double(*points)[2] = in->opacity ? (const double(*)[2])in->opacity : ramp;
+    out->opacity = base_alloc((size_t)count * sizeof *out->opacity);
+    if (!out->opacity) return scene_no_memory(d);
+    out->opacity_count = count;
+    for (int i = 0; i < count; i++) {
+        char key[32];
+        snprintf(key, sizeof key, "opacity[%d]", i);
+        if (i > 0 && points[i][0] < points[i - 1][0]) {
+            return scene_bad(d, path, key, "%g comes after %g, expected points that do not fall", points[i][0],
+                             points[i - 1][0]);
+        }
+        if (i > 1 && points[i][0] == points[i - 2][0]) {
+            return scene_bad(d, path, key, "%g is there three times, expected at most two points at a place",
+                             points[i][0]);
+        }
+        out->opacity[i] = (scene_opacity_point){points[i][0], (float)points[i][1]};
+    }
+    return INSITU_OK;
+}
+
+static insitu_status convert_volume(const scene_document *d, const char *path, const scene_file_volume *in,
+                                    scene_volume *out)
+{
+    out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
+    out->unit_distance = in->unit_distance ? *in->unit_distance : 0;
+    insitu_status status = convert_field(d, path, in->field, in->component, &out->field);
+    if (status == INSITU_OK) status = convert_range(d, path, in->range, &out->range);
+    if (status == INSITU_OK) status = convert_opacity(d, path, in, out);
+    return status;
+}
+
+/* Checks the counts of a whole image before anything is made. */
+static insitu_status count_layers(const scene_document *d, const char *path, const scene_file_image *in,
+                                  int *isosurfaces, int *volumes)
+{
+    int values = 0;
+    *isosurfaces = *volumes = 0;
+    for (int i = 0; i < in->layers_count; i++) {
+        const scene_file_layer *layer = &in->layers[i];
+        char key[32];
+        snprintf(key, sizeof key, "layers[%d]", i);
+        if (!layer->isosurface == !layer->volume) {
+            return scene_bad(d, path, key, "%s, expected one of isosurface and volume",
+                             layer->volume ? "holds both an isosurface and a volume" : "holds nothing");
+        }
+        *isosurfaces += layer->isosurface != NULL;
+        *volumes += layer->volume != NULL;
+        values += layer->isosurface ? layer->isosurface->values_count : 0;
+        if (values > max_isovalues) {
+            return scene_bad(d, path, key, "%d isovalues up to here, expected at most %d in an image", values,
+                             max_isovalues);
+        }
+        if (*volumes > max_volumes) {
+            return scene_bad(d, path, key, "%d volumes up to here, expected at most %d in an image", *volumes,
+                             max_volumes);
+        }
+    }
+    return INSITU_OK;
+}
+
+insitu_status scene_convert_layers(const scene_document *d, const char *path, const scene_file_image *in,
+                                   scene_image *out)
+{
+    int isosurfaces, volumes, values = 0;
+    insitu_status status = count_layers(d, path, in, &isosurfaces, &volumes);
+    if (status != INSITU_OK) return status;
+    out->isosurfaces = base_calloc((size_t)isosurfaces, sizeof *out->isosurfaces);
+    out->volumes = base_calloc((size_t)volumes, sizeof *out->volumes);
+    if (!out->isosurfaces || !out->volumes) return scene_no_memory(d);
+    for (int i = 0; i < in->layers_count && status == INSITU_OK; i++) {
+        const scene_file_layer *layer = &in->layers[i];
+        char layer_path[SCENE_PATH_SIZE - 16]; /* what comes below a layer is added */
+        snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer->volume ? "volume" : "isosurface");
+        if (layer->volume) {
+            status = convert_volume(d, layer_path, layer->volume, &out->volumes[out->volume_count++]);
+        } else {
+            scene_isosurface *surface = &out->isosurfaces[out->isosurface_count++];
+            status = convert_isosurface(d, layer_path, layer->isosurface, values, surface);
+            values += layer->isosurface->values_count;
+        }
+    }
+    return status;
+}

@@ -1,0 +1,212 @@
+/* One list a mapping holds each key twice over, as libcyaml's field and as our scene_key: the reader, the checks, the
+ * error messages and docs/scene.md all come from these lists, so that none can fall behind the others. */
+#include "scene_schema.h"
+
+#include "scene.h"
+
+#define REQUIRED CYAML_FLAG_DEFAULT
+#define OPTIONAL CYAML_FLAG_OPTIONAL
+#define POINTER (CYAML_FLAG_OPTIONAL | CYAML_FLAG_POINTER)
+
+#define AS_FIELD(field, ...) field,
+#define AS_KEY(field, ...) {__VA_ARGS__},
+#define DEFINE_MAPPING(name, the_title, LIST)                                                                          \
+    static const cyaml_schema_field_t name##_fields[] = {LIST(AS_FIELD) CYAML_FIELD_END};                              \
+    static const scene_key name##_keys[] = {LIST(AS_KEY)};                                                             \
+    static const scene_mapping name##_mapping = {the_title, name##_fields, name##_keys}
+
+/* A required or optional text of at most `longest` bytes. */
+#define TEXT(key, flags, type, member, longest) CYAML_FIELD_STRING_PTR(key, flags, type, member, 1, longest)
+/* An optional list of exactly `count` numbers. */
+#define NUMBERS(key, type, member, count) CYAML_FIELD_SEQUENCE_FIXED(key, POINTER, type, member, &number, count)
+#define CHOICE(key, type, member, words)                                                                               \
+    CYAML_FIELD_ENUM_PTR(key, CHOICE_FLAGS, type, member, words, CYAML_ARRAY_LEN(words))
+#define CHOICE_FLAGS (POINTER | CYAML_FLAG_STRICT)
+
+static const cyaml_schema_value_t number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
+static const cyaml_schema_value_t whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEFAULT, int)};
+static const cyaml_schema_value_t colour = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 3)};
+static const cyaml_schema_value_t opacity_point = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 2)};
+
+static const cyaml_strval_t map_words[] = {
+    {"viridis", SCENE_VIRIDIS}, {"inferno", SCENE_INFERNO}, {"cool_to_warm", SCENE_COOL_TO_WARM}, {"grey", SCENE_GREY}};
+static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
+
+#define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
+#define COMPONENT_DEFAULT "`0` of a field of one component, else `magnitude`"
+#define FIELD_HELP "Name of the field, as the simulation or the file gives it; at most 255 bytes."
+#define MAP_HELP "Colour map."
+#define RANGE_HELP "The values `[low, high]`, low < high, that the ends of the colour map stand for; clamped outside."
+#define RANGE_DEFAULT "from the data, over all ranks, at each drawn step"
+
+#define AUTOMATIC_KEYS(X)                                                                                              \
+    X(NUMBERS("direction", scene_file_automatic, direction, 3),                                                        \
+      .help = "From the middle of the data towards the eye. Any length but 0.", .by_default = "`[1, 0.8, 1.2]`")       \
+    X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom),                                             \
+      .help = "1 fits the sphere around the data's bounds into the image; larger is nearer.", .by_default = "`1`",     \
+      .low = 0, .is_low_excluded = true, .high = 1000)
+DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
+
+#define CAMERA_KEYS(X)                                                                                                 \
+    X(NUMBERS("position", scene_file_camera, position, 3),                                                             \
+      .help = "Where the eye is, in scene units. With `focal`; not with `automatic`.", .by_default = "automatic")      \
+    X(NUMBERS("focal", scene_file_camera, focal, 3),                                                                   \
+      .help = "The point looked at, in the middle of the image. Not where the eye is. With `position`.",               \
+      .by_default = "automatic")                                                                                       \
+    X(CYAML_FIELD_MAPPING_PTR("automatic", OPTIONAL, scene_file_camera, automatic, automatic_fields),                  \
+      .help = "Place the eye by the bounds of all the data of all ranks, at each drawn step.",                         \
+      .by_default = "where no `position` is given", .child = &automatic_mapping)                                       \
+    X(NUMBERS("up", scene_file_camera, up, 3), .help = "What is up in the image. Not parallel to the view.",           \
+      .by_default = "`[0, 1, 0]`; `[0, 0, 1]` where the view is along y")                                              \
+    X(CYAML_FIELD_FLOAT_PTR("angle", OPTIONAL, scene_file_camera, angle),                                              \
+      .help = "Whole vertical angle of view, in degrees.", .by_default = "`40`", .low = 0, .is_low_excluded = true,    \
+      .high = 180, .is_high_excluded = true)
+DEFINE_MAPPING(camera, "camera", CAMERA_KEYS);
+
+#define LIGHT_KEYS(X)                                                                                                  \
+    X(CYAML_FIELD_SEQUENCE_FIXED("direction", CYAML_FLAG_POINTER, scene_file_light, direction, &number, 3),            \
+      .help = "From the scene towards the light. Any length but 0.")                                                   \
+    X(NUMBERS("colour", scene_file_light, colour, 3), .help = "Colour, sRGB.", .by_default = "`[1, 1, 1]`", .low = 0,  \
+      .high = 1)                                                                                                       \
+    X(CYAML_FIELD_FLOAT_PTR("intensity", OPTIONAL, scene_file_light, intensity),                                       \
+      .help = "Factor on the colour, in linear light.", .by_default = "`1`", .low = 0, .high = 100)                    \
+    X(CHOICE("in", scene_file_light, in, frame_words),                                                                 \
+      .help = "The axes of `direction`: `camera` (right, up, towards the eye), so that the light goes with the eye, "  \
+              "or `world`.",                                                                                           \
+      .by_default = "`camera`")
+DEFINE_MAPPING(light, "lights", LIGHT_KEYS);
+
+#define MATERIAL_KEYS(X)                                                                                               \
+    X(CYAML_FIELD_FLOAT_PTR("ambient", OPTIONAL, scene_file_material, ambient),                                        \
+      .help = "Share of the colour that is seen without any light.", .by_default = "`0.15`", .low = 0, .high = 1)      \
+    X(CYAML_FIELD_FLOAT_PTR("diffuse", OPTIONAL, scene_file_material, diffuse),                                        \
+      .help = "Share of the colour that is seen in full light.", .by_default = "`0.75`", .low = 0, .high = 1)          \
+    X(CYAML_FIELD_FLOAT_PTR("specular", OPTIONAL, scene_file_material, specular),                                      \
+      .help = "Strength of the highlight (Blinn-Phong), of the light's colour.", .by_default = "`0.25`", .low = 0,     \
+      .high = 1)                                                                                                       \
+    X(CYAML_FIELD_FLOAT_PTR("shininess", OPTIONAL, scene_file_material, shininess),                                    \
+      .help = "Exponent of the highlight: larger is smaller and sharper.", .by_default = "`32`", .low = 1,             \
+      .high = 10000)
+DEFINE_MAPPING(material, "material", MATERIAL_KEYS);
+
+#define COLOUR_BY_KEYS(X)                                                                                              \
+    X(TEXT("field", REQUIRED, scene_file_colour_by, field, 255), .help = FIELD_HELP)                                   \
+    X(TEXT("component", OPTIONAL, scene_file_colour_by, component, 16), .help = COMPONENT_HELP,                        \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CHOICE("map", scene_file_colour_by, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                \
+    X(NUMBERS("range", scene_file_colour_by, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)
+DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
+
+#define ISOSURFACE_KEYS(X)                                                                                             \
+    X(TEXT("field", REQUIRED, scene_file_isosurface, field, 255), .help = FIELD_HELP)                                  \
+    X(TEXT("component", OPTIONAL, scene_file_isosurface, component, 16), .help = COMPONENT_HELP,                       \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1, 16),               \
+      .help = "The values at which surfaces are drawn, none twice. At most 16 in all isosurfaces of an image "         \
+              "together.")                                                                                             \
+    X(CYAML_FIELD_SEQUENCE("colours", POINTER, scene_file_isosurface, colours, &colour, 1, 16),                        \
+      .help = "Colours of the values in turn, sRGB; the last serves all values that are left. Not with `colour_by`.",  \
+      .by_default = "colours that differ, from a fixed cycle", .low = 0, .high = 1)                                    \
+    X(CYAML_FIELD_MAPPING_PTR("colour_by", OPTIONAL, scene_file_isosurface, colour_by, colour_by_fields),              \
+      .help = "Colour the surfaces by a field.", .by_default = "by `colours`", .child = &colour_by_mapping)            \
+    X(CYAML_FIELD_FLOAT_PTR("opacity", OPTIONAL, scene_file_isosurface, opacity),                                      \
+      .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
+    X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_isosurface, material, material_fields),                 \
+      .help = "How the surfaces take light.", .by_default = "a slight gloss", .child = &material_mapping)              \
+    X(CYAML_FIELD_INT_PTR("root_steps", OPTIONAL, scene_file_isosurface, root_steps),                                  \
+      .help = "Steps of the root search in a cell (Neubauer's method) after it has been bracketed.",                   \
+      .by_default = "`2`", .low = 0, .high = 64)
+DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
+
+#define VOLUME_KEYS(X)                                                                                                 \
+    X(TEXT("field", REQUIRED, scene_file_volume, field, 255), .help = FIELD_HELP)                                      \
+    X(TEXT("component", OPTIONAL, scene_file_volume, component, 16), .help = COMPONENT_HELP,                           \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CHOICE("map", scene_file_volume, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                   \
+    X(NUMBERS("range", scene_file_volume, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)                  \
+    X(CYAML_FIELD_SEQUENCE("opacity", POINTER, scene_file_volume, opacity, &opacity_point, 1, 32),                     \
+      .help = "Points `[at, opacity]`, joined by straight lines: `at` 0 is the low end of the range and 1 the high "   \
+              "end, never falling (twice the same makes a step); opacity is that of `unit_distance`.",                 \
+      .by_default = "`[[0, 0], [1, 0.9]]`", .low = 0, .high = 1)                                                       \
+    X(CYAML_FIELD_FLOAT_PTR("unit_distance", OPTIONAL, scene_file_volume, unit_distance),                              \
+      .help = "The length in scene units that lets 1 - opacity of the light through.",                                 \
+      .by_default = "a twentieth of the diagonal of the bounds", .low = 0, .is_low_excluded = true, .high = 1e30)
+DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
+
+#define LAYER_KEYS(X)                                                                                                  \
+    X(CYAML_FIELD_MAPPING_PTR("isosurface", OPTIONAL, scene_file_layer, isosurface, isosurface_fields),                \
+      .help = "Surfaces on which a field has given values.", .by_default = "none", .child = &isosurface_mapping)       \
+    X(CYAML_FIELD_MAPPING_PTR("volume", OPTIONAL, scene_file_layer, volume, volume_fields),                            \
+      .help = "A field as coloured mist. At most 4 in an image.", .by_default = "none", .child = &volume_mapping)
+DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
+
+#define SAMPLING_KEYS(X)                                                                                               \
+    X(CYAML_FIELD_FLOAT_PTR("step", OPTIONAL, scene_file_sampling, step),                                              \
+      .help = "Distance between samples, in scene units. Not with `step_cells`.", .by_default = "by `step_cells`",     \
+      .low = 0, .is_low_excluded = true, .high = 1e30)                                                                 \
+    X(CYAML_FIELD_FLOAT_PTR("step_cells", OPTIONAL, scene_file_sampling, step_cells),                                  \
+      .help = "Distance between samples in mean cell sizes: the cube root of the bounds' volume over the cells.",      \
+      .by_default = "`0.5`", .low = 0, .is_low_excluded = true, .high = 1000)                                          \
+    X(CYAML_FIELD_INT_PTR("group", OPTIONAL, scene_file_sampling, group),                                              \
+      .help = "Samples of a ray that are looked up together. Changes the speed, not the image.", .by_default = "`16`", \
+      .low = 1, .high = 64)                                                                                            \
+    X(CYAML_FIELD_BOOL_PTR("jitter", OPTIONAL, scene_file_sampling, jitter),                                           \
+      .help = "Shift each pixel's samples by a part of a step of its own: fine noise instead of rings.",               \
+      .by_default = "`true`")                                                                                          \
+    X(CYAML_FIELD_INT_PTR("frames", OPTIONAL, scene_file_sampling, frames),                                            \
+      .help = "Frames of different jitter that are averaged into the image.", .by_default = "`1`", .low = 1,           \
+      .high = 4096)
+DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
+
+#define OUTPUT_KEYS(X)                                                                                                 \
+    X(TEXT("path", REQUIRED, scene_file_output, path, 1023),                                                           \
+      .help = "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "       \
+              "folders are made. `{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, "         \
+              "`{name}` the image's name. At most 1023 bytes.")                                                        \
+    X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
+      .help = "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats, colour and depth.",                   \
+      .by_default = "`8`", .low = 8, .high = 16)
+DEFINE_MAPPING(output, "outputs", OUTPUT_KEYS);
+
+static const cyaml_schema_value_t light = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_light, light_fields)};
+static const cyaml_schema_value_t layer = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_layer, layer_fields)};
+static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_output, output_fields)};
+
+#define IMAGE_KEYS(X)                                                                                                  \
+    X(TEXT("name", REQUIRED, scene_file_image, name, 64),                                                              \
+      .help = "Name of the image, its own among the images; at most 64 bytes, no `/`.")                                \
+    X(CYAML_FIELD_SEQUENCE_FIXED("size", POINTER, scene_file_image, size, &whole_number, 2),                           \
+      .help = "Width and height in pixels.", .by_default = "`[1280, 720]`", .low = 1, .high = 32768)                   \
+    X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_image, every),                                                 \
+      .help = "Draw at the cycles that are multiples of this.", .by_default = "`1`", .low = 1, .high = 1000000000)     \
+    X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, camera_fields),                            \
+      .help = "Where the image is seen from.", .by_default = "automatic", .child = &camera_mapping)                    \
+    X(CYAML_FIELD_SEQUENCE("background", POINTER, scene_file_image, background, &number, 3, 4),                        \
+      .help = "Colour where nothing is, sRGB, and optionally its opacity.", .by_default = "`[0.08, 0.09, 0.11, 1]`",   \
+      .low = 0, .high = 1)                                                                                             \
+    X(CYAML_FIELD_SEQUENCE("lights", POINTER, scene_file_image, lights, &light, 1, 8),                                 \
+      .help = "The lights, in place of the default ones.",                                                             \
+      .by_default = "a light from the upper right of the camera and a weaker one from its left",                       \
+      .child = &light_mapping)                                                                                         \
+    X(CYAML_FIELD_SEQUENCE("layers", CYAML_FLAG_POINTER, scene_file_image, layers, &layer, 1, 20),                     \
+      .help = "What is drawn. Each entry holds one of the keys of a layer.", .child = &layer_mapping)                  \
+    X(CYAML_FIELD_MAPPING_PTR("sampling", OPTIONAL, scene_file_image, sampling, sampling_fields),                      \
+      .help = "How finely volumes are sampled.", .by_default = "half a cell, jittered", .child = &sampling_mapping)    \
+    X(CYAML_FIELD_SEQUENCE("outputs", CYAML_FLAG_POINTER, scene_file_image, outputs, &output, 1, 16),                  \
+      .help = "Files that the image is written to. No two files of a scene may have the same name.",                   \
+      .child = &output_mapping)
+DEFINE_MAPPING(image, "images", IMAGE_KEYS);
+
+static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_image, image_fields)};
+
+#define TOP_KEYS(X)                                                                                                    \
+    X(CYAML_FIELD_INT_PTR("threads", OPTIONAL, scene_file, threads),                                                   \
+      .help = "Threads of each rank. 0: the cores of the node, shared among its ranks.", .by_default = "`0`",          \
+      .low = 0, .high = 4096)                                                                                          \
+    X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, 64),                           \
+      .help = "The images to draw.", .child = &image_mapping)
+static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};
+static const scene_key top_keys[] = {TOP_KEYS(AS_KEY)};
+
+const scene_mapping scene_top = {"scene", top_fields, top_keys};
+const cyaml_schema_value_t scene_top_value = {CYAML_VALUE_MAPPING(CYAML_FLAG_POINTER, scene_file, top_fields)};

@@ -1,0 +1,125 @@
+/* The scene file's schema: what libcyaml reads into, and beside each key what it may hold and what it means.
+ *
+ * Everything optional is a pointer, NULL where the file does not give it; defaults are filled in by scene.c. */
+#ifndef SESSION_SCENE_SCHEMA_H
+#define SESSION_SCENE_SCHEMA_H
+
+#include <cyaml/cyaml.h>
+#include <stdbool.h>
+
+typedef enum scene_frame { SCENE_FRAME_CAMERA, SCENE_FRAME_WORLD } scene_frame;
+
+typedef struct scene_file_automatic {
+    double *direction; /* 3 */
+    double *zoom;
+} scene_file_automatic;
+
+typedef struct scene_file_camera {
+    double *position, *focal; /* 3 */
+    scene_file_automatic *automatic;
+    double *up; /* 3 */
+    double *angle;
+} scene_file_camera;
+
+typedef struct scene_file_light {
+    double *direction; /* 3 */
+    double *colour;    /* 3 */
+    double *intensity;
+    scene_frame *in;
+} scene_file_light;
+
+typedef struct scene_file_material {
+    double *ambient, *diffuse, *specular, *shininess;
+} scene_file_material;
+
+typedef struct scene_file_colour_by {
+    char *field, *component;
+    int *map;      /* scene_colour_map */
+    double *range; /* 2 */
+} scene_file_colour_by;
+
+typedef struct scene_file_isosurface {
+    char *field, *component;
+    double *values;
+    int values_count;
+    double (*colours)[3];
+    int colours_count;
+    scene_file_colour_by *colour_by;
+    double *opacity;
+    scene_file_material *material;
+    int *root_steps;
+} scene_file_isosurface;
+
+typedef struct scene_file_volume {
+    char *field, *component;
+    int *map;      /* scene_colour_map */
+    double *range; /* 2 */
+    double (*opacity)[2];
+    int opacity_count;
+    double *unit_distance;
+} scene_file_volume;
+
+typedef struct scene_file_layer {
+    scene_file_isosurface *isosurface;
+    scene_file_volume *volume;
+} scene_file_layer;
+
+typedef struct scene_file_sampling {
+    double *step, *step_cells;
+    int *group;
+    bool *jitter;
+    int *frames;
+} scene_file_sampling;
+
+typedef struct scene_file_output {
+    char *path;
+    int *bits;
+} scene_file_output;
+
+typedef struct scene_file_image {
+    char *name;
+    int *size; /* 2 */
+    int *every;
+    scene_file_camera *camera;
+    double *background; /* 3 or 4 */
+    int background_count;
+    scene_file_light *lights;
+    int lights_count;
+    scene_file_layer *layers;
+    int layers_count;
+    scene_file_sampling *sampling;
+    scene_file_output *outputs;
+    int outputs_count;
+} scene_file_image;
+
+typedef struct scene_file {
+    int *threads;
+    scene_file_image *images;
+    int images_count;
+} scene_file;
+
+struct scene_mapping;
+
+/* What stands beside one cyaml field. */
+typedef struct scene_key {
+    const char *help;
+    const char *by_default; /* as the reference shows it; NULL: the key is required */
+    double low, high;       /* of a number, or of each number in a list; both 0: any finite number */
+    bool is_low_excluded;
+    bool is_high_excluded;
+    const struct scene_mapping *child; /* of a mapping, or of a list of mappings */
+} scene_key;
+
+typedef struct scene_mapping {
+    const char *title;
+    const cyaml_schema_field_t *fields; /* ended by a NULL key */
+    const scene_key *keys;              /* one a field, in the same order */
+} scene_mapping;
+
+enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
+
+/* The mapping at the top of a file, of a scene_file, and libcyaml's view of the same. */
+extern const scene_mapping scene_top;
+extern const cyaml_schema_value_t scene_top_value;
+
+#endif

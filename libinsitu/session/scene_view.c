@@ -1,0 +1,137 @@
+/* The parts of an image that say how it is seen: camera and lights. */
+#include "scene_convert.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "colour_map.h"
+#include "memory.h"
+
+/* To unit length; false for a zero vector. Scaled first, so that neither 1e-200 nor 1e200 is lost in its square. */
+static bool normalize(double v[3])
+{
+    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!(largest > 0)) return false;
+    for (int i = 0; i < 3; i++) v[i] /= largest;
+    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    for (int i = 0; i < 3; i++) v[i] /= length;
+    return true;
+}
+
+/* Of unit vectors. Within a millionth of a radian the image's right would be mostly rounding. */
+static bool is_parallel(const double a[3], const double b[3])
+{
+    const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+    return sqrt(x * x + y * y + z * z) < 1e-6;
+}
+
+static void copy_vector(double to[3], const double *from)
+{
+    memcpy(to, from, 3 * sizeof *to);
+}
+
+static insitu_status convert_up(const scene_document *d, const char *path, const double *given, scene_camera *out)
+{
+    static const double along_y[3] = {0, 1, 0}, along_z[3] = {0, 0, 1};
+    if (!given) {
+        copy_vector(out->up, is_parallel(along_y, out->direction) ? along_z : along_y);
+        return INSITU_OK;
+    }
+    copy_vector(out->up, given);
+    if (!normalize(out->up)) return scene_bad(d, path, "up", "has length 0, expected a direction");
+    if (is_parallel(out->up, out->direction)) {
+        return scene_bad(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
+                         given[0], given[1], given[2]);
+    }
+    return INSITU_OK;
+}
+
+static insitu_status convert_explicit(const scene_document *d, const char *path, const scene_file_camera *in,
+                                      scene_camera *out)
+{
+    if (in->automatic) {
+        return scene_bad(d, path, "automatic", "given beside %s, expected one of the two",
+                         in->position ? "position" : "focal");
+    }
+    if (!in->position) return scene_bad(d, path, "position", "missing, expected beside focal");
+    if (!in->focal) return scene_bad(d, path, "focal", "missing, expected beside position");
+    out->is_automatic = false;
+    copy_vector(out->eye, in->position);
+    copy_vector(out->focal, in->focal);
+    for (int i = 0; i < 3; i++) out->direction[i] = out->eye[i] - out->focal[i];
+    for (int i = 0; i < 3; i++) {
+        if (!isfinite(out->direction[i])) {
+            return scene_bad(d, path, "position", "too far from focal, expected a finite distance");
+        }
+    }
+    if (normalize(out->direction)) return INSITU_OK;
+    return scene_bad(d, path, "focal", "[%g, %g, %g] is the position too, expected another point", out->focal[0],
+                     out->focal[1], out->focal[2]);
+}
+
+static insitu_status convert_automatic(const scene_document *d, const char *path, const scene_file_automatic *in,
+                                       scene_camera *out)
+{
+    if (in && in->direction) copy_vector(out->direction, in->direction);
+    if (in && in->zoom) out->zoom = *in->zoom;
+    if (normalize(out->direction)) return INSITU_OK;
+    return scene_bad(d, path, "automatic.direction", "has length 0, expected a direction");
+}
+
+insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
+                                   scene_camera *out)
+{
+    static const scene_file_camera none;
+    *out = (scene_camera){.is_automatic = true, .direction = {1, 0.8, 1.2}, .angle = 40, .zoom = 1};
+    if (!in) in = &none;
+    const bool is_explicit = in->position || in->focal;
+    insitu_status status =
+        is_explicit ? convert_explicit(d, path, in, out) : convert_automatic(d, path, in->automatic, out);
+    if (status == INSITU_OK) status = convert_up(d, path, in->up, out);
+    if (in->angle) out->angle = *in->angle;
+    return status;
+}
+
+static insitu_status convert_light(const scene_document *d, const char *path, const scene_file_light *in,
+                                   scene_light *out)
+{
+    const double intensity = in->intensity ? *in->intensity : 1;
+    copy_vector(out->direction, in->direction);
+    out->in_world = in->in && *in->in == SCENE_FRAME_WORLD;
+    for (int i = 0; i < 3; i++) {
+        const float linear = in->colour ? colour_linear_from_srgb((float)in->colour[i]) : 1;
+        out->colour[i] = (float)intensity * linear;
+    }
+    return normalize(out->direction) ? INSITU_OK
+                                     : scene_bad(d, path, "direction", "has length 0, expected a direction");
+}
+
+/* The fill keeps the side that the key light leaves dark readable, and is too weak to flatten what it shows. */
+static void default_lights(scene_light lights[2])
+{
+    lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};
+    lights[1] = (scene_light){.direction = {-0.8, 0.1, 0.6}, .colour = {0.35F, 0.35F, 0.35F}};
+    normalize(lights[0].direction);
+    normalize(lights[1].direction);
+}
+
+insitu_status scene_convert_lights(const scene_document *d, const char *path, const scene_file_image *in,
+                                   scene_image *out)
+{
+    const int count = in->lights ? in->lights_count : 2;
+    out->lights = base_calloc((size_t)count, sizeof *out->lights);
+    if (!out->lights) return scene_no_memory(d);
+    out->light_count = count;
+    if (!in->lights) {
+        default_lights(out->lights);
+        return INSITU_OK;
+    }
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < count && status == INSITU_OK; i++) {
+        char light_path[SCENE_PATH_SIZE];
+        snprintf(light_path, sizeof light_path, "%s.lights[%d]", path, i);
+        status = convert_light(d, light_path, &in->lights[i], &out->lights[i]);
+    }
+    return status;
+}
