@@ -1,0 +1,237 @@
+/* The double reference on a few hundred pixels of a big mesh.
+ *
+ * Brute force over all cells is affordable because each cell is first projected: the rectangle around its projected
+ * vertices holds the projection of all of it (every kind of cell lies within the hull of its vertices), and the cell is
+ * kept only where that rectangle, a pixel wider all round, holds a chosen pixel. The reference then tries every
+ * chosen pixel's ray against every cell that was kept for any of them. */
+#include "bench_error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "comp.h"
+#include "reference_render.h"
+#include "test_meshes.h"
+
+typedef struct chosen_pixel {
+    uint32_t pixel;
+    int x, y;
+} chosen_pixel;
+
+struct bench_pixels {
+    render_camera camera;
+    int columns, rows;
+    chosen_pixel *pixels; /* columns × rows */
+    grid kept;            /* the cells that matter, with the whole mesh's vertices; owns the three arrays below */
+    int64_t *connectivity, *offsets;
+    unsigned char *types;
+};
+
+static void *must(void *p)
+{
+    if (!p) abort();
+    return p;
+}
+
+static chosen_pixel choose(const render_camera *camera, int column, int row)
+{
+    const uint64_t block = (uint64_t)(row * 100000 + column);
+    const int x = column * BENCH_BLOCK + (int)(test_uniform(2 * block, 11) * BENCH_BLOCK);
+    const int y = row * BENCH_BLOCK + (int)(test_uniform(2 * block + 1, 11) * BENCH_BLOCK);
+    return (chosen_pixel){(uint32_t)(y * camera->width + x), x, y};
+}
+
+static void to_pixel(const render_camera *c, const double world[3], double out[2])
+{
+    double p[3] = {0, 0, 0};
+    for (int i = 0; i < 3; i++) {
+        const double d = world[i] - c->eye[i];
+        p[0] += d * c->right[i];
+        p[1] += d * c->up[i];
+        p[2] += d * c->forward[i];
+    }
+    const double per_slope = 0.5 * c->height / c->half_height;
+    out[0] = 0.5 * c->width - 0.5 + per_slope * p[0] / p[2];
+    out[1] = 0.5 * c->height - 0.5 - per_slope * p[1] / p[2];
+}
+
+static bool holds_chosen(const bench_pixels *all, const double low[2], const double high[2])
+{
+    const int last_column = (int)fmin(all->columns - 1, floor(high[0] / BENCH_BLOCK));
+    const int last_row = (int)fmin(all->rows - 1, floor(high[1] / BENCH_BLOCK));
+    for (int row = (int)fmax(0, floor(low[1] / BENCH_BLOCK)); row <= last_row; row++)
+        for (int column = (int)fmax(0, floor(low[0] / BENCH_BLOCK)); column <= last_column; column++) {
+            const chosen_pixel *p = &all->pixels[row * all->columns + column];
+            if (p->x >= low[0] && p->x <= high[0] && p->y >= low[1] && p->y <= high[1]) return true;
+        }
+    return false;
+}
+
+static bool is_wanted(const bench_pixels *all, const grid *cells, int64_t cell)
+{
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(cells, cell, vertices);
+    for (int i = 0; i < count; i++) {
+        double world[3], pixel[2];
+        grid_vertex(cells, vertices[i], world);
+        to_pixel(&all->camera, world, pixel);
+        for (int axis = 0; axis < 2; axis++) {
+            low[axis] = fmin(low[axis], pixel[axis] - 1);
+            high[axis] = fmax(high[axis], pixel[axis] + 1);
+        }
+    }
+    return holds_chosen(all, low, high);
+}
+
+/* kept: the wanted cells in the mesh's order. */
+static void keep_cells(bench_pixels *all, const grid *cells, const unsigned char *wanted)
+{
+    int64_t count = 0, at = 0;
+    for (int64_t cell = 0; cell < cells->cell_count; cell++) count += wanted[cell];
+    all->connectivity = must(malloc(GRID_MAX_CELL_VERTICES * sizeof(int64_t) * (size_t)(count + 1)));
+    all->offsets = must(malloc(sizeof(int64_t) * (size_t)(count + 1)));
+    all->types = must(malloc((size_t)(count + 1)));
+    all->offsets[0] = 0;
+    for (int64_t cell = 0; cell < cells->cell_count; cell++) {
+        if (!wanted[cell]) continue;
+        const int vertices = grid_cell_vertices(cells, cell, all->connectivity + all->offsets[at]);
+        all->types[at] = (unsigned char)grid_cell_type(cells, cell);
+        all->offsets[at + 1] = all->offsets[at] + vertices;
+        at++;
+    }
+    all->kept = *cells;
+    all->kept.cell_count = count;
+    all->kept.connectivity =
+        (grid_array){.data = (char *)all->connectivity, .stride = 8, .is_wide = true, .is_integer = true};
+    all->kept.offsets = (grid_array){.data = (char *)all->offsets, .stride = 8, .is_wide = true, .is_integer = true};
+    all->kept.cell_types = (char *)all->types;
+    all->kept.cell_types_stride = all->kept.cell_types_bytes = 1;
+}
+
+bench_pixels *bench_pixels_create(const grid *cells, const render_camera *camera)
+{
+    bench_pixels *all = must(calloc(1, sizeof *all));
+    all->camera = *camera;
+    all->columns = camera->width / BENCH_BLOCK;
+    all->rows = camera->height / BENCH_BLOCK;
+    all->pixels = must(malloc((size_t)(all->columns * all->rows) * sizeof *all->pixels));
+    for (int i = 0; i < all->columns * all->rows; i++)
+        all->pixels[i] = choose(camera, i % all->columns, i / all->columns);
+    unsigned char *wanted = must(malloc((size_t)cells->cell_count + 1));
+#pragma omp parallel for schedule(static)
+    for (int64_t cell = 0; cell < cells->cell_count; cell++) wanted[cell] = is_wanted(all, cells, cell);
+    keep_cells(all, cells, wanted);
+    free(wanted);
+    return all;
+}
+
+void bench_pixels_destroy(bench_pixels *pixels)
+{
+    free(pixels->pixels);
+    free(pixels->connectivity);
+    free(pixels->offsets);
+    free(pixels->types);
+    free(pixels);
+}
+
+/* The chosen pixels by the reference; the caller frees them. */
+static reference_ray *trace_chosen(const bench_pixels *all, const render_job *job)
+{
+    const float nothing[4] = {0, 0, 0, 0};
+    const render_part part = {&all->kept, NULL};
+    const int count = all->columns * all->rows;
+    render_job kept = *job;
+    kept.parts = &part;
+    reference_ray *rays = must(malloc((size_t)count * sizeof *rays));
+    reference_scene *scene = reference_create(&kept);
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < count; i++) reference_trace(scene, all->pixels[i].x, all->pixels[i].y, nothing, &rays[i]);
+    reference_free(scene);
+    return rays;
+}
+
+/* The number of the chosen pixel that is this one, or -1. */
+static int chosen_index(const bench_pixels *all, uint32_t pixel)
+{
+    const int x = (int)pixel % all->camera.width, y = (int)pixel / all->camera.width;
+    const int column = x / BENCH_BLOCK, row = y / BENCH_BLOCK, i = row * all->columns + column;
+    return column < all->columns && row < all->rows && all->pixels[i].pixel == pixel ? i : -1;
+}
+
+/* The frame's chosen pixels as compositing would finish them, over nothing: count × 4, and their depths. */
+static void merge_chosen(const bench_pixels *all, const fragment_list *fragments, float *rgba, float *depths)
+{
+    enum { MANY = 4096 };
+    const float nothing[4] = {0, 0, 0, 0};
+    const int count = all->columns * all->rows;
+    fragment *own = must(malloc((size_t)count * MANY * sizeof *own));
+    int *own_count = must(calloc((size_t)count, sizeof *own_count));
+    for (int64_t i = 0; i < fragments->count; i++) {
+        const int at = chosen_index(all, fragments->items[i].pixel);
+        if (at < 0) continue;
+        if (own_count[at] == MANY) abort();
+        own[(int64_t)at * MANY + own_count[at]++] = fragments->items[i];
+    }
+    for (int i = 0; i < count; i++)
+        comp_merge_pixel(own + (int64_t)i * MANY, own_count[i], nothing, rgba + 4 * i, depths + i);
+    free(own);
+    free(own_count);
+}
+
+static double field_error(const bench_pixels *all, const render_job *job, const chosen_pixel *p, double depth,
+                          double (*exact)(const double position[3]))
+{
+    double base[3], direction[3], point[3];
+    render_camera_ray(&all->camera, p->x, p->y, base, direction);
+    for (int axis = 0; axis < 3; axis++) point[axis] = base[axis] + depth * direction[axis];
+    return fabs(exact(point) - job->surfaces[0].values[0]);
+}
+
+bench_surface_error bench_surface_compare(const bench_pixels *all, const render_job *job,
+                                          double (*exact)(const double position[3]), const fragment_list *fragments)
+{
+    const int count = all->columns * all->rows;
+    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba)),
+          *depths = must(malloc((size_t)count * sizeof *depths));
+    double *errors = must(malloc(2 * (size_t)count * sizeof *errors)), *fields = errors + count;
+    reference_ray *truth = trace_chosen(all, job);
+    bench_surface_error out = {.checked = count};
+    int both = 0, hits = 0;
+    merge_chosen(all, fragments, rgba, depths);
+    for (int i = 0; i < count; i++) {
+        const bool is_hit = isfinite(depths[i]), should_hit = truth[i].hit_count > 0;
+        if (is_hit) fields[hits++] = field_error(all, job, &all->pixels[i], (double)depths[i], exact);
+        if (is_hit && should_hit) errors[both++] = fabs((double)depths[i] - truth[i].hits[0].depth);
+        out.disagreements += is_hit != should_hit;
+        out.ambiguous += is_hit != should_hit && truth[i].ambiguous;
+    }
+    out.depth = bench_stats_of(errors, both);
+    out.field = bench_stats_of(fields, hits);
+    free(rgba);
+    free(depths);
+    free(errors);
+    free(truth);
+    return out;
+}
+
+bench_stats bench_volume_compare(const bench_pixels *all, const render_job *job, const fragment_list *fragments)
+{
+    const int count = all->columns * all->rows;
+    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba)),
+          *depths = must(malloc((size_t)count * sizeof *depths));
+    double *errors = must(malloc((size_t)count * sizeof *errors));
+    reference_ray *truth = trace_chosen(all, job);
+    merge_chosen(all, fragments, rgba, depths);
+    for (int i = 0; i < count; i++) {
+        errors[i] = 0;
+        for (int channel = 0; channel < 4; channel++)
+            errors[i] = fmax(errors[i], fabs((double)rgba[4 * i + channel] - truth[i].rgba[channel]));
+    }
+    const bench_stats out = bench_stats_of(errors, count);
+    free(rgba);
+    free(depths);
+    free(errors);
+    free(truth);
+    return out;
+}

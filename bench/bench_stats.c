@@ -1,0 +1,44 @@
+/* Benchmarks print long CSV, a measure a line, so that further programs and measures need no new columns. */
+#include "bench_stats.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+static int compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+bench_stats bench_stats_of(double *values, int count)
+{
+    if (!count) return (bench_stats){0};
+    qsort(values, (size_t)count, sizeof *values, compare);
+    const double median = 0.5 * (values[(count - 1) / 2] + values[count / 2]);
+    return (bench_stats){count, median, values[0], values[count - 1]};
+}
+
+double bench_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+void bench_print_head(void)
+{
+    printf("program,isa,threads,mesh,n,cells,measure,unit,count,median,min,max\n");
+}
+
+void bench_print(const bench_subject *s, const char *measure, const char *unit, bench_stats stats)
+{
+    printf("%s,%s,%d,%s,%d,%lld,%s,%s,%d,%.6g,%.6g,%.6g\n", s->program, s->isa, s->threads, s->mesh, s->n,
+           (long long)s->cells, measure, unit, stats.count, stats.median, stats.low, stats.high);
+    fflush(stdout);
+}
+
+void bench_print_number(const bench_subject *subject, const char *measure, const char *unit, double number)
+{
+    bench_print(subject, measure, unit, (bench_stats){1, number, number, number});
+}
