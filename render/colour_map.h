@@ -2,7 +2,8 @@
 #ifndef RENDER_COLOUR_MAP_H
 #define RENDER_COLOUR_MAP_H
 
-/* The table (colour_count × 3 floats, linear light, static) of "viridis", "inferno", "cool_to_warm" or "grey", or NULL. */
+/* The table (colour_count × 3 floats, linear light, static) of "viridis", "inferno", "cool_to_warm" or "grey", or NULL.
+ */
 const float *colour_map_table(const char *name, int *colour_count);
 
 /* One sRGB component in [0, 1] to linear light, and back. */

@@ -38,14 +38,14 @@ typedef struct render_space {
     double depth_origin; /* z at which t = 0 */
 } render_space;
 
-/* Colour and opacity of a value: colours are a table of linear RGB, evenly spaced over [low, high], interpolated linearly,
- * clamped outside; opacity is piecewise linear through points of rising value (two of the same value make a step),
- * constant outside. Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
+/* Colour and opacity of a value: colours are a table of linear RGB, evenly spaced over [low, high], interpolated
+ * linearly, clamped outside; opacity is piecewise linear through points of rising value (two of the same value make a
+ * step), constant outside. Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
 typedef struct render_transfer {
     double low, high;
-    int colour_count; /* >= 2 */
+    int colour_count;     /* >= 2 */
     const float *colours; /* colour_count × 3 */
-    int opacity_count; /* 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, which have none */
+    int opacity_count;    /* 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, which have none */
     const double *opacity_values;
     const float *opacities;
     double unit_distance; /* scene units, > 0 */
@@ -72,13 +72,13 @@ typedef struct render_field {
 typedef struct render_surface_layer {
     render_field field; /* vertex-centred */
     int value_count;
-    const double *values;          /* isovalues */
-    const float *colours;          /* value_count × 3, linear; where colour_map is NULL */
-    render_field colour_field;     /* where colour_map is given: vertex- or cell-centred; ranges not looked at */
+    const double *values;      /* isovalues */
+    const float *colours;      /* value_count × 3, linear; where colour_map is NULL */
+    render_field colour_field; /* where colour_map is given: vertex- or cell-centred; ranges not looked at */
     const render_transfer *colour_map;
-    float opacity;                 /* 0 .. 1; 1 ends the ray */
+    float opacity; /* 0 .. 1; 1 ends the ray */
     render_material material;
-    int root_steps;                /* N of Neubauer's method (thesis, 4.3.3), 0 .. 64 */
+    int root_steps; /* N of Neubauer's method (thesis, 4.3.3), 0 .. 64 */
 } render_surface_layer;
 
 typedef struct render_volume_layer {
@@ -123,11 +123,11 @@ double render_jitter(uint32_t pixel, uint32_t frame);
 
 /* Trace every pixel of the camera against this rank's parts and append what is seen to out (memory from memory.h;
  * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
-insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics,
-                           base_error *error);
+insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
 
-/* The instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may force a lower one
- * than the machine's best; a name that is unknown or not to be had is ignored, with render_isa_warning() telling. */
+/* The instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may force a lower
+ * one than the machine's best; a name that is unknown or not to be had is ignored, with render_isa_warning() telling.
+ */
 const char *render_isa(void);
 const char *render_isa_warning(void);
 

@@ -25,7 +25,7 @@ typedef struct grid {
     int64_t cell_count;
     grid_array coordinates[3];
     grid_array connectivity;
-    grid_array offsets;    /* data NULL: all cells are of cell_type */
+    grid_array offsets;     /* data NULL: all cells are of cell_type */
     const char *cell_types; /* NULL: all cells are of cell_type */
     int64_t cell_types_stride;
     int cell_types_bytes; /* 1, 4 or 8 */
@@ -113,7 +113,8 @@ static inline double grid_field_value(const grid_field *f, int64_t i)
 
 /* The values at the cell's vertices (or the cell's own, count times). False where one is NaN or infinite: such a
  * cell is not drawn. */
-static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count, double *values)
+static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count,
+                                    double *values)
 {
     bool finite = true;
     for (int i = 0; i < count; i++) {

@@ -79,8 +79,23 @@ char *base_strdup(const char *text)
     return copy;
 }
 
-int64_t base_memory_held(void) { return atomic_load(&held_bytes); }
-int64_t base_memory_peak(void) { return atomic_load(&peak_bytes); }
-void base_memory_reset_peak(void) { atomic_store(&peak_bytes, atomic_load(&held_bytes)); }
-void base_memory_fail_nth(int64_t n) { atomic_store(&fail_countdown, n); }
-int64_t base_memory_allocations(void) { return atomic_load(&allocation_count); }
+int64_t base_memory_held(void)
+{
+    return atomic_load(&held_bytes);
+}
+int64_t base_memory_peak(void)
+{
+    return atomic_load(&peak_bytes);
+}
+void base_memory_reset_peak(void)
+{
+    atomic_store(&peak_bytes, atomic_load(&held_bytes));
+}
+void base_memory_fail_nth(int64_t n)
+{
+    atomic_store(&fail_countdown, n);
+}
+int64_t base_memory_allocations(void)
+{
+    return atomic_load(&allocation_count);
+}

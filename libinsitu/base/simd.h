@@ -1,0 +1,363 @@
+/* One vector of floats, one of ints, one of masks, and the operations that kernels need: the same source is compiled
+ * once per instruction set. SIMD_AVX512 (16 wide), SIMD_AVX2 (8), SIMD_SSE42 (4), or none of them: plain C on the
+ * compiler's generic vectors (4), which is the reference and runs anywhere.
+ *
+ * Arithmetic (+ - * /) and comparison are the compiler's own on vector types; every one of them is IEEE exact and
+ * fused nowhere (-ffp-contract=off), so all instruction sets give the same bits. The one exception is
+ * vf_diff_of_products(), whose two forms both err by at most 1.5 units in the last place.
+ *
+ * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, integer lanes of 0 and -1
+ * elsewhere: always go through vm_*. */
+#ifndef BASE_SIMD_H
+#define BASE_SIMD_H
+
+#include <stdint.h>
+#include <string.h>
+
+#if defined(SIMD_AVX512) || defined(SIMD_AVX2) || defined(SIMD_SSE42)
+#include <immintrin.h>
+#endif
+
+#if defined(SIMD_AVX512)
+#define SIMD_WIDTH 16
+#elif defined(SIMD_AVX2)
+#define SIMD_WIDTH 8
+#else
+#define SIMD_WIDTH 4
+#endif
+
+#define SIMD_INLINE static inline __attribute__((always_inline))
+
+typedef float vf __attribute__((vector_size(SIMD_WIDTH * 4), may_alias));
+typedef int32_t vi __attribute__((vector_size(SIMD_WIDTH * 4), may_alias));
+
+#if defined(SIMD_AVX512)
+typedef __mmask16 vm;
+#else
+typedef vi vm;
+#endif
+
+SIMD_INLINE vf vf_set(float x)
+{
+    return (vf){0} + x;
+}
+SIMD_INLINE vi vi_set(int32_t x)
+{
+    return (vi){0} + x;
+}
+
+SIMD_INLINE vf vf_load(const float *p)
+{
+    vf v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+SIMD_INLINE void vf_store(float *p, vf v)
+{
+    memcpy(p, &v, sizeof v);
+}
+SIMD_INLINE vi vi_from_bits(vf v)
+{
+    return (vi)v;
+}
+SIMD_INLINE vf vf_from_bits(vi v)
+{
+    return (vf)v;
+}
+
+/* Towards zero. */
+SIMD_INLINE vi vi_from_vf(vf v)
+{
+    return __builtin_convertvector(v, vi);
+}
+SIMD_INLINE vf vf_from_vi(vi v)
+{
+    return __builtin_convertvector(v, vf);
+}
+
+#if defined(SIMD_AVX512)
+
+SIMD_INLINE vm vf_lt(vf a, vf b)
+{
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ);
+}
+SIMD_INLINE vm vf_le(vf a, vf b)
+{
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LE_OQ);
+}
+SIMD_INLINE vm vf_eq(vf a, vf b)
+{
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_EQ_OQ);
+}
+SIMD_INLINE vm vm_and(vm a, vm b)
+{
+    return (vm)(a & b);
+}
+SIMD_INLINE vm vm_or(vm a, vm b)
+{
+    return (vm)(a | b);
+}
+SIMD_INLINE vm vm_xor(vm a, vm b)
+{
+    return (vm)(a ^ b);
+}
+SIMD_INLINE vm vm_andnot(vm a, vm b)
+{
+    return (vm)(a & ~b);
+} /* a and not b */
+SIMD_INLINE vm vm_none(void)
+{
+    return 0;
+}
+SIMD_INLINE unsigned vm_bits(vm m)
+{
+    return m;
+}
+SIMD_INLINE vm vm_from_bits(unsigned bits)
+{
+    return (vm)bits;
+}
+SIMD_INLINE int vm_any(vm m)
+{
+    return m != 0;
+}
+SIMD_INLINE vf vf_select(vm m, vf a, vf b)
+{
+    return (vf)_mm512_mask_blend_ps(m, (__m512)b, (__m512)a);
+}
+SIMD_INLINE vf vf_min(vf a, vf b)
+{
+    return (vf)_mm512_min_ps((__m512)a, (__m512)b);
+}
+SIMD_INLINE vf vf_max(vf a, vf b)
+{
+    return (vf)_mm512_max_ps((__m512)a, (__m512)b);
+}
+SIMD_INLINE vf vf_sqrt(vf a)
+{
+    return (vf)_mm512_sqrt_ps((__m512)a);
+}
+SIMD_INLINE vf vf_floor(vf a)
+{
+    return (vf)_mm512_roundscale_ps((__m512)a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+}
+SIMD_INLINE vf vf_gather(const float *base, vi index)
+{
+    return (vf)_mm512_i32gather_ps((__m512i)index, base, 4);
+}
+SIMD_INLINE float vf_reduce_min(vf a)
+{
+    return _mm512_reduce_min_ps((__m512)a);
+}
+SIMD_INLINE float vf_reduce_max(vf a)
+{
+    return _mm512_reduce_max_ps((__m512)a);
+}
+
+#else
+
+SIMD_INLINE vm vf_lt(vf a, vf b)
+{
+    return (vm)(a < b);
+}
+SIMD_INLINE vm vf_le(vf a, vf b)
+{
+    return (vm)(a <= b);
+}
+SIMD_INLINE vm vf_eq(vf a, vf b)
+{
+    return (vm)(a == b);
+}
+SIMD_INLINE vm vm_and(vm a, vm b)
+{
+    return a & b;
+}
+SIMD_INLINE vm vm_or(vm a, vm b)
+{
+    return a | b;
+}
+SIMD_INLINE vm vm_xor(vm a, vm b)
+{
+    return a ^ b;
+}
+SIMD_INLINE vm vm_andnot(vm a, vm b)
+{
+    return a & ~b;
+}
+SIMD_INLINE vm vm_none(void)
+{
+    return vi_set(0);
+}
+
+SIMD_INLINE vm vm_from_bits(unsigned bits)
+{
+    vi lane;
+    for (int i = 0; i < SIMD_WIDTH; i++) lane[i] = (bits >> i & 1u) ? -1 : 0;
+    return lane;
+}
+
+#if defined(SIMD_AVX2)
+
+SIMD_INLINE unsigned vm_bits(vm m)
+{
+    return (unsigned)_mm256_movemask_ps((__m256)m);
+}
+SIMD_INLINE int vm_any(vm m)
+{
+    return !_mm256_testz_si256((__m256i)m, (__m256i)m);
+}
+SIMD_INLINE vf vf_select(vm m, vf a, vf b)
+{
+    return (vf)_mm256_blendv_ps((__m256)b, (__m256)a, (__m256)m);
+}
+SIMD_INLINE vf vf_min(vf a, vf b)
+{
+    return (vf)_mm256_min_ps((__m256)a, (__m256)b);
+}
+SIMD_INLINE vf vf_max(vf a, vf b)
+{
+    return (vf)_mm256_max_ps((__m256)a, (__m256)b);
+}
+SIMD_INLINE vf vf_sqrt(vf a)
+{
+    return (vf)_mm256_sqrt_ps((__m256)a);
+}
+SIMD_INLINE vf vf_floor(vf a)
+{
+    return (vf)_mm256_floor_ps((__m256)a);
+}
+SIMD_INLINE vf vf_gather(const float *base, vi index)
+{
+    return (vf)_mm256_i32gather_ps(base, (__m256i)index, 4);
+}
+
+#elif defined(SIMD_SSE42)
+
+SIMD_INLINE unsigned vm_bits(vm m)
+{
+    return (unsigned)_mm_movemask_ps((__m128)m);
+}
+SIMD_INLINE int vm_any(vm m)
+{
+    return !_mm_testz_si128((__m128i)m, (__m128i)m);
+}
+SIMD_INLINE vf vf_select(vm m, vf a, vf b)
+{
+    return (vf)_mm_blendv_ps((__m128)b, (__m128)a, (__m128)m);
+}
+SIMD_INLINE vf vf_min(vf a, vf b)
+{
+    return (vf)_mm_min_ps((__m128)a, (__m128)b);
+}
+SIMD_INLINE vf vf_max(vf a, vf b)
+{
+    return (vf)_mm_max_ps((__m128)a, (__m128)b);
+}
+SIMD_INLINE vf vf_sqrt(vf a)
+{
+    return (vf)_mm_sqrt_ps((__m128)a);
+}
+SIMD_INLINE vf vf_floor(vf a)
+{
+    return (vf)_mm_floor_ps((__m128)a);
+}
+
+#else
+
+SIMD_INLINE unsigned vm_bits(vm m)
+{
+    unsigned bits = 0;
+    for (int i = 0; i < SIMD_WIDTH; i++) bits |= (m[i] ? 1u : 0u) << i;
+    return bits;
+}
+SIMD_INLINE int vm_any(vm m)
+{
+    return (m[0] | m[1] | m[2] | m[3]) != 0;
+}
+SIMD_INLINE vf vf_select(vm m, vf a, vf b)
+{
+    return (vf)(((vi)a & m) | ((vi)b & ~m));
+}
+SIMD_INLINE vf vf_min(vf a, vf b)
+{
+    return vf_select(vf_lt(a, b), a, b);
+} /* b where either is NaN, as x86 does */
+SIMD_INLINE vf vf_max(vf a, vf b)
+{
+    return vf_select(vf_lt(b, a), a, b);
+}
+SIMD_INLINE vf vf_sqrt(vf a)
+{
+    for (int i = 0; i < SIMD_WIDTH; i++) a[i] = __builtin_sqrtf(a[i]);
+    return a;
+}
+SIMD_INLINE vf vf_floor(vf a)
+{
+    for (int i = 0; i < SIMD_WIDTH; i++) a[i] = __builtin_floorf(a[i]);
+    return a;
+}
+
+#endif
+
+#if !defined(SIMD_AVX2)
+SIMD_INLINE vf vf_gather(const float *base, vi index)
+{
+    vf v;
+    for (int i = 0; i < SIMD_WIDTH; i++) v[i] = base[index[i]];
+    return v;
+}
+#endif
+
+SIMD_INLINE float vf_reduce_min(vf a)
+{
+    float least = a[0];
+    for (int i = 1; i < SIMD_WIDTH; i++) least = a[i] < least ? a[i] : least;
+    return least;
+}
+SIMD_INLINE float vf_reduce_max(vf a)
+{
+    float most = a[0];
+    for (int i = 1; i < SIMD_WIDTH; i++) most = a[i] > most ? a[i] : most;
+    return most;
+}
+
+#endif
+
+/* a b - c d to 1.5 units in the last place, zero only where it is zero, and of the right sign: Kahan's two fused
+ * steps where there are such, else in double, where the products of floats are exact. */
+SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
+{
+#if defined(SIMD_AVX512)
+    const __m512 cd = _mm512_mul_ps((__m512)c, (__m512)d);
+    const __m512 error = _mm512_fnmadd_ps((__m512)c, (__m512)d, cd);
+    return (vf)_mm512_add_ps(_mm512_fmsub_ps((__m512)a, (__m512)b, cd), error);
+#elif defined(SIMD_AVX2)
+    const __m256 cd = _mm256_mul_ps((__m256)c, (__m256)d);
+    const __m256 error = _mm256_fnmadd_ps((__m256)c, (__m256)d, cd);
+    return (vf)_mm256_add_ps(_mm256_fmsub_ps((__m256)a, (__m256)b, cd), error);
+#else
+    typedef double vd __attribute__((vector_size(SIMD_WIDTH * 8)));
+    const vd difference = __builtin_convertvector(a, vd) * __builtin_convertvector(b, vd) -
+                          __builtin_convertvector(c, vd) * __builtin_convertvector(d, vd);
+    return __builtin_convertvector(difference, vf);
+#endif
+}
+
+SIMD_INLINE vf vf_abs(vf a)
+{
+    return vf_from_bits(vi_from_bits(a) & vi_set(0x7fffffff));
+}
+SIMD_INLINE vf vf_clamp(vf a, vf low, vf high)
+{
+    return vf_min(vf_max(a, low), high);
+}
+SIMD_INLINE vm vm_all_lanes(void)
+{
+    return vm_from_bits((1u << SIMD_WIDTH) - 1u);
+}
+SIMD_INLINE vm vm_not(vm m)
+{
+    return vm_andnot(vm_all_lanes(), m);
+}
+
+#endif

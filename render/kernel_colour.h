@@ -1,0 +1,159 @@
+/* Colours: transfer functions, exponentials, and shading. */
+#ifndef RENDER_KERNEL_COLOUR_H
+#define RENDER_KERNEL_COLOUR_H
+
+#include "kernel_packet.h"
+
+/* 2^x for x <= 0, to 2e-7 relative; 0 below -126. Taylor of 2^f for f in [-1/2, 1/2]: the first term left out is
+ * (f ln 2)^7 / 7! < 1.2e-7. */
+SIMD_INLINE vf vf_exp2(vf x)
+{
+    const vf whole = vf_floor(x + 0.5f);
+    const vf f = x - whole;
+    vf p = f * 1.5403530e-4f + 1.3333558e-3f;
+    p = p * f + 9.6181291e-3f;
+    p = p * f + 5.5504109e-2f;
+    p = p * f + 2.4022651e-1f;
+    p = p * f + 6.9314718e-1f;
+    p = p * f + 1.0f;
+    const vf scale = vf_from_bits((vi_from_vf(vf_max(whole, vf_set(-127))) + 127) << 23);
+    return vf_select(vf_lt(x, vf_set(-126)), vf_set(0), p * scale);
+}
+
+/* log2(x) for normal x > 0: mantissa to [sqrt(1/2), sqrt(2)), then 2 atanh(s) / ln 2 with s = (m-1)/(m+1), |s| < 0.172:
+ * the first term left out is s^10 / 11 < 3e-9 relative. */
+SIMD_INLINE vf vf_log2(vf x)
+{
+    const vi bits = vi_from_bits(x);
+    const vi shifted = bits - 0x3f3504f3; /* bits of sqrt(1/2) */
+    const vi exponent = shifted >> 23;
+    const vf m = vf_from_bits(bits - (exponent << 23));
+    const vf s = (m - 1.0f) / (m + 1.0f);
+    const vf z = s * s;
+    vf p = z * 0.32059890f + 0.41219858f;
+    p = p * z + 0.57707802f;
+    p = p * z + 0.96179669f;
+    p = p * z + 2.8853901f;
+    return vf_from_vi(exponent) + s * p;
+}
+
+/* Transmittance of a sample whose opacity per unit is a: (1 - a)^exponent, and 1 minus it without cancellation. */
+SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
+{
+    const vf clear = 1.0f - opacity;
+    /* 1 - opacity was rounded by at most half a unit: put the rest back to first order. */
+    const vf rest = (1.0f - clear) - opacity;
+    const vf safe = vf_max(clear, vf_set(1.2e-38f));
+    const vf log = vf_select(vf_le(clear, vf_set(0)), vf_set(-1e30f), vf_log2(safe) + rest / safe * 1.4426950f);
+    const vf x = log * exponent;
+    /* 1 - 2^x near 0 by its own series: 7 terms at |x ln 2| < 0.35 leave 0.35^7 / 8! of the first. */
+    const vf y = x * 0.69314718f;
+    vf p = y * 1.9841270e-4f + 1.3888889e-3f;
+    p = p * y + 8.3333333e-3f;
+    p = p * y + 4.1666667e-2f;
+    p = p * y + 1.6666667e-1f;
+    p = p * y + 0.5f;
+    p = p * y + 1.0f;
+    const vf series = -(y * p);
+    const vf power = vf_exp2(x);
+    const vm small = vf_lt(vf_set(-0.5f), x);
+    *absorbed = vf_select(small, series, 1.0f - power);
+    return vf_select(small, 1.0f - series, power);
+}
+
+/* x in the transfer's domain; NaN gives the colour at 0. */
+SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
+{
+    const vf place = vf_clamp(x, vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
+    const vf whole = vf_min(vf_floor(place), vf_set((float)(t->colour_count - 2)));
+    const vf part = place - whole;
+    const vi index = vi_from_vf(whole) * 3;
+    for (int a = 0; a < 3; a++) {
+        const vf low = vf_gather(t->colours + a, index), high = vf_gather(t->colours + a + 3, index);
+        out[a] = low + part * (high - low);
+    }
+}
+
+SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)
+{
+    vf a = vf_set(t->base_opacity);
+    for (int i = 0; i < t->ramp_count; i++) {
+        const vf along = vf_clamp((x - t->ramp_start[i]) * t->ramp_inverse[i], vf_set(0), vf_set(1));
+        a += along * t->ramp_rise[i];
+    }
+    return vf_clamp(a, vf_set(0), vf_set(1));
+}
+
+SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
+{
+    /* Scaled by the largest component first: gradients of fields of 1e30 or 1e-30 must not overflow. */
+    const vf largest = vf_max(vf_abs(v[0]), vf_max(vf_abs(v[1]), vf_abs(v[2])));
+    *is_zero = vm_not(vf_lt(vf_set(0), largest));
+    const vf scale = 1.0f / vf_select(*is_zero, vf_set(1), largest);
+    const vf a = v[0] * scale, b = v[1] * scale, c = v[2] * scale;
+    return scale / vf_sqrt((a * a + b * b) + c * c);
+}
+
+/* Light one colour: n is any vector along the gradient, in camera axes. Blinn-Phong (render.h). */
+SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, const vf n[3], vf colour[3])
+{
+    const render_job *job = p->frame->job;
+    vm flat;
+    vf unit[3], inverse = kernel_inverse_length(n, &flat);
+    vf facing = vf_set(0);
+    for (int a = 0; a < 3; a++) {
+        unit[a] = vf_select(flat, p->view[a], n[a] * inverse);
+        facing += unit[a] * p->view[a];
+    }
+    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
+    for (int a = 0; a < 3; a++) unit[a] *= turn;
+    vf diffuse[3], specular[3];
+    for (int a = 0; a < 3; a++) diffuse[a] = vf_set(m->ambient), specular[a] = vf_set(0);
+    for (int i = 0; i < job->light_count; i++) {
+        const float *l = p->frame->light_direction[i], *c = job->lights[i].colour;
+        const vf nl = vf_max((unit[0] * l[0] + unit[1] * l[1]) + unit[2] * l[2], vf_set(0));
+        const vf half[3] = {p->view[0] + l[0], p->view[1] + l[1], p->view[2] + l[2]};
+        vm opposite;
+        const vf scale = kernel_inverse_length(half, &opposite);
+        vf nh = ((unit[0] * half[0] + unit[1] * half[1]) + unit[2] * half[2]) * scale;
+        nh = vf_select(opposite, vf_set(0), vf_max(nh, vf_set(0)));
+        vf shine = vf_exp2(vf_log2(vf_max(nh, vf_set(1e-20f))) * m->shininess);
+        shine = vf_select(vf_lt(vf_set(0), nh), shine, vf_set(0));
+        for (int a = 0; a < 3; a++) {
+            diffuse[a] += nl * (m->diffuse * c[a]);
+            specular[a] += shine * (m->specular * c[a]);
+        }
+    }
+    for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
+}
+
+/* Write the fragments of the rays in mask. */
+SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const vf kinds, vf t_in, vf t_out,
+                             const vf colour[3], vf transmittance)
+{
+    unsigned bits = vm_bits(mask);
+    fragment_list *list = p->thread->out;
+    if (!bits) return;
+    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->reserve(list, SIMD_WIDTH)) {
+        p->thread->out_of_memory = true;
+        return;
+    }
+    float a[7][SIMD_WIDTH];
+    vf_store(a[0], t_in);
+    vf_store(a[1], t_out);
+    for (int i = 0; i < 3; i++) vf_store(a[2 + i], colour[i]);
+    vf_store(a[5], transmittance);
+    vf_store(a[6], kinds);
+    while (bits) {
+        const int lane = __builtin_ctz(bits);
+        bits &= bits - 1;
+        list->items[list->count++] = (fragment){.pixel = p->pixel[lane],
+                                                .t_in = a[0][lane],
+                                                .t_out = a[1][lane],
+                                                .colour = {a[2][lane], a[3][lane], a[4][lane]},
+                                                .transmittance = a[5][lane],
+                                                .kind = kind + (uint32_t)a[6][lane]};
+    }
+}
+
+#endif

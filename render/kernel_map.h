@@ -1,0 +1,201 @@
+/* The inverse map of hexes, wedges and pyramids: which of the cell's own coordinates belong to a point, and so the
+ * field and its gradient there.
+ *
+ * All three are one polynomial in their coordinates (r, s, q),
+ *     c0 + c1 r + c2 s + c3 q + c4 m + c5 r q + c6 s q + c7 m q,
+ * with m = r s: the trilinear hex has all terms, the wedge lacks c4 and c7. The pyramid is the collapsed hex, whose
+ * map is singular at the apex; in the coordinates a = (1-q) r, b = (1-q) s, k = 1-q it is apex + a c1 + b c2 + k c3 +
+ * c4 m with m = a b / k, which is linear but for the last term, and that one vanishes for a parallelogram base. So
+ * Newton's method meets no singularity there: m is bounded by k. */
+#ifndef RENDER_KERNEL_MAP_H
+#define RENDER_KERNEL_MAP_H
+
+#include "kernel_cell.h"
+
+enum { KERNEL_MAP_STEPS = 10 };
+
+typedef struct kernel_polynomial {
+    float c[8];
+} kernel_polynomial;
+
+/* Coordinates relative to vertex 0 in tile space, so that they are of the cell's size; and the field. */
+typedef struct kernel_map {
+    bool is_pyramid;
+    float origin[3]; /* vertex 0 */
+    float tolerance; /* a Newton step below it is the last */
+    kernel_polynomial position[3], field, colour;
+} kernel_map;
+
+SIMD_INLINE void kernel_polynomial_fit(kernel_polynomial *p, int type, const double v[GRID_MAX_CELL_VERTICES])
+{
+    double c[8] = {0};
+    if (type == GRID_HEX) {
+        c[0] = v[0];
+        c[1] = v[1] - v[0];
+        c[2] = v[3] - v[0];
+        c[3] = v[4] - v[0];
+        c[4] = v[2] - v[1] - v[3] + v[0];
+        c[5] = v[5] - v[1] - v[4] + v[0];
+        c[6] = v[7] - v[3] - v[4] + v[0];
+        c[7] = (v[6] - v[5] - v[7] + v[4]) - c[4];
+    } else if (type == GRID_WEDGE) {
+        c[0] = v[0];
+        c[1] = v[1] - v[0];
+        c[2] = v[2] - v[0];
+        c[3] = v[3] - v[0];
+        c[5] = v[4] - v[1] - v[3] + v[0];
+        c[6] = v[5] - v[2] - v[3] + v[0];
+    } else {
+        c[0] = v[4];
+        c[1] = v[1] - v[0];
+        c[2] = v[3] - v[0];
+        c[3] = v[0] - v[4];
+        c[4] = v[0] - v[1] + v[2] - v[3];
+    }
+    for (int i = 0; i < 8; i++) p->c[i] = (float)c[i];
+}
+
+SIMD_INLINE void kernel_polynomial_of_floats(kernel_polynomial *p, int type, const float *v, float origin)
+{
+    double d[GRID_MAX_CELL_VERTICES];
+    for (int i = 0; i < grid_type_vertices(type); i++) d[i] = (double)v[i] - (double)origin;
+    kernel_polynomial_fit(p, type, d);
+}
+
+SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
+{
+    m->is_pyramid = c->type == GRID_PYRAMID;
+    m->origin[0] = c->x[0];
+    m->origin[1] = c->y[0];
+    m->origin[2] = c->z[0];
+    kernel_polynomial_of_floats(&m->position[0], c->type, c->x, c->x[0]);
+    kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0]);
+    kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0]);
+    kernel_polynomial_of_floats(&m->field, c->type, c->f, 0);
+    /* The error goes as the square of the step: below 3e-4 the next one would be under float32's resolution. */
+    m->tolerance = 3e-4f;
+}
+
+SIMD_INLINE void kernel_map_colour(kernel_map *m, const kernel_cell *c)
+{
+    kernel_polynomial_of_floats(&m->colour, c->type, c->g, 0);
+}
+
+/* m and its derivatives. */
+typedef struct kernel_product {
+    vf m, dr, ds, dq;
+} kernel_product;
+
+SIMD_INLINE kernel_product kernel_map_product(const kernel_map *map, const vf r[3])
+{
+    kernel_product out = {r[0] * r[1], r[1], r[0], vf_set(0)};
+    if (map->is_pyramid) {
+        /* Within the cell a / k and b / k are in [0, 1]; a step beyond the apex must not blow up. */
+        const vf inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
+        out.ds = vf_clamp(r[0] * inverse, vf_set(-1), vf_set(2));
+        out.dr = vf_clamp(r[1] * inverse, vf_set(-1), vf_set(2));
+        out.m = out.ds * r[1];
+        out.dq = -(out.ds * out.dr);
+    }
+    return out;
+}
+
+SIMD_INLINE vf kernel_polynomial_value(const kernel_map *map, const kernel_polynomial *p, const kernel_product *m,
+                                       const vf r[3])
+{
+    const float *c = p->c;
+    vf v = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m->m * c[4];
+    if (!map->is_pyramid) v += r[2] * ((r[0] * c[5] + r[1] * c[6]) + m->m * c[7]);
+    return v;
+}
+
+SIMD_INLINE void kernel_polynomial_gradient(const kernel_map *map, const kernel_polynomial *p, const kernel_product *m,
+                                            const vf r[3], vf out[3])
+{
+    const float *c = p->c;
+    out[0] = c[1] + m->dr * c[4];
+    out[1] = c[2] + m->ds * c[4];
+    out[2] = c[3] + m->dq * c[4];
+    if (map->is_pyramid) return;
+    out[0] += r[2] * (c[5] + m->dr * c[7]);
+    out[1] += r[2] * (c[6] + m->ds * c[7]);
+    out[2] += (r[0] * c[5] + r[1] * c[6]) + m->m * c[7];
+}
+
+SIMD_INLINE void kernel_cross(const vf a[3], const vf b[3], vf out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+SIMD_INLINE vf kernel_dot(const vf a[3], const vf b[3])
+{
+    return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
+
+/* The gradients of the three positions and their cross products: the rows of the Jacobian and, over det, the columns
+ * of its inverse. */
+typedef struct kernel_jacobian {
+    vf cross[3][3]; /* cross[0] = row1 × row2, ... */
+    vf det;
+} kernel_jacobian;
+
+SIMD_INLINE void kernel_map_jacobian(const kernel_map *map, const kernel_product *m, const vf r[3],
+                                     kernel_jacobian *out)
+{
+    vf row[3][3];
+    for (int a = 0; a < 3; a++) kernel_polynomial_gradient(map, &map->position[a], m, r, row[a]);
+    kernel_cross(row[1], row[2], out->cross[0]);
+    kernel_cross(row[2], row[0], out->cross[1]);
+    kernel_cross(row[0], row[1], out->cross[2]);
+    out->det = kernel_dot(row[0], out->cross[0]);
+}
+
+/* From the guess in r to the coordinates of the point at depth t on each ray of wanted, by Newton's method. Returns the
+ * rays that did not converge: theirs are not to be used. A ray that has converged is left alone, so that its result
+ * does not depend on the others of the packet. */
+SIMD_INLINE vm kernel_map_invert(const kernel_packet *p, const kernel_map *map, vm wanted, vf t, vf r[3])
+{
+    const vf target[3] = {(p->origin_x + p->slope_x * t) - map->origin[0],
+                          (p->origin_y + p->slope_y * t) - map->origin[1], t - map->origin[2]};
+    vm open = wanted;
+    for (int step = 0; step < KERNEL_MAP_STEPS && vm_any(open); step++) {
+        const kernel_product m = kernel_map_product(map, r);
+        kernel_jacobian j;
+        kernel_map_jacobian(map, &m, r, &j);
+        const vf inverse = vf_select(vf_eq(j.det, vf_set(0)), vf_set(0), 1.0f / j.det);
+        vf residual[3], largest = vf_set(0);
+        for (int a = 0; a < 3; a++) residual[a] = target[a] - kernel_polynomial_value(map, &map->position[a], &m, r);
+        for (int a = 0; a < 3; a++) {
+            const vf sum = (j.cross[0][a] * residual[0] + j.cross[1][a] * residual[1]) + j.cross[2][a] * residual[2];
+            const vf move = vf_clamp(sum * inverse, vf_set(-1), vf_set(1));
+            largest = vf_max(largest, vf_abs(move));
+            r[a] = vf_select(open, vf_clamp(r[a] + move, vf_set(-1), vf_set(2)), r[a]);
+        }
+        const vm solid = vm_not(vf_eq(j.det, vf_set(0)));
+        open = vm_andnot(open, vm_and(solid, vf_le(largest, vf_set(map->tolerance))));
+    }
+    return open;
+}
+
+SIMD_INLINE vf kernel_map_value(const kernel_map *map, const kernel_polynomial *field, const vf r[3])
+{
+    const kernel_product m = kernel_map_product(map, r);
+    return kernel_polynomial_value(map, field, &m, r);
+}
+
+/* The direction of the field's gradient at r, in tile space. */
+SIMD_INLINE void kernel_map_normal(const kernel_map *map, const vf r[3], vf out[3])
+{
+    const kernel_product m = kernel_map_product(map, r);
+    kernel_jacobian j;
+    vf g[3];
+    kernel_map_jacobian(map, &m, r, &j);
+    kernel_polynomial_gradient(map, &map->field, &m, r, g);
+    /* grad = J^-T g: the columns of J^-1 are cross / det, and the sign of det is settled by whoever turns the normal.
+     */
+    for (int a = 0; a < 3; a++) out[a] = kernel_dot(j.cross[a], g);
+}
+
+#endif

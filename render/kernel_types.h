@@ -1,0 +1,74 @@
+/* What render_frame.c prepares once a frame and the kernels of every instruction set read: constants in the forms
+ * that inner loops want. Kernel headers include nothing but static inline code and these types. */
+#ifndef RENDER_KERNEL_TYPES_H
+#define RENDER_KERNEL_TYPES_H
+
+#include "render.h"
+
+enum { KERNEL_TILE = 8, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
+
+/* Values that show: a node whose range meets none of these intervals is skipped. Rounded outward. */
+typedef struct kernel_interest {
+    int count;
+    float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
+} kernel_interest;
+
+/* A transfer function in its own domain, where [low, high] is [0, 1]: opacity is the first point's plus a sum of ramps
+ * (a ramp of infinite slope is a step). */
+typedef struct kernel_transfer {
+    double low, inverse_width; /* value -> domain */
+    const float *colours;
+    int colour_count;
+    int ramp_count;
+    float base_opacity;
+    float ramp_start[RENDER_MAX_OPACITY_POINTS], ramp_inverse[RENDER_MAX_OPACITY_POINTS];
+    float ramp_rise[RENDER_MAX_OPACITY_POINTS];
+    float exponent; /* step / unit_distance */
+    kernel_interest interest;
+} kernel_transfer;
+
+typedef struct kernel_surface {
+    const render_surface_layer *layer;
+    kernel_interest interest; /* the isovalues */
+    kernel_transfer colour;   /* where layer->colour_map */
+    uint32_t first_kind;      /* fragment kind of the layer's first isovalue */
+} kernel_surface;
+
+typedef struct kernel_frame {
+    const render_job *job;
+    int surface_count, volume_count;
+    kernel_surface *surfaces; /* opaque ones first */
+    int opaque_count;
+    kernel_transfer volumes[RENDER_MAX_VOLUMES];
+    double scaled_axes[3][3];  /* right, up, forward, each times the space's scale */
+    double depth_shift;        /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */
+    double slope_x0, slope_dx; /* of the pixel column x: slope_x0 + x * slope_dx; offsets where orthographic */
+    double slope_y0, slope_dy;
+    double scaled_step;                          /* step * scale */
+    float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
+    bool has_transparent;
+    bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there
+                         */
+} kernel_frame;
+
+/* One thread's state. */
+typedef struct kernel_thread {
+    fragment_list *out;
+    /* Make room for more items in out; false where memory ran out. */
+    bool (*reserve)(fragment_list *list, int64_t more);
+    bool out_of_memory;
+    int64_t map_failures;
+    double surface_seconds, volume_seconds;
+    double (*now)(void);
+} kernel_thread;
+
+/* What one instruction set's object exports. */
+typedef struct kernel_table {
+    int width;
+    /* Trace the tile of pixels whose upper left one is (x0, y0). */
+    void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
+} kernel_table;
+
+extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;
+
+#endif

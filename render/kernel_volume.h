@@ -1,0 +1,256 @@
+/* Volumes by sample position packets (thesis, section 4.4): the packet's rays with N samples each go down the tree
+ * together; a node is left out where no sample is in its box or where its range is transparent. In a cell the rays'
+ * intervals are found once, and each of the N samples that an interval owns, t_in <= t < t_out, gets its value. Then
+ * the N samples are blended front to back, and the next N follow.
+ *
+ * A sample's place depends on its number and its ray alone, so that every rank means the same samples; each sample
+ * has one owner, for neighbours share the bits of t at their face. */
+#ifndef RENDER_KERNEL_VOLUME_H
+#define RENDER_KERNEL_VOLUME_H
+
+#include "kernel_surface.h"
+
+/* What is behind so little light does not show: far below the 1e-6 that ranks may differ by. */
+#define KERNEL_DARK 1e-7f
+
+/* The samples of a window: NaN where this rank has none. */
+typedef struct kernel_samples {
+    int first, count;
+    vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
+    vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* of the owning interval; only where contact is asked for */
+} kernel_samples;
+
+/* A fragment under way on each ray. */
+typedef struct kernel_blend {
+    vm open;
+    vf t_first, t_last, contact_in, contact_out;
+    vf colour[3], transmittance;
+    vf light; /* what reaches this rank's next sample through all its samples so far */
+} kernel_blend;
+
+typedef struct kernel_volume_state {
+    int volume;
+    kernel_samples *samples;
+} kernel_volume_state;
+
+SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
+{
+    return p->sample_base + p->sample_step * (float)m;
+}
+
+/* f: values in the transfer's domain; false where all of the cell is transparent. */
+SIMD_INLINE bool kernel_cell_domain(kernel_cell *c, const kernel_transfer *t, bool *is_constant)
+{
+    double low = c->values[0], high = low;
+    for (int i = 1; i < c->count; i++) {
+        low = fmin(low, c->values[i]);
+        high = fmax(high, c->values[i]);
+    }
+    *is_constant = low == high;
+    return kernel_interest_meets(&t->interest, (float)fmin(fmax(low, -3e38), 3e38),
+                                 (float)fmin(fmax(high, -3e38), 3e38));
+}
+
+/* After kernel_cell_geometry(), which may reorder. Held to 1e18 so that interpolation cannot overflow. */
+SIMD_INLINE void kernel_cell_scale(kernel_cell *c, const kernel_transfer *t)
+{
+    for (int i = 0; i < c->count; i++)
+        c->f[i] = (float)fmin(fmax((c->values[i] - t->low) * t->inverse_width, -1e18), 1e18);
+}
+
+/* The window's samples that may be in the interval of some ray: indices into the window. */
+SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
+                                    int *begin, int *end)
+{
+    const vf from = (i->t_in - p->sample_base) / p->sample_step, to = (i->t_out - p->sample_base) / p->sample_step;
+    const float low = vf_reduce_min(vf_select(i->mask, from, vf_set(INFINITY)));
+    const float high = vf_reduce_max(vf_select(i->mask, to, vf_set(-INFINITY)));
+    const float first = fminf(fmaxf(low - (float)s->first - 0.5f, 0), KERNEL_MAX_GROUP);
+    const float last = fminf(fmaxf(high - (float)s->first + 1.5f, 0), (float)s->count);
+    *begin = (int)first;
+    *end = (int)last;
+}
+
+SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
+                             const kernel_interval *i)
+{
+    kernel_samples *s = state->samples;
+    int begin, end;
+    kernel_sample_span(p, s, i, &begin, &end);
+    const vf length = i->t_out - i->t_in;
+    const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
+    for (int n = begin; n < end; n++) {
+        const vf t = kernel_sample_t(p, s->first + n);
+        const vm own = vm_and(i->mask, vm_andnot(vf_lt(t, i->t_out), vf_lt(t, i->t_in)));
+        if (!vm_any(own)) continue;
+        vf value = i->v_in + slope * (t - i->t_in);
+        if (map) value = kernel_value_at(p, map, i, own, t);
+        s->value[state->volume][n] = vf_select(own, value, s->value[state->volume][n]);
+        if (p->frame->needs_contact) {
+            s->t_in[n] = vf_select(own, i->t_in, s->t_in[n]);
+            s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);
+        }
+    }
+}
+
+static void kernel_volume_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
+                               vm rays)
+{
+    kernel_volume_state *state = opaque_state;
+    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    const grid_field *field = &p->frame->job->volumes[state->volume].field.fields[part];
+    const grid *g = p->frame->job->parts[part].cells;
+    kernel_cell c;
+    for (int n = 0; n < count; n++) {
+        bool is_constant;
+        if (!kernel_cell_values(&c, g, field, cells[n])) continue;
+        if (!kernel_cell_domain(&c, transfer, &is_constant)) continue;
+        kernel_cell_geometry(&c, p, g);
+        kernel_cell_scale(&c, transfer);
+        if (c.type == GRID_TET) {
+            kernel_interval i;
+            kernel_tet_interval(p, &c, rays, false, &i);
+            if (vm_any(i.mask)) kernel_fill(p, state, NULL, &i);
+            continue;
+        }
+        kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+        kernel_map map;
+        const int intervals = kernel_poly_intervals(p, &c, rays, false, list);
+        if (intervals && !is_constant) kernel_map_setup(&map, &c);
+        for (int k = 0; k < intervals; k++) kernel_fill(p, state, is_constant ? NULL : &map, &list[k]);
+    }
+}
+
+/* End the fragments of the rays in mask. */
+SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
+{
+    const vm closing = vm_and(b->open, mask);
+    if (!vm_any(closing)) return;
+    kernel_emit(p, vm_and(closing, vf_lt(b->transmittance, vf_set(1))), FRAGMENT_VOLUME, vf_set(0), b->t_first,
+                b->t_last, b->colour, b->transmittance);
+    b->open = vm_andnot(b->open, closing);
+}
+
+/* Rays whose fragment must end before the sample at t: a surface is in between, or may be, on another rank. */
+SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
+                                   const kernel_hits *hits, vf t)
+{
+    if (hits->cut_count > KERNEL_MAX_CUTS) return b->open;
+    vm broken = vm_none();
+    for (int i = 0; i < hits->cut_count; i++)
+        broken =
+            vm_or(broken, vm_and(hits->cut_mask[i], vm_and(vf_lt(b->t_last, hits->cut[i]), vf_le(hits->cut[i], t))));
+    if (p->frame->needs_contact) {
+        const vm touch = vm_or(vf_eq(s->t_in[n], b->contact_out), vf_eq(s->t_in[n], b->contact_in));
+        broken = vm_or(broken, vm_not(touch));
+    }
+    return broken;
+}
+
+/* Colour (premultiplied) and transmittance of the samples of all volumes at one place. */
+SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_samples *s, int n, vf colour[3], vf *clear)
+{
+    const kernel_frame *f = p->frame;
+    vf sum[3] = {vf_set(0), vf_set(0), vf_set(0)}, weight = vf_set(0), through = vf_set(1), all = vf_set(0);
+    for (int v = 0; v < f->volume_count; v++) {
+        const vf value = s->value[v][n];
+        const vm has = vf_eq(value, value);
+        vf absorbed, c[3];
+        const vf left = kernel_transmittance(vf_select(has, kernel_opacity(&f->volumes[v], value), vf_set(0)),
+                                             f->volumes[v].exponent, &absorbed);
+        kernel_table_colour(&f->volumes[v], value, c);
+        for (int a = 0; a < 3; a++) sum[a] += absorbed * c[a];
+        weight += absorbed;
+        all += through * absorbed;
+        through *= left;
+    }
+    /* Several media at one place share what all of them absorb in proportion to what each would. */
+    const vf share = f->volume_count == 1 ? vf_set(1) : vf_select(vf_lt(vf_set(0), weight), all / weight, vf_set(0));
+    for (int a = 0; a < 3; a++) colour[a] = sum[a] * share;
+    *clear = through;
+}
+
+SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const kernel_samples *s,
+                                     const kernel_hits *hits)
+{
+    const bool is_alone = p->frame->job->is_alone;
+    for (int n = 0; n < s->count; n++) {
+        const vf t = kernel_sample_t(p, s->first + n);
+        vm has = vm_none();
+        for (int v = 0; v < p->frame->volume_count; v++) has = vm_or(has, vf_eq(s->value[v][n], s->value[v][n]));
+        has = vm_and(has, vm_and(vf_lt(t, p->t_far), vf_lt(vf_set(KERNEL_DARK), b->light)));
+        if (!is_alone) kernel_blend_close(p, b, vm_not(has));
+        if (!vm_any(has)) continue;
+        kernel_blend_close(p, b, vm_and(has, kernel_blend_breaks(p, b, s, n, hits, t)));
+        const vm fresh = vm_andnot(has, b->open);
+        vf colour[3], clear;
+        kernel_sample_colour(p, s, n, colour, &clear);
+        b->t_first = vf_select(fresh, t, b->t_first);
+        b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
+        for (int a = 0; a < 3; a++) {
+            b->colour[a] = vf_select(fresh, vf_set(0), b->colour[a]);
+            b->colour[a] = vf_select(has, b->colour[a] + b->transmittance * colour[a], b->colour[a]);
+        }
+        b->transmittance = vf_select(has, b->transmittance * clear, b->transmittance);
+        b->light = vf_select(has, b->light * clear, b->light);
+        b->t_last = vf_select(has, t, b->t_last);
+        b->open = vm_or(b->open, has);
+        if (p->frame->needs_contact) {
+            b->contact_in = vf_select(has, s->t_in[n], b->contact_in);
+            b->contact_out = vf_select(has, s->t_out[n], b->contact_out);
+        }
+    }
+}
+
+/* The part of the rays that is in any tree: sample numbers first..last. */
+SIMD_INLINE bool kernel_sample_range(const kernel_packet *p, int *first, int *last)
+{
+    const render_job *job = p->frame->job;
+    vf from = vf_set(INFINITY), to = vf_set(-INFINITY);
+    for (int i = 0; i < job->part_count; i++) {
+        vf t_in = p->t_near, t_out = p->t_far;
+        if (!job->parts[i].tree->node_count) continue;
+        const vm met = vm_and(p->active, kernel_box(p, &job->parts[i].tree->nodes[0], &t_in, &t_out));
+        from = vf_select(met, vf_min(from, t_in), from);
+        to = vf_select(met, vf_max(to, t_out), to);
+    }
+    const vm any = vf_lt(from, vf_set(INFINITY));
+    if (!vm_any(any)) return false;
+    const vf low = vf_select(any, (from - p->sample_base) / p->sample_step, vf_set(INFINITY));
+    const vf high = vf_select(any, (to - p->sample_base) / p->sample_step, vf_set(-INFINITY));
+    const int lowest = (int)floorf(vf_reduce_min(low)) - 1;
+    *first = lowest < p->sample_first ? p->sample_first : lowest;
+    *last = (int)floorf(vf_reduce_max(high)) + 1;
+    return *first <= *last;
+}
+
+SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
+{
+    const kernel_frame *f = p->frame;
+    kernel_samples s;
+    kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
+    int first, last;
+    if (!kernel_sample_range(p, &first, &last)) return;
+    b.contact_in = b.contact_out = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] = vf_set(0);
+    for (; first <= last; first += f->job->sample_group) {
+        s.first = first;
+        s.count = last - first + 1 < f->job->sample_group ? last - first + 1 : f->job->sample_group;
+        const vf t_first = kernel_sample_t(p, first), t_last = kernel_sample_t(p, first + s.count - 1);
+        const vf t_end = vf_min(t_last, p->t_far);
+        const vm lit = vm_and(p->active, vm_and(vf_lt(vf_set(KERNEL_DARK), b.light), vf_le(t_first, t_end)));
+        if (!vm_any(lit)) break;
+        const vm active = p->active;
+        p->active = lit;
+        for (int v = 0; v < f->volume_count; v++) {
+            for (int n = 0; n < s.count; n++) s.value[v][n] = vf_set(NAN);
+            kernel_volume_state state = {v, &s};
+            kernel_trace_parts(p, &f->job->volumes[v].field, &f->volumes[v].interest, t_first, &t_end,
+                               kernel_volume_leaf, &state);
+        }
+        p->active = active;
+        kernel_blend_window(p, &b, &s, hits);
+    }
+    kernel_blend_close(p, &b, p->active);
+}
+
+#endif

@@ -1,0 +1,55 @@
+#include "render_isa.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cpu.h"
+
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+static cpu_isa chosen;
+static char warning[160];
+
+static void choose(void)
+{
+    const char *wish = getenv("INSITU_ISA");
+    const cpu_isa best = cpu_best_isa();
+    chosen = best;
+    if (!wish || !*wish) return;
+    for (int i = 0; i < CPU_ISA_COUNT; i++) {
+        if (strcmp(wish, cpu_isa_name((cpu_isa)i)) != 0) continue;
+        if (i <= (int)best) {
+            chosen = (cpu_isa)i;
+            return;
+        }
+        snprintf(warning, sizeof warning, "INSITU_ISA=%s: this machine has %s at best, which is used", wish,
+                 cpu_isa_name(best));
+        return;
+    }
+    snprintf(warning, sizeof warning, "INSITU_ISA=%.40s is none of avx512, avx2, sse4.2, plain: %s is used", wish,
+             cpu_isa_name(best));
+}
+
+const kernel_table *render_kernels(void)
+{
+    pthread_once(&once, choose);
+#if defined(RENDER_HAS_X86)
+    if (chosen == CPU_AVX512) return &kernel_table_avx512;
+    if (chosen == CPU_AVX2) return &kernel_table_avx2;
+    if (chosen == CPU_SSE42) return &kernel_table_sse42;
+#endif
+    return &kernel_table_plain;
+}
+
+const char *render_isa(void)
+{
+    pthread_once(&once, choose);
+    return cpu_isa_name(chosen);
+}
+
+const char *render_isa_warning(void)
+{
+    pthread_once(&once, choose);
+    return warning;
+}

@@ -1,0 +1,168 @@
+#include "render_prepare.h"
+
+#include <string.h>
+
+#include "memory.h"
+
+static float below(double v)
+{
+    const float f = (float)v;
+    return (double)f > v ? nextafterf(f, -INFINITY) : f;
+}
+
+static float above(double v)
+{
+    const float f = (float)v;
+    return (double)f < v ? nextafterf(f, INFINITY) : f;
+}
+
+static void prepare_isovalues(kernel_interest *interest, const render_surface_layer *layer)
+{
+    interest->count = layer->value_count;
+    for (int i = 0; i < layer->value_count; i++) {
+        interest->low[i] = below(layer->values[i]);
+        interest->high[i] = above(layer->values[i]);
+    }
+}
+
+static void add_interval(kernel_interest *interest, double low, double high)
+{
+    const int last = interest->count - 1;
+    if (last >= 0 && interest->high[last] >= below(low)) {
+        interest->high[last] = above(high);
+        return;
+    }
+    interest->low[interest->count] = below(low);
+    interest->high[interest->count] = above(high);
+    interest->count++;
+}
+
+/* The stretches between opacity points that are not transparent at both ends. */
+static void prepare_visible(kernel_interest *interest, const render_transfer *t)
+{
+    const int n = t->opacity_count;
+    interest->count = 0;
+    if (t->opacities[0] > 0) add_interval(interest, -INFINITY, t->opacity_values[0]);
+    for (int i = 0; i + 1 < n; i++)
+        if (t->opacities[i] > 0 || t->opacities[i + 1] > 0)
+            add_interval(interest, t->opacity_values[i], t->opacity_values[i + 1]);
+    if (t->opacities[n - 1] > 0) add_interval(interest, t->opacity_values[n - 1], INFINITY);
+}
+
+static void prepare_transfer(kernel_transfer *out, const render_transfer *t, double step)
+{
+    const double width = t->high - t->low;
+    out->low = t->low;
+    out->inverse_width = width > 0 ? 1 / width : 1;
+    out->colours = t->colours;
+    out->colour_count = t->colour_count;
+    if (!t->opacity_count) return;
+    out->ramp_count = t->opacity_count - 1;
+    out->base_opacity = t->opacities[0];
+    for (int i = 0; i < out->ramp_count; i++) {
+        const double along = (t->opacity_values[i + 1] - t->opacity_values[i]) * out->inverse_width;
+        out->ramp_start[i] = (float)((t->opacity_values[i] - t->low) * out->inverse_width);
+        out->ramp_inverse[i] = along > 1e-38 ? (float)(1 / along) : 3e38f;
+        out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
+    }
+    out->exponent = (float)(step / t->unit_distance);
+    prepare_visible(&out->interest, t);
+}
+
+static void prepare_camera(kernel_frame *f)
+{
+    const render_camera *c = &f->job->camera;
+    const render_space *s = &f->job->space;
+    const double pixel = 2 * c->half_height / c->height;
+    const double *axes[3] = {c->right, c->up, c->forward};
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++) f->scaled_axes[i][a] = axes[i][a] * s->scale;
+    f->depth_shift = s->depth_origin * s->scale;
+    f->scaled_step = f->job->step * s->scale;
+    f->slope_x0 = (0.5 - 0.5 * c->width) * pixel;
+    f->slope_dx = pixel;
+    f->slope_y0 = (0.5 * c->height - 0.5) * pixel;
+    f->slope_dy = -pixel;
+    for (int i = 0; i < f->job->light_count; i++)
+        for (int k = 0; k < 3; k++) {
+            const double *d = f->job->lights[i].direction;
+            f->light_direction[i][k] = (float)(d[0] * axes[k][0] + d[1] * axes[k][1] + d[2] * axes[k][2]);
+        }
+}
+
+/* Opaque layers first; kinds number the isovalues in the job's order. */
+static void prepare_surfaces(kernel_frame *f)
+{
+    const render_job *job = f->job;
+    for (int pass = 0; pass < 2; pass++) {
+        uint32_t kind = FRAGMENT_SURFACE;
+        for (int i = 0; i < job->surface_count; i++) {
+            const render_surface_layer *layer = &job->surfaces[i];
+            const bool is_opaque = layer->opacity >= 1;
+            if (is_opaque == (pass == 0)) {
+                kernel_surface *s = &f->surfaces[f->surface_count++];
+                s->layer = layer;
+                s->first_kind = kind;
+                prepare_isovalues(&s->interest, layer);
+                if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
+                f->opaque_count += is_opaque;
+                f->has_transparent = f->has_transparent || !is_opaque;
+            }
+            kind += (uint32_t)layer->value_count;
+        }
+    }
+}
+
+static insitu_status check_job(const render_job *job, base_error *error)
+{
+    int values = 0;
+    for (int i = 0; i < job->surface_count; i++) {
+        values += job->surfaces[i].value_count;
+        if (job->surfaces[i].root_steps < 0 || job->surfaces[i].root_steps > 64)
+            return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: %d root steps, expected 0 to 64", i,
+                             job->surfaces[i].root_steps);
+    }
+    if (job->camera.width < 1 || job->camera.height < 1)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "image of %d x %d pixels, expected at least 1 x 1",
+                         job->camera.width, job->camera.height);
+    if (values > RENDER_MAX_ISOVALUES || job->volume_count > RENDER_MAX_VOLUMES || job->light_count > RENDER_MAX_LIGHTS)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "%d isovalues, %d volumes, %d lights: at most %d, %d, %d",
+                         values, job->volume_count, job->light_count, RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES,
+                         RENDER_MAX_LIGHTS);
+    if (!job->volume_count) return INSITU_OK;
+    if (job->sample_group < 1 || job->sample_group > KERNEL_MAX_GROUP)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "sample group of %d, expected 1 to %d", job->sample_group,
+                         KERNEL_MAX_GROUP);
+    /* The scene is of a size near 1 in scaled units: finer steps would make millions of samples a ray. */
+    if (!(job->step * job->space.scale > 1e-6))
+        return base_fail(error, INSITU_ERROR_ARGUMENT,
+                         "step of %g between samples, expected more than a millionth of "
+                         "the scene (%g)",
+                         job->step, 1e-6 / job->space.scale);
+    for (int i = 0; i < job->volume_count; i++) {
+        const render_transfer *t = job->volumes[i].transfer;
+        if (t->opacity_count < 1 || t->opacity_count > RENDER_MAX_OPACITY_POINTS || !(t->unit_distance > 0))
+            return base_fail(error, INSITU_ERROR_ARGUMENT,
+                             "volume %d: %d opacity points over a distance of %g, expected "
+                             "1 to %d over more than 0",
+                             i, t->opacity_count, t->unit_distance, RENDER_MAX_OPACITY_POINTS);
+    }
+    return INSITU_OK;
+}
+
+insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error)
+{
+    const insitu_status status = check_job(job, error);
+    if (status != INSITU_OK) return status;
+    memset(frame, 0, sizeof *frame);
+    frame->job = job;
+    frame->surfaces = base_calloc((size_t)job->surface_count, sizeof *frame->surfaces);
+    if (!frame->surfaces) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %d layers", job->surface_count);
+    prepare_camera(frame);
+    prepare_surfaces(frame);
+    frame->volume_count = job->volume_count;
+    for (int i = 0; i < job->volume_count; i++)
+        prepare_transfer(&frame->volumes[i], job->volumes[i].transfer, job->step);
+    frame->needs_contact = job->volume_count && job->surface_count && !job->is_alone;
+    return INSITU_OK;
+}
