@@ -9,7 +9,7 @@
 
 /* Pixels are merged a slice at a time: so many consecutive owned pixels that their counters and, as a rule, their
  * fragments stay in a core's cache. */
-enum { comp_slice_shift = 10, comp_slice_pixels = 1 << comp_slice_shift };
+enum { comp_slice_shift = 12, comp_slice_pixels = 1 << comp_slice_shift };
 
 /* By owner. starts has ranks + 1 entries; owner r's fragments end up at starts[r] .. starts[r + 1]. False where a
  * pixel lies outside the image: then nothing has moved. */
