@@ -1,0 +1,9 @@
+# Read by the preset "asan" right after project(): AddressSanitizer and UndefinedBehaviorSanitizer for all that follows.
+add_compile_options(-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all)
+add_link_options(-fsanitize=address,undefined)
+
+# Open MPI unloads its plugins before the process ends. LeakSanitizer then finds memory of theirs whose stack leads into
+# nowhere and cannot be told from ours; so no program unloads anything.
+file(WRITE ${CMAKE_BINARY_DIR}/keep_loaded.c "int dlclose(void *library);\nint dlclose(void *library) { return !library; }\n")
+add_library(keep_loaded OBJECT ${CMAKE_BINARY_DIR}/keep_loaded.c)
+link_libraries($<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:$<TARGET_OBJECTS:keep_loaded>>)
