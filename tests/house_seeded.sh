@@ -1,0 +1,100 @@
+#!/bin/sh
+# house_seeded.sh ROOT CC: the house tests can fail. Each violation is planted alone in a small tree or library of its
+# own, which without it passes.
+set -eu
+root=$1
+cc=$2
+here=$root/tests
+place=$(mktemp -d)
+trap 'rm -rf "$place"' EXIT
+failures=0
+
+# refuses WHAT COMMAND...: the command must fail with status 1 and print what.
+refuses() {
+    what=$1
+    shift
+    status=0
+    "$@" >"$place/said" 2>&1 || status=$?
+    if [ $status -ne 1 ] || ! grep -q -- "$what" "$place/said"; then
+        printf 'status %s, not a refusal about "%s":\n' $status "$what"
+        cat "$place/said"
+        failures=$((failures + 1))
+    fi
+}
+
+accepts() {
+    if ! "$@" >"$place/said" 2>&1; then
+        echo "refused: $*"
+        cat "$place/said"
+        failures=$((failures + 1))
+    fi
+}
+
+fresh_tree() {
+    rm -rf "$place/tree"
+    mkdir "$place/tree"
+    for room in libinsitu mmbvh render compositing adaptors mini-app tools bench tests examples; do
+        if [ -d "$root/$room" ]; then cp -R "$root/$room" "$place/tree/"; fi
+    done
+}
+
+# planted FILE LINE WHAT: with a file of that line in the tree the test of includes complains of what.
+planted() {
+    mkdir -p "$(dirname "$place/tree/$1")"
+    printf '%s\n' "$2" >"$place/tree/$1"
+    refuses "$1.*$3" sh "$here/house_includes.sh" "$place/tree"
+    rm "$place/tree/$1"
+}
+
+fresh_tree
+accepts sh "$here/house_includes.sh" "$place/tree"
+planted libinsitu/base/seeded.c '#include "comp.h"' 'base must not include comp.h of compositing'
+planted libinsitu/base/seeded.c '#include <mpi.h>' 'base knows no MPI'
+planted mmbvh/seeded.c '#include "render.h"' 'mmbvh must not include render.h of render'
+planted mmbvh/seeded.c '  #  include <mpi.h>' 'mmbvh knows no MPI'
+planted render/seeded.c '#include "comp.h"' 'render must not include comp.h of compositing'
+planted render/seeded.c '#include <comp.h>' 'comp.h is ours'
+planted render/seeded.h '#include "insitu/insitu.h"' 'render knows no MPI'
+planted render/seeded.c '#include "../libinsitu/session/scene.h"' 'render must not include .*scene.h of session'
+planted compositing/seeded.c '#include "render.h"' 'compositing must not include render.h of render'
+planted libinsitu/session/seeded.c '#include <vtkPoints.h>' 'session includes vtkPoints.h'
+planted libinsitu/include/insitu/seeded.h '#include "error.h"' 'public must not include error.h of base'
+planted adaptors/vtk/seeded.cpp '#include "memory.h"' 'adaptors must not include memory.h of base'
+planted tools/seeded.cpp '#include "scene.h"' 'tools must not include scene.h of session'
+planted mini-app/seeded.c '#include "error.h"' 'mini-app must not include error.h of base'
+planted mini-app/seeded.c '#include "insitu/nowhere.h"' 'no file of the tree is called nowhere.h'
+planted render/seeded.cpp 'int seeded;' 'the core is C'
+planted tests/comp.c 'int seeded;' 'same name as compositing/comp.c'
+rm -rf "$place/tree"
+mkdir -p "$place/tree/mmbvh"
+refuses 'wrong place' sh "$here/house_includes.sh" "$place/tree"
+
+# library NAME SOURCE [FLAG...]
+library() {
+    printf '%s\n' "$2" >"$place/$1.c"
+    name=$1
+    shift 2
+    "$cc" -shared -fPIC -o "$place/$name.so" "$place/$name.c" "$@"
+}
+library clean 'int insitu_one(void); int insitu_one(void) { return 1; }'
+accepts sh "$here/house_library.sh" "$place/clean.so"
+library leaking 'int insitu_one(void) { return 1; } int comp_two(void) { return 2; }' -w
+refuses comp_two sh "$here/house_library.sh" "$place/leaking.so"
+library heavy 'int insitu_one(void) { return 1; }' -w -Wl,--no-as-needed -l:libstdc++.so.6
+refuses 'libstdc++' sh "$here/house_library.sh" "$place/heavy.so"
+library empty 'static int one; int *insitu_none(void);' -w
+refuses 'nothing at all' sh "$here/house_library.sh" "$place/empty.so"
+
+# object NAME SOURCE
+object() {
+    printf '%s\n' "$2" >"$place/$1.c"
+    "$cc" -w -c -o "$place/$1.o" "$place/$1.c"
+}
+object one 'static int half(int x) { return x / 2; } int (*const table)(int) = half;'
+object two 'int half(int x) { return x / 2; } int (*const table)(int) = half;'
+object weak '__attribute__((weak)) int half(int x) { return x / 2; } int (*const table)(int) = half;'
+accepts sh "$here/house_kernels.sh" "$place/one.o"
+refuses half sh "$here/house_kernels.sh" "$place/one.o" "$place/two.o"
+refuses half sh "$here/house_kernels.sh" "$place/weak.o"
+
+exit $((failures > 0))
