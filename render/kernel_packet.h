@@ -76,38 +76,67 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
     }
 }
 
-static inline void kernel_packet_lane(kernel_packet *p, int lane, int x, int y, float *lanes[])
+/* Lanes of a packet under construction: plain arrays and one loop a quantity, which compilers vectorize. */
+typedef struct kernel_lanes {
+    double px[SIMD_WIDTH], py[SIMD_WIDTH], length[SIMD_WIDTH];
+    float value[SIMD_WIDTH];
+} kernel_lanes;
+
+static inline void kernel_packet_tile_rays(kernel_packet *p, kernel_lanes *l)
 {
     const kernel_frame *f = p->frame;
-    const render_job *job = f->job;
-    const double px = kernel_column(f, x), py = kernel_row(f, y);
-    const double dx = px - p->tile->centre_x, dy = py - p->tile->centre_y;
-    const bool flat = job->camera.is_orthographic;
-    lanes[0][lane] = (float)(flat ? dx * job->space.scale : dx * f->depth_shift);
-    lanes[1][lane] = (float)(flat ? dy * job->space.scale : dy * f->depth_shift);
-    lanes[2][lane] = flat ? 0 : (float)dx;
-    lanes[3][lane] = flat ? 0 : (float)dy;
-    double base[3], direction[3];
-    kernel_tree_ray(f, px, py, base, direction);
+    const bool flat = f->job->camera.is_orthographic;
+    const double reach = flat ? f->job->space.scale : f->depth_shift;
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)((l->px[i] - p->tile->centre_x) * reach);
+    p->origin_x = vf_load(l->value);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)((l->py[i] - p->tile->centre_y) * reach);
+    p->origin_y = vf_load(l->value);
+    p->slope_x = p->slope_y = vf_set(0);
+    if (flat) return;
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)(l->px[i] - p->tile->centre_x);
+    p->slope_x = vf_load(l->value);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)(l->py[i] - p->tile->centre_y);
+    p->slope_y = vf_load(l->value);
+}
+
+/* Rays in tree space, axis by axis: position = base + t * direction. */
+static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
+{
+    const render_camera *c = &p->frame->job->camera;
+    const render_space *space = &p->frame->job->space;
+    const bool flat = c->is_orthographic;
+    double size = 0;
     for (int a = 0; a < 3; a++) {
-        double d = direction[a];
-        if (fabs(d) < 1e-12) d = d < 0 ? -1e-12 : 1e-12;
-        lanes[4 + a][lane] = (float)(1 / d);
-        lanes[7 + a][lane] = (float)(base[a] * (double)(float)(1 / d));
-        const float size = (float)fabs(base[a]);
-        if (size > p->pad) p->pad = size;
+        float shift[SIMD_WIDTH];
+        const double start = (c->eye[a] - space->origin[a]) * space->scale;
+        for (int i = 0; i < SIMD_WIDTH; i++) {
+            const double sideways = l->px[i] * c->right[a] + l->py[i] * c->up[a];
+            const double along = c->forward[a] + (flat ? 0.0 : sideways);
+            const double base = start + (flat ? sideways * space->scale : 0.0) + p->frame->depth_shift * along;
+            const double slant = fabs(along) < 1e-12 ? 1e-12 : along;
+            const double inverse = (double)(float)(1 / slant);
+            l->value[i] = (float)inverse;
+            shift[i] = (float)(base * inverse);
+            size = fabs(base) > size ? fabs(base) : size;
+        }
+        p->inverse[a] = vf_load(l->value);
+        p->shift[a] = vf_load(shift);
     }
-    const double length = flat ? 1 : sqrt(1 + px * px + py * py);
-    lanes[10][lane] = flat ? 0 : (float)(-px / length);
-    lanes[11][lane] = flat ? 0 : (float)(-py / length);
-    lanes[12][lane] = (float)(-1 / length);
-    p->pixel[lane] = (uint32_t)y * (uint32_t)job->camera.width + (uint32_t)x;
-    if (f->volume_count) {
-        const double dt = f->scaled_step / length;
-        const double jitter = job->jitter ? render_jitter(p->pixel[lane], (uint32_t)job->frame) : 0.5;
-        lanes[13][lane] = (float)((-p->sample_first + jitter) * dt - f->depth_shift);
-        lanes[14][lane] = (float)dt;
-    }
+    /* Positions near the scene and the base are at most of size + 1; plane * inverse - shift errs by 2 roundings of
+     * that, the base by 1, the direction by 1 over the scene's size: 16 units leave a margin of 2. */
+    p->pad = 16 * 6e-8f * ((float)size + 2);
+}
+
+static inline void kernel_packet_view(kernel_packet *p, kernel_lanes *l)
+{
+    const bool flat = p->frame->job->camera.is_orthographic;
+    for (int i = 0; i < SIMD_WIDTH; i++) l->length[i] = flat ? 1 : sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->px[i] / l->length[i]);
+    p->view[0] = vf_load(l->value);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->py[i] / l->length[i]);
+    p->view[1] = vf_load(l->value);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)(-1 / l->length[i]);
+    p->view[2] = vf_load(l->value);
 }
 
 /* Number the samples from one near the depth origin, so that float32 holds their places well; the number depends on
@@ -118,44 +147,47 @@ static inline int kernel_sample_first(const kernel_frame *f)
     return count > 0 && count < 1e9 ? -(int)count : 0;
 }
 
+static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
+{
+    const kernel_frame *f = p->frame;
+    float step[SIMD_WIDTH];
+    p->sample_first = kernel_sample_first(f);
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        const double dt = f->scaled_step / l->length[i];
+        const double jitter = f->job->jitter ? render_jitter(p->pixel[i], (uint32_t)f->job->frame) : 0.5;
+        l->value[i] = (float)((-p->sample_first + jitter) * dt - f->depth_shift);
+        step[i] = (float)dt;
+    }
+    p->sample_base = vf_load(l->value);
+    p->sample_step = vf_load(step);
+}
+
 static inline void kernel_packet_setup(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
-    float store[15][SIMD_WIDTH] = {{0}};
-    float *lanes[15];
-    for (int i = 0; i < 15; i++) lanes[i] = store[i];
+    const render_camera *camera = &f->job->camera;
+    kernel_lanes l;
+    unsigned bits = 0;
     p->frame = f;
     p->tile = tile;
     p->thread = thread;
-    p->pad = 1;
-    p->sample_first = f->volume_count ? kernel_sample_first(f) : 0;
-    unsigned bits = 0;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const int x = x0 + lane % KERNEL_PACKET_COLUMNS, y = y0 + lane / KERNEL_PACKET_COLUMNS;
-        const bool inside = x < f->job->camera.width && y < f->job->camera.height;
-        if (inside) bits |= 1u << lane;
-        kernel_packet_lane(p, lane, inside ? x : x0, inside ? y : y0, lanes);
+        if (x < camera->width && y < camera->height) bits |= 1u << lane;
+        p->pixel[lane] = (uint32_t)y * (uint32_t)camera->width + (uint32_t)x;
+        l.px[lane] = kernel_column(f, x);
+        l.py[lane] = kernel_row(f, y);
     }
     p->active = vm_from_bits(bits);
-    p->origin_x = vf_load(store[0]);
-    p->origin_y = vf_load(store[1]);
-    p->slope_x = vf_load(store[2]);
-    p->slope_y = vf_load(store[3]);
-    for (int a = 0; a < 3; a++) {
-        p->inverse[a] = vf_load(store[4 + a]);
-        p->shift[a] = vf_load(store[7 + a]);
-        p->view[a] = vf_load(store[10 + a]);
-    }
-    /* Positions near the scene and the base are at most of size pad + 1; plane * inverse - shift errs by 2 roundings of
-     * that, the base by 1, the direction by 1 over the scene's size: 16 units leave a margin of 2. */
-    p->pad = 16 * 6e-8f * (p->pad + 1);
+    kernel_packet_tile_rays(p, &l);
+    kernel_packet_tree_rays(p, &l);
+    kernel_packet_view(p, &l);
     double base[3], direction[3];
     kernel_tree_ray(f, tile->centre_x, tile->centre_y, base, direction);
     for (int a = 0; a < 3; a++) p->centre_direction[a] = (float)direction[a];
     p->t_near = vf_set((float)-f->depth_shift);
     p->t_far = vf_set(INFINITY);
-    p->sample_base = vf_load(store[13]);
-    p->sample_step = vf_load(store[14]);
+    if (f->volume_count) kernel_packet_samples(p, &l);
 }
 
 /* Where the packet's rays are in the node's box, between low and high. */

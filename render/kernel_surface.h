@@ -41,14 +41,22 @@ SIMD_INLINE bool kernel_cell_straddles(const kernel_cell *c, double value)
     return below && above;
 }
 
-/* f: values minus the isovalue, times the power of two that brings the largest to [1/2, 1). */
+/* f: values minus the isovalue, times a power of two that brings the largest near 1. The power is read off the bits
+ * of the largest: its exponent, mirrored. */
 SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
 {
     double largest = 0;
-    for (int i = 0; i < c->count; i++) largest = fmax(largest, fabs(c->values[i] - value));
-    int exponent = 0;
-    frexp(largest, &exponent);
-    const double scale = ldexp(1.0, -exponent < -1000 ? -1000 : -exponent > 1000 ? 1000 : -exponent);
+    for (int i = 0; i < c->count; i++) {
+        const double size = fabs(c->values[i] - value);
+        largest = size > largest ? size : largest;
+    }
+    uint64_t bits;
+    memcpy(&bits, &largest, sizeof bits);
+    const uint64_t exponent = bits >> 52;
+    const uint64_t mirrored = exponent < 23 ? 2023 : exponent > 2023 ? 23 : 2046 - exponent;
+    bits = mirrored << 52;
+    double scale;
+    memcpy(&scale, &bits, sizeof scale);
     for (int i = 0; i < c->count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
 }
 
@@ -137,7 +145,8 @@ SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c,
         g[a] = df[0] * (d[1][b] * d[2][e] - d[1][e] * d[2][b]) + df[1] * (d[2][b] * d[0][e] - d[2][e] * d[0][b]) +
                df[2] * (d[0][b] * d[1][e] - d[0][e] * d[1][b]);
     }
-    const double largest = fmax(fabs(g[0]), fmax(fabs(g[1]), fabs(g[2])));
+    double largest = 0;
+    for (int a = 0; a < 3; a++) largest = fabs(g[a]) > largest ? fabs(g[a]) : largest;
     const double scale = largest > 0 ? 1 / (largest * p->frame->job->space.scale) : 0;
     for (int a = 0; a < 3; a++) {
         const double *axis = p->frame->scaled_axes[a];

@@ -38,13 +38,19 @@ SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
     return p->sample_base + p->sample_step * (float)m;
 }
 
-/* f: values in the transfer's domain; false where all of the cell is transparent. */
+/* v to float, held within -limit .. limit. */
+SIMD_INLINE float kernel_hold(double v, double limit)
+{
+    return (float)(v < -limit ? -limit : v > limit ? limit : v);
+}
+
+/* False where all of the cell is transparent. */
 SIMD_INLINE bool kernel_cell_domain(kernel_cell *c, const kernel_transfer *t, bool *is_constant)
 {
     double low = c->values[0], high = low;
     for (int i = 1; i < c->count; i++) {
-        low = fmin(low, c->values[i]);
-        high = fmax(high, c->values[i]);
+        low = c->values[i] < low ? c->values[i] : low;
+        high = c->values[i] > high ? c->values[i] : high;
     }
     *is_constant = low == high;
     return kernel_interest_meets(&t->interest, (float)fmin(fmax(low, -3e38), 3e38),
@@ -54,8 +60,7 @@ SIMD_INLINE bool kernel_cell_domain(kernel_cell *c, const kernel_transfer *t, bo
 /* After kernel_cell_geometry(), which may reorder. Held to 1e18 so that interpolation cannot overflow. */
 SIMD_INLINE void kernel_cell_scale(kernel_cell *c, const kernel_transfer *t)
 {
-    for (int i = 0; i < c->count; i++)
-        c->f[i] = (float)fmin(fmax((c->values[i] - t->low) * t->inverse_width, -1e18), 1e18);
+    for (int i = 0; i < c->count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
 /* The window's samples that may be in the interval of some ray: indices into the window. */
