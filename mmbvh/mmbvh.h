@@ -4,14 +4,20 @@
  * The nodes stand in one array, root first, siblings side by side, so that one reference finds both. A leaf holds
  * at most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32, rounded
  * outward from the double values. A cell that is a ghost is not in the tree; one that has a value that is not
- * finite has the empty range (+inf, -inf) and so is never met. */
+ * finite has the empty range (+inf, -inf) and so is never met.
+ *
+ * Nodes are numbered depth first by pairs: a pair of siblings, then all below the left one, then all below the right
+ * one; the leaves' cells stand in the same order. So children come after parents, and all below a node is one run. */
 #ifndef MMBVH_MMBVH_H
 #define MMBVH_MMBVH_H
 
 #include "error.h"
 #include "grid.h"
 
-enum { MMBVH_MAX_LEAF = 7 };
+enum {
+    MMBVH_MAX_LEAF = 7,
+    MMBVH_MAX_DEPTH = 80 /* of a leaf, the root's being 1: so many entries are enough for a traversal's stack */
+};
 
 typedef struct mmbvh_node {
     float lower[3];
@@ -24,20 +30,20 @@ typedef struct mmbvh_node {
 
 typedef struct mmbvh {
     mmbvh_node *nodes;
-    int64_t node_count;   /* 0 for no cells at all */
-    uint32_t *cells;      /* cell indices (or mesh indices in a parent tree), leaf by leaf */
+    int64_t node_count; /* 0 for no cells at all */
+    uint32_t *cells;    /* cell indices (or mesh indices in a parent tree), leaf by leaf */
     int64_t cell_count;
-    double origin[3];     /* bounds are of (position - origin) * scale */
+    double origin[3]; /* bounds are of (position - origin) * scale */
     double scale;
-    double built_cost;    /* SAH cost when built: refitted trees are compared with it */
+    double built_cost;      /* SAH cost when built: refitted trees are compared with it */
     int64_t unusable_cells; /* cells with the empty range in the nodes' own ranges */
 } mmbvh;
 
 /* Ranges of one field: the nodes' own (stride 40) or an array of pairs beside the tree (stride 8). */
 typedef struct mmbvh_ranges {
-    const char *low;  /* of node 0 */
+    const char *low; /* of node 0 */
     const char *high;
-    int64_t stride;   /* bytes from node to node */
+    int64_t stride; /* bytes from node to node */
 } mmbvh_ranges;
 
 typedef struct mmbvh_options {
@@ -90,11 +96,11 @@ double mmbvh_cost(const mmbvh *tree);
 
 typedef struct mmbvh_statistics {
     int64_t leaves;
-    int depth;            /* of the deepest leaf, root 1 */
-    double cells_a_leaf;  /* mean */
+    int depth;              /* of the deepest leaf, root 1 */
+    double cells_a_leaf;    /* mean */
     double sibling_overlap; /* mean over inner nodes: surface area of the children's intersection over their union's */
-    double cost;          /* mmbvh_cost() */
-    int64_t bytes;        /* nodes and cell indices */
+    double cost;            /* mmbvh_cost() */
+    int64_t bytes;          /* nodes and cell indices */
 } mmbvh_statistics;
 
 /* Prove the tree: every non-ghost cell in exactly one leaf, counts within 1..7, every node's bounds and range contain

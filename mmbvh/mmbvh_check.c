@@ -1,0 +1,216 @@
+/* The whole-tree proof. One walk in the order the nodes must be numbered in: what is not where the walk expects it is
+ * a violation, so that every node and every entry is met exactly once, and no broken tree makes the walk endless. */
+#include "mmbvh.h"
+
+#include <inttypes.h>
+
+#include "memory.h"
+#include "mmbvh_cost.h"
+
+typedef struct walk {
+    const mmbvh *tree;
+    const grid *g;
+    const grid_field *field;
+    unsigned char *seen; /* by cell, a bit each */
+    int64_t seen_count;  /* cells that could be met: the grid's, or a parent tree's */
+    int64_t next_pair;
+    int64_t next_entry;
+    int64_t unusable;
+    int64_t leaves;
+    int depth;
+    double overlap;
+    base_error *error;
+} walk;
+
+#define BROKEN(w, ...) base_fail((w)->error, INSITU_ERROR_INTERNAL, __VA_ARGS__)
+
+static insitu_status check_box(const walk *w, int64_t index)
+{
+    const mmbvh_node *node = w->tree->nodes + index;
+    for (int axis = 0; axis < 3; axis++) {
+        if (w->g && !(node->lower[axis] <= node->upper[axis])) {
+            return BROKEN(w, "node %" PRId64 ": lower bound %g above upper bound %g on axis %d", index,
+                          (double)node->lower[axis], (double)node->upper[axis], axis);
+        }
+    }
+    return INSITU_OK;
+}
+
+static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cell, const int64_t *vertices, int count)
+{
+    const mmbvh_node *node = w->tree->nodes + index;
+    for (int i = 0; i < count; i++) {
+        double p[3];
+        grid_vertex(w->g, vertices[i], p);
+        for (int axis = 0; axis < 3; axis++) {
+            const double x = (p[axis] - w->tree->origin[axis]) * w->tree->scale;
+            if (!(node->lower[axis] <= x && x <= node->upper[axis])) {
+                return BROKEN(w, "leaf %" PRId64 ": vertex %" PRId64 " of cell %" PRId64 " lies outside its bounds",
+                              index, vertices[i], cell);
+            }
+        }
+    }
+    return INSITU_OK;
+}
+
+static insitu_status check_cell_range(walk *w, int64_t index, int64_t cell, const int64_t *vertices, int count)
+{
+    const mmbvh_node *node = w->tree->nodes + index;
+    double values[GRID_MAX_CELL_VERTICES];
+    if (!grid_cell_values(w->field, cell, vertices, count, values)) {
+        w->unusable++;
+        return INSITU_OK;
+    }
+    for (int i = 0; i < count; i++) {
+        if (!(node->range_low <= values[i] && values[i] <= node->range_high)) {
+            return BROKEN(w, "leaf %" PRId64 ": value %g of cell %" PRId64 " lies outside its range", index, values[i],
+                          cell);
+        }
+    }
+    return INSITU_OK;
+}
+
+static insitu_status check_cell(walk *w, int64_t index, int64_t cell)
+{
+    if (cell >= w->seen_count) return BROKEN(w, "leaf %" PRId64 ": there is no cell %" PRId64, index, cell);
+    unsigned char *byte = &w->seen[cell / 8];
+    const unsigned bit = 1u << (cell % 8);
+    if (*byte & bit) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is in the tree twice", index, cell);
+    *byte = (unsigned char)(*byte | bit);
+    if (!w->g) return INSITU_OK;
+    if (grid_is_ghost(w->g, cell)) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is a ghost", index, cell);
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(w->g, cell, vertices);
+    const insitu_status status = check_cell_bounds(w, index, cell, vertices, count);
+    if (status || !w->field) return status;
+    return check_cell_range(w, index, cell, vertices, count);
+}
+
+static insitu_status check_leaf(walk *w, int64_t index)
+{
+    const mmbvh_node *node = w->tree->nodes + index;
+    const int64_t first = (int64_t)node->ref, count = (int64_t)node->count;
+    if (first != w->next_entry || count > w->tree->cell_count - first) {
+        return BROKEN(w, "leaf %" PRId64 ": its cells are entries %" PRId64 " on, expected %" PRId64 " of %" PRId64,
+                      index, first, w->next_entry, w->tree->cell_count);
+    }
+    for (int64_t i = first; i < first + count; i++) {
+        const insitu_status status = check_cell(w, index, w->tree->cells[i]);
+        if (status) return status;
+    }
+    w->next_entry += count;
+    w->leaves++;
+    return INSITU_OK;
+}
+
+static insitu_status check_contained(const walk *w, int64_t index, int64_t child_index)
+{
+    const mmbvh_node *node = w->tree->nodes + index, *child = w->tree->nodes + child_index;
+    for (int axis = 0; axis < 3; axis++) {
+        if (!(node->lower[axis] <= child->lower[axis] && child->upper[axis] <= node->upper[axis])) {
+            return BROKEN(w, "node %" PRId64 ": child %" PRId64 " lies outside its bounds", index, child_index);
+        }
+    }
+    if (!(node->range_low <= child->range_low && child->range_high <= node->range_high)) {
+        return BROKEN(w, "node %" PRId64 ": child %" PRId64 " lies outside its range", index, child_index);
+    }
+    return INSITU_OK;
+}
+
+static double pair_overlap(const mmbvh_node *parent, const mmbvh_node *pair)
+{
+    float lower[3], upper[3];
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = pair[0].lower[axis] > pair[1].lower[axis] ? pair[0].lower[axis] : pair[1].lower[axis];
+        upper[axis] = pair[0].upper[axis] < pair[1].upper[axis] ? pair[0].upper[axis] : pair[1].upper[axis];
+    }
+    const double whole = cost_half_area(parent->lower, parent->upper);
+    return whole > 0 ? cost_half_area(lower, upper) / whole : 0;
+}
+
+static insitu_status check_inner(walk *w, int64_t index)
+{
+    const int64_t pair = (int64_t)w->tree->nodes[index].ref;
+    if (pair != w->next_pair || pair + 2 > w->tree->node_count) {
+        return BROKEN(w, "node %" PRId64 ": its children are nodes %" PRId64 " on, expected %" PRId64 " of %" PRId64,
+                      index, pair, w->next_pair, w->tree->node_count);
+    }
+    w->next_pair += 2;
+    for (int side = 0; side < 2; side++) {
+        const insitu_status status = check_contained(w, index, pair + side);
+        if (status) return status;
+    }
+    w->overlap += pair_overlap(&w->tree->nodes[index], &w->tree->nodes[pair]);
+    return INSITU_OK;
+}
+
+static insitu_status check_nodes(walk *w)
+{
+    /* Of every pair on the way down, the right one waits. */
+    struct {
+        int64_t index;
+        int depth;
+    } stack[MMBVH_MAX_DEPTH + 1] = {{0, 1}};
+    int height = 1;
+    while (height > 0) {
+        const int64_t index = stack[--height].index;
+        const int depth = stack[height].depth;
+        if (depth > MMBVH_MAX_DEPTH) return BROKEN(w, "node %" PRId64 ": deeper than %d", index, MMBVH_MAX_DEPTH);
+        w->depth = depth > w->depth ? depth : w->depth;
+        insitu_status status = check_box(w, index);
+        const mmbvh_node *node = w->tree->nodes + index;
+        if (!status) status = node->count ? check_leaf(w, index) : check_inner(w, index);
+        if (status) return status;
+        if (node->count) continue;
+        for (int side = 1; side >= 0; side--) {
+            stack[height].index = (int64_t)node->ref + side;
+            stack[height++].depth = depth + 1;
+        }
+    }
+    return INSITU_OK;
+}
+
+/* Nothing left over when the walk is done. */
+static insitu_status check_complete(const walk *w)
+{
+    if (w->next_pair != w->tree->node_count && w->tree->node_count) {
+        return BROKEN(w, "%" PRId64 " of %" PRId64 " nodes are reached", w->next_pair, w->tree->node_count);
+    }
+    if (w->next_entry != w->tree->cell_count) {
+        return BROKEN(w, "%" PRId64 " of %" PRId64 " cell entries are in leaves", w->next_entry, w->tree->cell_count);
+    }
+    for (int64_t cell = 0; cell < w->seen_count; cell++) {
+        const bool seen = w->seen[cell / 8] >> (cell % 8) & 1;
+        if (!seen && !(w->g && grid_is_ghost(w->g, cell))) return BROKEN(w, "cell %" PRId64 " is in no leaf", cell);
+    }
+    if (w->field && w->unusable != w->tree->unusable_cells) {
+        return BROKEN(w, "%" PRId64 " cells are unusable, the tree says %" PRId64, w->unusable,
+                      w->tree->unusable_cells);
+    }
+    return INSITU_OK;
+}
+
+static mmbvh_statistics statistics_of(const walk *w)
+{
+    mmbvh_statistics s = {.leaves = w->leaves, .depth = w->depth, .cost = mmbvh_cost(w->tree)};
+    const int64_t inner = w->tree->node_count - w->leaves;
+    s.cells_a_leaf = w->leaves ? (double)w->tree->cell_count / (double)w->leaves : 0;
+    s.sibling_overlap = inner ? w->overlap / (double)inner : 0;
+    s.bytes = w->tree->node_count * (int64_t)sizeof(mmbvh_node) + w->tree->cell_count * (int64_t)sizeof(uint32_t);
+    return s;
+}
+
+insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_statistics *out,
+                          base_error *error)
+{
+    if (!tree) return base_fail(error, INSITU_ERROR_ARGUMENT, "no tree to check");
+    walk w = {.tree = tree, .g = g, .field = g ? field : NULL, .next_pair = 1, .error = error};
+    w.seen_count = g ? g->cell_count : tree->cell_count;
+    w.seen = base_calloc((size_t)w.seen_count / 8 + 1, 1);
+    if (!w.seen) return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: checking a tree");
+    insitu_status status = tree->node_count > 0 ? check_nodes(&w) : INSITU_OK;
+    if (!status) status = check_complete(&w);
+    base_free(w.seen);
+    if (!status && out) *out = statistics_of(&w);
+    return status;
+}

@@ -1,0 +1,13 @@
+/* The surface area heuristic's cost of a finished tree. */
+#ifndef MMBVH_COST_H
+#define MMBVH_COST_H
+
+#include "mmbvh.h"
+
+/* Half the surface area of a node's box; 0 for an empty one. */
+double cost_half_area(const float lower[3], const float upper[3]);
+
+/* mmbvh_cost() by so many threads, to the same bits. */
+double cost_of_tree(const mmbvh *tree, int threads);
+
+#endif

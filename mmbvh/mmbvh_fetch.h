@@ -1,0 +1,154 @@
+/* Reading cells fast. The grid's accessors ask each array for its element type at every element; here the questions
+ * are constants of an inlined function, asked once for a whole pass over the cells. */
+#ifndef MMBVH_FETCH_H
+#define MMBVH_FETCH_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+
+#define MMBVH_INLINE static inline __attribute__((always_inline))
+
+/* How a cell's vertices are found: all cells are tets one after the other, all of one type, or each says its own. */
+typedef enum fetch_shape { FETCH_TETS, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
+
+static inline fetch_shape fetch_grid_shape(const grid *g)
+{
+    if (g->cell_types || g->offsets.data) return FETCH_BY_CELL;
+    return g->cell_type == GRID_TET ? FETCH_TETS : FETCH_UNIFORM;
+}
+
+MMBVH_INLINE int64_t fetch_index(const grid_array *a, int64_t i, const bool wide)
+{
+    const char *p = a->data + i * a->stride;
+    return wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
+}
+
+/* Of an array of floats or doubles. */
+MMBVH_INLINE double fetch_number(const grid_array *a, int64_t i, const bool wide)
+{
+    const char *p = a->data + i * a->stride;
+    return wide ? *(const double *)(const void *)p : (double)*(const float *)(const void *)p;
+}
+
+MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_shape shape)
+{
+    if (shape == FETCH_TETS) return 4;
+    return grid_type_vertices(shape == FETCH_UNIFORM ? g->cell_type : grid_cell_type(g, cell));
+}
+
+/* Where a cell's vertices begin in the connectivity. */
+MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const fetch_shape shape)
+{
+    return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
+}
+
+/* The largest float not above x, and the smallest not below it. A double beyond the floats' range goes to the largest
+ * finite float or to infinity, whichever lies outward. Zero comes out positive, so that equal bounds are equal bits. */
+static inline float round_down(double x)
+{
+    float f = (float)x;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    const uint32_t step = bits >> 31 ? 1u : UINT32_MAX; /* towards -inf: a negative float's bits grow */
+    bits += (double)f > x ? step : 0u;                  /* f is never +0 here: a tiny negative x rounds to -0 */
+    memcpy(&f, &bits, sizeof f);
+    return f + 0.0f;
+}
+
+static inline float round_up(double x)
+{
+    return 0.0f - round_down(-x);
+}
+
+/* A box of doubles that grows, in the grid's own coordinates. */
+typedef struct fetch_box {
+    double lower[3];
+    double upper[3];
+} fetch_box;
+
+MMBVH_INLINE void fetch_box_empty(fetch_box *box)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        box->lower[axis] = INFINITY;
+        box->upper[axis] = -INFINITY;
+    }
+}
+
+MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
+                                 const bool wide_index, const bool wide_number)
+{
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    for (int i = 0; i < count; i++) {
+        const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
+        for (int axis = 0; axis < 3; axis++) {
+            const double x = fetch_number(&g->coordinates[axis], vertex, wide_number);
+            box->lower[axis] = x < box->lower[axis] ? x : box->lower[axis];
+            box->upper[axis] = x > box->upper[axis] ? x : box->upper[axis];
+        }
+    }
+}
+
+/* To a node's coordinates, outward: rounding is monotonic, so the box of the rounded is the rounded box. */
+MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], double scale, float *lower,
+                                  float *upper)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = round_down((box->lower[axis] - origin[axis]) * scale);
+        upper[axis] = round_up((box->upper[axis] - origin[axis]) * scale);
+    }
+}
+
+/* Where the coordinates are not all floats or all doubles, fetch_box_cell() will not do. */
+static inline bool fetch_coordinates_alike(const grid *g)
+{
+    const grid_array *c = g->coordinates;
+    const bool integer = c[0].is_integer || c[1].is_integer || c[2].is_integer;
+    return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide;
+}
+
+static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cell)
+{
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(g, cell, vertices);
+    for (int i = 0; i < count; i++) {
+        double p[3];
+        grid_vertex(g, vertices[i], p);
+        for (int axis = 0; axis < 3; axis++) {
+            box->lower[axis] = p[axis] < box->lower[axis] ? p[axis] : box->lower[axis];
+            box->upper[axis] = p[axis] > box->upper[axis] ? p[axis] : box->upper[axis];
+        }
+    }
+}
+
+/* One instance of a pass for each way an array can be laid out: DEFINE(name, shape, wide_index, wide_number) makes a
+ * function, and FETCH_TABLE(prefix) is the table of them, by [shape][wide_index][wide_number]. */
+#define FETCH_INSTANCES(DEFINE, prefix)                                                                                \
+    DEFINE(prefix##_tets_44, FETCH_TETS, false, false)                                                                 \
+    DEFINE(prefix##_tets_48, FETCH_TETS, false, true)                                                                  \
+    DEFINE(prefix##_tets_84, FETCH_TETS, true, false)                                                                  \
+    DEFINE(prefix##_tets_88, FETCH_TETS, true, true)                                                                   \
+    DEFINE(prefix##_uniform_44, FETCH_UNIFORM, false, false)                                                           \
+    DEFINE(prefix##_uniform_48, FETCH_UNIFORM, false, true)                                                            \
+    DEFINE(prefix##_uniform_84, FETCH_UNIFORM, true, false)                                                            \
+    DEFINE(prefix##_uniform_88, FETCH_UNIFORM, true, true)                                                             \
+    DEFINE(prefix##_by_cell_44, FETCH_BY_CELL, false, false)                                                           \
+    DEFINE(prefix##_by_cell_48, FETCH_BY_CELL, false, true)                                                            \
+    DEFINE(prefix##_by_cell_84, FETCH_BY_CELL, true, false)                                                            \
+    DEFINE(prefix##_by_cell_88, FETCH_BY_CELL, true, true)
+
+#define FETCH_TABLE(prefix)                                                                                            \
+    {                                                                                                                  \
+        {{prefix##_tets_44, prefix##_tets_48}, {prefix##_tets_84, prefix##_tets_88}},                                  \
+            {{prefix##_uniform_44, prefix##_uniform_48}, {prefix##_uniform_84, prefix##_uniform_88}},                  \
+        {                                                                                                              \
+            {prefix##_by_cell_44, prefix##_by_cell_48},                                                                \
+            {                                                                                                          \
+                prefix##_by_cell_84, prefix##_by_cell_88                                                               \
+            }                                                                                                          \
+        }                                                                                                              \
+    }
+
+#endif

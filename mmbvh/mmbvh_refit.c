@@ -1,0 +1,271 @@
+/* New ranges and bounds on an old tree. */
+#include "mmbvh_sweep.h"
+
+#include <omp.h>
+
+#include "mmbvh_fetch.h"
+
+enum { RUN_MAX = 4096, PREFETCH_CELLS = 24, PREFETCH_VALUES = 12 };
+
+int sweep_threads(const mmbvh_options *options)
+{
+    return options && options->threads > 0 ? options->threads : omp_get_max_threads();
+}
+
+/* All below node is nodes[ref .. end): in parts of at most RUN_MAX by tasks, then the pair at ref itself. */
+static int64_t sweep_below(const sweep *s, int64_t first, int64_t end)
+{
+    if (end - first <= RUN_MAX) return s->run(s, first, end);
+    const mmbvh_node *pair = s->tree->nodes + first;
+    const int64_t right_first = pair[1].count ? end : (int64_t)pair[1].ref;
+    int64_t left = 0, right = 0;
+#pragma omp task default(none) firstprivate(s, first, right_first) shared(left)
+    left = sweep_below(s, first + 2, right_first);
+    right = sweep_below(s, right_first, end);
+#pragma omp taskwait
+    return left + right + s->run(s, first, first + 2);
+}
+
+int64_t sweep_tree(const sweep *s, int threads)
+{
+    int64_t unusable = 0;
+    const int64_t node_count = s->tree->node_count;
+    if (!node_count) return 0;
+    if (node_count <= RUN_MAX) return s->run(s, 0, node_count);
+#pragma omp parallel num_threads(threads)
+#pragma omp single
+    unusable = sweep_below(s, 1, node_count);
+    return unusable + s->run(s, 0, 1);
+}
+
+typedef struct range {
+    float low, high;
+} range;
+
+static const range empty_range = {INFINITY, -INFINITY};
+
+static inline range get_range(const sweep *s, int64_t node)
+{
+    return (range){*(const float *)(const void *)(s->low + node * s->stride),
+                   *(const float *)(const void *)(s->high + node * s->stride)};
+}
+
+static inline void set_range(const sweep *s, int64_t node, range r)
+{
+    *(float *)(void *)(s->low + node * s->stride) = r.low;
+    *(float *)(void *)(s->high + node * s->stride) = r.high;
+}
+
+static inline range united(range a, range b)
+{
+    return (range){a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
+}
+
+static inline range children_range(const sweep *s, int64_t left)
+{
+    return united(get_range(s, left), get_range(s, left + 1));
+}
+
+/* Doubles that grow by whole cells; rounded once at the end. */
+typedef struct span {
+    double low, high;
+    int64_t unusable;
+} span;
+
+static inline void span_add(span *to, double low, double high, bool finite)
+{
+    if (!finite) {
+        to->unusable++;
+        return;
+    }
+    to->low = low < to->low ? low : to->low;
+    to->high = high > to->high ? high : to->high;
+}
+
+static inline range span_range(const span *s)
+{
+    return s->low <= s->high ? (range){round_down(s->low), round_up(s->high)} : empty_range;
+}
+
+MMBVH_INLINE void span_add_cell(span *to, const sweep *s, int64_t cell, const fetch_shape shape, const bool wide_index,
+                                const bool wide_number)
+{
+    const int count = fetch_vertex_count(s->g, cell, shape);
+    const int64_t first = fetch_first(s->g, cell, count, shape);
+    double low = INFINITY, high = -INFINITY, poison = 0;
+    for (int i = 0; i < count; i++) {
+        const double v = fetch_number(&s->values, fetch_index(&s->g->connectivity, first + i, wide_index), wide_number);
+        low = v < low ? v : low;
+        high = v > high ? v : high;
+        poison += v - v; /* 0 while all are finite, then not a number */
+    }
+    span_add(to, low, high, poison == 0);
+}
+
+/* The sweep goes down through the cells too: fetch what later leaves will ask for, connectivity first, values after. */
+MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
+{
+    if (entry < PREFETCH_CELLS) return;
+    const int64_t later = s->tree->cells[entry - PREFETCH_CELLS];
+    const int64_t sooner = s->tree->cells[entry - PREFETCH_VALUES];
+    if (shape == FETCH_BY_CELL) return;
+    const int count = fetch_vertex_count(s->g, sooner, shape);
+    const grid_array *connectivity = &s->g->connectivity;
+    __builtin_prefetch(connectivity->data + later * count * connectivity->stride);
+    for (int i = 0; i < count; i++) {
+        const int64_t vertex = fetch_index(connectivity, sooner * count + i, wide_index);
+        __builtin_prefetch(s->values.data + vertex * s->values.stride);
+    }
+}
+
+MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, const fetch_shape shape,
+                                const bool wide_index, const bool wide_number)
+{
+    int64_t unusable = 0;
+    for (int64_t i = end - 1; i >= first; i--) {
+        const mmbvh_node *node = s->tree->nodes + i;
+        if (!node->count) {
+            set_range(s, i, children_range(s, (int64_t)node->ref));
+            continue;
+        }
+        span leaf = {INFINITY, -INFINITY, 0};
+        for (int64_t k = node->count - 1; k >= 0; k--) {
+            const int64_t entry = (int64_t)node->ref + k;
+            prefetch_cell(s, entry, shape, wide_index);
+            span_add_cell(&leaf, s, s->tree->cells[entry], shape, wide_index, wide_number);
+        }
+        set_range(s, i, span_range(&leaf));
+        unusable += leaf.unusable;
+    }
+    return unusable;
+}
+
+#define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
+    static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
+    {                                                                                                                  \
+        return run_ranges(s, first, end, shape, wide_index, wide_number);                                              \
+    }
+FETCH_INSTANCES(DEFINE_RUN, run_ranges)
+
+static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
+
+/* Leaves by a function a cell, for whatever the instances above do not read. */
+MMBVH_INLINE int64_t run_leaves(const sweep *s, int64_t first, int64_t end,
+                                void (*const add)(span *, const sweep *, int64_t))
+{
+    int64_t unusable = 0;
+    for (int64_t i = end - 1; i >= first; i--) {
+        const mmbvh_node *node = s->tree->nodes + i;
+        if (!node->count) {
+            set_range(s, i, children_range(s, (int64_t)node->ref));
+            continue;
+        }
+        span leaf = {INFINITY, -INFINITY, 0};
+        for (uint64_t k = 0; k < node->count; k++) add(&leaf, s, s->tree->cells[node->ref + k]);
+        set_range(s, i, span_range(&leaf));
+        unusable += leaf.unusable;
+    }
+    return unusable;
+}
+
+static void add_any_cell(span *to, const sweep *s, int64_t cell)
+{
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    double values[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(s->g, cell, vertices);
+    const bool finite = grid_cell_values(s->field, cell, vertices, count, values);
+    double low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < count; i++) {
+        low = values[i] < low ? values[i] : low;
+        high = values[i] > high ? values[i] : high;
+    }
+    span_add(to, low, high, finite);
+}
+
+static void add_cell_value(span *to, const sweep *s, int64_t cell)
+{
+    const double v = grid_field_value(s->field, cell);
+    span_add(to, v, v, isfinite(v));
+}
+
+static int64_t run_any(const sweep *s, int64_t first, int64_t end)
+{
+    return run_leaves(s, first, end, add_any_cell);
+}
+static int64_t run_by_cell(const sweep *s, int64_t first, int64_t end)
+{
+    return run_leaves(s, first, end, add_cell_value);
+}
+
+static int64_t run_infinite(const sweep *s, int64_t first, int64_t end)
+{
+    for (int64_t i = first; i < end; i++) set_range(s, i, (range){-INFINITY, INFINITY});
+    return 0;
+}
+
+static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
+{
+    for (int64_t i = end - 1; i >= first; i--) {
+        const mmbvh_node *node = s->tree->nodes + i;
+        range r = node->count ? empty_range : children_range(s, (int64_t)node->ref);
+        for (uint64_t k = 0; k < node->count; k++) {
+            const float *of_box = s->box_ranges + 2 * (int64_t)s->tree->cells[node->ref + k];
+            r = united((range){of_box[0], of_box[1]}, r);
+        }
+        set_range(s, i, r);
+    }
+    return 0;
+}
+
+static sweep_run choose_run(const grid *g, const grid_field *field)
+{
+    if (!field) return run_infinite;
+    if (field->is_cell_centred) return run_by_cell;
+    if (field->component < 0 || field->values.is_integer) return run_any;
+    return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
+}
+
+sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, float *low, float *high,
+                      int64_t stride)
+{
+    sweep s = {.tree = tree, .g = g, .field = field, .low = (char *)low, .high = (char *)high, .stride = stride};
+    s.run = choose_run(g, field);
+    if (field && field->component >= 0) {
+        s.values = field->values;
+        s.values.data += field->component * field->component_stride;
+    }
+    return s;
+}
+
+sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges)
+{
+    return (sweep){.tree = tree,
+                   .run = run_box_ranges,
+                   .box_ranges = ranges,
+                   .low = (char *)&tree->nodes->range_low,
+                   .high = (char *)&tree->nodes->range_high,
+                   .stride = (int64_t)sizeof(mmbvh_node)};
+}
+
+insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *field, const mmbvh_options *options)
+{
+    if (!tree || !g) return INSITU_ERROR_ARGUMENT;
+    if (!tree->node_count) return INSITU_OK;
+    mmbvh_node *root = tree->nodes;
+    const sweep s = sweep_of_ranges(tree, g, field, &root->range_low, &root->range_high, (int64_t)sizeof *root);
+    tree->unusable_cells = sweep_tree(&s, sweep_threads(options));
+    return INSITU_OK;
+}
+
+insitu_status mmbvh_compute_ranges(const mmbvh *tree, const grid *g, const grid_field *field,
+                                   const mmbvh_options *options, float *pairs, int64_t *unusable)
+{
+    if (!tree || !g || (!pairs && tree->node_count)) return INSITU_ERROR_ARGUMENT;
+    int64_t count = 0;
+    if (tree->node_count) {
+        const sweep s = sweep_of_ranges(tree, g, field, pairs, pairs + 1, 2 * (int64_t)sizeof *pairs);
+        count = sweep_tree(&s, sweep_threads(options));
+    }
+    if (unusable) *unusable = count;
+    return INSITU_OK;
+}
