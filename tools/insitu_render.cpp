@@ -1,0 +1,298 @@
+/* insitu-render: the engine of libinsitu on files. A simulation that has already run is played back to a session: each
+ * step is read, dealt out, handed over by the VTK adaptor and drawn.
+ *
+ * One rank may fail where others do not (a file that only it cannot read). So nothing local is followed by anything
+ * collective before all ranks have agreed that none failed; if one did, all throw its message, and rank 0 prints it. */
+#include <chrono>
+#include <climits>
+#include <cstdio>
+#include <memory>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <mpi.h>
+#include <unistd.h>
+
+#include <vtkDataObject.h>
+
+#include "data_info.h"
+#include "insitu/insitu.h"
+#include "insitu/vtk.h"
+#include "render_options.h"
+#include "render_progress.h"
+#include "step_source.h"
+
+using namespace render_tool;
+
+namespace
+{
+
+struct world {
+    MPI_Comm comm = MPI_COMM_WORLD;
+    int rank = 0, ranks = 1;
+
+    world()
+    {
+        MPI_Comm_rank(comm, &rank);
+        MPI_Comm_size(comm, &ranks);
+    }
+    bool is_root() const { return rank == 0; }
+};
+
+/* Collective: throw the message of the lowest rank that has one, on all. */
+void agree(const world &w, const std::string &message)
+{
+    int failing = message.empty() ? INT_MAX : w.rank;
+    MPI_Allreduce(MPI_IN_PLACE, &failing, 1, MPI_INT, MPI_MIN, w.comm);
+    if (failing == INT_MAX) return;
+    int length = static_cast<int>(message.size());
+    MPI_Bcast(&length, 1, MPI_INT, failing, w.comm);
+    std::string text = message;
+    text.resize(static_cast<size_t>(length));
+    MPI_Bcast(text.data(), length, MPI_CHAR, failing, w.comm);
+    throw std::runtime_error(text);
+}
+
+/* Collective: run something local on every rank, and throw on all if it throws on one. */
+template <typename Body> void all_do(const world &w, Body body)
+{
+    std::string message;
+    try {
+        body();
+    } catch (const std::exception &e) {
+        message = e.what()[0] ? e.what() : "unknown error";
+    }
+    agree(w, message);
+}
+
+/* A session and its adaptor, closed in the right order. */
+class stage
+{
+  public:
+    stage(const world &w, const std::string &scene)
+    {
+        if (insitu_create(w.comm, scene.c_str(), &session_) != INSITU_OK)
+            throw std::runtime_error(insitu_error(nullptr));
+        (void)insitu_vtk_create(session_, &adaptor_);
+    }
+    ~stage()
+    {
+        insitu_vtk_destroy(&adaptor_);
+        (void)insitu_destroy(&session_);
+    }
+    stage(const stage &) = delete;
+    stage &operator=(const stage &) = delete;
+
+    /* A part of which nothing can be drawn is no error here: the rest of the data may lie on other ranks. */
+    insitu_vtk_report set(vtkDataObject *data)
+    {
+        insitu_vtk_report report;
+        const insitu_status status = insitu_vtk_set(adaptor_, "data", data, &report);
+        const bool has_nothing = status == INSITU_ERROR_MESH && report.cells == 0 && report.cells_not_drawn > 0;
+        if (status != INSITU_OK && !has_nothing) throw std::runtime_error(insitu_vtk_error(adaptor_));
+        return report;
+    }
+
+    const insitu_report &step(int64_t cycle, double time)
+    {
+        if (insitu_step(session_, cycle, time) != INSITU_OK) throw std::runtime_error(insitu_error(session_));
+        return *insitu_last_report(session_);
+    }
+
+  private:
+    insitu_session *session_ = nullptr;
+    insitu_vtk_adaptor *adaptor_ = nullptr;
+};
+
+/* Collective: the lines of every rank's text that no earlier rank, and no earlier call, had; on rank 0. */
+std::vector<std::string> new_lines(const world &w, const std::string &text, std::set<std::string> &seen)
+{
+    int length = static_cast<int>(text.size());
+    std::vector<int> lengths(static_cast<size_t>(w.ranks)), starts(static_cast<size_t>(w.ranks));
+    MPI_Gather(&length, 1, MPI_INT, lengths.data(), 1, MPI_INT, 0, w.comm);
+    size_t total = 0;
+    for (size_t r = 0; w.is_root() && r < lengths.size(); r++) {
+        starts[r] = static_cast<int>(total);
+        total += static_cast<size_t>(lengths[r]);
+    }
+    std::string all(total, '\0');
+    MPI_Gatherv(text.data(), length, MPI_CHAR, all.data(), lengths.data(), starts.data(), MPI_CHAR, 0, w.comm);
+    std::vector<std::string> fresh;
+    std::istringstream in(all);
+    for (std::string line; std::getline(in, line);)
+        if (!line.empty() && seen.insert(line).second) fresh.push_back(line);
+    return fresh;
+}
+
+/* One run's memory of what it has said and done. */
+struct run_state {
+    std::set<std::string> said;
+    int images = 0;
+};
+
+constexpr size_t warnings_at_once = 8;
+
+void show_warnings(const world &w, const std::string &text, run_state &run, progress &bar)
+{
+    const std::vector<std::string> fresh = new_lines(w, text, run.said);
+    for (size_t i = 0; i < fresh.size() && i < warnings_at_once; i++) bar.note("warning: " + fresh[i]);
+    if (fresh.size() > warnings_at_once)
+        bar.note("warning: and " + std::to_string(fresh.size() - warnings_at_once) + " more");
+}
+
+/* Warnings about cells carry counts, which are a rank's own: said here of all ranks together. */
+std::string cell_warnings(const int64_t sums[4])
+{
+    std::string text;
+    const char *const what[] = {"", " higher-order cells drawn by their corners as linear ones",
+                                " cells of less than 3 dimensions are not drawn",
+                                " cells of types that cannot be drawn (see --info) are not drawn"};
+    for (int i = 1; i < 4; i++)
+        if (sums[i] > 0) text += std::to_string(sums[i]) + what[i] + "\n";
+    return text;
+}
+
+/* Collective: throw where no rank has a cell to draw; return what is worth a warning. */
+std::string check_cells(const world &w, const insitu_vtk_report &report, const std::string &name)
+{
+    int64_t sums[4] = {report.cells, report.cells_linear, report.cells_flat, report.cells_not_drawn};
+    MPI_Allreduce(MPI_IN_PLACE, sums, 4, MPI_INT64_T, MPI_SUM, w.comm);
+    if (sums[0] > 0) return w.is_root() ? cell_warnings(sums) : "";
+    std::string why = name + ": no cells to draw";
+    if (sums[3] > 0) why += "; " + std::to_string(sums[3]) + " cells of types that cannot be drawn (see --info)";
+    if (sums[2] > 0) why += "; " + std::to_string(sums[2]) + " cells of less than 3 dimensions";
+    throw std::runtime_error(why);
+}
+
+/* What the adaptor says beside what check_cells() sums up. */
+std::string other_warnings(const char *warnings)
+{
+    std::string text;
+    std::istringstream in(warnings);
+    for (std::string line; std::getline(in, line);)
+        if (line.find("drawn") == std::string::npos || line.find(": a vtk") != std::string::npos) text += line + "\n";
+    return text;
+}
+
+std::string milliseconds(double ms)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, ms < 10 ? "%.1f" : "%.0f", ms);
+    return text;
+}
+
+/* Collective: a line on the step; cells are summed over ranks, times are the slowest rank's. */
+std::string step_line(const world &w, const insitu_report &r, const std::string &name, double time, double read_ms)
+{
+    const char *const names[] = {"prepare", "build", "refit", "surface", "volume", "composite", "write"};
+    double times[9] = {r.prepare_ms,   r.build_ms, r.refit_ms, r.surface_ms, r.volume_ms,
+                       r.composite_ms, r.write_ms, r.total_ms, read_ms};
+    MPI_Allreduce(MPI_IN_PLACE, times, 9, MPI_DOUBLE, MPI_MAX, w.comm);
+    int64_t cells = r.cells;
+    MPI_Allreduce(MPI_IN_PLACE, &cells, 1, MPI_INT64_T, MPI_SUM, w.comm);
+    std::ostringstream line;
+    line << name << "  cycle " << r.cycle << "  time " << time << "  " << cells << " cells  read "
+         << milliseconds(times[8]) << " ms  insitu " << milliseconds(times[7]) << " ms";
+    const char *before = ": ";
+    for (int i = 0; i < 7; i++) {
+        if (times[i] < 0.05) continue;
+        line << before << names[i] << ' ' << milliseconds(times[i]);
+        before = ", ";
+    }
+    if (r.images == 0) line << "  (nothing due)";
+    return line.str();
+}
+
+void draw_step(const world &w, step_source &source, stage &on, size_t index, run_state &run, progress &bar)
+{
+    const std::string name = source.name(index);
+    bar.begin(index, name);
+    step_source::result part;
+    insitu_vtk_report report{};
+    const auto start = std::chrono::steady_clock::now();
+    all_do(w, [&] {
+        part = source.read(index);
+        report = on.set(part.data);
+    });
+    const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
+    /* Of all ranks one time, whichever of them read a part without it. */
+    MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
+    std::string warnings = check_cells(w, report, name) + other_warnings(report.warnings);
+    const insitu_report &done = on.step(source.cycle(index), part.time);
+    if (done.warnings) warnings += done.warnings;
+    run.images += done.images;
+    bar.line(step_line(w, done, name, part.time, read_time.count()));
+    show_warnings(w, warnings, run, bar);
+}
+
+std::string working_folder()
+{
+    char path[PATH_MAX];
+    return getcwd(path, sizeof path) ? path : ".";
+}
+
+void draw(const world &w, const options &o)
+{
+    std::unique_ptr<step_source> source;
+    all_do(w, [&] { source = std::make_unique<step_source>(o, w.rank, w.ranks); });
+    stage on(w, o.scene);
+    run_state run;
+    progress bar(w.is_root(), source->count());
+    for (size_t i = 0; i < source->count(); i++) draw_step(w, *source, on, i, run, bar);
+    bar.line(std::to_string(source->count()) + (source->count() == 1 ? " step, " : " steps, ") +
+             std::to_string(run.images) + (run.images == 1 ? " picture" : " pictures") + " in " + working_folder());
+}
+
+void show_info(const options &o)
+{
+    for (const std::string &path : o.files) {
+        data_file file(path);
+        const auto step = static_cast<size_t>(o.first_step);
+        if (step > 0 && step >= file.times().size())
+            throw std::runtime_error(path + ": has no step " + std::to_string(step));
+        print_info(path, file.read(step, 0, 1), file.times());
+    }
+}
+
+void run(const world &w, int argc, char **argv)
+{
+    const options o = parse_options(argc, argv);
+    if (o.help || o.version) {
+        if (!w.is_root()) return;
+        if (o.help)
+            std::fputs(help_text().c_str(), stdout);
+        else
+            std::printf("insitu-render %d.%d.%d\n", INSITU_VERSION_MAJOR, INSITU_VERSION_MINOR, INSITU_VERSION_PATCH);
+        return;
+    }
+    catch_vtk_messages();
+    if (o.info)
+        all_do(w, [&] {
+            if (w.is_root()) show_info(o);
+        });
+    else
+        draw(w, o);
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    int provided;
+    MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
+    int status = 0;
+    {
+        const world w;
+        try {
+            run(w, argc, argv);
+        } catch (const std::exception &e) {
+            status = 1;
+            if (w.is_root()) std::fprintf(stderr, "insitu-render: %s\n", e.what());
+        }
+    }
+    MPI_Finalize();
+    return status;
+}

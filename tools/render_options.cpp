@@ -1,0 +1,160 @@
+/* Parsed by hand rather than by getopt, which prints by itself, once a rank. */
+#include "render_options.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "data_file.h"
+
+namespace render_tool
+{
+
+namespace
+{
+
+int64_t parse_step(const std::string &text, const std::string &all)
+{
+    const bool is_number = !text.empty() && text.size() < 18 &&
+                           std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
+    if (!is_number) throw std::runtime_error("--steps " + all + ": expected A:B, A:, :B or A, counting from 0");
+    return std::strtoll(text.c_str(), nullptr, 10);
+}
+
+void parse_steps(const std::string &text, options &o)
+{
+    const size_t colon = text.find(':');
+    if (colon == std::string::npos) {
+        o.first_step = o.last_step = parse_step(text, text);
+        return;
+    }
+    const std::string first = text.substr(0, colon), last = text.substr(colon + 1);
+    if (!first.empty()) o.first_step = parse_step(first, text);
+    if (!last.empty()) o.last_step = parse_step(last, text);
+    if (o.first_step > o.last_step) throw std::runtime_error("--steps " + text + ": the first step is after the last");
+}
+
+/* The runs of digits of a name, and the name with each run as '#'. */
+struct numbered_name {
+    std::string path, shape;
+    std::vector<std::string> numbers; // without leading zeros
+
+    explicit numbered_name(const std::string &of) : path(of)
+    {
+        for (size_t i = 0; i < of.size();) {
+            if (!std::isdigit(static_cast<unsigned char>(of[i]))) {
+                shape += of[i++];
+                continue;
+            }
+            const size_t begin = i;
+            while (i < of.size() && std::isdigit(static_cast<unsigned char>(of[i]))) i++;
+            const std::string run = of.substr(begin, i - begin);
+            numbers.push_back(run.substr(std::min(run.find_first_not_of('0'), run.size() - 1)));
+            shape += '#';
+        }
+    }
+
+    bool operator<(const numbered_name &other) const
+    {
+        for (size_t i = 0; i < numbers.size(); i++) {
+            const std::string &a = numbers[i], &b = other.numbers[i];
+            if (a.size() != b.size()) return a.size() < b.size();
+            if (a != b) return a < b;
+        }
+        return false;
+    }
+};
+
+void order_by_number(std::vector<std::string> &files)
+{
+    const std::vector<numbered_name> names(files.begin(), files.end());
+    auto like_first = [&](const numbered_name &n) { return n.shape == names[0].shape; };
+    if (names.empty() || !std::all_of(names.begin(), names.end(), like_first)) return;
+    std::vector<numbered_name> sorted = names;
+    std::stable_sort(sorted.begin(), sorted.end());
+    for (size_t i = 0; i < files.size(); i++) files[i] = sorted[i].path;
+}
+
+/* The value of "--name value" or "--name=value"; moves i past it. */
+bool takes_value(const std::string &name, int argc, char **argv, int &i, std::string &value)
+{
+    const std::string argument = argv[i];
+    if (argument.rfind(name + "=", 0) == 0) {
+        value = argument.substr(name.size() + 1);
+        return true;
+    }
+    if (argument != name) return false;
+    if (i + 1 >= argc) throw std::runtime_error(name + ": a value is missing");
+    value = argv[++i];
+    return true;
+}
+
+void parse_argument(int argc, char **argv, int &i, options &o, std::vector<std::string> &names)
+{
+    const std::string argument = argv[i];
+    std::string value;
+    if (argument == "--help" || argument == "-h")
+        o.help = true;
+    else if (argument == "--version")
+        o.version = true;
+    else if (argument == "--info")
+        o.info = true;
+    else if (argument == "--pieces")
+        o.pieces = true;
+    else if (takes_value("--steps", argc, argv, i, value))
+        parse_steps(value, o);
+    else if (takes_value("--partition", argc, argv, i, value)) {
+        if (!parse_partition(value, o.how))
+            throw std::runtime_error("--partition " + value + ": expected block, random or checkerboard");
+    } else if (argument.size() > 1 && argument[0] == '-')
+        throw std::runtime_error(argument + ": unknown option; see insitu-render --help");
+    else
+        names.push_back(argument);
+}
+
+} // namespace
+
+options parse_options(int argc, char **argv)
+{
+    options o;
+    std::vector<std::string> names;
+    for (int i = 1; i < argc; i++) parse_argument(argc, argv, i, o, names);
+    if (o.help || o.version) return o;
+    if (!o.info) {
+        if (names.empty())
+            throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");
+        o.scene = names.front();
+        names.erase(names.begin());
+    }
+    if (names.empty()) throw std::runtime_error("data files are missing; see insitu-render --help");
+    o.files = names;
+    if (!o.pieces) order_by_number(o.files);
+    return o;
+}
+
+std::string help_text()
+{
+    return "usage: insitu-render [options] scene.yaml file...\n"
+           "       mpirun -n ranks insitu-render [options] scene.yaml file...\n"
+           "       insitu-render --info file...\n"
+           "\n"
+           "Draw the pictures that a scene file describes, from files of unstructured cells. Several\n"
+           "files are time steps, in order; a file with time steps inside is stepped through. Pictures\n"
+           "go where the scene's outputs say, relative to the working directory.\n"
+           "\n"
+           "  --info               list cells by type, bounds, fields with their ranges, and times\n"
+           "  --steps A:B          only steps A to B, counting from 0; A:, :B and A do too\n"
+           "  --pieces             the files are pieces of one step, not steps\n"
+           "  --partition HOW      how cells are dealt out to ranks: block (default), random or\n"
+           "                       checkerboard; pictures do not depend on it\n"
+           "  --version            print the version\n"
+           "  --help               print this\n"
+           "\n"
+           "Files read: " +
+           known_endings() +
+           "\n"
+           "Exit status: 0, or 1 after a message on stderr.\n";
+}
+
+} // namespace render_tool

@@ -1,0 +1,35 @@
+/* The command line of insitu-render. */
+#ifndef RENDER_OPTIONS_H
+#define RENDER_OPTIONS_H
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cell_deal.h"
+
+namespace render_tool
+{
+
+struct options {
+    bool help = false;
+    bool version = false;
+    bool info = false;
+    bool pieces = false; // the files are pieces of one step, not steps
+    int64_t first_step = 0;
+    int64_t last_step = std::numeric_limits<int64_t>::max();
+    partition how = partition::block;
+    std::string scene;
+    std::vector<std::string> files;
+};
+
+/* Throws std::runtime_error with what is wrong. Files whose names differ in nothing but numbers come in the order of
+ * the numbers, so that a shell's file_10 does not precede its file_2. */
+options parse_options(int argc, char **argv);
+
+std::string help_text();
+
+} // namespace render_tool
+
+#endif

@@ -1,0 +1,52 @@
+/* The steps of a run: which file and which step in it each is, and this rank's part of one. */
+#ifndef STEP_SOURCE_H
+#define STEP_SOURCE_H
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vtkSmartPointer.h>
+
+#include "data_file.h"
+#include "render_options.h"
+
+namespace render_tool
+{
+
+class step_source
+{
+  public:
+    /* Opens the files that hold steps inside; throws std::runtime_error. */
+    step_source(const options &o, int rank, int ranks);
+
+    size_t count() const { return steps_.size(); }
+    int64_t cycle(size_t step) const { return steps_[step].cycle; }
+    std::string name(size_t step) const; /* the file's, without its folder */
+
+    struct result {
+        vtkSmartPointer<vtkDataObject> data; // this rank's part; null where it has none
+        double time = 0;
+    };
+    result read(size_t step); /* throws std::runtime_error */
+
+  private:
+    struct step {
+        size_t file;
+        size_t inside;
+        int64_t cycle;
+    };
+    data_file &open(size_t file);
+    vtkSmartPointer<vtkDataObject> read_pieces();
+    bool keeps_whole_files() const;
+
+    options options_;
+    int rank_, ranks_;
+    std::vector<step> steps_;
+    std::unique_ptr<data_file> open_; // the file read last
+    size_t open_index_ = 0;
+};
+
+} // namespace render_tool
+
+#endif
