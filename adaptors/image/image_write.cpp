@@ -2,9 +2,10 @@
  *
  * A picture appears whole or not at all: it is written under a temporary name in its own folder, which rename() then
  * swaps in at once even on most network file systems. libinsitu loads this file by dlopen() inside someone's run, so
- * nothing may be thrown out of it, no thread is started, and what goes wrong is said in a message. */
+ * nothing may be thrown out of it, it starts no threads, and what goes wrong is said in a message. */
 #include "insitu/image_output.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cerrno>
@@ -111,19 +112,30 @@ class temporary_file
     bool is_kept_ = false;
 };
 
-void write_pixels(const fs::path &path, const OIIO::ImageSpec &spec, const void *pixels)
+/* The file as OpenImageIO makes it, in memory: its PNG writer does not notice a full disk. */
+std::vector<unsigned char> encode_file(const fs::path &path, const OIIO::ImageSpec &spec, const void *pixels)
 {
-    /* OpenImageIO words a file that cannot be opened poorly; the system knows why. */
-    std::FILE *probe = std::fopen(path.c_str(), "wb");
-    if (!probe) throw io_error(std::strerror(errno));
-    std::fclose(probe);
-
-    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(path.string());
+    std::vector<unsigned char> bytes;
+    OIIO::Filesystem::IOVecOutput memory(bytes);
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(path.string(), &memory);
     if (!output) throw io_error(OIIO::geterror());
     output->threads(1);
     if (!output->open(path.string(), spec)) throw io_error(output->geterror());
     if (!output->write_image(spec.format, pixels)) throw io_error(output->geterror());
     if (!output->close()) throw io_error(output->geterror());
+    return bytes;
+}
+
+void write_pixels(const fs::path &path, const OIIO::ImageSpec &spec, const void *pixels)
+{
+    const std::vector<unsigned char> bytes = encode_file(path, spec, pixels);
+    std::FILE *file = std::fopen(path.c_str(), "wb");
+    if (!file) throw io_error(std::strerror(errno));
+    errno = 0;
+    const bool is_written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+    const int write_error = errno;
+    const bool is_closed = std::fclose(file) == 0;
+    if (!is_written || !is_closed) throw io_error(std::strerror(is_written ? errno : write_error));
 }
 
 template <typename code> void write_png(const insitu_image &image, const fs::path &path, OIIO::TypeDesc type)

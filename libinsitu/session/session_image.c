@@ -1,12 +1,16 @@
 /* The image library is looked for where a person would put it: on the loader's own path (beside libinsitu, by its
  * RUNPATH), then beside the object this code is in, then in the lib folder next to that one's, which is where it
  * stands for a program in bin that links libinsitu statically. It stays loaded until the process ends: C++ libraries
- * with threads and static objects do not survive being unloaded. */
+ * with threads and static objects do not survive being unloaded.
+ *
+ * Some library behind OpenImageIO starts threads as it is loaded. They sleep, but they would take the simulation's
+ * signals and run its handlers; so they are born with every signal blocked. */
 #define _GNU_SOURCE 1 /* dladdr */
 #include "session_image.h"
 
 #include <dlfcn.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -16,7 +20,11 @@ static insitu_image_write_function *loaded_writer;
 
 static void *open_library(const char *path, char *why, size_t size)
 {
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (!handle && !*why) snprintf(why, size, "%s", dlerror());
     return handle;
 }

@@ -1,0 +1,25 @@
+# Scene files, colour maps and images.
+add_executable(test_scene test_scene.c)
+target_link_libraries(test_scene PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME scene COMMAND test_scene)
+set_tests_properties(scene PROPERTIES TIMEOUT 60)
+
+add_executable(scene_reference scene_reference.c)
+target_link_libraries(scene_reference PRIVATE insitu_flags insitu_internal)
+add_test(NAME scene_reference_is_in_step COMMAND scene_reference ${PROJECT_SOURCE_DIR}/docs/scene.md)
+set_tests_properties(scene_reference_is_in_step PROPERTIES TIMEOUT 60)
+add_custom_target(scene_docs COMMAND scene_reference > ${PROJECT_SOURCE_DIR}/docs/scene.md VERBATIM)
+
+add_executable(test_colour_map test_colour_map.c)
+target_link_libraries(test_colour_map PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME colour_map COMMAND test_colour_map)
+set_tests_properties(colour_map PROPERTIES TIMEOUT 60)
+
+# Reads back by OpenImageIO what the adaptor wrote, which it loads as libinsitu does.
+add_executable(test_image_output test_image_output.cpp)
+add_dependencies(test_image_output insitu_image)
+target_include_directories(test_image_output SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
+target_link_libraries(test_image_output PRIVATE
+  insitu_flags insitu_internal ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY} PkgConfig::CMOCKA)
+add_test(NAME image_output COMMAND test_image_output ${CMAKE_CURRENT_BINARY_DIR}/image_output)
+set_tests_properties(image_output PROPERTIES TIMEOUT 120)

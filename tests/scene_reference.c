@@ -1,0 +1,98 @@
+/* Prints docs/scene.md from the schema that reads scene files. With a file's name: says where that file differs, and
+ * fails if it does. `ninja scene_docs` writes the page anew. */
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "scene_document.h"
+
+static const char introduction[] =
+    "# The scene file\n"
+    "\n"
+    "A scene file says what to draw, when, and where to put it. It is YAML. It is read on rank 0, and read again when "
+    "it\n"
+    "changes, so that the pictures of a running job can be changed. A key that is unknown, of the wrong type or out\n"
+    "of range is an error that names the file, the line, the key, and what was expected; anchors, aliases and tags "
+    "are\n"
+    "not taken.\n"
+    "\n"
+    "```yaml\n"
+    "images:\n"
+    "  - name: wave\n"
+    "    size: [1280, 720]\n"
+    "    camera: {automatic: {direction: [1, 0.8, 1.2]}}\n"
+    "    layers:\n"
+    "      - isosurface: {field: pressure, values: [0.2, 0.5]}\n"
+    "      - volume: {field: pressure, map: cool_to_warm, opacity: [[0, 0], [0.4, 0.3], [1, 0.9]]}\n"
+    "    outputs:\n"
+    "      - path: \"out/{name}_{cycle:06}.png\"\n"
+    "```\n"
+    "\n"
+    "More stand in [examples](../examples). Colours are sRGB, from 0 to 1. Lengths are those of the mesh's "
+    "coordinates.\n"
+    "This page is printed from the schema that the library reads scene files by.\n";
+
+static const scene_mapping *shown[32];
+static int shown_count;
+
+/* Mappings with their paths in the file, each once, in the order a reader meets them. */
+static void print_mapping(FILE *to, const scene_mapping *mapping, const char *path)
+{
+    for (int i = 0; i < shown_count; i++) {
+        if (shown[i] == mapping) return;
+    }
+    shown[shown_count++] = mapping;
+    fprintf(to, "\n## %s\n\n| key | value | default | meaning |\n|---|---|---|---|\n", *path ? path : "The file");
+    for (int i = 0; mapping->fields[i].key; i++) {
+        const scene_key *key = &mapping->keys[i];
+        char words[SCENE_WORDS_SIZE];
+        scene_value_words(&mapping->fields[i].value, key, words);
+        char *keys = strstr(words, " with the keys");
+        if (keys) *keys = '\0';
+        fprintf(to, "| `%s` | %s | %s | %s |\n", mapping->fields[i].key, words,
+                key->by_default ? key->by_default : "**required**", key->help);
+    }
+    for (int i = 0; mapping->fields[i].key; i++) {
+        if (!mapping->keys[i].child) continue;
+        char below[256];
+        const bool is_list = mapping->fields[i].value.type == CYAML_SEQUENCE;
+        snprintf(below, sizeof below, "%s%s%s%s", path, *path ? "." : "", mapping->fields[i].key, is_list ? "[]" : "");
+        print_mapping(to, mapping->keys[i].child, below);
+    }
+}
+
+static int compare(FILE *expected, const char *file_name)
+{
+    FILE *found = fopen(file_name, "r");
+    if (!found) {
+        fprintf(stderr, "%s: cannot be read\n", file_name);
+        return EXIT_FAILURE;
+    }
+    char a[2048], b[2048];
+    bool is_same = true;
+    for (int line = 1; is_same; line++) {
+        const char *in_a = fgets(a, sizeof a, expected), *in_b = fgets(b, sizeof b, found);
+        if (!in_a && !in_b) break;
+        is_same = in_a && in_b && strcmp(a, b) == 0;
+        if (!is_same) {
+            fprintf(stderr, "%s:%d: is\n%sexpected (build the target scene_docs)\n%s", file_name, line,
+                    in_b ? b : "the end\n", in_a ? a : "the end\n");
+        }
+    }
+    fclose(found);
+    return is_same ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+int main(int argument_count, char **arguments)
+{
+    FILE *page = argument_count > 1 ? tmpfile() : stdout;
+    if (!page) return EXIT_FAILURE;
+    fputs(introduction, page);
+    print_mapping(page, &scene_top, "");
+    if (argument_count == 1) return EXIT_SUCCESS;
+    rewind(page);
+    const int result = compare(page, arguments[1]);
+    fclose(page);
+    return result;
+}

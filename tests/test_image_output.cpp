@@ -1,0 +1,284 @@
+/* The image adaptor, called as libinsitu calls it: by the loader. What was written is read back by OpenImageIO and held
+ * against the pixels, through the sRGB curve in double where the format has it. */
+#include <OpenImageIO/imageio.h>
+
+#include <cmath>
+#include <csetjmp>
+#include <csignal>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <string>
+#include <sys/resource.h>
+#include <vector>
+
+/* Last, for it defines macros as short as fail(). */
+extern "C" {
+#include <cmocka.h>
+
+#include "session_image.h"
+}
+
+namespace fs = std::filesystem;
+
+namespace
+{
+
+fs::path folder; /* of this run, empty at its start */
+
+struct picture {
+    int width, height;
+    std::vector<float> rgba, depth;
+    insitu_image view(bool with_depth) const
+    {
+        return {width, height, rgba.data(), with_depth ? depth.data() : nullptr};
+    }
+};
+
+std::uint32_t hash(std::uint32_t x)
+{
+    x = (x ^ (x >> 16)) * 0x7feb352dU;
+    x = (x ^ (x >> 15)) * 0x846ca68bU;
+    return x ^ (x >> 16);
+}
+
+float number(std::size_t i)
+{
+    return static_cast<float>(hash(static_cast<std::uint32_t>(i)) >> 8) / 16777216.0F;
+}
+
+/* Premultiplied colours of every alpha, or opaque ones; a little outside [0, 1] too, as highlights are. */
+picture make_picture(int width, int height, bool opaque)
+{
+    const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    picture p{width, height, std::vector<float>(4 * count), std::vector<float>(count)};
+    for (std::size_t i = 0; i < count; i++) {
+        const float alpha = opaque ? 1 : i % 7 == 0 ? 0 : i % 7 == 1 ? 1 : number(5 * i);
+        for (std::size_t c = 0; c < 3; c++) p.rgba[4 * i + c] = alpha * (1.1F * number(5 * i + 1 + c) - 0.05F);
+        p.rgba[4 * i + 3] = alpha;
+        p.depth[i] = i % 3 == 0 ? std::numeric_limits<float>::infinity() : 1e3F * number(5 * i + 4);
+    }
+    return p;
+}
+
+insitu_status write(const insitu_image &image, insitu_image_format format, const fs::path &path, base_error &error)
+{
+    error = base_error{};
+    return session_write_image(&image, format, path.c_str(), &error);
+}
+
+void write_well(const insitu_image &image, insitu_image_format format, const fs::path &path)
+{
+    base_error error;
+    if (write(image, format, path, error) != INSITU_OK) fail_msg("%s", error.message);
+}
+
+template <typename number_type>
+std::vector<number_type> read_back(const fs::path &path, OIIO::TypeDesc type, OIIO::ImageSpec &spec)
+{
+    OIIO::ImageSpec straight;
+    straight.attribute("oiio:UnassociatedAlpha", 1);
+    const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path.string(), &straight);
+    if (!input) fail_msg("%s", OIIO::geterror().c_str());
+    spec = input->spec();
+    assert_true(spec.format == type);
+    std::vector<number_type> values(static_cast<std::size_t>(spec.image_pixels()) *
+                                    static_cast<std::size_t>(spec.nchannels));
+    assert_true(input->read_image(0, 0, 0, spec.nchannels, type, values.data()));
+    input->close();
+    return values;
+}
+
+double exact_code(double linear, double largest)
+{
+    const double l = std::fmin(1, std::fmax(0, linear));
+    return largest * (l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055);
+}
+
+template <typename code>
+void check_png(const picture &p, insitu_image_format format, OIIO::TypeDesc type, std::size_t channels)
+{
+    const fs::path path = folder / "png" / "round_trip.png";
+    write_well(p.view(true), format, path);
+    OIIO::ImageSpec spec;
+    const std::vector<code> codes = read_back<code>(path, type, spec);
+    assert_int_equal(spec.width, p.width);
+    assert_int_equal(spec.height, p.height);
+    assert_int_equal(spec.nchannels, channels);
+    const double largest = std::numeric_limits<code>::max();
+    const double half =
+        0.5 + 1e-9 * largest; /* rounding to nearest; the double arithmetic of both sides is far finer */
+    for (std::size_t i = 0; i < p.depth.size(); i++) {
+        const double alpha = p.rgba[4 * i + 3];
+        for (std::size_t c = 0; c < 3; c++) {
+            const double straight = alpha > 0 ? p.rgba[4 * i + c] / alpha : 0;
+            assert_true(std::fabs(codes[channels * i + c] - exact_code(straight, largest)) <= half);
+        }
+        if (channels == 4) assert_true(std::fabs(codes[4 * i + 3] - alpha * largest) <= half);
+    }
+}
+
+const int sizes[][2] = {{1, 1}, {1, 7}, {13, 1}, {17, 11}, {64, 33}};
+
+void png8_is_within_half_a_code(void **)
+{
+    for (const auto &size : sizes) {
+        check_png<std::uint8_t>(make_picture(size[0], size[1], true), INSITU_PNG8, OIIO::TypeDesc::UINT8, 3);
+        check_png<std::uint8_t>(make_picture(size[0], size[1], false), INSITU_PNG8, OIIO::TypeDesc::UINT8, 4);
+    }
+}
+
+void png16_is_within_half_a_code(void **)
+{
+    for (const auto &size : sizes) {
+        check_png<std::uint16_t>(make_picture(size[0], size[1], true), INSITU_PNG16, OIIO::TypeDesc::UINT16, 3);
+        check_png<std::uint16_t>(make_picture(size[0], size[1], false), INSITU_PNG16, OIIO::TypeDesc::UINT16, 4);
+    }
+}
+
+void png_of_numbers_that_are_not_is_black(void **)
+{
+    const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+    const picture p{2, 1, {nan, infinity, -infinity, 1, nan, nan, nan, nan}, {0, 0}};
+    write_well(p.view(false), INSITU_PNG8, folder / "nan.png");
+    OIIO::ImageSpec spec;
+    const auto codes = read_back<std::uint8_t>(folder / "nan.png", OIIO::TypeDesc::UINT8, spec);
+    assert_int_equal(codes.size(), 8);
+    const std::uint8_t expected[8] = {0, 255, 0, 255, 0, 0, 0, 0};
+    assert_memory_equal(codes.data(), expected, 8);
+}
+
+void exr_is_bitwise(void **)
+{
+    for (const auto &size : sizes) {
+        for (const std::size_t channels : {std::size_t{4}, std::size_t{5}}) {
+            const picture p = make_picture(size[0], size[1], false);
+            const fs::path path = folder / "deep" / "er" / "round_trip.exr";
+            write_well(p.view(channels == 5), INSITU_EXR, path);
+            OIIO::ImageSpec spec;
+            const std::vector<float> values = read_back<float>(path, OIIO::TypeDesc::FLOAT, spec);
+            assert_int_equal(spec.nchannels, channels);
+            const std::vector<std::string> names = {"R", "G", "B", "A", "Z"};
+            for (std::size_t c = 0; c < channels; c++)
+                assert_string_equal(spec.channelnames[c].c_str(), names[c].c_str());
+            for (std::size_t i = 0; i < p.depth.size(); i++) {
+                assert_memory_equal(&values[channels * i], &p.rgba[4 * i], 4 * sizeof(float));
+                if (channels == 5) assert_memory_equal(&values[5 * i + 4], &p.depth[i], sizeof(float));
+            }
+        }
+    }
+}
+
+std::size_t count_files(const fs::path &in)
+{
+    std::size_t count = 0;
+    for ([[maybe_unused]] const auto &entry : fs::recursive_directory_iterator(in)) count++;
+    return count;
+}
+
+void writing_leaves_the_picture_alone(void **)
+{
+    const fs::path in = folder / "alone";
+    const picture first = make_picture(20, 10, true), second = make_picture(5, 4, true);
+    write_well(first.view(false), INSITU_PNG8, in / "a.png");
+    write_well(second.view(false), INSITU_PNG8, in / "a.png");
+    assert_int_equal(count_files(in), 1);
+    OIIO::ImageSpec spec;
+    read_back<std::uint8_t>(in / "a.png", OIIO::TypeDesc::UINT8, spec);
+    assert_int_equal(spec.width, 5);
+}
+
+/* Root may write anywhere, so nothing here goes by permissions. */
+void unwritable_places_are_told(void **)
+{
+    const fs::path in = folder / "unwritable";
+    fs::create_directories(in / "taken.png" / "below");
+    const picture p = make_picture(3, 2, true);
+    write_well(p.view(false), INSITU_PNG8, in / "file.png");
+    const std::size_t before = count_files(in);
+    const struct {
+        fs::path path;
+        const char *why;
+    } cases[] = {{in / "file.png" / "a.png", "Not a directory"},
+                 {in / "file.png" / "b" / "a.png", "Not a directory"},
+                 {"/proc/a.png", ""},
+                 {"/proc/b/a.png", ""},
+                 {in / "taken.png", "irectory"},
+                 {in / (std::string(300, 'a') + ".png"), "name too long"}};
+    for (const auto &c : cases) {
+        for (const auto format : {INSITU_PNG8, INSITU_PNG16, INSITU_EXR}) {
+            base_error error;
+            assert_int_equal(write(p.view(true), format, c.path, error), INSITU_ERROR_IO);
+            const std::string start = c.path.string() + ": cannot be written: ";
+            if (std::strncmp(error.message, start.c_str(), start.size()) != 0 || !std::strstr(error.message, c.why)) {
+                fail_msg("%s", error.message);
+            }
+        }
+    }
+    assert_int_equal(count_files(in), before);
+}
+
+/* A full disk, in small: no file of this process may grow beyond 4 KiB. */
+void full_disk_is_told_and_leaves_the_old_picture(void **)
+{
+    const fs::path in = folder / "full";
+    const picture small = make_picture(2, 2, true), large = make_picture(200, 200, false);
+    for (const auto format : {INSITU_PNG8, INSITU_PNG16, INSITU_EXR}) {
+        const fs::path path = in / "a";
+        write_well(small.view(true), format, path);
+        const std::uintmax_t size = fs::file_size(path);
+        rlimit before;
+        getrlimit(RLIMIT_FSIZE, &before);
+        const rlimit small_limit = {4096, before.rlim_max};
+        const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+        setrlimit(RLIMIT_FSIZE, &small_limit);
+        base_error error;
+        const insitu_status status = write(large.view(true), format, path, error);
+        setrlimit(RLIMIT_FSIZE, &before);
+        std::signal(SIGXFSZ, handler);
+        assert_int_equal(status, INSITU_ERROR_IO);
+        assert_non_null(std::strstr(error.message, "File too large"));
+        assert_true(fs::file_size(path) == size);
+        assert_int_equal(count_files(in), 1);
+    }
+}
+
+void nonsense_is_refused(void **)
+{
+    const picture p = make_picture(3, 2, true);
+    insitu_image no_pixels = p.view(false), no_width = p.view(false);
+    no_pixels.rgba = nullptr;
+    no_width.width = 0;
+    base_error error;
+    assert_int_equal(write(no_pixels, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write(no_width, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write(p.view(false), static_cast<insitu_image_format>(3), folder / "n.png", error),
+                     INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write(p.view(false), INSITU_PNG8, "", error), INSITU_ERROR_ARGUMENT);
+    assert_false(fs::exists(folder / "n.png"));
+}
+
+} // namespace
+
+int main(int argument_count, char **arguments)
+{
+    folder = argument_count > 1 ? arguments[1] : "test_image_output_files";
+    fs::remove_all(folder);
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(png8_is_within_half_a_code),
+        cmocka_unit_test(png16_is_within_half_a_code),
+        cmocka_unit_test(png_of_numbers_that_are_not_is_black),
+        cmocka_unit_test(exr_is_bitwise),
+        cmocka_unit_test(writing_leaves_the_picture_alone),
+        cmocka_unit_test(unwritable_places_are_told),
+        cmocka_unit_test(full_disk_is_told_and_leaves_the_old_picture),
+        cmocka_unit_test(nonsense_is_refused),
+    };
+    const int failures = cmocka_run_group_tests(tests, nullptr, nullptr);
+    fs::remove_all(folder);
+    return failures;
+}

@@ -1,0 +1,623 @@
+/* Scene files: what a good one becomes, every default, and what a bad one is told. The bad files are one good file with
+ * one line replaced, so that nothing else in them can be the reason for the message. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "colour_map.h"
+#include "memory.h"
+#include "scene.h"
+#include "scene_document.h"
+
+/* sRGB's definition, in double, apart from the library's. */
+static double linear(double s)
+{
+    return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
+}
+
+/* A colour's float32 steps: sRGB to float, pow, times a factor, each within 2^-24 relative; slope of the curve < 2.5.
+ */
+#define COLOUR_TOLERANCE 1e-6
+
+static void assert_near(double value, double expected, double tolerance)
+{
+    if (!(fabs(value - expected) <= tolerance)) fail_msg("%.17g, expected %.17g within %g", value, expected, tolerance);
+}
+
+static insitu_status parse(const char *text, scene *s, base_error *error)
+{
+    *error = (base_error){.status = INSITU_OK};
+    return scene_parse(text, strlen(text), "scene.yaml", s, error);
+}
+
+static void parse_good(const char *text, scene *s)
+{
+    base_error error;
+    if (parse(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
+}
+
+static const char every_key[] = "threads: 3\n"
+                                "images:\n"
+                                "  - name: wave\n"
+                                "    size: [640, 480]\n"
+                                "    every: 10\n"
+                                "    camera: {position: [4, 3, 5], focal: [1, 0, 0], up: [0, 0, 2], angle: 35.5}\n"
+                                "    background: [0.5, 0.25, 1, 0.5]\n"
+                                "    lights:\n"
+                                "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
+                                "      - {direction: [3, 0, 4], in: camera}\n"
+                                "    layers:\n"
+                                "      - isosurface:\n"
+                                "          field: pressure\n"
+                                "          component: magnitude\n"
+                                "          values: [0.2, 0.5, -1e-3]\n"
+                                "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
+                                "          opacity: 0.5\n"
+                                "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
+                                "          root_steps: 5\n"
+                                "      - volume:\n"
+                                "          field: temperature\n"
+                                "          component: y\n"
+                                "          map: cool_to_warm\n"
+                                "          range: [-2, 3]\n"
+                                "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
+                                "          unit_distance: 0.1\n"
+                                "      - isosurface: {field: q, values: [7], colour_by: {field: speed, component: 2, "
+                                "map: inferno, range: [0, 1]}}\n"
+                                "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4}\n"
+                                "    outputs:\n"
+                                "      - path: \"out/{name}_{cycle:06}.png\"\n"
+                                "        bits: 16\n"
+                                "      - path: out/wave_{cycle}.EXR\n"
+                                "  - name: second\n"
+                                "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5}}\n"
+                                "    layers: [{volume: {field: p}}]\n"
+                                "    sampling: {step: 0.125}\n"
+                                "    outputs: [{path: b.png, bits: 8}]\n";
+
+static const char fewest_keys[] = "images:\n"
+                                  "- name: a\n"
+                                  "  layers:\n"
+                                  "  - isosurface: {field: p, values: [1, 2]}\n"
+                                  "  - isosurface: {field: p, values: [1], colour_by: {field: q}}\n"
+                                  "  - volume: {field: p}\n"
+                                  "  outputs: [{path: a.png}]\n";
+
+static void check_vector(const double v[3], double x, double y, double z)
+{
+    assert_near(v[0], x, 1e-15);
+    assert_near(v[1], y, 1e-15);
+    assert_near(v[2], z, 1e-15);
+}
+
+static void check_colour(const float c[3], double r, double g, double b)
+{
+    assert_near(c[0], r, COLOUR_TOLERANCE);
+    assert_near(c[1], g, COLOUR_TOLERANCE);
+    assert_near(c[2], b, COLOUR_TOLERANCE);
+}
+
+static void scene_image_keys_are_read(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.threads, 3);
+    assert_int_equal(s.image_count, 2);
+    const scene_image *image = &s.images[0];
+    assert_string_equal(image->name, "wave");
+    assert_int_equal(image->line, 3);
+    assert_int_equal(image->width, 640);
+    assert_int_equal(image->height, 480);
+    assert_int_equal(image->every, 10);
+    check_colour(image->background, 0.5 * linear(0.5), 0.5 * linear(0.25), 0.5);
+    assert_true(image->background[3] == 0.5F);
+    assert_true(image->step == 0 && image->step_cells == 0.25);
+    assert_int_equal(image->sample_group, 8);
+    assert_false(image->jitter);
+    assert_int_equal(image->frames, 4);
+    assert_int_equal(image->output_count, 2);
+    assert_string_equal(image->outputs[0].path, "out/{name}_{cycle:06}.png");
+    assert_int_equal(image->outputs[0].format, SCENE_PNG16);
+    assert_string_equal(image->outputs[1].path, "out/wave_{cycle}.EXR");
+    assert_int_equal(image->outputs[1].format, SCENE_EXR);
+    assert_true(s.images[1].step == 0.125);
+    assert_int_equal(s.images[1].outputs[0].format, SCENE_PNG8);
+    scene_free(&s);
+}
+
+static void scene_view_keys_are_read(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(every_key, &s);
+    const scene_camera *camera = &s.images[0].camera;
+    assert_false(camera->is_automatic);
+    check_vector(camera->eye, 4, 3, 5);
+    check_vector(camera->focal, 1, 0, 0);
+    check_vector(camera->up, 0, 0, 1);
+    assert_true(camera->angle == 35.5);
+    assert_true(s.images[1].camera.is_automatic);
+    check_vector(s.images[1].camera.direction, 0, 0.6, 0.8);
+    assert_true(s.images[1].camera.zoom == 1.5);
+
+    const scene_light *lights = s.images[0].lights;
+    assert_int_equal(s.images[0].light_count, 2);
+    check_vector(lights[0].direction, 0, 0, 1);
+    assert_true(lights[0].in_world);
+    check_colour(lights[0].colour, 0.5, 0.5 * linear(0.5), 0);
+    check_vector(lights[1].direction, 0.6, 0, 0.8);
+    assert_false(lights[1].in_world);
+    scene_free(&s);
+}
+
+static void scene_isosurface_keys_are_read(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.images[0].isosurface_count, 2);
+    const scene_isosurface *first = &s.images[0].isosurfaces[0], *second = first + 1;
+    assert_string_equal(first->field.name, "pressure");
+    assert_int_equal(first->field.line, 13);
+    assert_int_equal(first->field.component, SCENE_COMPONENT_MAGNITUDE);
+    assert_int_equal(first->value_count, 3);
+    assert_true(first->values[0] == 0.2 && first->values[1] == 0.5 && first->values[2] == -1e-3);
+    check_colour(first->colours, 1, 0, 0);
+    check_colour(first->colours + 3, linear(0.5), linear(0.25), 0);
+    check_colour(first->colours + 6, linear(0.5), linear(0.25), 0);
+    assert_true(first->opacity == 0.5F);
+    assert_true(first->material.ambient == 0.1F && first->material.diffuse == 0.2F);
+    assert_true(first->material.specular == 0.3F && first->material.shininess == 40);
+    assert_int_equal(first->root_steps, 5);
+    assert_false(first->has_colour_by);
+    assert_true(second->has_colour_by);
+    assert_string_equal(second->colour_by.name, "speed");
+    assert_int_equal(second->colour_by.component, 2);
+    assert_int_equal(second->colour_by.line, 27);
+    assert_int_equal(second->colour_map, SCENE_INFERNO);
+    assert_true(second->colour_range.is_fixed && second->colour_range.low == 0 && second->colour_range.high == 1);
+    scene_free(&s);
+}
+
+static void scene_volume_keys_are_read(void **state)
+{
+    (void)state;
+    static const double at[] = {0, 0.4, 0.4, 1};
+    static const float opacity[] = {0, 0.3F, 0.5F, 0.9F};
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.images[0].volume_count, 1);
+    const scene_volume *volume = &s.images[0].volumes[0];
+    assert_string_equal(volume->field.name, "temperature");
+    assert_int_equal(volume->field.component, 1);
+    assert_int_equal(volume->colour_map, SCENE_COOL_TO_WARM);
+    assert_true(volume->range.is_fixed && volume->range.low == -2 && volume->range.high == 3);
+    assert_true(volume->unit_distance == 0.1);
+    assert_int_equal(volume->opacity_count, 4);
+    for (int i = 0; i < 4; i++) assert_true(volume->opacity[i].at == at[i] && volume->opacity[i].opacity == opacity[i]);
+    scene_free(&s);
+}
+
+static void scene_image_defaults_hold(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(fewest_keys, &s);
+    const scene_image *image = &s.images[0];
+    const double length = sqrt(1 + 0.64 + 1.44);
+    assert_int_equal(s.threads, 0);
+    assert_true(image->width == 1280 && image->height == 720 && image->every == 1);
+    check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
+    assert_true(image->background[3] == 1);
+    assert_true(image->step == 0 && image->step_cells == 0.5 && image->sample_group == 16);
+    assert_true(image->jitter && image->frames == 1);
+    assert_true(image->camera.is_automatic && image->camera.angle == 40 && image->camera.zoom == 1);
+    check_vector(image->camera.direction, 1 / length, 0.8 / length, 1.2 / length);
+    check_vector(image->camera.up, 0, 1, 0);
+    assert_int_equal(image->light_count, 2);
+    for (int i = 0; i < 2; i++) {
+        const double *d = image->lights[i].direction;
+        assert_false(image->lights[i].in_world);
+        assert_near(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1, 1e-15);
+        assert_true(d[2] > 0); /* from the eye's side */
+    }
+    assert_int_equal(image->outputs[0].format, SCENE_PNG8);
+    scene_free(&s);
+}
+
+static void scene_layer_defaults_hold(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(fewest_keys, &s);
+    const scene_isosurface *surface = &s.images[0].isosurfaces[0];
+    assert_int_equal(surface->field.component, SCENE_COMPONENT_DEFAULT);
+    assert_true(surface->opacity == 1 && surface->root_steps == 2);
+    assert_true(surface->material.ambient == 0.15F && surface->material.diffuse == 0.75F);
+    assert_true(surface->material.specular == 0.25F && surface->material.shininess == 32);
+    assert_int_equal(surface[1].colour_map, SCENE_VIRIDIS);
+    assert_false(surface[1].colour_range.is_fixed);
+    assert_memory_not_equal(surface[0].colours, surface[0].colours + 3, 3 * sizeof(float));
+    assert_memory_not_equal(surface[0].colours, surface[1].colours, 3 * sizeof(float));
+    const scene_volume *volume = &s.images[0].volumes[0];
+    assert_int_equal(volume->colour_map, SCENE_VIRIDIS);
+    assert_false(volume->range.is_fixed);
+    assert_true(volume->unit_distance == 0 && volume->opacity_count == 2);
+    assert_true(volume->opacity[0].at == 0 && volume->opacity[0].opacity == 0);
+    assert_true(volume->opacity[1].at == 1 && volume->opacity[1].opacity == 0.9F);
+    scene_free(&s);
+}
+
+static void scene_up_defaults_to_z_where_the_view_is_along_y(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good("images: [{name: a, camera: {automatic: {direction: [0, -2, 0]}}, layers: [{volume: {field: p}}], "
+               "outputs: [{path: a.png}]}]",
+               &s);
+    check_vector(s.images[0].camera.up, 0, 0, 1);
+    scene_free(&s);
+}
+
+/* ---- bad files ---- */
+
+static const char *const good_lines[] = {
+    /*  1 */ "threads: 1",
+    /*  2 */ "images:",
+    /*  3 */ "  - name: a",
+    /*  4 */ "    size: [64, 48]",
+    /*  5 */ "    every: 2",
+    /*  6 */ "    camera: {position: [0, 0, 5], focal: [0, 0, 0]}",
+    /*  7 */ "    background: [1, 1, 1]",
+    /*  8 */ "    lights: [{direction: [0, 0, 1]}]",
+    /*  9 */ "    layers:",
+    /* 10 */ "      - isosurface: {field: f, values: [1, 2]}",
+    /* 11 */ "      - volume: {field: f}",
+    /* 12 */ "    sampling: {step: 0.5}",
+    /* 13 */ "    outputs:",
+    /* 14 */ "      - path: a.png",
+    /* 15 */ "  - name: b",
+    /* 16 */ "    layers: [{volume: {field: f}}]",
+    /* 17 */ "    outputs: [{path: b.exr}]",
+};
+enum { good_line_count = sizeof good_lines / sizeof *good_lines };
+
+#define V "{volume: {field: f}}"
+
+static const struct bad_file {
+    int line; /* replaced */
+    const char *by;
+    int told; /* the line in the message */
+    const char *words[3];
+} bad_files[] = {
+    {1, "thread: 1", 1, {"the key \"thread\" is unknown", "threads, images"}},
+    {1, "threads: many", 1, {"threads: \"many\"", "a whole number from 0 to 4096"}},
+    {1, "threads: -1", 1, {"threads: \"-1\"", "from 0 to 4096"}},
+    {1, "threads: 010", 1, {"threads: \"010\"", "a whole number"}},
+    {1, "threads: 2.5", 1, {"threads: \"2.5\"", "a whole number"}},
+    {1, "threads:", 1, {"threads: nothing", "a whole number"}},
+    {1, "threads: [1]", 1, {"threads: a list", "a whole number"}},
+    {1, "threads: &t 1", 1, {"an anchor (&)"}},
+    {1, "threads: *t", 1, {"an alias (*)"}},
+    {1, "threads: !!int 1", 1, {"a tag (!)"}},
+    {1, "threads: 1\nthreads: 2", 2, {"the key \"threads\" is given twice"}},
+    {1, "threads: 1\n---", 2, {"a second document"}},
+    {1, "threads: \"1", 18, {"not valid YAML"}},
+    {1, "[[[[[[[[[[[[[[[[[[[[ ", 1, {"too deep", "16"}},
+    {1, "threads: \x01", 1, {"not valid YAML", "control characters"}},
+    {2, "pictures:", 2, {"the key \"pictures\" is unknown"}},
+    {3, "  - title: a", 3, {"images[0]: the key \"title\" is unknown", "name, size, every, camera"}},
+    {3, "  - every: 3\n    name: a", 6, {"images[0]: the key \"every\" is given twice"}},
+    {3, "  - threads: 1", 3, {"the key \"threads\" is unknown"}},
+    {3, "  - [a]: b", 3, {"the key a list is unknown"}},
+    {3, "  - name: b", 15, {"images[1].name: \"b\" is the name of the image in line 3"}},
+    {3, "  - name: a/b", 3, {"images[0].name: \"a/b\"", "without"}},
+    {3, "  - name: [a]", 3, {"images[0].name: a list", "a text of 1 to 64 bytes"}},
+    {3, "  - name: \"a\\0b\"", 3, {"images[0].name: ", "a text"}},
+    {4, "    size: 64", 4, {"images[0].size: \"64\"", "a list of 2 whole numbers from 1 to 32768"}},
+    {4, "    size: [64]", 4, {"images[0].size: a list of 1", "a list of 2"}},
+    {4, "    size: [0, 48]", 4, {"images[0].size[0]: \"0\"", "from 1 to 32768"}},
+    {4, "    size: [64,\n      32769]", 5, {"images[0].size[1]: \"32769\""}},
+    {4, "    size: [64, 99999999999999999999]", 4, {"images[0].size[1]"}},
+    {5, "    every: 0", 5, {"images[0].every: \"0\"", "from 1"}},
+    {6, "    camera: [0, 0, 5]", 6, {"images[0].camera: a list", "a mapping with the keys position, focal"}},
+    {6, "    camera: {position: [0, 0, 5]}", 6, {"images[0].camera.focal: missing"}},
+    {6, "    camera: {focal: [0, 0, 5]}", 6, {"images[0].camera.position: missing"}},
+    {6, "    camera: {position: [1, 1, 1], focal: [1, 1, 1]}", 6, {"camera.focal: [1, 1, 1] is the position too"}},
+    {6, "    camera: {position: [0, 5, 0], focal: [0, 0, 0], up: [0, 1, 0]}", 6, {"camera.up", "parallel to the view"}},
+    {6, "    camera: {position: [0, 5, 0], focal: [0, 0, 0], up: [0, 0, 0]}", 6, {"camera.up: has length 0"}},
+    {6, "    camera: {position: [0, 5, 0], focal: [0, 0, 0], automatic: {}}", 6, {"camera.automatic: given beside"}},
+    {6, "    camera: {position: [1e308, 0, 0], focal: [-1e308, 0, 0]}", 6, {"camera.position: too far from focal"}},
+    {6, "    camera: {automatic: {direction: [0, 0, 0]}}", 6, {"camera.automatic.direction: has length 0"}},
+    {6, "    camera: {automatic: {zoom: 0}}", 6, {"camera.automatic.zoom: \"0\"", "above 0 and at most 1000"}},
+    {6, "    camera: {angle: 0}", 6, {"camera.angle: \"0\"", "above 0 and below 180"}},
+    {6, "    camera: {angle: 180}", 6, {"camera.angle: \"180\"", "above 0 and below 180"}},
+    {6, "    camera: {angle: nan}", 6, {"camera.angle: \"nan\"", "a number"}},
+    {6, "    camera: {position: [0, 0, inf], focal: [0, 0, 0]}", 6, {"camera.position[2]: \"inf\"", "a number"}},
+    {6, "    camera: {position: [0, 0, 1e999], focal: [0, 0, 0]}", 6, {"camera.position[2]: \"1e999\""}},
+    {6, "    camera: {position: [0, 0, 0x5], focal: [0, 0, 0]}", 6, {"camera.position[2]: \"0x5\""}},
+    {6, "    camera: {position: [0, 0, 5 m], focal: [0, 0, 0]}", 6, {"camera.position[2]: \"5 m\""}},
+    {7, "    background: [1, 1]", 7, {"background: a list of 2", "a list of 3 to 4 numbers from 0 to 1"}},
+    {7, "    background: [1, 1, 255]", 7, {"background[2]: \"255\"", "from 0 to 1"}},
+    {7, "    background: white", 7, {"background: \"white\"", "a list"}},
+    {8, "    lights: []", 8, {"lights: a list of 0", "a list of 1 to 8 mappings"}},
+    {8, "    lights: [{colour: [1, 1, 1]}]", 8, {"lights[0].direction: missing", "a list of 3 numbers"}},
+    {8, "    lights:\n      - {direction: [0, 0, 1]}\n      - {direction: [0, 0, 0]}", 10, {"lights[1].direction"}},
+    {8, "    lights: [{direction: [0, 0, 1], in: sky}]", 8, {"lights[0].in: \"sky\"", "one of camera, world"}},
+    {8, "    lights: [{direction: [0, 0, 1], intensity: -1}]", 8, {"lights[0].intensity: \"-1\"", "from 0 to 100"}},
+    {9, "    layers: []\n    layer:", 9, {"images[0].layers: a list of 0", "1 to 20 mappings"}},
+    {10, "      - isosurface: {field: f}", 10, {"isosurface.values: missing", "a list of 1 to 16 numbers"}},
+    {10, "      - isosurface: {values: [1]}", 10, {"layers[0].isosurface.field: missing", "a text"}},
+    {10, "      - isosurface: {field: f, values: []}", 10, {"isosurface.values: a list of 0"}},
+    {10, "      - isosurface: {field: f, values: 1}", 10, {"isosurface.values: \"1\"", "a list"}},
+    {10, "      - isosurface: {field: f, values: [1,\n        2, 1]}", 11, {"values[2]: 1 is there twice"}},
+    {10,
+     "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8]}\n"
+     "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7]}",
+     11,
+     {"layers[1]: 17 isovalues", "at most 16"}},
+    {10, "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]}", 10, {"a list of 17"}},
+    {10, "      - isosurface: {field: f, values: [1], colours: [[1,0,0],[0,1,0]]}", 10, {"2 colours for 1 values"}},
+    {10, "      - isosurface: {field: f, values: [1], colours: [[1,0]]}", 10, {"colours[0]: a list of 2", "of 3"}},
+    {10, "      - isosurface: {field: f, values: [1], colours: [[1,0,2]]}", 10, {"colours[0][2]: \"2\"", "0 to 1"}},
+    {10, "      - isosurface: {field: f, values: [1], colours: [[1,0,0]], colour_by: {field: g}}", 10, {"colour_by"}},
+    {10,
+     "      - isosurface: {field: f, values: [1], colour_by: {field: g, map: jet}}",
+     10,
+     {"\"jet\"", "viridis, inferno"}},
+    {10, "      - isosurface: {field: f, values: [1], colour_by: {field: g, range: [1, 1]}}", 10, {"does not rise"}},
+    {10, "      - isosurface: {field: f, values: [1], component: w}", 10, {"component: \"w\"", "magnitude, x, y, z"}},
+    {10, "      - isosurface: {field: f, values: [1], component: -1}", 10, {"component: \"-1\"", "magnitude"}},
+    {10, "      - isosurface: {field: f, values: [1], opacity: 1.5}", 10, {"opacity: \"1.5\"", "from 0 to 1"}},
+    {10, "      - isosurface: {field: f, values: [1], root_steps: 65}", 10, {"root_steps: \"65\"", "from 0 to 64"}},
+    {10, "      - isosurface: {field: f, values: [1], material: {shine: 1}}", 10, {"material: the key \"shine\""}},
+    {10, "      - isosurface: {field: f, values: [1], material: {shininess: 0}}", 10, {"material.shininess: \"0\""}},
+    {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface and volume"}},
+    {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds both"}},
+    {11, "      - slice: {field: f}", 11, {"layers[1]: the key \"slice\" is unknown", "isosurface, volume"}},
+    {11, "      - " V "\n      - " V "\n      - " V "\n      - " V "\n      - " V, 15, {"5 volumes", "at most 4"}},
+    {11, "      - volume: {field: f, range: [2, 1]}", 11, {"volume.range: [2, 1] does not rise", "low < high"}},
+    {11, "      - volume: {field: f, opacity: [[0, 0], [0.5, 1], [0.4, 0]]}", 11, {"opacity[2]: 0.4 comes after 0.5"}},
+    {11, "      - volume: {field: f, opacity: [[0, 0], [0, 1], [0, 0]]}", 11, {"opacity[2]: 0 is there three times"}},
+    {11, "      - volume: {field: f, opacity: [[0, 0], [1.5, 1]]}", 11, {"opacity[1][0]: \"1.5\"", "from 0 to 1"}},
+    {11, "      - volume: {field: f, opacity: [[0, 0, 0]]}", 11, {"opacity[0]: a list of 3", "a list of 2"}},
+    {11, "      - volume: {field: f, opacity: 0.5}", 11, {"opacity: \"0.5\"", "lists of 2 numbers"}},
+    {11, "      - volume: {field: f, unit_distance: 0}", 11, {"unit_distance: \"0\"", "above 0"}},
+    {12, "    sampling: {step: 1, step_cells: 1}", 12, {"sampling.step: given beside step_cells"}},
+    {12, "    sampling: {step: 0}", 12, {"sampling.step: \"0\"", "above 0"}},
+    {12, "    sampling: {group: 65}", 12, {"sampling.group: \"65\"", "from 1 to 64"}},
+    {12, "    sampling: {jitter: maybe}", 12, {"sampling.jitter: \"maybe\"", "true or false"}},
+    {12, "    sampling: {frames: 4097}", 12, {"sampling.frames: \"4097\"", "from 1 to 4096"}},
+    {14, "      - path: a.jpg", 14, {"outputs[0].path: \"a.jpg\"", ".png or .exr"}},
+    {14, "      - path: a{time}.png", 14, {"\"{time}\" is unknown", "{cycle}"}},
+    {14, "      - path: a{cycle:6}.png", 14, {"\"{cycle:6}\" is unknown"}},
+    {14, "      - path: a{cycle:021}.png", 14, {"\"{cycle:021}\" is unknown"}},
+    {14, "      - path: a{cycle.png", 14, {"is unknown"}},
+    {14, "      - path: a.png\n        bits: 12", 15, {"outputs[0].bits: 12", "8 or 16"}},
+    {14, "      - path: a.exr\n        bits: 16", 15, {"outputs[0].bits", "for a PNG only"}},
+    {14, "      - path: a.png\n      - path: a.png", 15, {"outputs[1].path: \"a.png\" is another output's file too"}},
+    {14, "      - path: b.exr", 17, {"images[1].outputs[0].path: \"b.exr\" is another"}},
+    {14, "      - path: a{cycle}.png\n      - path: a{cycle:03}.png", 15, {"is another output's file too"}},
+    {14, "      - bits: 8", 14, {"outputs[0].path: missing"}},
+};
+
+static void text_with_line(int line, const char *by, char *text)
+{
+    *text = '\0';
+    for (int i = 0; i < good_line_count; i++) {
+        strcat(text, i + 1 == line ? by : good_lines[i]);
+        strcat(text, "\n");
+    }
+}
+
+static void scene_that_bad_files_are_made_of_is_good(void **state)
+{
+    (void)state;
+    char text[4096];
+    scene s;
+    text_with_line(0, "", text);
+    parse_good(text, &s);
+    scene_free(&s);
+}
+
+static void scene_bad_files_are_told_line_key_and_expectation(void **state)
+{
+    (void)state;
+    int failures = 0;
+    for (size_t i = 0; i < sizeof bad_files / sizeof *bad_files; i++) {
+        const struct bad_file *bad = &bad_files[i];
+        char text[4096], where[32];
+        scene s;
+        base_error error;
+        text_with_line(bad->line, bad->by, text);
+        snprintf(where, sizeof where, "scene.yaml:%d: ", bad->told);
+        const int64_t held = base_memory_held();
+        const insitu_status status = parse(text, &s, &error);
+        bool is_told = status == INSITU_ERROR_SCENE && strncmp(error.message, where, strlen(where)) == 0;
+        for (int w = 0; w < 3 && bad->words[w]; w++) is_told = is_told && strstr(error.message, bad->words[w]);
+        is_told = is_told && s.image_count == 0 && !s.images && base_memory_held() == held;
+        if (!is_told) print_error("%s\n  status %d: %s\n", bad->by, status, error.message);
+        failures += !is_told;
+    }
+    assert_int_equal(failures, 0);
+}
+
+static void scene_whole_file_faults_are_told(void **state)
+{
+    (void)state;
+    static const char *const files[][2] = {
+        {"", "scene.yaml:1: the file is empty"},
+        {"# nothing\n", "scene.yaml:1: the file is empty"},
+        {"- a\n", "scene.yaml:1: a list is not allowed, expected a mapping with the keys threads, images"},
+        {"hello", "scene.yaml:1: \"hello\" is not allowed"},
+        {"threads: 1\n", "scene.yaml:1: images: missing, expected a list of 1 to 64 mappings"},
+        {"threads: 1\nimages: \xff\n", "scene.yaml:2: not valid YAML: invalid leading UTF-8"},
+    };
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        scene s;
+        base_error error;
+        assert_int_equal(parse(files[i][0], &s, &error), INSITU_ERROR_SCENE);
+        if (strncmp(error.message, files[i][1], strlen(files[i][1])) != 0) fail_msg("%s", error.message);
+    }
+}
+
+static void scene_huge_file_is_refused(void **state)
+{
+    (void)state;
+    const size_t size = SCENE_MAX_BYTES + 1;
+    char *text = test_malloc(size);
+    memset(text, '\n', size);
+    memcpy(text, fewest_keys, sizeof fewest_keys - 1);
+    scene s;
+    base_error error = {.status = INSITU_OK};
+    assert_int_equal(scene_parse(text, size, "scene.yaml", &s, &error), INSITU_ERROR_SCENE);
+    assert_non_null(strstr(error.message, "1048577 bytes"));
+    assert_int_equal(scene_parse(text, size - 1, "scene.yaml", &s, NULL), INSITU_OK);
+    scene_free(&s);
+    test_free(text);
+}
+
+/* Each prefix of a good file is cut somewhere else: most are errors, none may be worse. */
+static void scene_truncated_files_end_well(void **state)
+{
+    (void)state;
+    const int64_t held = base_memory_held();
+    for (size_t size = 0; size < sizeof every_key; size++) {
+        scene s;
+        base_error error = {.status = INSITU_OK};
+        const insitu_status status = scene_parse(every_key, size, "scene.yaml", &s, &error);
+        assert_true((status == INSITU_OK) == (error.message[0] == '\0'));
+        scene_free(&s);
+    }
+    assert_int_equal(base_memory_held(), held);
+}
+
+static void scene_every_failed_allocation_is_an_error_without_a_leak(void **state)
+{
+    (void)state;
+    const int64_t held = base_memory_held();
+    insitu_status status = INSITU_ERROR_MEMORY;
+    int failures = 0;
+    for (int n = 1; status != INSITU_OK && n < 10000; n++) {
+        scene s;
+        base_error error;
+        base_memory_fail_nth(n);
+        status = parse(every_key, &s, &error);
+        base_memory_fail_nth(0);
+        if (status != INSITU_OK) {
+            assert_int_equal(status, INSITU_ERROR_MEMORY);
+            assert_string_equal(error.message, "scene.yaml: no memory for the scene");
+            assert_null(s.images);
+            failures++;
+        }
+        scene_free(&s);
+        assert_int_equal(base_memory_held(), held);
+    }
+    assert_int_equal(status, INSITU_OK);
+    assert_true(failures > 50);
+}
+
+static void scene_numbers_do_not_follow_the_locale(void **state)
+{
+    (void)state;
+    if (!setlocale(LC_NUMERIC, "de_DE.UTF-8") && !setlocale(LC_NUMERIC, "de_DE")) skip();
+    scene s;
+    parse_good(every_key, &s);
+    assert_true(s.images[0].camera.angle == 35.5);
+    scene_free(&s);
+    assert_string_equal(localeconv()->decimal_point, ",");
+    setlocale(LC_NUMERIC, "C");
+}
+
+static void scene_output_path_replaces_placeholders(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *pattern;
+        long long cycle;
+        const char *path;
+    } cases[] = {{"a.png", 7, "a.png"},
+                 {"{name}/{cycle}.png", 7, "wave/7.png"},
+                 {"{cycle:06}{cycle:01}", 42, "00004242"},
+                 {"{cycle:020}", 1, "00000000000000000001"},
+                 {"{cycle:03}", 123456, "123456"},
+                 {"{cycle}", INT64_MIN, "-9223372036854775808"},
+                 {"{cycle:05}", -3, "-0003"},
+                 {"{", 1, "{"},
+                 {"", 1, ""}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char *path = scene_output_path(cases[i].pattern, "wave", cases[i].cycle);
+        assert_string_equal(path, cases[i].path);
+        base_free(path);
+    }
+    base_memory_fail_nth(1);
+    assert_null(scene_output_path("a", "b", 1));
+    base_memory_fail_nth(0);
+}
+
+/* ---- the schema ---- */
+
+static bool is_of_mappings(const cyaml_schema_value_t *value)
+{
+    if (value->type == CYAML_MAPPING) return true;
+    return value->type == CYAML_SEQUENCE && value->sequence.entry->type == CYAML_MAPPING;
+}
+
+static void check_mapping(const scene_mapping *mapping)
+{
+    for (int i = 0; mapping->fields[i].key; i++) {
+        const cyaml_schema_field_t *field = &mapping->fields[i];
+        const scene_key *key = &mapping->keys[i];
+        const bool is_optional = field->value.flags & CYAML_FLAG_OPTIONAL;
+        char in_file[64];
+        snprintf(in_file, sizeof in_file, "%s:", field->key);
+        if (!key->help || strlen(key->help) < 10) fail_msg("%s.%s has no help", mapping->title, field->key);
+        if (is_optional == !key->by_default) fail_msg("%s.%s: default and optional differ", mapping->title, field->key);
+        if (is_of_mappings(&field->value) == !key->child) fail_msg("%s.%s: child", mapping->title, field->key);
+        if (!strstr(every_key, in_file)) fail_msg("%s.%s is not in the test's file", mapping->title, field->key);
+        if (key->child) {
+            const cyaml_schema_value_t *value = &field->value;
+            const cyaml_schema_value_t *entry = value->type == CYAML_MAPPING ? value : value->sequence.entry;
+            assert_ptr_equal(entry->mapping.fields, key->child->fields);
+            check_mapping(key->child);
+        }
+    }
+}
+
+static void schema_keys_have_help_and_defaults(void **state)
+{
+    (void)state;
+    check_mapping(&scene_top);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scene_image_keys_are_read),
+        cmocka_unit_test(scene_view_keys_are_read),
+        cmocka_unit_test(scene_isosurface_keys_are_read),
+        cmocka_unit_test(scene_volume_keys_are_read),
+        cmocka_unit_test(scene_image_defaults_hold),
+        cmocka_unit_test(scene_layer_defaults_hold),
+        cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
+        cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),
+        cmocka_unit_test(scene_bad_files_are_told_line_key_and_expectation),
+        cmocka_unit_test(scene_whole_file_faults_are_told),
+        cmocka_unit_test(scene_huge_file_is_refused),
+        cmocka_unit_test(scene_truncated_files_end_well),
+        cmocka_unit_test(scene_every_failed_allocation_is_an_error_without_a_leak),
+        cmocka_unit_test(scene_numbers_do_not_follow_the_locale),
+        cmocka_unit_test(scene_output_path_replaces_placeholders),
+        cmocka_unit_test(schema_keys_have_help_and_defaults),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
