@@ -5,7 +5,7 @@
 set -eu
 cd "$1"
 rooms=''
-for room in libinsitu mmbvh render compositing adaptors mini-app tools bench tests examples; do
+for room in libinsitu mmbvh render compositing adaptors mini-app tools bench tests examples cmake; do
     if [ -d "$room" ]; then rooms="$rooms $room"; fi
 done
 # shellcheck disable=SC2086 # a list

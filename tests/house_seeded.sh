@@ -33,7 +33,7 @@ accepts() {
 fresh_tree() {
     rm -rf "$place/tree"
     mkdir "$place/tree"
-    for room in libinsitu mmbvh render compositing adaptors mini-app tools bench tests examples; do
+    for room in libinsitu mmbvh render compositing adaptors mini-app tools bench tests examples cmake; do
         if [ -d "$root/$room" ]; then cp -R "$root/$room" "$place/tree/"; fi
     done
 }

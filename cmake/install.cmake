@@ -1,0 +1,42 @@
+# What a user gets: headers, libraries, insitu::insitu and insitu::vtk for find_package(), insitu.pc for the rest. All of
+# it may be moved after installation: no file names the prefix.
+include(CMakePackageConfigHelpers)
+set(insitu_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/insitu)
+
+# The names users link by, for those too who add this tree to theirs.
+add_library(insitu::insitu ALIAS insitu)
+set_target_properties(insitu_headers PROPERTIES EXPORT_NAME headers)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+install(TARGETS insitu insitu_headers EXPORT insituTargets
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(EXPORT insituTargets NAMESPACE insitu:: DESTINATION ${insitu_package_dir})
+
+# Loaded at run time, from beside libinsitu; nobody links it.
+install(TARGETS insitu_image LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+
+if(TARGET insitu_vtk)
+  add_library(insitu::vtk ALIAS insitu_vtk)
+  set_target_properties(insitu_vtk PROPERTIES EXPORT_NAME vtk)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/adaptors/vtk/include/insitu
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+  install(TARGETS insitu_vtk EXPORT insituVtkTargets
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT insituVtkTargets NAMESPACE insitu:: DESTINATION ${insitu_package_dir})
+endif()
+if(TARGET insitu-render)
+  set_target_properties(insitu-render PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+  install(TARGETS insitu-render RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
+
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/insituConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/insituConfig.cmake INSTALL_DESTINATION ${insitu_package_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/insituConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/insituConfig.cmake ${PROJECT_BINARY_DIR}/insituConfigVersion.cmake
+  DESTINATION ${insitu_package_dir})
+
+set(insitu_pc_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+file(RELATIVE_PATH insitu_pc_to_prefix /prefix/${insitu_pc_dir} /prefix)
+configure_file(${CMAKE_CURRENT_LIST_DIR}/insitu.pc.in ${PROJECT_BINARY_DIR}/insitu.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/insitu.pc DESTINATION ${insitu_pc_dir})
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -1,0 +1,9 @@
+# A user's view: install into a prefix of its own, then build and run an outside project against it.
+add_test(NAME outside_project_builds_and_runs
+  COMMAND ${CMAKE_COMMAND} -DBUILD=${PROJECT_BINARY_DIR} -DSOURCE=${CMAKE_CURRENT_SOURCE_DIR}/outside
+    -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/outside -DLIBDIR=${CMAKE_INSTALL_LIBDIR} -DWITH_VTK=$<TARGET_EXISTS:insitu_vtk>
+    "-DFLAGS=$<$<BOOL:${CMAKE_PROJECT_INCLUDE}>:-fsanitize=address,undefined>"
+    -DCC=${CMAKE_C_COMPILER} -DCXX=${CMAKE_CXX_COMPILER} -DGENERATOR=${CMAKE_GENERATOR} -DMPICC=${MPI_C_COMPILER}
+    -DPKG_CONFIG=${PKG_CONFIG_EXECUTABLE} -P ${CMAKE_CURRENT_SOURCE_DIR}/outside_run.cmake)
+set_tests_properties(outside_project_builds_and_runs PROPERTIES
+  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 180)

@@ -1,0 +1,31 @@
+# Installs into one folder and moves it to another, so that a path which survived in some file would be found out.
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT status EQUAL 0)
+    list(JOIN ARGN " " command)
+    message(FATAL_ERROR "status ${status} of: ${command}\n${output}")
+  endif()
+endfunction()
+
+file(REMOVE_RECURSE ${FOLDER})
+file(MAKE_DIRECTORY ${FOLDER})
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${FOLDER}/installed)
+file(RENAME ${FOLDER}/installed ${FOLDER}/moved)
+set(prefix ${FOLDER}/moved)
+
+run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE} -B ${FOLDER}/project -DCMAKE_PREFIX_PATH=${prefix}
+  -DCMAKE_FIND_USE_PACKAGE_REGISTRY=OFF -DWITH_VTK=${WITH_VTK} -DCMAKE_C_COMPILER=${CC} -DCMAKE_CXX_COMPILER=${CXX}
+  "-DCMAKE_C_FLAGS=${FLAGS}" "-DCMAKE_CXX_FLAGS=${FLAGS}")
+run(${CMAKE_COMMAND} --build ${FOLDER}/project)
+run(${FOLDER}/project/outside_user)
+if(WITH_VTK)
+  run(${FOLDER}/project/outside_vtk)
+endif()
+
+# By pkg-config, as a makefile would.
+set(ENV{PKG_CONFIG_PATH} ${prefix}/${LIBDIR}/pkgconfig)
+execute_process(COMMAND ${PKG_CONFIG} --cflags --libs insitu
+  OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+separate_arguments(flags UNIX_COMMAND "${flags} ${FLAGS}")
+run(${MPICC} ${SOURCE}/outside_user.c -o ${FOLDER}/by_pkg_config ${flags} -Wl,-rpath,${prefix}/${LIBDIR})
+run(${FOLDER}/by_pkg_config)
