@@ -1,7 +1,7 @@
 # Scene files, colour maps and images.
 add_executable(test_scene test_scene.c)
 target_link_libraries(test_scene PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
-add_test(NAME scene COMMAND test_scene)
+add_test(NAME scene COMMAND test_scene ${PROJECT_SOURCE_DIR}/examples)
 set_tests_properties(scene PROPERTIES TIMEOUT 60)
 
 add_executable(scene_reference scene_reference.c)

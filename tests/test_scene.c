@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#include <dirent.h>
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
@@ -266,6 +267,38 @@ static void scene_up_defaults_to_z_where_the_view_is_along_y(void **state)
                &s);
     check_vector(s.images[0].camera.up, 0, 0, 1);
     scene_free(&s);
+}
+
+static void check_example(const char *folder, const char *name)
+{
+    static char text[SCENE_MAX_BYTES];
+    char path[1024];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    const size_t size = fread(text, 1, sizeof text, file);
+    fclose(file);
+    scene s;
+    base_error error = {.status = INSITU_OK};
+    if (scene_parse(text, size, path, &s, &error) != INSITU_OK) fail_msg("%s", error.message);
+    scene_free(&s);
+}
+
+static void scene_examples_are_good(void **state)
+{
+    const char *folder = *state;
+    if (!folder) skip();
+    DIR *listing = opendir(folder);
+    assert_non_null(listing);
+    int count = 0;
+    for (const struct dirent *entry; (entry = readdir(listing));) {
+        const char *ending = strrchr(entry->d_name, '.');
+        if (!ending || strcmp(ending, ".yaml") != 0) continue;
+        check_example(folder, entry->d_name);
+        count++;
+    }
+    closedir(listing);
+    assert_true(count > 0);
 }
 
 /* ---- bad files ---- */
@@ -599,7 +632,8 @@ static void schema_keys_have_help_and_defaults(void **state)
     check_mapping(&scene_top);
 }
 
-int main(void)
+/* Argument: the folder of examples. */
+int main(int argument_count, char **arguments)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scene_image_keys_are_read),
@@ -609,6 +643,7 @@ int main(void)
         cmocka_unit_test(scene_image_defaults_hold),
         cmocka_unit_test(scene_layer_defaults_hold),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
+        cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),
         cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),
         cmocka_unit_test(scene_bad_files_are_told_line_key_and_expectation),
         cmocka_unit_test(scene_whole_file_faults_are_told),
