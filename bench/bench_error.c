@@ -159,8 +159,10 @@ static int chosen_index(const bench_pixels *all, uint32_t pixel)
     return column < all->columns && row < all->rows && all->pixels[i].pixel == pixel ? i : -1;
 }
 
-/* The frame's chosen pixels as compositing would finish them, over nothing: count × 4, and their depths. */
-static void merge_chosen(const bench_pixels *all, const fragment_list *fragments, float *rgba, float *depths)
+/* The frame's chosen pixels as compositing would finish them, over nothing: count × 4, and their depths, which leave
+ * the kernels as the ray's parameter t. */
+static void merge_chosen(const bench_pixels *all, const render_space *space, const fragment_list *fragments,
+                         float *rgba, double *depths)
 {
     enum { MANY = 4096 };
     const float nothing[4] = {0, 0, 0, 0};
@@ -173,8 +175,11 @@ static void merge_chosen(const bench_pixels *all, const fragment_list *fragments
         if (own_count[at] == MANY) abort();
         own[(int64_t)at * MANY + own_count[at]++] = fragments->items[i];
     }
-    for (int i = 0; i < count; i++)
-        comp_merge_pixel(own + (int64_t)i * MANY, own_count[i], nothing, rgba + 4 * i, depths + i);
+    for (int i = 0; i < count; i++) {
+        float t;
+        comp_merge_pixel(own + (int64_t)i * MANY, own_count[i], nothing, rgba + 4 * i, &t);
+        depths[i] = (double)t / space->scale + space->depth_origin;
+    }
     free(own);
     free(own_count);
 }
@@ -192,17 +197,17 @@ bench_surface_error bench_surface_compare(const bench_pixels *all, const render_
                                           double (*exact)(const double position[3]), const fragment_list *fragments)
 {
     const int count = all->columns * all->rows;
-    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba)),
-          *depths = must(malloc((size_t)count * sizeof *depths));
+    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba));
+    double *depths = must(malloc((size_t)count * sizeof *depths));
     double *errors = must(malloc(2 * (size_t)count * sizeof *errors)), *fields = errors + count;
     reference_ray *truth = trace_chosen(all, job);
     bench_surface_error out = {.checked = count};
     int both = 0, hits = 0;
-    merge_chosen(all, fragments, rgba, depths);
+    merge_chosen(all, &job->space, fragments, rgba, depths);
     for (int i = 0; i < count; i++) {
         const bool is_hit = isfinite(depths[i]), should_hit = truth[i].hit_count > 0;
-        if (is_hit) fields[hits++] = field_error(all, job, &all->pixels[i], (double)depths[i], exact);
-        if (is_hit && should_hit) errors[both++] = fabs((double)depths[i] - truth[i].hits[0].depth);
+        if (is_hit) fields[hits++] = field_error(all, job, &all->pixels[i], depths[i], exact);
+        if (is_hit && should_hit) errors[both++] = fabs(depths[i] - truth[i].hits[0].depth);
         out.disagreements += is_hit != should_hit;
         out.ambiguous += is_hit != should_hit && truth[i].ambiguous;
     }
@@ -218,17 +223,20 @@ bench_surface_error bench_surface_compare(const bench_pixels *all, const render_
 bench_stats bench_volume_compare(const bench_pixels *all, const render_job *job, const fragment_list *fragments)
 {
     const int count = all->columns * all->rows;
-    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba)),
-          *depths = must(malloc((size_t)count * sizeof *depths));
+    float *rgba = must(malloc(4 * (size_t)count * sizeof *rgba));
+    double *depths = must(malloc((size_t)count * sizeof *depths));
     double *errors = must(malloc((size_t)count * sizeof *errors));
     reference_ray *truth = trace_chosen(all, job);
-    merge_chosen(all, fragments, rgba, depths);
+    merge_chosen(all, &job->space, fragments, rgba, depths);
+    int seen = 0;
     for (int i = 0; i < count; i++) {
-        errors[i] = 0;
+        if (!truth[i].samples) continue;
+        double error = 0;
         for (int channel = 0; channel < 4; channel++)
-            errors[i] = fmax(errors[i], fabs((double)rgba[4 * i + channel] - truth[i].rgba[channel]));
+            error = fmax(error, fabs((double)rgba[4 * i + channel] - truth[i].rgba[channel]));
+        errors[seen++] = error;
     }
-    const bench_stats out = bench_stats_of(errors, count);
+    const bench_stats out = bench_stats_of(errors, seen);
     free(rgba);
     free(depths);
     free(errors);

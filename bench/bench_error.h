@@ -6,7 +6,7 @@
 #include "bench_stats.h"
 #include "render.h"
 
-enum { BENCH_BLOCK = 80 };
+enum { BENCH_BLOCK = 60 };
 
 /* The chosen pixels, and the cells that can be seen in them. */
 typedef struct bench_pixels bench_pixels;
@@ -27,7 +27,8 @@ typedef struct bench_surface_error {
 bench_surface_error bench_surface_compare(const bench_pixels *pixels, const render_job *job,
                                           double (*exact)(const double position[3]), const fragment_list *fragments);
 
-/* The largest difference of a pixel's linear premultiplied red, green, blue or opacity, of a job with volumes alone. */
+/* The largest difference of a pixel's linear premultiplied red, green, blue or opacity, where the ray meets cells, of a
+ * job with volumes alone. */
 bench_stats bench_volume_compare(const bench_pixels *pixels, const render_job *job, const fragment_list *fragments);
 
 #endif

@@ -12,7 +12,7 @@ BEGIN {
     print "0.5 in a length of 0.5), samples each half side of a cube, jittered, in groups of 16."
     print ""
     print "A speed is the median of the runs, with the least and the greatest of them. Beside it stands the error on one pixel in each"
-    print "block of 80 x 80, against brute force in double over all cells: of the isosurface the difference in depth, in sides of a"
+    print "block of 60 x 60, against brute force in double over all cells: of the isosurface the difference in depth, in sides of a"
     print "cube, and of how many pixels one says hit and the other miss; of the volume the largest difference of linear red,"
     print "green, blue or opacity. \"Closed form\" is how far the field's formula is from the isovalue at the points hit: what linear or"
     print "trilinear cells cost, whoever draws them. In brackets: how many of the disagreements are rays that meet more than one root"
