@@ -1,0 +1,74 @@
+/* Quads are bilinear patches. Their area vector is half the cross product of the diagonals, whatever the warp; what
+ * they add to a volume is the mean of the two ways to split them into triangles, which is exact for the patch. So the
+ * volumes of cells that share faces add up to the box, and the areas around a cell to zero. */
+#include "wave_geometry.h"
+
+static void difference(const double a[3], const double b[3], double out[3])
+{
+    for (int i = 0; i < 3; ++i) out[i] = a[i] - b[i];
+}
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static double determinant(const double a[3], const double b[3], const double c[3])
+{
+    double ab[3];
+    cross(a, b, ab);
+    return dot(ab, c);
+}
+
+static void face_area(const double p[4][3], int size, double area[3])
+{
+    double a[3], b[3];
+    difference(p[size == 4 ? 2 : 1], p[0], a);
+    difference(p[size == 4 ? 3 : 2], size == 4 ? p[1] : p[0], b);
+    cross(a, b, area);
+    for (int i = 0; i < 3; ++i) area[i] *= 0.5;
+}
+
+/* Of the cone from the origin. */
+static double face_volume(const double p[4][3], int size)
+{
+    if (size == 3) return determinant(p[0], p[1], p[2]) / 6;
+    return (determinant(p[0], p[1], p[2]) + determinant(p[0], p[2], p[3]) + determinant(p[0], p[1], p[3]) +
+            determinant(p[1], p[2], p[3])) /
+           12;
+}
+
+/* A face's vertices relative to origin, from the one of least id on, so that its two cells round alike. */
+static void face_points(const wave_cell_shape *shape, int face, const double position[8][3], const int64_t id[8],
+                        const double origin[3], double p[4][3])
+{
+    int size = shape->face_size[face], first = 0;
+    for (int i = 1; i < size; ++i) {
+        if (id[shape->face[face][i]] < id[shape->face[face][first]]) first = i;
+    }
+    for (int i = 0; i < size; ++i) difference(position[shape->face[face][(first + i) % size]], origin, p[i]);
+}
+
+void wave_cell_measure(const wave_cell_shape *shape, const double position[8][3], const int64_t id[8],
+                       wave_cell_geometry *out)
+{
+    static const double zero[3] = {0, 0, 0};
+    double p[4][3];
+    *out = (wave_cell_geometry){0};
+    for (int i = 0; i < shape->vertex_count; ++i) {
+        for (int a = 0; a < 3; ++a) out->centroid[a] += shape->centre[i] * position[i][a];
+    }
+    for (int f = 0; f < shape->face_count; ++f) {
+        face_points(shape, f, position, id, zero, p);
+        face_area(p, shape->face_size[f], out->area[f]);
+        face_points(shape, f, position, id, position[0], p);
+        out->volume += face_volume(p, shape->face_size[f]);
+    }
+}

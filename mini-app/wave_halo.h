@@ -1,0 +1,27 @@
+/* The exchange of halo cells' values between ranks. */
+#ifndef WAVE_HALO_H
+#define WAVE_HALO_H
+
+#include <mpi.h>
+
+#include "wave_mesh.h"
+
+enum { WAVE_TAG_HALO = 1 };
+
+typedef struct wave_halo {
+    const wave_mesh *mesh; /* borrowed */
+    MPI_Comm comm;         /* borrowed */
+    int value_bytes;       /* 4 or 8 */
+    char *send, *receive;
+    MPI_Request *requests;
+} wave_halo;
+
+/* Values of four components a cell, of value_bytes each. False where memory ran out. Local. */
+bool wave_halo_create(const wave_mesh *mesh, MPI_Comm comm, int value_bytes, wave_halo *halo);
+void wave_halo_free(wave_halo *halo);
+
+/* Give every halo cell its owner's values: component k of cell c is element c * cell_stride + k * component_stride.
+ * Collective. */
+void wave_halo_exchange(wave_halo *halo, void *values, int64_t cell_stride, int64_t component_stride);
+
+#endif

@@ -1,0 +1,222 @@
+/* Godunov's scheme for acoustics on any cells, of second order by values at vertices.
+ *
+ *   p_t = -K div u        p' = p - dt K/V sum_f A_f u*_f        over the faces f of a cell
+ *   u_t = -1/rho grad p   u' = u - dt/(rho V) sum_f A_f n_f p*_f
+ *
+ * p* and u* solve Riemann's problem between the two sides a, b of a face, each with its own impedance Z = rho c:
+ *
+ *   p* = (Zb pa + Za pb + Za Zb (ua - ub)) / (Za + Zb)        u* = (Za ua + Zb ub + pa - pb) / (Za + Zb)
+ *
+ * The reconstruction needs no gradients. Let P_v be the state at a vertex, from the cells around it, P_f and P_c its
+ * means over a face's and a cell's vertices. The linear function through them, moved to the cell's own mean q, is at
+ * the face
+ *
+ *   q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
+ *
+ * (q_t from Green's theorem with P_f: the step from the old time to the middle of the new). P_f is common to both
+ * sides, so ranks exchange four jumps a cell and nothing else. In one dimension this is Fromm's scheme. Of first order,
+ * j = q and P = 0.
+ *
+ * Every cell gathers over its own faces: each flux is computed twice, but nothing is written twice, the order of every
+ * sum is the cell's own, and so each cell's result is the same to the bit on any partition.
+ */
+#include "wave_kernel.h"
+
+#include <stddef.h>
+
+#ifndef WAVE_REAL
+#error "WAVE_REAL, WAVE_INDEX and WAVE_TABLE say what to compile"
+#endif
+
+typedef WAVE_REAL real;
+typedef WAVE_INDEX local_index;
+
+typedef struct layer_table {
+    real modulus[WAVE_LAYERS_MAX], inverse_density[WAVE_LAYERS_MAX], impedance[WAVE_LAYERS_MAX];
+    real inverse_sum[WAVE_LAYERS_MAX][WAVE_LAYERS_MAX]; /* 1 / (Za + Zb) */
+} layer_table;
+
+typedef struct cell_view {
+    const wave_cell_shape *shape;
+    const local_index *vertex;
+    const real *face;         /* normal and area of each */
+    const int32_t *neighbour; /* of each face */
+} cell_view;
+
+static layer_table make_layers(const wave_grid *grid)
+{
+    layer_table t;
+    for (int a = 0; a < WAVE_LAYERS_MAX; ++a) {
+        double density = grid->density[a];
+        t.modulus[a] = (real)grid->modulus[a];
+        t.inverse_density[a] = (real)(density > 0 ? 1 / density : 0);
+        t.impedance[a] = (real)grid->impedance[a];
+        for (int b = 0; b < WAVE_LAYERS_MAX; ++b) {
+            double sum = grid->impedance[a] + grid->impedance[b];
+            t.inverse_sum[a][b] = (real)(sum > 0 ? 1 / sum : 0);
+        }
+    }
+    return t;
+}
+
+static inline cell_view view_cell(const wave_grid *grid, int32_t c)
+{
+    cell_view view = {.shape = wave_cell_shape_of(grid->types ? grid->types[c] : grid->uniform_type)};
+    int64_t first_vertex =
+        grid->offsets ? (int64_t)((const local_index *)grid->offsets)[c] : (int64_t)c * view.shape->vertex_count;
+    int64_t first_face = grid->face_offsets ? grid->face_offsets[c] : (int64_t)c * view.shape->face_count;
+    view.vertex = (const local_index *)grid->connectivity + first_vertex;
+    view.face = (const real *)grid->faces + 4 * first_face;
+    view.neighbour = grid->neighbours + first_face;
+    return view;
+}
+
+static void to_vertices(const wave_grid *grid)
+{
+    const real *weights = grid->around_weights, *state = grid->state.values;
+    real *out = grid->vertex_state.values;
+    int64_t stride = grid->state.stride, apart = grid->state.component_stride;
+    for (int32_t v = 0; v < grid->own_vertices; ++v) {
+        real sum[4] = {0, 0, 0, 0};
+        for (int64_t i = grid->around_offsets[v]; i < grid->around_offsets[v + 1]; ++i) {
+            const real *q = state + grid->around[i] * stride;
+            for (int k = 0; k < 4; ++k) sum[k] += weights[i] * q[k * apart];
+        }
+        for (int a = 0; a < 3 && grid->reflecting; ++a) {
+            if (grid->walls[v] >> a & 1) sum[1 + a] = 0;
+        }
+        for (int k = 0; k < 4; ++k) {
+            out[v * grid->vertex_state.stride + k * grid->vertex_state.component_stride] = sum[k];
+        }
+    }
+}
+
+/* The vertex states of a cell. */
+static inline void load_vertices(const wave_grid *grid, const cell_view *view, real p[8][4])
+{
+    const real *values = grid->vertex_state.values;
+    int64_t stride = grid->vertex_state.stride, apart = grid->vertex_state.component_stride;
+    for (int i = 0; i < view->shape->vertex_count; ++i) {
+        const real *from = values + (int64_t)view->vertex[i] * stride;
+        for (int k = 0; k < 4; ++k) p[i][k] = from[k * apart];
+    }
+}
+
+/* Opposite vertices of a quad are summed first: the mean then rounds alike on both sides. */
+static inline void face_mean(const wave_cell_shape *shape, int f, const real p[8][4], real mean[4])
+{
+    const int8_t *v = shape->face[f];
+    if (shape->face_size[f] == 3) {
+        for (int k = 0; k < 4; ++k) mean[k] = (p[v[0]][k] + p[v[1]][k] + p[v[2]][k]) * (real)(1.0 / 3);
+    } else {
+        for (int k = 0; k < 4; ++k) mean[k] = ((p[v[0]][k] + p[v[2]][k]) + (p[v[1]][k] + p[v[3]][k])) * (real)0.25;
+    }
+}
+
+/* Integrals over the cell's surface of u.n and of p n. */
+static inline void integrate_faces(const cell_view *view, const real p[8][4], real integral[4])
+{
+    for (int k = 0; k < 4; ++k) integral[k] = 0;
+    for (int f = 0; f < view->shape->face_count; ++f) {
+        const real *n = view->face + 4 * f;
+        real mean[4];
+        face_mean(view->shape, f, p, mean);
+        integral[0] += n[3] * (n[0] * mean[1] + n[1] * mean[2] + n[2] * mean[3]);
+        for (int a = 0; a < 3; ++a) integral[1 + a] += n[3] * n[a] * mean[0];
+    }
+}
+
+static inline void find_jump(const wave_grid *grid, const layer_table *layers, real half_step, int32_t c)
+{
+    const real *state = (const real *)grid->state.values + c * grid->state.stride;
+    real *jump = (real *)grid->jump + 4 * (int64_t)c;
+    cell_view view = view_cell(grid, c);
+    real p[8][4], integral[4];
+    load_vertices(grid, &view, p);
+    integrate_faces(&view, p, integral);
+    real rate = half_step * ((const real *)grid->inverse_volume)[c];
+    int layer = grid->layers[c];
+    for (int k = 0; k < 4; ++k) {
+        real mean = 0;
+        for (int i = 0; i < view.shape->vertex_count; ++i) mean += (real)view.shape->centre[i] * p[i][k];
+        real material = k == 0 ? layers->modulus[layer] : layers->inverse_density[layer];
+        jump[k] = state[k * grid->state.component_stride] - mean - rate * material * integral[k];
+    }
+}
+
+static void find_jumps(const wave_grid *grid, double time_step)
+{
+    if (grid->second_order) {
+        layer_table layers = make_layers(grid);
+        for (int32_t c = 0; c < grid->own_cells; ++c) find_jump(grid, &layers, (real)(0.5 * time_step), c);
+        return;
+    }
+    for (int32_t c = 0; c < grid->own_cells; ++c) {
+        const real *state = (const real *)grid->state.values + c * grid->state.stride;
+        for (int k = 0; k < 4; ++k) ((real *)grid->jump)[4 * (int64_t)c + k] = state[k * grid->state.component_stride];
+    }
+}
+
+/* p* and u* of a face with normal n, between jumps a and b over the common mean; b is NULL at a wall. */
+static inline void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
+                                 const real *a, int layer_a, const real *b, int layer_b, real star[2])
+{
+    real za = layers->impedance[layer_a], pa = mean[0] + a[0];
+    real ua = n[0] * (mean[1] + a[1]) + n[1] * (mean[2] + a[2]) + n[2] * (mean[3] + a[3]);
+    if (!b) {
+        /* A rigid wall mirrors the state; one that absorbs has silence behind it. */
+        star[0] = grid->reflecting ? pa + za * ua : (pa + za * ua) * (real)0.5;
+        star[1] = grid->reflecting ? 0 : star[0] * (2 * layers->inverse_sum[layer_a][layer_a]);
+        return;
+    }
+    real zb = layers->impedance[layer_b], pb = mean[0] + b[0];
+    real ub = n[0] * (mean[1] + b[1]) + n[1] * (mean[2] + b[2]) + n[2] * (mean[3] + b[3]);
+    real inverse = layers->inverse_sum[layer_a][layer_b];
+    star[0] = ((zb * pa + za * pb) + za * zb * (ua - ub)) * inverse;
+    star[1] = ((za * ua + zb * ub) + (pa - pb)) * inverse;
+}
+
+static inline void apply_flux(const wave_grid *grid, const layer_table *layers, real time_step, int32_t c)
+{
+    const real *jumps = grid->jump;
+    cell_view view = view_cell(grid, c);
+    real p[8][4], mean[4] = {0, 0, 0, 0}, sum[4] = {0, 0, 0, 0};
+    int layer = grid->layers[c];
+    if (grid->second_order) load_vertices(grid, &view, p);
+    for (int f = 0; f < view.shape->face_count; ++f) {
+        const real *n = view.face + 4 * f;
+        int32_t beyond = view.neighbour[f];
+        real star[2];
+        if (grid->second_order) face_mean(view.shape, f, p, mean);
+        solve_riemann(grid, layers, n, mean, jumps + 4 * (int64_t)c, layer,
+                      beyond < 0 ? NULL : jumps + 4 * (int64_t)beyond, beyond < 0 ? 0 : grid->layers[beyond], star);
+        sum[0] += n[3] * star[1];
+        for (int a = 0; a < 3; ++a) sum[1 + a] += n[3] * star[0] * n[a];
+    }
+    real *state = (real *)grid->state.values + c * grid->state.stride;
+    real rate = time_step * ((const real *)grid->inverse_volume)[c];
+    state[0] -= rate * layers->modulus[layer] * sum[0];
+    for (int k = 1; k < 4; ++k) {
+        state[k * grid->state.component_stride] -= rate * layers->inverse_density[layer] * sum[k];
+    }
+}
+
+static void apply_fluxes(const wave_grid *grid, double time_step)
+{
+    layer_table layers = make_layers(grid);
+    for (int32_t c = 0; c < grid->own_cells; ++c) apply_flux(grid, &layers, (real)time_step, c);
+}
+
+static void move_vertices(const wave_grid *grid, double scale)
+{
+    const real *velocity = grid->vertex_state.values;
+    real *x = grid->coordinates.values;
+    for (int32_t v = 0; v < grid->own_vertices; ++v) {
+        for (int a = 0; a < 3; ++a) {
+            int64_t from = v * grid->vertex_state.stride + (1 + a) * grid->vertex_state.component_stride;
+            x[v * grid->coordinates.stride + a * grid->coordinates.component_stride] += (real)scale * velocity[from];
+        }
+    }
+}
+
+const wave_kernel WAVE_TABLE = {to_vertices, find_jumps, apply_fluxes, move_vertices};

@@ -1,0 +1,245 @@
+/* How cubes are cut, so that the cells of neighbours always share whole faces:
+ *
+ *   tets      six around the diagonal 000-111 (Kuhn): every face of the cube is split from its least to its greatest
+ *             corner
+ *   hex       one: no face is split
+ *   wedges    two, extruded along z: the z faces are split as Kuhn's are, the x and y faces are whole
+ *   pyramids  six around a vertex in the centre. A face that a neighbour wants split becomes two tets with that
+ *             diagonal instead: these cubes are the transition between all others.
+ *
+ * Mixed, from below: tets, wedges (their z faces meet split as both want), one layer of pyramid cubes (tets below,
+ * pyramids above), then hexes, with pyramid cubes in a third of them.
+ */
+#include "wave_lattice.h"
+
+#include <stddef.h>
+
+enum { TET = 10, HEX = 12, WEDGE = 13, PYRAMID = 14 };
+
+static const int8_t corner_offset[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                           {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+
+/* The faces of a cube, outward; the axis and side each lies on. */
+static const struct {
+    int8_t corner[4];
+    int8_t axis, step;
+} cube_face[6] = {{{0, 4, 7, 3}, 0, -1}, {{1, 2, 6, 5}, 0, 1},  {{0, 1, 5, 4}, 1, -1},
+                  {{3, 7, 6, 2}, 1, 1},  {{0, 3, 2, 1}, 2, -1}, {{4, 5, 6, 7}, 2, 1}};
+
+static const wave_cell_shape tet_shape = {
+    4, 4, {3, 3, 3, 3}, {{0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {0, 2, 1}}, {0.25, 0.25, 0.25, 0.25}};
+static const wave_cell_shape hex_shape = {
+    8,
+    6,
+    {4, 4, 4, 4, 4, 4},
+    {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}},
+    {0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125}};
+static const wave_cell_shape wedge_shape = {6,
+                                            5,
+                                            {3, 3, 4, 4, 4},
+                                            {{0, 2, 1}, {3, 4, 5}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}},
+                                            {1.0 / 6, 1.0 / 6, 1.0 / 6, 1.0 / 6, 1.0 / 6, 1.0 / 6}};
+static const wave_cell_shape pyramid_shape = {5,
+                                              5,
+                                              {4, 3, 3, 3, 3},
+                                              {{0, 3, 2, 1}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}},
+                                              {0.1875, 0.1875, 0.1875, 0.1875, 0.25}};
+
+const wave_cell_shape *wave_cell_shape_of(int type)
+{
+    switch (type) {
+    case TET: return &tet_shape;
+    case HEX: return &hex_shape;
+    case WEDGE: return &wedge_shape;
+    case PYRAMID: return &pyramid_shape;
+    default: return NULL;
+    }
+}
+
+wave_lattice wave_lattice_make(const int size[3], wave_cells cells, double jitter)
+{
+    wave_lattice lattice = {.cells = cells, .jitter = jitter};
+    int longest = size[0];
+    for (int a = 0; a < 3; ++a) {
+        lattice.size[a] = size[a];
+        longest = size[a] > longest ? size[a] : longest;
+    }
+    lattice.edge = 2.0 / longest;
+    lattice.origin[0] = -0.5 * lattice.edge * size[0];
+    lattice.origin[1] = -0.5 * lattice.edge * size[1];
+    lattice.origin[2] = -lattice.edge * size[2];
+    return lattice;
+}
+
+int64_t wave_lattice_cube_count(const wave_lattice *lattice)
+{
+    return (int64_t)lattice->size[0] * lattice->size[1] * lattice->size[2];
+}
+
+int64_t wave_lattice_cube(const wave_lattice *lattice, const int ijk[3])
+{
+    return ijk[0] + lattice->size[0] * (ijk[1] + (int64_t)lattice->size[1] * ijk[2]);
+}
+
+void wave_lattice_cube_ijk(const wave_lattice *lattice, int64_t cube, int ijk[3])
+{
+    ijk[0] = (int)(cube % lattice->size[0]);
+    ijk[1] = (int)(cube / lattice->size[0] % lattice->size[1]);
+    ijk[2] = (int)(cube / lattice->size[0] / lattice->size[1]);
+}
+
+bool wave_lattice_holds(const wave_lattice *lattice, const int ijk[3])
+{
+    for (int a = 0; a < 3; ++a) {
+        if (ijk[a] < 0 || ijk[a] >= lattice->size[a]) return false;
+    }
+    return true;
+}
+
+static int64_t lattice_vertex_count(const wave_lattice *lattice)
+{
+    return (int64_t)(lattice->size[0] + 1) * (lattice->size[1] + 1) * (lattice->size[2] + 1);
+}
+
+static int64_t corner_vertex(const wave_lattice *lattice, const int ijk[3], int corner)
+{
+    const int8_t *o = corner_offset[corner];
+    int64_t nx = lattice->size[0] + 1, ny = lattice->size[1] + 1;
+    return ijk[0] + o[0] + nx * (ijk[1] + o[1] + ny * (int64_t)(ijk[2] + o[2]));
+}
+
+static wave_cells cube_kind(const wave_lattice *lattice, const int ijk[3])
+{
+    if (lattice->cells != WAVE_MIXED) return lattice->cells;
+    int transition = lattice->size[2] / 2;
+    if (ijk[2] < lattice->size[2] / 4) return WAVE_TETS;
+    if (ijk[2] < transition) return WAVE_WEDGES;
+    if (ijk[2] == transition) return WAVE_PYRAMIDS;
+    return ijk[0] < lattice->size[0] / 3 ? WAVE_PYRAMIDS : WAVE_HEXES;
+}
+
+static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3], int face)
+{
+    int axis = cube_face[face].axis;
+    int beside[3] = {ijk[0], ijk[1], ijk[2]};
+    beside[axis] += cube_face[face].step;
+    if (!wave_lattice_holds(lattice, beside)) return false;
+    wave_cells kind = cube_kind(lattice, beside);
+    return kind == WAVE_TETS || (kind == WAVE_WEDGES && axis == 2);
+}
+
+static int cut_tets(const int64_t v[8], wave_cell *cells)
+{
+    /* From corner 0 to corner 6 along the axes in each of six orders; odd orders are mirrored. */
+    static const int8_t path[6][2] = {{1, 2}, {3, 7}, {4, 5}, {2, 3}, {7, 4}, {5, 1}};
+    for (int t = 0; t < 6; ++t) {
+        cells[t] = (wave_cell){TET, {v[0], v[path[t][0]], v[path[t][1]], v[6]}};
+    }
+    return 6;
+}
+
+static int cut_wedges(const int64_t v[8], wave_cell *cells)
+{
+    cells[0] = (wave_cell){WEDGE, {v[0], v[1], v[2], v[4], v[5], v[6]}};
+    cells[1] = (wave_cell){WEDGE, {v[0], v[2], v[3], v[4], v[6], v[7]}};
+    return 2;
+}
+
+static int cut_pyramids(const wave_lattice *lattice, const int ijk[3], const int64_t v[8], int64_t centre,
+                        wave_cell *cells)
+{
+    int count = 0;
+    for (int f = 0; f < 6; ++f) {
+        /* The table's faces begin at their least or greatest corner or at neither; the ids tell which. */
+        int64_t q[4];
+        int least = 0;
+        for (int i = 0; i < 4; ++i) {
+            q[i] = v[cube_face[f].corner[i]];
+            least = q[i] < q[least] ? i : least;
+        }
+        int64_t a = q[least], b = q[(least + 1) % 4], c = q[(least + 2) % 4], d = q[(least + 3) % 4];
+        if (neighbour_wants_split(lattice, ijk, f)) {
+            cells[count++] = (wave_cell){TET, {a, c, b, centre}};
+            cells[count++] = (wave_cell){TET, {a, d, c, centre}};
+        } else {
+            cells[count++] = (wave_cell){PYRAMID, {a, d, c, b, centre}};
+        }
+    }
+    return count;
+}
+
+int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cells[WAVE_CELLS_PER_CUBE])
+{
+    int ijk[3];
+    int64_t v[8];
+    wave_lattice_cube_ijk(lattice, cube, ijk);
+    for (int c = 0; c < 8; ++c) v[c] = corner_vertex(lattice, ijk, c);
+    switch (cube_kind(lattice, ijk)) {
+    case WAVE_TETS: return cut_tets(v, cells);
+    case WAVE_WEDGES: return cut_wedges(v, cells);
+    case WAVE_PYRAMIDS: return cut_pyramids(lattice, ijk, v, lattice_vertex_count(lattice) + cube, cells);
+    default: cells[0] = (wave_cell){HEX, {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]}}; return 1;
+    }
+}
+
+uint8_t wave_lattice_uniform_type(const wave_lattice *lattice)
+{
+    static const uint8_t type[] = {TET, HEX, WEDGE, PYRAMID, 0};
+    return type[lattice->cells];
+}
+
+bool wave_lattice_vertex_ijk(const wave_lattice *lattice, int64_t vertex, int ijk[3])
+{
+    int64_t corners = lattice_vertex_count(lattice);
+    if (vertex >= corners) {
+        wave_lattice_cube_ijk(lattice, vertex - corners, ijk);
+        return false;
+    }
+    int64_t nx = lattice->size[0] + 1, ny = lattice->size[1] + 1;
+    ijk[0] = (int)(vertex % nx);
+    ijk[1] = (int)(vertex / nx % ny);
+    ijk[2] = (int)(vertex / nx / ny);
+    return true;
+}
+
+uint8_t wave_lattice_walls(const wave_lattice *lattice, int64_t vertex)
+{
+    int ijk[3];
+    unsigned walls = 0;
+    if (!wave_lattice_vertex_ijk(lattice, vertex, ijk)) return 0;
+    for (int a = 0; a < 3; ++a) {
+        if (ijk[a] == 0 || ijk[a] == lattice->size[a]) walls |= 1u << a;
+    }
+    return (uint8_t)walls;
+}
+
+static void corner_position(const wave_lattice *lattice, int64_t vertex, const int ijk[3], double xyz[3])
+{
+    bool inner = true;
+    for (int a = 0; a < 3; ++a) {
+        inner = inner && ijk[a] > 0 && ijk[a] < lattice->size[a];
+        xyz[a] = lattice->origin[a] + lattice->edge * ijk[a];
+    }
+    if (!inner || lattice->jitter == 0) return;
+    for (int a = 0; a < 3; ++a) {
+        double unit = (double)(wave_hash((uint64_t)(3 * vertex + a)) >> 11) * 0x1p-53;
+        xyz[a] += lattice->edge * lattice->jitter * (2 * unit - 1);
+    }
+}
+
+void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz[3])
+{
+    int ijk[3];
+    if (wave_lattice_vertex_ijk(lattice, vertex, ijk)) {
+        corner_position(lattice, vertex, ijk, xyz);
+        return;
+    }
+    xyz[0] = xyz[1] = xyz[2] = 0;
+    for (int c = 0; c < 8; ++c) {
+        const int8_t *o = corner_offset[c];
+        int at[3] = {ijk[0] + o[0], ijk[1] + o[1], ijk[2] + o[2]};
+        double corner[3];
+        corner_position(lattice, corner_vertex(lattice, ijk, c), at, corner);
+        for (int a = 0; a < 3; ++a) xyz[a] += 0.125 * corner[a];
+    }
+}

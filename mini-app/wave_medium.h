@@ -1,0 +1,45 @@
+/* What the wave goes through, and what makes it. Lengths in half box sides, speeds so that the slowest layer has 0.8.
+ */
+#ifndef WAVE_MEDIUM_H
+#define WAVE_MEDIUM_H
+
+#include <stdint.h>
+
+#include "wave_lattice.h"
+
+enum { WAVE_LAYERS_MAX = 8 };
+
+/* Flat layers, from the surface down. */
+typedef struct wave_medium {
+    int count;
+    double bottom[WAVE_LAYERS_MAX]; /* z of each layer's lower side, falling; the last reaches all the way down */
+    double speed[WAVE_LAYERS_MAX];
+    double density[WAVE_LAYERS_MAX];
+} wave_medium;
+
+/* A point that injects volume at the rate Q(t) = amplitude tau exp(-(pi frequency tau)^2), tau = t - delay, smeared
+ * over a Gaussian ball of this radius. Far away the pressure is density / (4 pi r) Q'(t - r / speed): Ricker's wavelet.
+ * Over all time nothing is added: Q is odd about its delay. */
+typedef struct wave_source {
+    double position[3];
+    double frequency;
+    double delay;
+    double amplitude;
+    double radius; /* standard deviation of the ball */
+} wave_source;
+
+/* Four layers, stiffer and heavier with depth. */
+wave_medium wave_medium_layered(const wave_lattice *lattice);
+wave_medium wave_medium_uniform(double speed, double density);
+
+uint8_t wave_medium_layer(const wave_medium *medium, double z);
+
+/* In the third layer, off the middle; strong enough for a pressure of 1 at a distance of 0.5. */
+wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *medium);
+
+double wave_source_rate(const wave_source *source, double time);
+
+/* Share of the rate per unit volume at this place; 0 further than five radii away. */
+double wave_source_density(const wave_source *source, const double xyz[3]);
+
+#endif

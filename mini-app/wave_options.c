@@ -1,0 +1,206 @@
+/* Options are "--name value" or "--name=value". Each is a row of a table: a flag, or a reader of its value. */
+#include "wave_options.h"
+
+#include <errno.h>
+#include <limits.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char help_text[] =
+    "insitu-wave: a wave from a point source through layers, drawn while it runs\n"
+    "\n"
+    "  mpirun -n 4 insitu-wave [options]\n"
+    "\n"
+    "  --cells KIND        tet (default), hex, wedge, pyramid, mixed\n"
+    "  --size N | X,Y,Z    cubes of the lattice that the cells are cut from (32)\n"
+    "  --steps N           time steps (100)\n"
+    "  --precision TYPE    float (default) or double: computed on and handed over\n"
+    "  --index TYPE        int32 (default) or int64: of the connectivity\n"
+    "  --layout HOW        aos (default): components interleaved; soa: an array each\n"
+    "  --partition HOW     block (default), morton, random, checkerboard: of cubes onto ranks\n"
+    "  --boundary HOW      absorb (default) or reflect\n"
+    "  --order N           2 (default) or 1: of the scheme\n"
+    "  --jitter A          inner vertices move by up to A edges, 0 to 0.3 (0)\n"
+    "  --moving            vertices are drawn displaced by the wave\n"
+    "  --swell S           how much --moving exaggerates (0.05)\n"
+    "  --centring WHERE    cell (default) or vertex: of the fields handed over\n"
+    "  --ghosts            hand over the halo cells too, flagged\n"
+    "  --ids               hand over global vertex ids\n"
+    "  --scene FILE        what to draw (examples/wave.yaml)\n"
+    "  --no-insitu         simulate only\n"
+    "  --help              this text\n"
+    "\n"
+    "Fields: pressure, velocity (3 components), speed (of sound). Errors of libinsitu are shown once each, and the\n"
+    "simulation runs on to its end; the exit status is then 0. A wrong option is status 1.\n";
+
+const char *wave_options_help(void)
+{
+    return help_text;
+}
+
+typedef struct option_row option_row;
+struct option_row {
+    const char *name;
+    bool (*read)(const option_row *row, const char *value, void *field); /* NULL: a flag */
+    size_t offset;
+    const char *expected; /* for messages; of a choice, its words divided by '|' */
+    const int *choice;    /* what each word stands for; NULL: 0, 1, 2, ... */
+    double low, high;
+};
+
+static bool read_choice(const option_row *row, const char *value, void *field)
+{
+    size_t length = strlen(value);
+    const char *word = row->expected;
+    for (int i = 0; word; ++i) {
+        const char *end = strchr(word, '|');
+        size_t word_length = end ? (size_t)(end - word) : strlen(word);
+        if (word_length == length && strncmp(word, value, length) == 0) {
+            *(int *)field = row->choice ? row->choice[i] : i;
+            return true;
+        }
+        word = end ? end + 1 : NULL;
+    }
+    return false;
+}
+
+static bool read_number(const option_row *row, const char *value, void *field)
+{
+    char *end;
+    double number = strtod(value, &end);
+    if (end == value || *end || !(number >= row->low && number <= row->high)) return false;
+    *(double *)field = number;
+    return true;
+}
+
+static bool read_count(const char **text, double low, double high, int *out)
+{
+    char *end;
+    errno = 0;
+    long number = strtol(*text, &end, 10);
+    if (end == *text || errno || (double)number < low || (double)number > high) return false;
+    *out = (int)number;
+    *text = end;
+    return true;
+}
+
+static bool read_integer(const option_row *row, const char *value, void *field)
+{
+    return read_count(&value, row->low, row->high, field) && !*value;
+}
+
+static bool read_size(const option_row *row, const char *value, void *field)
+{
+    int *size = field;
+    if (!read_count(&value, row->low, row->high, &size[0])) return false;
+    size[1] = size[2] = size[0];
+    if (!*value) return true;
+    for (int a = 1; a < 3; ++a) {
+        if (*value++ != ',' || !read_count(&value, row->low, row->high, &size[a])) return false;
+    }
+    return !*value;
+}
+
+static bool read_text(const option_row *row, const char *value, void *field)
+{
+    (void)row;
+    *(const char **)field = value;
+    return *value != 0;
+}
+
+static const int of_bytes[] = {4, 8};
+static const int of_order[] = {1, 2};
+
+/* Choices are stored through int pointers: the enums' and bools' own fields are set from raw_options. */
+typedef struct raw_options {
+    int cells, partition, real_bytes, index_bytes, apart, reflecting, order, at_vertices, steps, size[3];
+    double jitter, swell;
+    const char *scene;
+    bool moving, ghosts, ids, no_insitu, help;
+} raw_options;
+
+#define AT(field) offsetof(raw_options, field)
+
+static const option_row rows[] = {
+    {"--cells", read_choice, AT(cells), "tet|hex|wedge|pyramid|mixed", NULL, 0, 0},
+    {"--size", read_size, AT(size), "N or X,Y,Z, each 1 to 8192", NULL, 1, 8192},
+    {"--steps", read_integer, AT(steps), "0 to 1000000000", NULL, 0, 1e9},
+    {"--precision", read_choice, AT(real_bytes), "float|double", of_bytes, 0, 0},
+    {"--index", read_choice, AT(index_bytes), "int32|int64", of_bytes, 0, 0},
+    {"--layout", read_choice, AT(apart), "aos|soa", NULL, 0, 0},
+    {"--partition", read_choice, AT(partition), "block|morton|random|checkerboard", NULL, 0, 0},
+    {"--boundary", read_choice, AT(reflecting), "absorb|reflect", NULL, 0, 0},
+    {"--order", read_choice, AT(order), "1|2", of_order, 0, 0},
+    {"--jitter", read_number, AT(jitter), "a number from 0 to 0.3", NULL, 0, 0.3},
+    {"--swell", read_number, AT(swell), "a number from 0 to 10", NULL, 0, 10},
+    {"--centring", read_choice, AT(at_vertices), "cell|vertex", NULL, 0, 0},
+    {"--scene", read_text, AT(scene), "a file", NULL, 0, 0},
+    {"--moving", NULL, AT(moving), NULL, NULL, 0, 0},
+    {"--ghosts", NULL, AT(ghosts), NULL, NULL, 0, 0},
+    {"--ids", NULL, AT(ids), NULL, NULL, 0, 0},
+    {"--no-insitu", NULL, AT(no_insitu), NULL, NULL, 0, 0},
+    {"--help", NULL, AT(help), NULL, NULL, 0, 0},
+};
+
+static const option_row *find_row(const char *argument, size_t length)
+{
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
+        if (strlen(rows[i].name) == length && strncmp(rows[i].name, argument, length) == 0) return &rows[i];
+    }
+    return NULL;
+}
+
+static bool read_option(int argc, char **argv, int *at, raw_options *raw, char *message, size_t size)
+{
+    const char *argument = argv[*at], *equals = strchr(argument, '=');
+    const option_row *row = find_row(argument, equals ? (size_t)(equals - argument) : strlen(argument));
+    if (!row) {
+        snprintf(message, size, "%s: no such option; --help lists them", argument);
+        return false;
+    }
+    if (!row->read) {
+        if (equals) snprintf(message, size, "%s takes no value", row->name);
+        *((bool *)((char *)raw + row->offset)) = true;
+        return !equals;
+    }
+    const char *value = equals ? equals + 1 : *at + 1 < argc ? argv[++*at] : NULL;
+    if (value && row->read(row, value, (char *)raw + row->offset)) return true;
+    snprintf(message, size, "%s: expected %s, got %s", row->name, row->expected, value ? value : "nothing");
+    return false;
+}
+
+bool wave_options_parse(int argc, char **argv, wave_options *options, char *message, int message_size)
+{
+    raw_options raw = {.steps = 100,
+                       .size = {32, 32, 32},
+                       .real_bytes = 4,
+                       .index_bytes = 4,
+                       .order = 2,
+                       .swell = 0.05,
+                       .scene = "examples/wave.yaml"};
+    for (int i = 1; i < argc; ++i) {
+        if (!read_option(argc, argv, &i, &raw, message, (size_t)message_size)) return false;
+    }
+    *options = (wave_options){
+        .cells = (wave_cells)raw.cells,
+        .size = {raw.size[0], raw.size[1], raw.size[2]},
+        .steps = raw.steps,
+        .real_bytes = raw.real_bytes,
+        .index_bytes = raw.index_bytes,
+        .apart = raw.apart != 0,
+        .partition = (wave_partition_kind)raw.partition,
+        .reflecting = raw.reflecting != 0,
+        .order = raw.order,
+        .jitter = raw.jitter,
+        .moving = raw.moving,
+        .swell = raw.swell,
+        .ghosts = raw.ghosts,
+        .ids = raw.ids,
+        .at_vertices = raw.at_vertices != 0,
+        .scene = raw.no_insitu ? NULL : raw.scene,
+        .help = raw.help,
+    };
+    return true;
+}

@@ -1,0 +1,35 @@
+/* Handing the wave's arrays to libinsitu, and telling what it did: the part of the mini-app to read for an example. */
+#ifndef WAVE_PICTURES_H
+#define WAVE_PICTURES_H
+
+#include <insitu/insitu.h>
+
+#include "wave_options.h"
+#include "wave_solver.h"
+
+enum { WAVE_MESSAGES_MAX = 64 };
+
+typedef struct wave_pictures {
+    insitu_session *session; /* NULL: none wanted, or it could not be opened */
+    const wave_options *options;
+    const wave_mesh *mesh;
+    const wave_solver *solver;
+    int rank;
+    uint8_t *ghosts;   /* cells, where they are handed over */
+    bool handed_over;  /* the mesh, once */
+    int images;        /* drawn so far */
+    int message_count; /* errors and warnings shown so far, by hash */
+    uint64_t messages[WAVE_MESSAGES_MAX];
+} wave_pictures;
+
+/* Open a session. Without one the simulation runs all the same, and the reason has been shown. Collective. */
+void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, const wave_solver *solver, MPI_Comm comm,
+                        wave_pictures *pictures);
+
+/* Hand over and draw what is due. Returns this rank's report, all zero without a session. Collective. */
+insitu_report wave_pictures_step(wave_pictures *pictures, int64_t cycle, double time);
+
+/* Collective. */
+void wave_pictures_close(wave_pictures *pictures);
+
+#endif
