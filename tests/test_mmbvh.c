@@ -1,0 +1,584 @@
+/* The tree against brute force over all cells in double: what is built, refitted, and what happens without memory. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <float.h>
+#include <stdio.h>
+
+#include "memory.h"
+#include "mmbvh.h"
+#include "test_mmbvh_grids.h"
+
+static const double no_shift[3] = {0, 0, 0};
+
+static mmbvh build_by(const lattice *l, const grid_field *field, int threads)
+{
+    mmbvh tree;
+    base_error error = {0};
+    const insitu_status status = mmbvh_build(&l->g, field, no_shift, 1, &(mmbvh_options){threads}, &tree, &error);
+    if (status) fail_msg("%s", error.message);
+    return tree;
+}
+
+static mmbvh_statistics assert_proved(const mmbvh *tree, const grid *g, const grid_field *field)
+{
+    mmbvh_statistics statistics = {0};
+    base_error error = {0};
+    if (mmbvh_check(tree, g, field, &statistics, &error)) fail_msg("%s", error.message);
+    return statistics;
+}
+
+/* The box of a cell, in the tree's coordinates, in double. */
+static void cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double lower[3], double upper[3])
+{
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(&l->g, cell, vertices);
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = INFINITY;
+        upper[axis] = -INFINITY;
+        for (int i = 0; i < count; i++) {
+            double p[3];
+            grid_vertex(&l->g, vertices[i], p);
+            const double x = (p[axis] - tree->origin[axis]) * tree->scale;
+            lower[axis] = fmin(lower[axis], x);
+            upper[axis] = fmax(upper[axis], x);
+        }
+    }
+}
+
+/* By the C library, apart from the tree's own rounding. */
+static float float_below(double x)
+{
+    const float f = (float)x;
+    return (double)f > x ? nextafterf(f, -INFINITY) : f;
+}
+
+static float float_above(double x)
+{
+    const float f = (float)x;
+    return (double)f < x ? nextafterf(f, INFINITY) : f;
+}
+
+/* A leaf's box and range as brute force has them. */
+static mmbvh_node leaf_by_hand(const lattice *l, const mmbvh *tree, const grid_field *field, int64_t index)
+{
+    mmbvh_node leaf = tree->nodes[index];
+    double low = INFINITY, high = -INFINITY,
+           box[2][3] = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (uint64_t k = 0; k < leaf.count; k++) {
+        const int64_t cell = tree->cells[leaf.ref + k];
+        double lower[3], upper[3], values[GRID_MAX_CELL_VERTICES];
+        cell_box(l, tree, cell, lower, upper);
+        for (int axis = 0; axis < 3; axis++) {
+            box[0][axis] = fmin(box[0][axis], lower[axis]);
+            box[1][axis] = fmax(box[1][axis], upper[axis]);
+        }
+        int64_t vertices[GRID_MAX_CELL_VERTICES];
+        const int count = grid_cell_vertices(&l->g, cell, vertices);
+        if (!grid_cell_values(field, cell, vertices, count, values)) continue;
+        for (int i = 0; i < count; i++) {
+            low = fmin(low, values[i]);
+            high = fmax(high, values[i]);
+        }
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        leaf.lower[axis] = float_below(box[0][axis]);
+        leaf.upper[axis] = float_above(box[1][axis]);
+    }
+    leaf.range_low = low <= high ? float_below(low) : INFINITY;
+    leaf.range_high = low <= high ? float_above(high) : -INFINITY;
+    return leaf;
+}
+
+/* Not only contained, which mmbvh_check proves, but no larger than need be. */
+static void assert_tight(const lattice *l, const mmbvh *tree, const grid_field *field)
+{
+    for (int64_t i = 0; i < tree->node_count; i++) {
+        const mmbvh_node *node = &tree->nodes[i];
+        mmbvh_node expected;
+        if (node->count) {
+            expected = leaf_by_hand(l, tree, field, i);
+        } else {
+            const mmbvh_node *pair = &tree->nodes[node->ref];
+            expected = pair[0];
+            for (int axis = 0; axis < 3; axis++) {
+                expected.lower[axis] = fminf(pair[0].lower[axis], pair[1].lower[axis]);
+                expected.upper[axis] = fmaxf(pair[0].upper[axis], pair[1].upper[axis]);
+            }
+            expected.range_low = fminf(pair[0].range_low, pair[1].range_low);
+            expected.range_high = fmaxf(pair[0].range_high, pair[1].range_high);
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            assert_true(node->lower[axis] == expected.lower[axis]);
+            assert_true(node->upper[axis] == expected.upper[axis]);
+        }
+        assert_true(node->range_low == expected.range_low);
+        assert_true(node->range_high == expected.range_high);
+    }
+}
+
+static void every_layout_builds_a_proved_and_tight_tree(void **state)
+{
+    (void)state;
+    for (int kind = LATTICE_TETS; kind <= LATTICE_MIXED; kind++) {
+        for (int bits = 0; bits < 16; bits++) {
+            const lattice_layout layout = {bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3 & 1};
+            lattice l = make_lattice(7, (lattice_kind)kind, layout);
+            mmbvh tree = build_by(&l, &l.field, 2);
+            const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
+            assert_tight(&l, &tree, &l.field);
+            assert_int_equal(tree.unusable_cells, 0);
+            assert_int_equal(tree.cell_count, l.g.cell_count);
+            assert_int_equal(s.bytes, tree.node_count * 40 + tree.cell_count * 4);
+            mmbvh_free(&tree);
+            assert_null(tree.nodes);
+            free_lattice(&l);
+        }
+    }
+}
+
+static void shifted_and_scaled_bounds_are_rounded_outward(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(6, LATTICE_TETS, (lattice_layout){true, false, true, false});
+    const double origin[3] = {5.8e6, -1.0 / 3, 2};
+    mmbvh tree;
+    base_error error = {0};
+    assert_int_equal(mmbvh_build(&l.g, &l.field, origin, 0.1, NULL, &tree, &error), INSITU_OK);
+    assert_proved(&tree, &l.g, &l.field);
+    assert_tight(&l, &tree, &l.field);
+    mmbvh_free(&tree);
+    free_lattice(&l);
+}
+
+/* 178,746 tets: enough that the root itself is split by chunks in parallel. */
+static void same_bytes_for_any_number_of_threads(void **state)
+{
+    (void)state;
+    static const int threads[] = {1, 2, 3, 8, 8, 8};
+    lattice l = make_lattice(31, LATTICE_TETS, (lattice_layout){false, false, true, false});
+    mmbvh first = build_by(&l, &l.field, 1);
+    assert_proved(&first, &l.g, &l.field);
+    for (size_t i = 0; i < sizeof threads / sizeof *threads; i++) {
+        mmbvh tree = build_by(&l, &l.field, threads[i]);
+        assert_int_equal(tree.node_count, first.node_count);
+        assert_memory_equal(tree.nodes, first.nodes, (size_t)first.node_count * sizeof *first.nodes);
+        assert_memory_equal(tree.cells, first.cells, (size_t)first.cell_count * sizeof *first.cells);
+        assert_true(tree.built_cost == first.built_cost);
+        mmbvh_free(&tree);
+    }
+    mmbvh_free(&first);
+    free_lattice(&l);
+}
+
+static void ghosts_are_not_in_the_tree(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(8, LATTICE_MIXED, (lattice_layout){false, true, false, false});
+    l.ghosts = calloc((size_t)l.g.cell_count, 3);
+    int64_t ghosts = 0;
+    for (int64_t cell = 0; cell < l.g.cell_count; cell++) {
+        l.ghosts[3 * cell] = hash_unit((uint64_t)cell) < 0.4 ? 2 : 0;
+        ghosts += l.ghosts[3 * cell] != 0;
+    }
+    l.g.ghosts = l.ghosts;
+    l.g.ghosts_stride = 3;
+    mmbvh tree = build_by(&l, &l.field, 2);
+    assert_int_equal(tree.cell_count, l.g.cell_count - ghosts);
+    assert_proved(&tree, &l.g, &l.field);
+    assert_tight(&l, &tree, &l.field);
+    mmbvh_free(&tree);
+
+    for (int64_t cell = 0; cell < l.g.cell_count; cell++) l.ghosts[3 * cell] = 1;
+    tree = build_by(&l, &l.field, 2);
+    assert_int_equal(tree.node_count, 0);
+    assert_proved(&tree, &l.g, &l.field);
+    mmbvh_free(&tree);
+    free_lattice(&l);
+}
+
+/* Some vertices' values to NaN or infinity; returns how many cells have one. */
+static int64_t poison(lattice *l)
+{
+    for (int64_t v = 0; v < l->g.vertex_count; v++) {
+        const double u = hash_unit((uint64_t)(7 * v));
+        if (u < 0.03) put_number(&l->field.values, v, u < 0.01 ? (double)NAN : u < 0.02 ? INFINITY : -INFINITY);
+    }
+    int64_t count = 0;
+    for (int64_t cell = 0; cell < l->g.cell_count; cell++) {
+        int64_t vertices[GRID_MAX_CELL_VERTICES];
+        double values[GRID_MAX_CELL_VERTICES];
+        const int n = grid_cell_vertices(&l->g, cell, vertices);
+        count += !grid_cell_values(&l->field, cell, vertices, n, values);
+    }
+    return count;
+}
+
+static void values_that_are_not_finite_are_counted_and_left_out(void **state)
+{
+    (void)state;
+    for (int kind = LATTICE_TETS; kind <= LATTICE_MIXED; kind++) {
+        lattice l = make_lattice(9, (lattice_kind)kind, (lattice_layout){false, false, kind == LATTICE_HEXES, false});
+        const int64_t unusable = poison(&l);
+        assert_true(unusable > 0 && unusable < l.g.cell_count);
+        mmbvh tree = build_by(&l, &l.field, 2);
+        assert_int_equal(tree.unusable_cells, unusable);
+        assert_proved(&tree, &l.g, &l.field);
+        assert_tight(&l, &tree, &l.field);
+        for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, (double)NAN);
+        mmbvh_refit_ranges(&tree, &l.g, &l.field, NULL);
+        assert_int_equal(tree.unusable_cells, l.g.cell_count);
+        for (int64_t i = 0; i < tree.node_count; i++) {
+            assert_true(tree.nodes[i].range_low == INFINITY && tree.nodes[i].range_high == -INFINITY);
+        }
+        mmbvh_free(&tree);
+        free_lattice(&l);
+    }
+}
+
+static void values_beyond_floats_round_outward(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(2, LATTICE_HEXES, (lattice_layout){false, false, true, false});
+    for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, v % 2 ? 1e300 : 2e300);
+    mmbvh tree = build_by(&l, &l.field, 1);
+    assert_proved(&tree, &l.g, &l.field);
+    assert_true(tree.nodes[0].range_low == FLT_MAX && tree.nodes[0].range_high == INFINITY);
+    for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, v % 2 ? -1e-300 : 1e-300);
+    mmbvh_refit_ranges(&tree, &l.g, &l.field, NULL);
+    assert_proved(&tree, &l.g, &l.field);
+    assert_true(tree.nodes[0].range_low == -FLT_TRUE_MIN && tree.nodes[0].range_high == FLT_TRUE_MIN);
+    mmbvh_free(&tree);
+    free_lattice(&l);
+}
+
+static void no_field_gives_infinite_ranges(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(5, LATTICE_TETS, (lattice_layout){0});
+    mmbvh tree = build_by(&l, NULL, 2);
+    assert_proved(&tree, &l.g, NULL);
+    for (int64_t i = 0; i < tree.node_count; i++) {
+        assert_true(tree.nodes[i].range_low == -INFINITY && tree.nodes[i].range_high == INFINITY);
+    }
+    mmbvh_free(&tree);
+    free_lattice(&l);
+}
+
+/* 29,791 hexes: more nodes than one task of a refit sweeps. */
+static void refitted_ranges_equal_a_fresh_build(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(31, LATTICE_HEXES, (lattice_layout){false, false, false, false});
+    mmbvh old = build_by(&l, &l.field, 2);
+    for (int64_t v = 0; v < l.g.vertex_count; v++) put_number(&l.field.values, v, hash_unit((uint64_t)v));
+    const int64_t unusable = poison(&l);
+    mmbvh fresh = build_by(&l, &l.field, 2);
+    assert_memory_not_equal(old.nodes, fresh.nodes, (size_t)fresh.node_count * sizeof *fresh.nodes);
+    for (int threads = 1; threads <= 3; threads++) {
+        for (int64_t i = 0; i < old.node_count; i++) old.nodes[i].range_low = old.nodes[i].range_high = NAN;
+        assert_int_equal(mmbvh_refit_ranges(&old, &l.g, &l.field, &(mmbvh_options){threads}), INSITU_OK);
+        assert_memory_equal(old.nodes, fresh.nodes, (size_t)fresh.node_count * sizeof *fresh.nodes);
+        assert_int_equal(old.unusable_cells, unusable);
+    }
+    mmbvh_free(&old);
+    mmbvh_free(&fresh);
+    free_lattice(&l);
+}
+
+static void refitted_bounds_contain_moved_vertices_tightly(void **state)
+{
+    (void)state;
+    for (int bits = 0; bits < 6; bits++) {
+        const lattice_layout layout = {bits & 1, false, false, bits & 1};
+        lattice l = make_lattice(18, (lattice_kind)(bits / 2), layout);
+        mmbvh tree = build_by(&l, &l.field, 2);
+        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){2});
+        mmbvh same = build_by(&l, &l.field, 2);
+        assert_memory_equal(tree.nodes, same.nodes, (size_t)same.node_count * sizeof *same.nodes);
+        assert_true(mmbvh_cost(&tree) == tree.built_cost);
+        for (int64_t v = 0; v < l.g.vertex_count; v++) {
+            double p[3];
+            grid_vertex(&l.g, v, p);
+            put_number(&l.g.coordinates[0], v, p[0] + 3 * sin(p[1]));
+            put_number(&l.g.coordinates[2], v, p[2] * 1.5 - 7);
+        }
+        assert_int_not_equal(mmbvh_check(&tree, &l.g, &l.field, NULL, NULL), INSITU_OK);
+        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){2});
+        assert_proved(&tree, &l.g, &l.field);
+        assert_tight(&l, &tree, &l.field);
+        assert_true(mmbvh_cost(&tree) > tree.built_cost);
+        mmbvh_free(&tree);
+        mmbvh_free(&same);
+        free_lattice(&l);
+    }
+}
+
+/* A further field's pairs are what the nodes would hold had the tree been refitted to it. */
+static void assert_pairs_equal_refit(lattice *l, const mmbvh *tree, const grid_field *field)
+{
+    float *pairs = malloc((size_t)tree->node_count * 2 * sizeof *pairs);
+    int64_t unusable = -1;
+    assert_int_equal(mmbvh_compute_ranges(tree, &l->g, field, &(mmbvh_options){2}, pairs, &unusable), INSITU_OK);
+    mmbvh other = build_by(l, field, 1);
+    assert_proved(&other, &l->g, field);
+    assert_tight(l, &other, field);
+    assert_int_equal(unusable, other.unusable_cells);
+    const mmbvh_ranges a = mmbvh_pair_ranges(pairs), b = mmbvh_own_ranges(&other);
+    for (int64_t i = 0; i < tree->node_count; i++) {
+        assert_memory_equal(a.low + i * a.stride, b.low + i * b.stride, sizeof(float));
+        assert_memory_equal(a.high + i * a.stride, b.high + i * b.stride, sizeof(float));
+    }
+    mmbvh_free(&other);
+    free(pairs);
+}
+
+static void further_fields_have_ranges_beside_the_tree(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(19, LATTICE_MIXED, (lattice_layout){0});
+    mmbvh tree = build_by(&l, &l.field, 2);
+    assert_pairs_equal_refit(&l, &tree, &l.field);
+
+    double *vectors = malloc((size_t)l.g.cell_count * 3 * sizeof *vectors);
+    for (int64_t i = 0; i < 3 * l.g.cell_count; i++) vectors[i] = hash_unit((uint64_t)i) - 0.5;
+    vectors[3 * 17 + 1] = NAN;
+    grid_field field = {.values = {(const char *)vectors, 24, true, false},
+                        .component_stride = 8,
+                        .component_count = 3,
+                        .component = 1};
+    assert_pairs_equal_refit(&l, &tree, &field); /* a component of a vector at the vertices */
+    field.component = -1;
+    assert_pairs_equal_refit(&l, &tree, &field); /* its magnitude */
+    field.is_cell_centred = true;
+    assert_pairs_equal_refit(&l, &tree, &field); /* at the cells */
+    field.component = 2;
+    assert_pairs_equal_refit(&l, &tree, &field);
+
+    int32_t *integers = malloc((size_t)l.g.vertex_count * sizeof *integers);
+    for (int64_t v = 0; v < l.g.vertex_count; v++) integers[v] = (int32_t)(2e9 * hash_unit((uint64_t)v));
+    const grid_field materials = {.values = {(const char *)integers, 4, false, true}, .component_count = 1};
+    assert_pairs_equal_refit(&l, &tree, &materials);
+    mmbvh_free(&tree);
+    free(vectors);
+    free(integers);
+    free_lattice(&l);
+}
+
+/* count cells, all the same tet; vertices of n = 1 cubes serve. */
+static lattice make_coincident(int64_t count)
+{
+    lattice l = make_lattice(1, LATTICE_TETS, (lattice_layout){0});
+    free(l.connectivity);
+    l.g.connectivity = make_array(&l.connectivity, 4 * count, false, true, false);
+    for (int64_t i = 0; i < 4 * count; i++) put_index(&l.g.connectivity, i, lattice_tets[0][i % 4]);
+    l.g.cell_count = count;
+    return l;
+}
+
+static void coincident_cells_are_halved(void **state)
+{
+    (void)state;
+    static const int64_t counts[] = {0, 1, 2, 7, 8, 100, 100000};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        lattice l = make_coincident(counts[i]);
+        mmbvh tree = build_by(&l, &l.field, 2);
+        const mmbvh_statistics s = assert_proved(&tree, &l.g, &l.field);
+        const int64_t halvings = counts[i] > 7 ? (int64_t)ceil(log2((double)counts[i] / 7)) : 0;
+        assert_true(s.depth <= halvings + 1);
+        assert_int_equal(s.leaves, counts[i] == 0 ? 0 : counts[i] <= 7 ? 1 : s.leaves);
+        assert_true((tree.node_count == 0) == (counts[i] == 0));
+        mmbvh_free(&tree);
+        free_lattice(&l);
+    }
+}
+
+/* Cells that shrink towards a point by a third each: every plane of equal bins peels a few off. */
+static void depth_is_bounded_where_cells_shrink_without_end(void **state)
+{
+    (void)state;
+    enum { COUNT = 60000 };
+    float *boxes = malloc(6 * COUNT * sizeof *boxes), *ranges = calloc(2 * COUNT, sizeof *ranges);
+    for (int64_t i = 0; i < COUNT; i++) {
+        const float x = powf(0.67f, (float)(i % 300));
+        for (int axis = 0; axis < 3; axis++) {
+            boxes[3 * i + axis] = x;
+            boxes[3 * (COUNT + i) + axis] = 1.2f * x;
+        }
+    }
+    mmbvh tree;
+    assert_int_equal(mmbvh_build_boxes(boxes, boxes + 3 * COUNT, ranges, COUNT, NULL, &tree, NULL), INSITU_OK);
+    assert_proved(&tree, NULL, NULL);
+    mmbvh_free(&tree);
+    free(boxes);
+    free(ranges);
+}
+
+static void parent_tree_holds_every_mesh(void **state)
+{
+    (void)state;
+    enum { COUNT = 1000 };
+    static float lower[COUNT][3], upper[COUNT][3], ranges[COUNT][2];
+    for (int64_t i = 0; i < COUNT; i++) {
+        for (int axis = 0; axis < 3; axis++) {
+            lower[i][axis] = (float)(10 * hash_unit((uint64_t)(6 * i + axis)));
+            upper[i][axis] = lower[i][axis] + (float)hash_unit((uint64_t)(6 * i + axis + 3));
+        }
+        ranges[i][0] = (float)hash_unit((uint64_t)i) - 2;
+        ranges[i][1] = i % 9 ? ranges[i][0] + 1 : -INFINITY;
+        if (i % 9 == 0) ranges[i][0] = INFINITY;
+    }
+    for (int64_t count = 0; count <= COUNT; count = 3 * count + 1) {
+        mmbvh tree;
+        assert_int_equal(mmbvh_build_boxes(lower[0], upper[0], ranges[0], count, NULL, &tree, NULL), INSITU_OK);
+        assert_proved(&tree, NULL, NULL);
+        assert_int_equal(tree.cell_count, count);
+        for (int64_t i = 0; i < tree.node_count; i++) {
+            const mmbvh_node *node = &tree.nodes[i];
+            for (uint64_t k = 0; k < node->count; k++) {
+                const uint32_t mesh = tree.cells[node->ref + k];
+                assert_true(node->range_low <= ranges[mesh][0] && ranges[mesh][1] <= node->range_high);
+                for (int axis = 0; axis < 3; axis++) {
+                    assert_true(node->lower[axis] <= lower[mesh][axis] && upper[mesh][axis] <= node->upper[axis]);
+                }
+            }
+        }
+        mmbvh_free(&tree);
+    }
+}
+
+/* Whoever descends only into boxes that hold the point meets every cell whose own box holds it. */
+static void descent_to_a_point_misses_no_cell(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(9, LATTICE_MIXED, (lattice_layout){0});
+    mmbvh tree = build_by(&l, &l.field, 2);
+    bool *met = malloc((size_t)l.g.cell_count * sizeof *met);
+    for (int64_t n = 0; n < 200; n++) {
+        double p[3];
+        for (int axis = 0; axis < 3; axis++) p[axis] = 10 * hash_unit((uint64_t)(1000 + 3 * n + axis)) - 0.5;
+        if (n < 50) grid_vertex(&l.g, 13 * n, p); /* on the boxes' corners too */
+        memset(met, 0, (size_t)l.g.cell_count * sizeof *met);
+        int64_t stack[MMBVH_MAX_DEPTH + 1] = {0};
+        for (int height = 1; height > 0;) {
+            const mmbvh_node *node = &tree.nodes[stack[--height]];
+            bool inside = true;
+            for (int axis = 0; axis < 3; axis++) {
+                inside = inside && node->lower[axis] <= p[axis] && p[axis] <= node->upper[axis];
+            }
+            for (uint64_t k = 0; inside && k < node->count; k++) met[tree.cells[node->ref + k]] = true;
+            for (int side = 0; inside && !node->count && side < 2; side++) stack[height++] = (int64_t)node->ref + side;
+        }
+        for (int64_t cell = 0; cell < l.g.cell_count; cell++) {
+            double lower[3], upper[3];
+            cell_box(&l, &tree, cell, lower, upper);
+            bool inside = true;
+            for (int axis = 0; axis < 3; axis++) inside = inside && lower[axis] <= p[axis] && p[axis] <= upper[axis];
+            assert_true(!inside || met[cell]);
+        }
+    }
+    free(met);
+    mmbvh_free(&tree);
+    free_lattice(&l);
+}
+
+/* A tree that pays: on a lattice of n^3 cubes a ray crosses about 1.5 n of them (the mean chord of a cube is 2/3 of
+ * its side, and it meets a plane's cells on three axes); a tree that tests 60 boxes and cells for each of them would be
+ * no tree. */
+static void cost_grows_with_the_side_not_the_cells(void **state)
+{
+    (void)state;
+    double costs[2];
+    for (int i = 0; i < 2; i++) {
+        lattice l = make_lattice(i ? 30 : 10, LATTICE_HEXES, (lattice_layout){0});
+        mmbvh tree = build_by(&l, NULL, 2);
+        const mmbvh_statistics s = assert_proved(&tree, &l.g, NULL);
+        assert_true(s.cost == tree.built_cost && s.cells_a_leaf >= 1 && s.cells_a_leaf <= 7);
+        assert_true(s.sibling_overlap > 0 && s.sibling_overlap < 0.6);
+        costs[i] = s.cost;
+        mmbvh_free(&tree);
+        free_lattice(&l);
+    }
+    assert_true(costs[0] < 60 * 15 && costs[1] < 60 * 45);
+    assert_true(costs[1] / costs[0] < 5);
+}
+
+static void cost_of_a_tree_by_hand(void **state)
+{
+    (void)state;
+    mmbvh_node nodes[3] = {{.upper = {4, 2, 1}, .ref = 1},
+                           {.upper = {1, 2, 1}, .count = 3},
+                           {.lower = {2, 0, 0}, .upper = {4, 1, 1}, .count = 2, .ref = 3}};
+    const mmbvh tree = {.nodes = nodes, .node_count = 3, .cell_count = 5, .scale = 1};
+    /* Half areas 14, 5 and 5; 1 for the root's box, 2 for the pair, cells by probability. All exact in 1e-15. */
+    assert_true(fabs(mmbvh_cost(&tree) - (3 + (3 * 5 + 2 * 5) / 14.0)) < 1e-14);
+}
+
+static void failed_allocations_give_an_error_and_leave_nothing(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(16, LATTICE_TETS, (lattice_layout){0}); /* 24,576 tets: a top and subtrees */
+    for (int threads = 1; threads <= 2; threads++) {
+        const int64_t held = base_memory_held(), before = base_memory_allocations();
+        mmbvh tree = build_by(&l, &l.field, threads);
+        const int64_t allocations = base_memory_allocations() - before;
+        mmbvh_free(&tree);
+        assert_int_equal(base_memory_held(), held);
+        assert_true(allocations > 10);
+        for (int64_t n = 1; n <= allocations; n++) {
+            base_error error = {0};
+            memset(&tree, 0xff, sizeof tree);
+            base_memory_fail_nth(n);
+            assert_int_equal(mmbvh_build(&l.g, &l.field, no_shift, 1, &(mmbvh_options){threads}, &tree, &error),
+                             INSITU_ERROR_MEMORY);
+            assert_int_equal(error.status, INSITU_ERROR_MEMORY);
+            const mmbvh zeroed = {0};
+            assert_memory_equal(&tree, &zeroed, sizeof tree);
+            assert_int_equal(base_memory_held(), held);
+        }
+        base_memory_fail_nth(0);
+    }
+    free_lattice(&l);
+}
+
+static void wrong_arguments_are_refused(void **state)
+{
+    (void)state;
+    lattice l = make_lattice(1, LATTICE_TETS, (lattice_layout){0});
+    mmbvh tree;
+    assert_int_equal(mmbvh_build(NULL, NULL, no_shift, 1, NULL, &tree, NULL), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(mmbvh_build(&l.g, NULL, no_shift, 0, NULL, &tree, NULL), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(mmbvh_build(&l.g, NULL, no_shift, (double)NAN, NULL, &tree, NULL), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(mmbvh_build_boxes(NULL, NULL, NULL, 1, NULL, &tree, NULL), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(mmbvh_refit_ranges(NULL, &l.g, NULL, NULL), INSITU_ERROR_ARGUMENT);
+    mmbvh_free(NULL);
+    free_lattice(&l);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_layout_builds_a_proved_and_tight_tree),
+        cmocka_unit_test(shifted_and_scaled_bounds_are_rounded_outward),
+        cmocka_unit_test(same_bytes_for_any_number_of_threads),
+        cmocka_unit_test(ghosts_are_not_in_the_tree),
+        cmocka_unit_test(values_that_are_not_finite_are_counted_and_left_out),
+        cmocka_unit_test(values_beyond_floats_round_outward),
+        cmocka_unit_test(no_field_gives_infinite_ranges),
+        cmocka_unit_test(refitted_ranges_equal_a_fresh_build),
+        cmocka_unit_test(refitted_bounds_contain_moved_vertices_tightly),
+        cmocka_unit_test(further_fields_have_ranges_beside_the_tree),
+        cmocka_unit_test(coincident_cells_are_halved),
+        cmocka_unit_test(depth_is_bounded_where_cells_shrink_without_end),
+        cmocka_unit_test(parent_tree_holds_every_mesh),
+        cmocka_unit_test(descent_to_a_point_misses_no_cell),
+        cmocka_unit_test(cost_grows_with_the_side_not_the_cells),
+        cmocka_unit_test(cost_of_a_tree_by_hand),
+        cmocka_unit_test(failed_allocations_give_an_error_and_leave_nothing),
+        cmocka_unit_test(wrong_arguments_are_refused),
+    };
+    return cmocka_run_group_tests_name("mmbvh", tests, NULL, NULL);
+}
