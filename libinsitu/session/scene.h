@@ -25,7 +25,7 @@ typedef struct scene_range {
 } scene_range;
 
 typedef struct scene_opacity_point {
-    double at;     /* 0 .. 1 of the range; rising */
+    double at;     /* 0 .. 1 of the range; never falling, two the same make a step */
     float opacity; /* 0 .. 1, per unit_distance */
 } scene_opacity_point;
 
@@ -74,7 +74,7 @@ typedef struct scene_camera {
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 
 typedef struct scene_output {
-    char *path; /* {cycle}, {cycle:06}, {name} are replaced; relative to the working directory of rank 0 */
+    char *path;          /* {cycle}, {cycle:06}, {name} are replaced; relative to the working directory of rank 0 */
     scene_format format; /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
 } scene_output;
 
