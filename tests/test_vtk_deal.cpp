@@ -1,0 +1,183 @@
+/* Dealing cells out to ranks: every cell on exactly one rank whatever the partition, its points bitwise as they were,
+ * its values with it. */
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <vtkCellData.h>
+#include <vtkCompositeDataIterator.h>
+#include <vtkCompositeDataSet.h>
+#include <vtkDoubleArray.h>
+#include <vtkIntArray.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkUnstructuredGrid.h>
+
+#include "cell_deal.h"
+
+// cmocka defines fail as a macro, so it comes after all C++ headers.
+extern "C" {
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+}
+
+using render_tool::deal;
+using render_tool::partition;
+
+namespace
+{
+
+/* n × n × n hexahedra of thirds, so that no coordinate is a float; cell data "id" from first on, point data "x". */
+vtkSmartPointer<vtkUnstructuredGrid> lattice(int n, int first, double shift)
+{
+    auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    vtkNew<vtkPoints> points;
+    points->SetDataTypeToDouble();
+    vtkNew<vtkDoubleArray> x;
+    x->SetName("x");
+    for (int i = 0; i < (n + 1) * (n + 1) * (n + 1); i++) {
+        const double p[3] = {i % (n + 1) / 3.0 + shift, i / (n + 1) % (n + 1) / 3.0, i / ((n + 1) * (n + 1)) / 3.0};
+        points->InsertNextPoint(p);
+        x->InsertNextValue(p[0]);
+    }
+    grid->SetPoints(points);
+    vtkNew<vtkIntArray> id;
+    id->SetName("id");
+    for (int i = 0; i < n * n * n; i++) {
+        const vtkIdType o = i % n + (n + 1) * (i / n % n + (n + 1) * (i / (n * n)));
+        const vtkIdType up = (n + 1) * (n + 1);
+        const vtkIdType c[8] = {o, o + 1, o + n + 2, o + n + 1, o + up, o + up + 1, o + up + n + 2, o + up + n + 1};
+        grid->InsertNextCell(VTK_HEXAHEDRON, 8, c);
+        id->InsertNextValue(first + i);
+    }
+    grid->GetCellData()->AddArray(id);
+    grid->GetPointData()->AddArray(x);
+    return grid;
+}
+
+using corners = std::vector<double>; // x y z of each vertex of a cell
+
+void collect(vtkUnstructuredGrid *grid, std::map<int, corners> &found)
+{
+    auto *id = vtkIntArray::SafeDownCast(grid->GetCellData()->GetArray("id"));
+    auto *x = vtkDoubleArray::SafeDownCast(grid->GetPointData()->GetArray("x"));
+    assert_non_null(id);
+    assert_non_null(x);
+    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
+        vtkIdType count;
+        const vtkIdType *points;
+        grid->GetCellPoints(i, count, points);
+        corners at;
+        for (vtkIdType k = 0; k < count; k++) {
+            double p[3];
+            grid->GetPoint(points[k], p);
+            assert_true(x->GetValue(points[k]) == p[0]);
+            at.insert(at.end(), p, p + 3);
+        }
+        assert_true(found.emplace(id->GetValue(i), at).second);
+    }
+}
+
+void collect_all(vtkDataObject *data, std::map<int, corners> &found)
+{
+    if (!data) return;
+    if (auto *grid = vtkUnstructuredGrid::SafeDownCast(data)) {
+        collect(grid, found);
+        return;
+    }
+    auto *composite = vtkCompositeDataSet::SafeDownCast(data);
+    assert_non_null(composite);
+    const auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
+        collect(vtkUnstructuredGrid::SafeDownCast(it->GetCurrentDataObject()), found);
+}
+
+void expect_each_cell_once(vtkDataObject *data)
+{
+    std::map<int, corners> expected;
+    collect_all(data, expected);
+    for (const partition how : {partition::block, partition::random, partition::checkerboard})
+        for (const int ranks : {1, 2, 3, 7, 100}) {
+            std::map<int, corners> found;
+            for (int rank = 0; rank < ranks; rank++) collect_all(deal(data, how, rank, ranks), found);
+            assert_true(found == expected);
+        }
+}
+
+void grid_is_dealt_each_cell_once(void **)
+{
+    expect_each_cell_once(lattice(4, 0, 0));
+}
+
+void composite_is_dealt_each_cell_once(void **)
+{
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    blocks->SetBlock(0, lattice(3, 0, 0));
+    blocks->SetBlock(1, nullptr);
+    blocks->SetBlock(2, lattice(2, 1000, 5));
+    expect_each_cell_once(blocks);
+}
+
+void more_ranks_than_cells_leaves_some_without(void **)
+{
+    const auto grid = lattice(1, 0, 0);
+    int with = 0;
+    for (int rank = 0; rank < 5; rank++) with += deal(grid, partition::block, rank, 5) != nullptr;
+    assert_int_equal(with, 1);
+}
+
+/* A block's size differs from the mean by less than one cell; a hash of 4096 cells over 4 ranks by less than 5 standard
+ * deviations: sqrt(4096 · 1/4 · 3/4) · 5 = 139. */
+void parts_are_balanced(void **)
+{
+    const auto grid = lattice(16, 0, 0);
+    for (int rank = 0; rank < 4; rank++) {
+        auto cells = [&](partition how) {
+            return vtkUnstructuredGrid::SafeDownCast(deal(grid, how, rank, 4))->GetNumberOfCells();
+        };
+        assert_int_equal(cells(partition::block), 1024);
+        assert_in_range(cells(partition::random), 1024 - 139, 1024 + 139);
+    }
+}
+
+void leaves_keep_their_numbers(void **)
+{
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    blocks->SetBlock(0, lattice(2, 0, 0));
+    blocks->SetBlock(1, lattice(2, 100, 5));
+    const auto dealt = deal(blocks, partition::block, 1, 2);
+    auto *last = vtkMultiBlockDataSet::SafeDownCast(dealt);
+    assert_int_equal(last->GetNumberOfBlocks(), 2);
+    assert_null(last->GetBlock(0));
+    assert_ptr_equal(last->GetBlock(1), blocks->GetBlock(1));
+}
+
+void names_of_partitions_are_known(void **)
+{
+    partition how = partition::block;
+    assert_true(render_tool::parse_partition("checkerboard", how));
+    assert_true(how == partition::checkerboard);
+    assert_false(render_tool::parse_partition("Block", how));
+}
+
+} // namespace
+
+int main()
+{
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(grid_is_dealt_each_cell_once),
+        cmocka_unit_test(composite_is_dealt_each_cell_once),
+        cmocka_unit_test(more_ranks_than_cells_leaves_some_without),
+        cmocka_unit_test(parts_are_balanced),
+        cmocka_unit_test(leaves_keep_their_numbers),
+        cmocka_unit_test(names_of_partitions_are_known),
+    };
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

@@ -1,0 +1,243 @@
+/* insitu-render on real files: alone and on ranks it must draw the same pictures. An isosurface's pixels (depth and
+ * colour) are bitwise the same on any partition; a volume's differ by the rounding of "over" in another order. Its
+ * bound of 1e-6 in linear light is what the library promises: with the few tens of merges of a pixel at float rounding
+ * (6e-8) of values up to 1 there is no room for an error of another kind.
+ *
+ *     test_vtk_images <insitu-render> <mpiexec>, with the data's folder in INSITU_TEST_DATA; 77 where that is not set
+ */
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <OpenImageIO/imageio.h>
+
+#include "test_vtk_run.h"
+
+// cmocka defines fail as a macro, so it comes after all C++ headers.
+extern "C" {
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+}
+
+namespace
+{
+
+constexpr int width = 96, height = 72;
+constexpr double volume_tolerance = 1e-6;
+
+std::string tool, mpiexec, data_folder;
+
+struct subject {
+    std::string name;
+    std::vector<std::string> files;
+    std::string field;
+    double value, low, high;
+    int shown_in; // step in which there is something to see
+};
+
+struct picture {
+    std::vector<float> rgba, depth; // depth: empty where the file has no channel Z
+};
+
+picture read_picture(const std::string &path)
+{
+    const auto in = OIIO::ImageInput::open(path);
+    if (!in) print_error("%s cannot be opened\n", path.c_str());
+    assert_true(in != nullptr);
+    const OIIO::ImageSpec spec = in->spec();
+    assert_int_equal(spec.width, width);
+    assert_int_equal(spec.height, height);
+    const auto channels = static_cast<size_t>(spec.nchannels);
+    const size_t pixels = static_cast<size_t>(width) * height;
+    std::vector<float> all(pixels * channels);
+    assert_true(in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, all.data()));
+    picture p;
+    for (size_t i = 0; i < pixels; i++)
+        for (size_t c = 0; c < channels; c++) {
+            const std::string &channel = spec.channelnames[c];
+            if (channel == "Z")
+                p.depth.push_back(all[i * channels + c]);
+            else if (channel == "R" || channel == "G" || channel == "B" || channel == "A")
+                p.rgba.push_back(all[i * channels + c]);
+        }
+    assert_int_equal(p.rgba.size(), pixels * 4);
+    return p;
+}
+
+double difference(const std::vector<float> &a, const std::vector<float> &b)
+{
+    assert_int_equal(a.size(), b.size());
+    double most = 0;
+    for (size_t i = 0; i < a.size(); i++) {
+        assert_true(std::isfinite(a[i]) && std::isfinite(b[i]));
+        most = std::fmax(most, std::fabs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
+    }
+    return most;
+}
+
+bool is_bitwise(const std::vector<float> &a, const std::vector<float> &b)
+{
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+}
+
+int covered(const picture &p)
+{
+    int count = 0;
+    for (size_t i = 3; i < p.rgba.size(); i += 4) count += p.rgba[i] > 0;
+    return count;
+}
+
+std::string scene_of(const subject &s)
+{
+    auto image = [](const std::string &name, const std::string &layer) {
+        return "  - name: " + name + "\n    size: [" + std::to_string(width) + ", " + std::to_string(height) +
+               "]\n    background: [0, 0, 0, 0]\n    layers:\n      - " + layer + "\n    outputs:\n      - path: \"" +
+               name + "_{cycle}.exr\"\n";
+    };
+    const std::string field = "{field: \"" + s.field + "\", ";
+    return "images:\n" + image("iso", "isosurface: " + field + "values: [" + std::to_string(s.value) + "]}") +
+           image("volume", "volume: " + field + "range: [" + std::to_string(s.low) + ", " + std::to_string(s.high) +
+                               "], opacity: [[0, 0], [1, 0.9]]}");
+}
+
+/* Draw into a folder of its own, with no rank launcher where ranks is 0. */
+std::string draw(const subject &s, int ranks, const std::string &partition)
+{
+    const std::string folder = fresh_folder("vtk_images/" + s.name + "_" + std::to_string(ranks) + "_" + partition);
+    write_file(folder + "/scene.yaml", scene_of(s));
+    std::string command = ranks > 0 ? shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
+    command += shell_word(tool) + " --partition " + partition + " scene.yaml";
+    for (const std::string &file : s.files) command += " " + shell_word(data_folder + "/" + file);
+    const run_result r = run_in(folder, command);
+    if (r.status != 0) print_error("%s\n%s%s", command.c_str(), r.out.c_str(), r.err.c_str());
+    assert_int_equal(r.status, 0);
+    return folder;
+}
+
+std::string file_of(const std::string &folder, const char *image, size_t step)
+{
+    return folder + "/" + image + "_" + std::to_string(step) + ".exr";
+}
+
+void expect_same_pictures(const std::string &alone, const std::string &others, size_t steps)
+{
+    for (size_t step = 0; step < steps; step++) {
+        const picture iso = read_picture(file_of(alone, "iso", step)),
+                      iso2 = read_picture(file_of(others, "iso", step));
+        assert_true(is_bitwise(iso.depth, iso2.depth));
+        assert_true(is_bitwise(iso.rgba, iso2.rgba));
+        const picture volume = read_picture(file_of(alone, "volume", step));
+        const double most = difference(volume.rgba, read_picture(file_of(others, "volume", step)).rgba);
+        if (most > volume_tolerance) print_error("%s: volumes differ by %g\n", others.c_str(), most);
+        assert_true(most <= volume_tolerance);
+    }
+}
+
+/* At least a hundredth of the picture: the camera is automatic, and every one of these surfaces is larger. */
+void expect_something_to_see(const subject &s, const std::string &folder)
+{
+    const auto step = static_cast<size_t>(s.shown_in);
+    assert_in_range(covered(read_picture(file_of(folder, "iso", step))), width * height / 100, width * height);
+    assert_in_range(covered(read_picture(file_of(folder, "volume", step))), width * height / 100, width * height);
+}
+
+void draws_the_same_on_ranks(const subject &s)
+{
+    const std::string alone = draw(s, 0, "block");
+    expect_something_to_see(s, alone);
+    for (const char *partition : {"block", "random"})
+        expect_same_pictures(alone, draw(s, 3, partition), s.files.size());
+}
+
+void draws_alone(const subject &s)
+{
+    expect_something_to_see(s, draw(s, 0, "block"));
+}
+
+void bluntfin_is_the_same_on_ranks(void **)
+{
+    draws_the_same_on_ranks({"bluntfin_hex", {"bluntfin_hex.vtu"}, "Density", 1.2, 0.4, 3.5, 0});
+    draws_the_same_on_ranks({"bluntfin_tet", {"bluntfin_tet.vtu"}, "Density", 1.2, 0.4, 3.5, 0});
+}
+
+void post_is_the_same_on_ranks(void **)
+{
+    draws_the_same_on_ranks({"post_hex", {"post_hex.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
+}
+
+void disk_is_the_same_on_ranks(void **)
+{
+    draws_the_same_on_ranks({"disk_vtu", {"disk_out_ref.vtu"}, "Temp", 340, 293, 913, 0});
+    draws_the_same_on_ranks({"disk_ex2", {"disk_out_ref.ex2"}, "Temp", 340, 293, 913, 0});
+}
+
+void can_series_is_the_same_on_ranks(void **)
+{
+    draws_the_same_on_ranks({"can", {"can_0.vtu", "can_1.vtu", "can_2.vtu"}, "EQPS_pt", 0.7, 0, 2.7, 2});
+}
+
+void cells_of_a_series_show_by_cell_field(void **)
+{
+    draws_the_same_on_ranks({"can_cell", {"can_1.vtu"}, "EQPS", 0.35, 0, 1.9, 0});
+}
+
+void mixed_lattice_is_the_same_on_ranks(void **)
+{
+    draws_the_same_on_ranks({"mixed", {"mixed_lattice.vtu"}, "f", 0.2, -1.5, 1.5, 0});
+}
+
+void every_kind_of_cell_is_drawn(void **)
+{
+    draws_alone({"quadratic", {"cylinder_quadratic.vtu"}, "velocity_norm", 0.5, 0, 1, 0});
+    draws_alone({"tiny_tet", {"tiny_QuadraticTetra.vtu"}, "DistanceToCenter", 0.9, 0.3, 1.74, 0});
+    draws_alone({"tiny_wedge", {"tiny_QuadraticWedge.vtu"}, "DistanceToCenter", 0.9, 0.3, 1.74, 0});
+    draws_alone({"wedges", {"mesh_fs8_wedge.vtu"}, "synthetic", 0.2, -2, 1.8, 0});
+    draws_alone({"notch", {"notch_stress.vtu"}, "Nodal Stress-normed", 1500000, 0, 8000000, 0});
+    draws_the_same_on_ranks({"prisms", {"pentahexa.vtu"}, "synthetic", 0.3, -1, 1.6, 0});
+}
+
+void info_counts_the_mixed_lattice(void **)
+{
+    const run_result r = run_in(".", shell_word(tool) + " --info " + shell_word(data_folder + "/mixed_lattice.vtu") +
+                                         " " + shell_word(data_folder + "/disk_out_ref.ex2"));
+    assert_int_equal(r.status, 0);
+    for (const char *text : {"66586 cells", "Tetra                    type 10  50024", "type 12  4394", "type 13  8788",
+                             "type 14  3380", "bounds -1 .. 1, -1 .. 1, -1 .. 1", "-1.49928 .. 1.4983",
+                             "1 blocks, 7472 cells", "293.15 .. 913.15", "times  1"})
+        assert_true(r.says(text));
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    const char *folder = std::getenv("INSITU_TEST_DATA");
+    if (argc != 3) return 2;
+    if (!folder || !folder[0]) {
+        print_message("skipped: INSITU_TEST_DATA is not set\n");
+        return 77;
+    }
+    tool = argv[1];
+    mpiexec = argv[2];
+    char absolute[4096];
+    if (!realpath(folder, absolute)) {
+        print_error("INSITU_TEST_DATA: %s: %s\n", folder, std::strerror(errno));
+        return 1;
+    }
+    data_folder = absolute;
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(info_counts_the_mixed_lattice),   cmocka_unit_test(mixed_lattice_is_the_same_on_ranks),
+        cmocka_unit_test(every_kind_of_cell_is_drawn),     cmocka_unit_test(bluntfin_is_the_same_on_ranks),
+        cmocka_unit_test(post_is_the_same_on_ranks),       cmocka_unit_test(disk_is_the_same_on_ranks),
+        cmocka_unit_test(can_series_is_the_same_on_ranks), cmocka_unit_test(cells_of_a_series_show_by_cell_field),
+    };
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

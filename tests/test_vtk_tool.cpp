@@ -1,0 +1,286 @@
+/* insitu-render from outside: what it says of good files and of bad ones, alone and on ranks. Files are written here,
+ * so that what they hold is known.
+ *
+ *     test_vtk_tool <insitu-render> <mpiexec> */
+#include <string>
+
+#include <vtkCellData.h>
+#include <vtkFloatArray.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkUnstructuredGridWriter.h>
+#include <vtkXMLMultiBlockDataWriter.h>
+#include <vtkXMLUnstructuredGridWriter.h>
+
+#include "test_vtk_run.h"
+
+// cmocka defines fail as a macro, so it comes after all C++ headers.
+extern "C" {
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+}
+
+namespace
+{
+
+std::string tool, mpiexec, folder;
+
+const char *const scene = "images:\n"
+                          "  - name: a\n"
+                          "    size: [32, 24]\n"
+                          "    layers:\n"
+                          "      - isosurface:\n"
+                          "          field: x\n"
+                          "          values: [0.5]\n"
+                          "    outputs:\n"
+                          "      - path: a_{cycle:02}.exr\n";
+
+/* Tets along x, each with its own points; point field "x" is the x of the point, cell field "number" counts. */
+vtkSmartPointer<vtkUnstructuredGrid> row_of_tets(int count)
+{
+    auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkFloatArray> x, number;
+    x->SetName("x");
+    number->SetName("number");
+    const double corner[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    for (int i = 0; i < count; i++) {
+        vtkIdType ids[4];
+        for (int k = 0; k < 4; k++) {
+            ids[k] = points->InsertNextPoint(corner[k][0] + i, corner[k][1], corner[k][2]);
+            x->InsertNextValue(static_cast<float>(corner[k][0] + i));
+        }
+        grid->InsertNextCell(VTK_TETRA, 4, ids);
+        number->InsertNextValue(static_cast<float>(i));
+    }
+    grid->SetPoints(points);
+    grid->GetPointData()->AddArray(x);
+    grid->GetCellData()->AddArray(number);
+    return grid;
+}
+
+std::string path_of(const std::string &name)
+{
+    return folder + "/" + name;
+}
+
+void write_vtu(const std::string &name, vtkUnstructuredGrid *grid)
+{
+    vtkNew<vtkXMLUnstructuredGridWriter> writer;
+    writer->SetFileName(path_of(name).c_str());
+    writer->SetInputData(grid);
+    assert_int_equal(writer->Write(), 1);
+}
+
+int make_files(void **)
+{
+    folder = fresh_folder("vtk_tool");
+    write_file(path_of("scene.yaml"), scene);
+    write_vtu("row.vtu", row_of_tets(40));
+    write_vtu("row_2.vtu", row_of_tets(2));
+    write_vtu("row_10.vtu", row_of_tets(10));
+    write_vtu("empty.vtu", row_of_tets(0));
+    const std::string whole = read_file(path_of("row.vtu"));
+    write_file(path_of("cut.vtu"), whole.substr(0, whole.size() / 2));
+    write_file(path_of("notes.txt"), "no data");
+    write_file(path_of("pieces.pvtu"),
+               "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\"><PUnstructuredGrid GhostLevel=\"0\">"
+               "<PPointData><PDataArray type=\"Float32\" Name=\"x\"/></PPointData>"
+               "<PCellData><PDataArray type=\"Float32\" Name=\"number\"/></PCellData>"
+               "<PPoints><PDataArray type=\"Float32\" NumberOfComponents=\"3\"/></PPoints>\n"
+               "<Piece Source=\"row.vtu\"/>\n<Piece Source=\"row_2.vtu\"/>\n<Piece Source=\"row_10.vtu\"/>\n"
+               "</PUnstructuredGrid></VTKFile>\n");
+
+    vtkNew<vtkUnstructuredGridWriter> legacy;
+    legacy->SetFileName(path_of("row.vtk").c_str());
+    legacy->SetInputData(row_of_tets(5));
+    assert_int_equal(legacy->Write(), 1);
+
+    vtkNew<vtkMultiBlockDataSet> blocks;
+    blocks->SetBlock(0, row_of_tets(3));
+    blocks->SetBlock(1, row_of_tets(4));
+    vtkNew<vtkXMLMultiBlockDataWriter> writer;
+    writer->SetFileName(path_of("blocks.vtm").c_str());
+    writer->SetInputData(blocks);
+    assert_int_equal(writer->Write(), 1);
+
+    vtkNew<vtkUnstructuredGrid> flat;
+    flat->SetPoints(row_of_tets(1)->GetPoints());
+    const vtkIdType triangle[3] = {0, 1, 2};
+    flat->InsertNextCell(VTK_TRIANGLE, 3, triangle);
+    write_vtu("flat.vtu", flat);
+    return 0;
+}
+
+run_result run_tool(const std::string &arguments)
+{
+    return run_in(folder, shell_word(tool) + " " + arguments);
+}
+
+run_result run_ranks(int ranks, const std::string &arguments)
+{
+    return run_in(folder,
+                  shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " + shell_word(tool) + " " + arguments);
+}
+
+void expect(const run_result &r, int status, const std::string &text)
+{
+    if (r.status == status && r.says(text)) return;
+    print_error("status %d, expected %d with '%s'\n%s%s", r.status, status, text.c_str(), r.out.c_str(), r.err.c_str());
+    assert_true(false);
+}
+
+int count_of(const std::string &text, const std::string &what)
+{
+    int count = 0;
+    for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) count++;
+    return count;
+}
+
+void help_explains_itself(void **)
+{
+    const run_result r = run_tool("--help");
+    expect(r, 0, "usage: insitu-render");
+    for (const char *option : {"--info", "--steps", "--pieces", "--partition", "--help", ".vtu", ".vtm"})
+        assert_true(r.says(option));
+    assert_string_equal(r.err.c_str(), "");
+}
+
+void info_lists_what_is_in_a_file(void **)
+{
+    const run_result r = run_tool("--info row.vtu");
+    expect(r, 0, "40 cells, 160 points (float)");
+    assert_true(r.says("Tetra"));
+    assert_true(r.says("bounds 0 .. 40, 0 .. 1, 0 .. 1"));
+    assert_true(r.says("point  x "));
+    assert_true(r.says("0 .. 40\n"));
+    assert_true(r.says("cell   number"));
+    assert_true(r.says("0 .. 39\n"));
+}
+
+void info_reads_every_kind(void **)
+{
+    expect(run_tool("--info pieces.pvtu"), 0, "52 cells");
+    expect(run_tool("--info blocks.vtm"), 0, "2 blocks, 7 cells");
+    expect(run_tool("--info row.vtk"), 0, "5 cells");
+    expect(run_ranks(2, "--info row.vtk"), 0, "5 cells");
+}
+
+void wrong_files_are_named_with_the_reason(void **)
+{
+    expect(run_tool("scene.yaml missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+    expect(run_tool("scene.yaml notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
+    expect(run_tool("scene.yaml ."), 1, "is a directory");
+    expect(run_tool("--info cut.vtu"), 1, "insitu-render: cut.vtu: cannot be read");
+    expect(run_tool("--info missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+}
+
+void errors_are_one_line(void **)
+{
+    const run_result r = run_tool("--info cut.vtu");
+    assert_int_equal(r.status, 1);
+    assert_int_equal(count_of(r.err, "\n"), 1);
+    assert_string_equal(r.out.c_str(), "");
+}
+
+void wrong_options_are_named(void **)
+{
+    expect(run_tool("--fast"), 1, "--fast: unknown option");
+    expect(run_tool("--steps 3:1 scene.yaml row.vtu"), 1, "the first step is after the last");
+    expect(run_tool("--steps x scene.yaml row.vtu"), 1, "--steps x: expected");
+    expect(run_tool("--steps 4: scene.yaml row.vtu"), 1, "none chosen of 1");
+    expect(run_tool("--partition round scene.yaml row.vtu"), 1, "--partition round: expected");
+    expect(run_tool("--steps"), 1, "a value is missing");
+    expect(run_tool(""), 1, "missing");
+    expect(run_tool("scene.yaml"), 1, "data files are missing");
+}
+
+/* One rank alone gets a file that is not there, so it alone fails before and where others go on to collective calls. */
+void one_rank_failing_ends_all(void **)
+{
+    const std::string start =
+        shell_word(mpiexec) + " -n 2 " + shell_word(tool) + " scene.yaml row.vtu : -n 1 " + shell_word(tool);
+    expect(run_in(folder, start + " scene.yaml missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
+}
+
+void one_rank_failing_to_read_ends_all(void **)
+{
+    const std::string start =
+        shell_word(mpiexec) + " -n 2 " + shell_word(tool) + " scene.yaml row.vtu : -n 1 " + shell_word(tool);
+    expect(run_in(folder, start + " scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: cannot be read");
+    expect(run_ranks(3, "scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: cannot be read");
+}
+
+void nothing_to_draw_is_an_error(void **)
+{
+    expect(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
+    expect(run_tool("scene.yaml flat.vtu"), 1, "flat.vtu: no cells to draw; 1 cells of less than 3 dimensions");
+    expect(run_ranks(2, "scene.yaml empty.vtu"), 1, "empty.vtu: no cells to draw");
+}
+
+void wrong_scenes_are_errors(void **)
+{
+    expect(run_tool("missing.yaml row.vtu"), 1, "missing.yaml");
+    write_file(path_of("wrong.yaml"), "images:\n  - nmae: a\n");
+    expect(run_tool("wrong.yaml row.vtu"), 1, "nmae");
+}
+
+void several_files_are_steps_in_the_order_of_their_numbers(void **)
+{
+    const run_result r = run_tool("scene.yaml row_10.vtu row_2.vtu");
+    expect(r, 0, "2 steps, 2 pictures");
+    assert_true(r.out.find("row_2.vtu  cycle 0") < r.out.find("row_10.vtu  cycle 1"));
+    assert_int_equal(read_file(path_of("a_00.exr")).empty(), 0);
+    assert_int_equal(read_file(path_of("a_01.exr")).empty(), 0);
+}
+
+void chosen_steps_keep_their_cycles(void **)
+{
+    const run_result r = run_tool("--steps 1 scene.yaml row_2.vtu row_10.vtu");
+    expect(r, 0, "row_10.vtu  cycle 1");
+    assert_int_equal(count_of(r.out, "cycle"), 1);
+}
+
+/* All cells are there, however they are read and dealt out. */
+void every_way_of_reading_gives_all_cells(void **)
+{
+    for (const int ranks : {2, 4}) {
+        expect(run_ranks(ranks, "scene.yaml pieces.pvtu"), 0, "  52 cells");
+        expect(run_ranks(ranks, "scene.yaml blocks.vtm"), 0, "  7 cells");
+        expect(run_ranks(ranks, "--partition random scene.yaml row.vtu"), 0, "  40 cells");
+        expect(run_ranks(ranks, "--pieces scene.yaml row.vtu row_2.vtu row_10.vtu"), 0, "  52 cells");
+    }
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    if (argc != 3) return 2;
+    tool = argv[1];
+    mpiexec = argv[2];
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(help_explains_itself),
+        cmocka_unit_test(info_lists_what_is_in_a_file),
+        cmocka_unit_test(info_reads_every_kind),
+        cmocka_unit_test(wrong_files_are_named_with_the_reason),
+        cmocka_unit_test(errors_are_one_line),
+        cmocka_unit_test(wrong_options_are_named),
+        cmocka_unit_test(one_rank_failing_ends_all),
+        cmocka_unit_test(one_rank_failing_to_read_ends_all),
+        cmocka_unit_test(nothing_to_draw_is_an_error),
+        cmocka_unit_test(wrong_scenes_are_errors),
+        cmocka_unit_test(several_files_are_steps_in_the_order_of_their_numbers),
+        cmocka_unit_test(chosen_steps_keep_their_cycles),
+        cmocka_unit_test(every_way_of_reading_gives_all_cells),
+    };
+    return cmocka_run_group_tests(tests, make_files, nullptr);
+}
