@@ -19,8 +19,10 @@
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
 
 typedef struct kernel_cell {
+    uint32_t serial, index; /* the cache's key: tile, cell, */
+    int part, layer;        /* mesh, and whose values these are */
+    bool is_finite, is_placed, is_constant;
     int type, count;
-    int64_t index;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
     double values[GRID_MAX_CELL_VERTICES];
@@ -56,13 +58,31 @@ SIMD_INLINE bool kernel_position_before(const double *a, const double *b)
     return a[2] < b[2];
 }
 
-/* Vertices of the cell and its values; false where a value is not finite. */
-SIMD_INLINE bool kernel_cell_values(kernel_cell *c, const grid *g, const grid_field *field, int64_t index)
+/* Cells that rays of the tile have met, by hash: a cell is fetched, ordered and moved into tile space once for all the
+ * tile's packets, and for all of a volume's windows, as long as it is not pushed out. */
+enum { KERNEL_CACHE_BITS = 8, KERNEL_CACHE_CELLS = 1 << KERNEL_CACHE_BITS };
+
+typedef struct kernel_cache {
+    kernel_cell cells[KERNEL_CACHE_CELLS];
+} kernel_cache;
+
+/* The cell with its values; a new one is not placed yet. layer tells apart the fields that cells are asked for. */
+SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
+                                          uint32_t index)
 {
+    const uint32_t key = index + 0x85ebca6bu * (uint32_t)part + 0xc2b2ae35u * (uint32_t)layer;
+    kernel_cell *c = &((kernel_cache *)p->thread->cache)->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];
+    if (c->serial == p->thread->serial && c->index == index && c->part == part && c->layer == layer) return c;
+    const grid *g = p->frame->job->parts[part].cells;
+    c->serial = p->thread->serial;
     c->index = index;
+    c->part = part;
+    c->layer = layer;
+    c->is_placed = false;
     c->type = grid_cell_type(g, index);
     c->count = grid_cell_vertices(g, index, c->vertices);
-    return grid_cell_values(field, index, c->vertices, c->count, c->values);
+    c->is_finite = grid_cell_values(field, index, c->vertices, c->count, c->values);
+    return c;
 }
 
 SIMD_INLINE void kernel_cell_swap(kernel_cell *c, int i, int j)
@@ -100,7 +120,7 @@ SIMD_INLINE void kernel_cell_order(kernel_cell *c)
 }
 
 /* Vertices into tile space (kernel_packet.h), in order. */
-SIMD_INLINE void kernel_cell_geometry(kernel_cell *c, const kernel_packet *p, const grid *g)
+SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
     const kernel_frame *f = p->frame;
     const double *eye = f->job->camera.eye;
@@ -118,6 +138,7 @@ SIMD_INLINE void kernel_cell_geometry(kernel_cell *c, const kernel_packet *p, co
         c->y[i] = (float)(y - cy * depth);
         c->z[i] = (float)(z - f->depth_shift);
     }
+    c->is_placed = true;
 }
 
 SIMD_INLINE void kernel_project(const kernel_packet *p, const kernel_cell *c, int i, kernel_projected *out)

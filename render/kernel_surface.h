@@ -27,6 +27,7 @@ typedef struct kernel_hits {
 
 typedef struct kernel_surface_state {
     const kernel_surface *surface;
+    int layer;
     kernel_hits *hits;
     bool is_opaque;
 } kernel_surface_state;
@@ -249,22 +250,21 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
     kernel_surface_state *state = opaque_state;
     const render_surface_layer *layer = state->surface->layer;
     const grid *g = p->frame->job->parts[part].cells;
-    kernel_cell c;
     for (int n = 0; n < count; n++) {
-        if (!kernel_cell_values(&c, g, &layer->field.fields[part], cells[n])) continue;
-        bool is_placed = false;
+        kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
+        if (!c->is_finite) continue;
         for (int value = 0; value < layer->value_count; value++) {
-            if (!kernel_cell_straddles(&c, layer->values[value])) continue;
-            if (!is_placed) {
-                kernel_cell_geometry(&c, p, g);
-                if (layer->colour_map) kernel_cell_colours(&c, state->surface, part);
-                is_placed = true;
+            if (!kernel_cell_straddles(c, layer->values[value])) continue;
+            const bool is_fresh = !c->is_placed;
+            if (is_fresh) {
+                kernel_cell_place(c, p, g);
+                if (layer->colour_map) kernel_cell_colours(c, state->surface, part);
             }
-            kernel_cell_relative(&c, layer->values[value]);
-            if (c.type == GRID_TET)
-                kernel_tet_surface(p, state, &c, value, rays);
+            if (is_fresh || layer->value_count > 1) kernel_cell_relative(c, layer->values[value]);
+            if (c->type == GRID_TET)
+                kernel_tet_surface(p, state, c, value, rays);
             else
-                kernel_poly_surface(p, state, &c, value, rays);
+                kernel_poly_surface(p, state, c, value, rays);
         }
     }
 }
@@ -277,7 +277,8 @@ SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
     for (int n = 0; n < f->surface_count; n++) {
-        kernel_surface_state state = {.surface = &f->surfaces[n], .hits = hits, .is_opaque = n < f->opaque_count};
+        kernel_surface_state state = {
+            .surface = &f->surfaces[n], .layer = n, .hits = hits, .is_opaque = n < f->opaque_count};
         kernel_trace_parts(p, &f->surfaces[n].layer->field, &f->surfaces[n].interest, p->t_near, &p->t_far,
                            kernel_surface_leaf, &state);
     }

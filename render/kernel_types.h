@@ -3,9 +3,11 @@
 #ifndef RENDER_KERNEL_TYPES_H
 #define RENDER_KERNEL_TYPES_H
 
+#include <stddef.h>
+
 #include "render.h"
 
-enum { KERNEL_TILE = 8, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
+enum { KERNEL_TILE = 16, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
 
 /* Values that show: a node whose range meets none of these intervals is skipped. Rounded outward. */
 typedef struct kernel_interest {
@@ -53,6 +55,8 @@ typedef struct kernel_frame {
 
 /* One thread's state. */
 typedef struct kernel_thread {
+    void *cache;     /* cache_bytes of the kernel table, zeroed at the frame's begin */
+    uint32_t serial; /* of the tile, from 1: what the cache holds of other tiles is stale */
     fragment_list *out;
     /* Make room for more items in out; false where memory ran out. */
     bool (*reserve)(fragment_list *list, int64_t more);
@@ -65,6 +69,7 @@ typedef struct kernel_thread {
 /* What one instruction set's object exports. */
 typedef struct kernel_table {
     int width;
+    size_t cache_bytes;
     /* Trace the tile of pixels whose upper left one is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
 } kernel_table;

@@ -44,23 +44,25 @@ SIMD_INLINE float kernel_hold(double v, double limit)
     return (float)(v < -limit ? -limit : v > limit ? limit : v);
 }
 
-/* False where all of the cell is transparent. */
-SIMD_INLINE bool kernel_cell_domain(kernel_cell *c, const kernel_transfer *t, bool *is_constant)
+/* Does the cell show? */
+SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)
 {
     double low = c->values[0], high = low;
     for (int i = 1; i < c->count; i++) {
         low = c->values[i] < low ? c->values[i] : low;
         high = c->values[i] > high ? c->values[i] : high;
     }
-    *is_constant = low == high;
-    return kernel_interest_meets(&t->interest, (float)fmin(fmax(low, -3e38), 3e38),
-                                 (float)fmin(fmax(high, -3e38), 3e38));
+    return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
 }
 
-/* After kernel_cell_geometry(), which may reorder. Held to 1e18 so that interpolation cannot overflow. */
-SIMD_INLINE void kernel_cell_scale(kernel_cell *c, const kernel_transfer *t)
+/* f: values in the transfer's domain, held to 1e18 so that interpolation cannot overflow. */
+SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
 {
-    for (int i = 0; i < c->count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+    c->is_constant = true;
+    for (int i = 0; i < c->count; i++) {
+        c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+        c->is_constant = c->is_constant && c->values[i] == c->values[0];
+    }
 }
 
 /* The window's samples that may be in the interval of some ray: indices into the window. */
@@ -105,24 +107,25 @@ static void kernel_volume_leaf(kernel_packet *p, void *opaque_state, int part, c
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
     const grid_field *field = &p->frame->job->volumes[state->volume].field.fields[part];
     const grid *g = p->frame->job->parts[part].cells;
-    kernel_cell c;
     for (int n = 0; n < count; n++) {
-        bool is_constant;
-        if (!kernel_cell_values(&c, g, field, cells[n])) continue;
-        if (!kernel_cell_domain(&c, transfer, &is_constant)) continue;
-        kernel_cell_geometry(&c, p, g);
-        kernel_cell_scale(&c, transfer);
-        if (c.type == GRID_TET) {
+        /* Layers of volumes are counted on from those of surfaces. */
+        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count + state->volume, part, field, cells[n]);
+        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
+        if (!c->is_placed) {
+            kernel_cell_place(c, p, g);
+            kernel_cell_domain(c, transfer);
+        }
+        if (c->type == GRID_TET) {
             kernel_interval i;
-            kernel_tet_interval(p, &c, rays, false, &i);
+            kernel_tet_interval(p, c, rays, false, &i);
             if (vm_any(i.mask)) kernel_fill(p, state, NULL, &i);
             continue;
         }
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
         kernel_map map;
-        const int intervals = kernel_poly_intervals(p, &c, rays, false, list);
-        if (intervals && !is_constant) kernel_map_setup(&map, &c);
-        for (int k = 0; k < intervals; k++) kernel_fill(p, state, is_constant ? NULL : &map, &list[k]);
+        const int intervals = kernel_poly_intervals(p, c, rays, false, list);
+        if (intervals && !c->is_constant) kernel_map_setup(&map, c);
+        for (int k = 0; k < intervals; k++) kernel_fill(p, state, c->is_constant ? NULL : &map, &list[k]);
     }
 }
 

@@ -61,14 +61,17 @@ static bool join_lists(fragment_list *out, fragment_list *lists, int count)
 static insitu_status trace_frame(const kernel_frame *frame, fragment_list *lists, int threads, fragment_list *out,
                                  render_statistics *statistics, base_error *error)
 {
+    const size_t cache_bytes = render_kernels()->cache_bytes;
     int failed = 0;
     int64_t failures = 0;
     double surface = 0, volume = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : failed, failures) reduction(max : surface, volume)
     {
         fragment_list *list = &lists[omp_get_thread_num()];
-        kernel_thread thread = {.out = list, .reserve = reserve, .now = now};
+        kernel_thread thread = {.cache = base_calloc(1, cache_bytes), .out = list, .reserve = reserve, .now = now};
+        thread.out_of_memory = !thread.cache;
         trace_tiles(frame, &thread);
+        base_free(thread.cache);
         failed += thread.out_of_memory;
         failures += thread.map_failures;
         surface = thread.surface_seconds;

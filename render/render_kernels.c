@@ -68,10 +68,11 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
 {
     const render_camera *camera = &f->job->camera;
     kernel_tile tile;
+    thread->serial++;
     kernel_tile_setup(&tile, f, x0, y0);
     for (int y = y0; y < y0 + KERNEL_TILE && y < camera->height; y += KERNEL_PACKET_ROWS)
         for (int x = x0; x < x0 + KERNEL_TILE && x < camera->width; x += KERNEL_PACKET_COLUMNS)
             trace_packet(f, &tile, thread, x, y);
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, trace_tile};
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_cache), trace_tile};
