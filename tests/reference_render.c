@@ -183,7 +183,7 @@ static double bisect(trace *t, const placed_cell *c, const double *values, doubl
                      bool side_in)
 {
     double low = z_in, high = z_out;
-    for (int step = 0; step < 60; step++) {
+    for (int step = 0; step < 44; step++) {
         const double middle = 0.5 * (low + high);
         if (middle <= low || middle >= high) break;
         if ((value_along(t, c, values, middle) >= iso) == side_in)
@@ -192,6 +192,24 @@ static double bisect(trace *t, const placed_cell *c, const double *values, doubl
             high = middle;
     }
     return 0.5 * (low + high);
+}
+
+/* Neubauer's method: regula falsi from the faces' values, for its error alone. */
+static double falsi(trace *t, const placed_cell *c, const double *values, double iso, const reference_crossing ends[2],
+                    const double face[2], int steps)
+{
+    double z0 = ends[0].z, z1 = ends[1].z, v0 = face[0] - iso, v1 = face[1] - iso;
+    for (int n = 0; n < steps && z1 - z0 > 1e-12 * c->size; n++) {
+        const double z = z0 - v0 * (z1 - z0) / (v1 - v0), v = value_along(t, c, values, z) - iso;
+        if ((v < 0) == (v0 < 0)) {
+            z0 = z;
+            v0 = v;
+        } else {
+            z1 = z;
+            v1 = v;
+        }
+    }
+    return z0 - v0 * (z1 - z0) / (v1 - v0);
 }
 
 /* More sign changes than the one that the ends promise? */
@@ -237,10 +255,10 @@ static void surface_colour(trace *t, const placed_cell *c, const render_surface_
     table_colour(layer->colour_map, value, colour);
 }
 
-static void add_hit(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, int surface,
-                    const double *values, double depth)
+static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index,
+                              int surface, const double *values, double depth)
 {
-    double point[3], value, gradient[3], colour[3], low, high;
+    double point[3], value, gradient[3], colour[3];
     event *e = add_event(t);
     e->depth = e->hit.depth = depth;
     e->order = e->hit.surface = surface;
@@ -249,15 +267,13 @@ static void add_hit(trace *t, const placed_cell *c, const render_surface_layer *
     line_at(t, depth, point);
     reference_interpolate(&c->cell, point, values, &value, gradient);
     to_world(&t->scene->job->camera, gradient, e->hit.normal);
-    const double steepness = sqrt(dot(gradient, gradient));
     normalize(e->hit.normal);
     const double along = dot(e->hit.normal, t->direction) / sqrt(dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
-    range_of(values, c->cell.count, &low, &high);
     e->hit.conditioning = 1 / fabs(along);
-    e->hit.softness = (high - low) / (steepness * c->size) / fabs(along);
     surface_colour(t, c, layer, value_index, point, colour);
     shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
+    return &e->hit;
 }
 
 static void cross_surface(trace *t, const placed_cell *c, const render_surface_layer *layer, int first_surface,
@@ -275,7 +291,9 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
         const double z = bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
         if (is_ambiguous(t, c, values, iso, ends[0].z, ends[1].z, side)) t->out->ambiguous = true;
         lessen(&t->out->eye_margin, fabs(z) / c->size);
-        if (z >= 0) add_hit(t, c, layer, i, first_surface + i, values, z);
+        if (z < 0) continue;
+        reference_hit *hit = add_hit(t, c, layer, i, first_surface + i, values, z);
+        hit->falsi_error = fabs(falsi(t, c, values, iso, ends, face, layer->root_steps) - z);
     }
 }
 

@@ -11,9 +11,8 @@ typedef struct reference_hit {
     double normal[3]; /* world, towards the eye */
     double colour[3]; /* shaded, not premultiplied */
     double opacity;
+    double falsi_error;  /* how far Neubauer's method in double with the layer's root_steps is from depth */
     double conditioning; /* |gradient| / |its component along the ray|: how an error of position becomes one of depth */
-    double softness;     /* (range of the cell's values) / (|gradient| × cell size) × conditioning: the same of the
-                            field's rounding, in cell sizes per range */
 } reference_hit;
 
 enum { REFERENCE_MAX_HITS = 64 };

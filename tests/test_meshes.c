@@ -353,13 +353,26 @@ void test_mesh_shuffle(test_mesh *mesh, uint64_t seed)
         for (int j = 0; j < grid_type_vertices(old.types[from]); j++) renumbered[j] = vertex_to[v[j]];
         mesh->ghosts[i] = old.ghosts[from];
         add_cell(mesh, old.types[from], renumbered, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
-        const symmetry *s = symmetries(old.types[from]);
-        for (uint64_t turn = 0; turn < 12; turn++)
-            reorder(mesh, i, s->order[hash((uint64_t)i * 16 + turn, seed + 2) % (uint64_t)s->count]);
     }
     test_mesh_free(&old);
     free(vertex_to);
     free(cell_from);
+}
+
+void test_mesh_turn(test_mesh *mesh, uint64_t seed)
+{
+    for (int64_t i = 0; i < mesh->cell_count; i++) {
+        const symmetry *s = symmetries(mesh->types[i]);
+        for (uint64_t turn = 0; turn < 12; turn++)
+            reorder(mesh, i, s->order[hash((uint64_t)i * 16 + turn, seed) % (uint64_t)s->count]);
+    }
+}
+
+void test_mesh_transform(test_mesh *mesh, double scale, const double offset[3])
+{
+    for (int64_t i = 0; i < mesh->vertex_count; i++)
+        for (int axis = 0; axis < 3; axis++)
+            mesh->coordinates[3 * i + axis] = mesh->coordinates[3 * i + axis] * scale + offset[axis];
 }
 
 const char *test_partition_kind_name(test_partition_kind kind)

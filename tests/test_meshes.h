@@ -65,9 +65,14 @@ void test_mesh_round(test_mesh *mesh);
 /* Turn every cell (or, with every_second, a half chosen by hash) into its mirror image's vertex order: left-handed. */
 void test_mesh_mirror(test_mesh *mesh, bool every_second);
 
-/* Another order of the cells and of the vertices, and each cell's vertices by a random symmetry of its kind (rotations
- * and mirrors). The same geometry and field. */
+/* Another order of the cells and of the vertices. The same geometry and field. */
 void test_mesh_shuffle(test_mesh *mesh, uint64_t seed);
+
+/* Each cell's vertices by a random symmetry of its kind (rotations and mirrors). The same geometry and field. */
+void test_mesh_turn(test_mesh *mesh, uint64_t seed);
+
+/* position * scale + offset. */
+void test_mesh_transform(test_mesh *mesh, double scale, const double offset[3]);
 
 typedef enum test_partition_kind {
     TEST_BLOCK,

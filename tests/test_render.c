@@ -1,0 +1,392 @@
+/* The kernels against the reference, every ray: all cell kinds, cameras outside and inside, opaque and transparent
+ * surfaces, volumes, and both. */
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include <cmocka.h>
+
+static const double one_value[1] = {0.3};
+static const double four_values[4] = {-0.9, -0.2, 0.3, 1.1};
+static const double linear_values[3] = {-0.6, 0.1, 0.5};
+
+/* Fraction of rays with several roots in a cell or on whose cells a warped face contradicts the interior. */
+static void assert_few_ambiguous(const fixture_outcome *o, double share)
+{
+    if ((double)o->ambiguous > share * (double)o->rays) fail_msg("%d of %d ambiguous", (int)o->ambiguous, (int)o->rays);
+}
+
+static const char *case_name(test_mesh_kind kind, fixture_camera camera, const char *what)
+{
+    static char name[96];
+    snprintf(name, sizeof name, "%s, %s, %s", test_mesh_kind_name(kind), fixture_camera_name(camera), what);
+    return name;
+}
+
+/* Coarse lattices for the kinds of many cells. */
+static int lattice_side(test_mesh_kind kind)
+{
+    return kind == TEST_HEXES ? 6 : kind == TEST_WEDGES ? 5 : 4;
+}
+
+static void surface_is_the_reference_for_every_kind_and_camera(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
+            render_fixture f;
+            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_look(&f, camera, 39, 33);
+            fixture_add_surface(&f, one_value, 1, 1);
+            const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "one value"));
+            assert_true(o.hits > 150);
+            assert_few_ambiguous(&o, kind == TEST_TETS ? 0 : 0.1);
+            fixture_free(&f);
+        }
+}
+
+static void surfaces_of_several_values_are_the_reference(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
+            render_fixture f;
+            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_look(&f, camera, 27, 23);
+            fixture_add_surface(&f, four_values, 4, 1);
+            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "four values"));
+            f.surfaces[0].opacity = 0.4f;
+            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "four transparent values"));
+            fixture_free(&f);
+        }
+}
+
+static void transparent_surfaces_before_an_opaque_one_are_the_reference(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        render_fixture f;
+        fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_add_surface(&f, four_values, 2, 0.3f);
+        fixture_add_surface(&f, four_values + 2, 2, 1);
+        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "transparent before opaque"));
+        fixture_free(&f);
+    }
+}
+
+static void volume_is_the_reference_for_every_kind_and_camera(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++) {
+            render_fixture f;
+            fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+            fixture_look(&f, camera, 37, 31);
+            fixture_set_volume(&f, 0.3);
+            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "volume"));
+            fixture_free(&f);
+        }
+}
+
+static void volume_and_surfaces_are_the_reference_together(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++)
+            for (int transparent = 0; transparent < 2; transparent++) {
+                render_fixture f;
+                fixture_create_lattice(&f, kind, lattice_side(kind), 0.2, test_wave);
+                fixture_look(&f, camera, 25, 21);
+                fixture_add_surface(&f, four_values + 1, 2, transparent ? 0.5f : 1);
+                fixture_set_volume(&f, 0.4);
+                const char *what = transparent ? "volume and transparent surfaces" : "volume and surfaces";
+                fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, what));
+                f.job.is_alone = false;
+                fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, what));
+                fixture_free(&f);
+            }
+}
+
+/* ---- closed forms ---- */
+
+static double ray_linear(const render_camera *camera, int pixel, double *at_base)
+{
+    double base[3], d[3];
+    render_camera_ray(camera, pixel % camera->width, pixel / camera->width, base, d);
+    *at_base = test_linear(base);
+    return 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
+}
+
+/* Plane-faced cells of a linear field: the surface is its plane. Float32 positions and values err by a few 6e-8 of the
+ * mesh's size (value 1.6 at most); the ray's slope turns that into depth. */
+static void linear_surface_is_a_plane_in_every_kind(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
+            render_fixture f;
+            drawn_frame drawn;
+            fixture_create_lattice(&f, kind, 3, kind == TEST_TETS ? 0.2 : 0, test_linear);
+            fixture_look(&f, camera, 41, 37);
+            fixture_add_surface(&f, linear_values, 3, 0.5f);
+            f.surfaces[0].root_steps = 2;
+            fixture_draw(&f, &drawn);
+            for (int64_t i = 0; i < drawn.list.count; i++) {
+                const fragment *hit = &drawn.list.items[i];
+                double at_base;
+                const double slope = ray_linear(&f.job.camera, (int)hit->pixel, &at_base);
+                const double value = at_base + slope * fixture_depth(&f, hit->t_in);
+                assert_true(fabs(value - linear_values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope));
+            }
+            assert_true(drawn.list.count > 300);
+            drawn_free(&drawn);
+            fixture_free(&f);
+        }
+}
+
+/* A constant opacity: every ray's transmittance is that of the number of samples in the cube, on lattice lines as well:
+ * no sample is lost or counted twice at a face, an edge or a vertex. */
+static void constant_volume_counts_every_sample_once(void **state)
+{
+    (void)state;
+    static const float constant[1] = {0.3f};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = CAMERA_OUTSIDE; camera < CAMERA_COUNT; camera++) {
+            render_fixture f;
+            drawn_frame drawn;
+            int off = 0, met = 0;
+            fixture_create_lattice(&f, kind, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_linear);
+            fixture_look(&f, camera, 43, 41);
+            fixture_set_volume(&f, 0.23);
+            f.transfer.opacity_count = 1;
+            f.transfer.opacities = constant;
+            fixture_draw(&f, &drawn);
+            for (int p = 0; p < 43 * 41; p++) {
+                double base[3], d[3], low = 0, high = (double)INFINITY;
+                render_camera_ray(&f.job.camera, p % 43, p / 43, base, d);
+                for (int axis = 0; axis < 3; axis++) {
+                    const double a = (-1 - base[axis]) / d[axis], b = (1 - base[axis]) / d[axis];
+                    low = fmax(low, fmin(a, b));
+                    high = fmin(high, fmax(a, b));
+                }
+                /* Within rounding of the cube's border a ray or sample may go either way. */
+                if (fabs(high - low) < 1e-5 || (camera == CAMERA_ALONG_X && (fabs(base[1]) == 1 || fabs(base[2]) == 1)))
+                    continue;
+                const double length = f.job.camera.is_orthographic ? 1 : sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+                const double step = f.job.step / length, jitter = render_jitter((uint32_t)p, 0);
+                const double count = low < high ? ceil(high / step - jitter) - ceil(low / step - jitter) : 0;
+                const double clear = pow(0.7, count * f.job.step / f.transfer.unit_distance) * 0.5;
+                met += low < high;
+                off += fabs(1 - (double)drawn.picture.rgba[4 * p + 3] - clear) > 1e-5;
+            }
+            assert_true(met > 300);
+            if (off) fail_msg("%s: %d of %d rays", case_name(kind, camera, "samples"), off, met);
+            drawn_free(&drawn);
+            fixture_free(&f);
+        }
+}
+
+/* Rays through the vertices, along the edges and in the faces of a lattice meet a linear field's surface exactly once.
+ */
+static void lattice_lines_have_no_holes(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        render_fixture f;
+        drawn_frame drawn;
+        int met = 0;
+        fixture_create_lattice(&f, kind, 4, 0, test_linear);
+        fixture_look(&f, CAMERA_ALONG_X, 43, 41);
+        static const double value[1] = {0.1};
+        fixture_add_surface(&f, value, 1, 0.5f);
+        fixture_draw(&f, &drawn);
+        for (int p = 0; p < 43 * 41; p++) {
+            double base[3], d[3], at_base;
+            render_camera_ray(&f.job.camera, p % 43, p / 43, base, d);
+            const double slope = ray_linear(&f.job.camera, p, &at_base), z = (0.1 - at_base) / slope;
+            const double x = base[0] + z * d[0];
+            if (fabs(base[1]) >= 1 || fabs(base[2]) >= 1 || fabs(fabs(x) - 1) < 1e-5) continue;
+            met++;
+            assert_int_equal(drawn.first[p + 1] - drawn.first[p], fabs(x) < 1);
+        }
+        assert_true(met > 800);
+        drawn_free(&drawn);
+        fixture_free(&f);
+    }
+}
+
+/* ---- single cells, ugly ones too ---- */
+
+static void single_cells_are_the_reference(void **state)
+{
+    (void)state;
+    static const double values[3] = {-0.25, 0.1, 0.35};
+    /* A sliver's float32 rounding is 6e-8 of its length and 1e-3 of its thickness: margins and depths follow. */
+    static const fixture_bounds thin = {.depth = 1e-2, .colour = 2, .excluded = 1, .margin = 1e-3};
+    for (test_cell_shape shape = 0; shape < TEST_SHAPE_COUNT; shape++)
+        for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
+            test_mesh mesh;
+            render_fixture f;
+            test_mesh_single(shape, test_linear, &mesh);
+            fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                           (const double[]){0, 0, 0});
+            fixture_look(&f, camera, 39, 33);
+            fixture_add_surface(&f, values, 3, 0.5f);
+            fixture_set_volume(&f, 0.05);
+            const bool is_thin = shape == TEST_SLIVER_TET || shape >= TEST_FLAT_TET;
+            fixture_compare(&f, is_thin ? &thin : &fixture_usual_bounds, test_cell_shape_name(shape));
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+}
+
+static void left_handed_cells_are_the_reference(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        render_fixture f;
+        test_mesh_lattice(kind, 3, 0.2, test_wave, &mesh);
+        test_mesh_mirror(&mesh, true);
+        fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / 3, 1,
+                       (const double[]){0, 0, 0});
+        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_add_surface(&f, one_value, 1, 0.5f);
+        fixture_set_volume(&f, 0.3);
+        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "left-handed"));
+        fixture_free(&f);
+        test_mesh_free(&mesh);
+    }
+}
+
+/* Far from the origin, in double: the same picture relative to the cells. The double coordinates themselves round by
+ * 5.8e6 · 1e-16 = 6e-10 of cells of 2000 / 4 and the camera's as much. */
+static void far_coordinates_are_the_reference(void **state)
+{
+    (void)state;
+    static const double far_away[3] = {5.8e6, -4.9e5, 3.1e6};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        render_fixture f;
+        test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+        test_mesh_transform(&mesh, 1000, far_away);
+        fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 500, 1000, far_away);
+        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_add_surface(&f, one_value, 1, 0.5f);
+        fixture_set_volume(&f, 0.3);
+        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "far away"));
+        fixture_free(&f);
+        test_mesh_free(&mesh);
+    }
+}
+
+/* Values of any size: the transfer and the isovalue scale with them. */
+static double huge_wave(const double p[3])
+{
+    return 1e30 * test_wave(p);
+}
+static double tiny_wave(const double p[3])
+{
+    return 1e-30 * test_wave(p);
+}
+
+static void values_of_any_size_are_the_reference(void **state)
+{
+    (void)state;
+    static const double huge_values[1] = {0.3e30}, tiny_values[1] = {0.3e-30};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int tiny = 0; tiny < 2; tiny++) {
+            render_fixture f;
+            const double scale = tiny ? 1e-30 : 1e30, tent[3] = {-0.6 * scale, 0, 0.6 * scale};
+            fixture_create_lattice(&f, kind, 3, 0.2, tiny ? tiny_wave : huge_wave);
+            fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+            fixture_add_surface(&f, tiny ? tiny_values : huge_values, 1, 0.5f);
+            fixture_set_volume(&f, 0.3);
+            f.transfer.low *= scale;
+            f.transfer.high *= scale;
+            f.transfer.opacity_values = tent;
+            fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, tiny ? "1e-30" : "1e30"));
+            fixture_free(&f);
+        }
+}
+
+static void surface_coloured_by_the_field_is_the_reference(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        test_view colours;
+        render_fixture f;
+        test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
+        test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
+        fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_set_volume(&f, 0.3);
+        f.job.volume_count = 0;
+        fixture_add_surface(&f, four_values, 4, 1);
+        f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
+        f.surfaces[0].colour_map = &f.transfer;
+        fixture_compare(&f, &fixture_usual_bounds, case_name(kind, CAMERA_OUTSIDE, "coloured by a field"));
+        test_view_free(&colours);
+        test_mesh_free(&mesh);
+        fixture_free(&f);
+    }
+}
+
+/* N of Neubauer's method: what is left of the error after each, in cells; the hits are the same for all. */
+static void root_steps_lessen_the_error(void **state)
+{
+    (void)state;
+    double error[5];
+    for (int steps = 0; steps <= 4; steps++) {
+        static const fixture_bounds loose = {.depth = 1, .colour = 2, .excluded = 2e-3, .margin = 1e-6};
+        render_fixture f;
+        fixture_create_lattice(&f, TEST_HEXES, 6, 0.2, test_wave);
+        fixture_add_surface(&f, one_value, 1, 1);
+        f.surfaces[0].root_steps = steps;
+        error[steps] = fixture_compare(&f, &loose, "root steps").total_depth;
+        fixture_free(&f);
+    }
+    for (int steps = 1; steps <= 4; steps++) assert_true(error[steps] < error[steps - 1]);
+}
+
+static void one_pixel_images_are_the_reference(void **state)
+{
+    (void)state;
+    static const int sizes[4][2] = {{1, 1}, {1, 9}, {17, 1}, {3, 5}};
+    for (int i = 0; i < 4; i++) {
+        render_fixture f;
+        fixture_create_lattice(&f, TEST_HEXES, 3, 0.2, test_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, sizes[i][0], sizes[i][1]);
+        fixture_add_surface(&f, one_value, 1, 0.5f);
+        fixture_set_volume(&f, 0.3);
+        fixture_compare(&f, &fixture_usual_bounds, "small images");
+        fixture_free(&f);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(surface_is_the_reference_for_every_kind_and_camera),
+        cmocka_unit_test(surfaces_of_several_values_are_the_reference),
+        cmocka_unit_test(transparent_surfaces_before_an_opaque_one_are_the_reference),
+        cmocka_unit_test(volume_is_the_reference_for_every_kind_and_camera),
+        cmocka_unit_test(volume_and_surfaces_are_the_reference_together),
+        cmocka_unit_test(linear_surface_is_a_plane_in_every_kind),
+        cmocka_unit_test(constant_volume_counts_every_sample_once),
+        cmocka_unit_test(lattice_lines_have_no_holes),
+        cmocka_unit_test(single_cells_are_the_reference),
+        cmocka_unit_test(left_handed_cells_are_the_reference),
+        cmocka_unit_test(far_coordinates_are_the_reference),
+        cmocka_unit_test(values_of_any_size_are_the_reference),
+        cmocka_unit_test(surface_coloured_by_the_field_is_the_reference),
+        cmocka_unit_test(root_steps_lessen_the_error),
+        cmocka_unit_test(one_pixel_images_are_the_reference),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,346 @@
+/* Frames for the tests of the renderer.
+ *
+ * A ray counts unless the reference says that rounding may turn one of its decisions: within margin of an edge of a
+ * cell, of a face value equal to an isovalue, of a sample at a cell's end or a hit at the eye. Those are excluded and
+ * their share is bounded. Rays on which a cell has several roots, or a warped face speaks against the interior (its
+ * value is the bilinear patch's, its place the split triangles'), count for hit or miss but not for depth. */
+#include "test_render_fixture.h"
+
+#include "comp.h"
+#include "memory.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+const float fixture_background[4] = {0.05f, 0.1f, 0.15f, 0.5f};
+
+/* Margin: float32 rounding of positions near a size of 1 is 6e-8, in cells of 1/3 some 2e-7, a few of them 1e-6. A
+ * pixel meets some 20 cells of 12 edges: a share of 20 · 12 · 2e-6 · (1 / pixels of a cell's width) is below 1e-3. */
+const fixture_bounds fixture_usual_bounds = {.depth = 1e-5, .colour = 1e-5, .excluded = 2e-3, .margin = 1e-6};
+
+static const float surface_colours[4][3] = {
+    {0.8f, 0.2f, 0.1f}, {0.1f, 0.7f, 0.3f}, {0.2f, 0.3f, 0.9f}, {0.9f, 0.8f, 0.2f}};
+static const float transfer_colours[5][3] = {
+    {0.1f, 0.2f, 0.8f}, {0.5f, 0.6f, 0.9f}, {0.9f, 0.9f, 0.9f}, {0.9f, 0.6f, 0.4f}, {0.7f, 0.1f, 0.1f}};
+static const double tent_values[3] = {-0.6, 0, 0.6};
+static const float tent_opacities[3] = {0, 0.8f, 0};
+
+const char *fixture_camera_name(fixture_camera camera)
+{
+    static const char *const names[CAMERA_COUNT] = {"outside", "orthographic", "inside", "plane inside", "along x"};
+    return names[camera];
+}
+
+void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_layout layout, double cell_size,
+                    double scale, const double offset[3])
+{
+    memset(f, 0, sizeof *f);
+    f->part_count = count;
+    f->cell_size = cell_size;
+    f->scale = scale;
+    memcpy(f->offset, offset, sizeof f->offset);
+    memcpy(f->job.space.origin, offset, sizeof f->offset);
+    f->job.space.scale = ldexp(1, -1 - ilogb(scale));
+    for (int i = 0; i < count; i++) {
+        base_error error = {0};
+        test_view_create(&meshes[i], layout, &f->views[i]);
+        f->fields[i] = f->views[i].field;
+        const insitu_status status = mmbvh_build(&f->views[i].cells, &f->fields[i], offset, f->job.space.scale,
+                                                 &(mmbvh_options){.threads = 1}, &f->trees[i], &error);
+        if (status != INSITU_OK) fail_msg("mmbvh_build: %s", error.message);
+        /* A part without nodes has the field all the same. */
+        f->ranges[i] = mmbvh_own_ranges(&f->trees[i]);
+        if (!f->ranges[i].low) f->ranges[i] = mmbvh_pair_ranges((const float *)tent_opacities);
+        f->parts[i] = (render_part){&f->views[i].cells, &f->trees[i]};
+    }
+    f->lights[0] = (render_light){{0.6, 0.64, 0.48}, {0.9f, 0.8f, 0.7f}};
+    f->lights[1] = (render_light){{-0.8, 0, 0.6}, {0.1f, 0.2f, 0.3f}};
+    f->job.parts = f->parts;
+    f->job.part_count = count;
+    f->job.surfaces = f->surfaces;
+    f->job.volumes = &f->volume;
+    f->job.lights = f->lights;
+    f->job.light_count = 2;
+    f->job.step = cell_size;
+    f->job.sample_group = 16;
+    f->job.jitter = true;
+    f->job.is_alone = true;
+    f->job.threads = 1;
+    fixture_look(f, CAMERA_OUTSIDE, 48, 40);
+}
+
+void fixture_create_lattice(render_fixture *f, test_mesh_kind kind, int n, double jitter, test_function *field)
+{
+    test_mesh mesh;
+    test_mesh_lattice(kind, n, jitter, field, &mesh);
+    fixture_create(f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / n, 1,
+                   (const double[]){0, 0, 0});
+    test_mesh_free(&mesh);
+}
+
+void fixture_free(render_fixture *f)
+{
+    for (int i = 0; i < f->part_count; i++) {
+        test_view_free(&f->views[i]);
+        mmbvh_free(&f->trees[i]);
+    }
+    memset(f, 0, sizeof *f);
+}
+
+void fixture_look(render_fixture *f, fixture_camera camera, int width, int height)
+{
+    static const double views[CAMERA_COUNT][2][3] = {{{2.4, 1.6, 3.0}, {0, 0, 0}},
+                                                     {{2.4, 1.6, 3.0}, {0, 0, 0}},
+                                                     {{0.13, -0.21, 0.17}, {1, 0.3, -0.23}},
+                                                     {{0.1, 0.05, 0.15}, {-1.1, -0.7, -1.9}},
+                                                     {{3, 0, 0}, {0, 0, 0}}};
+    double eye[3], focal[3], depth = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        eye[axis] = views[camera][0][axis] * f->scale + f->offset[axis];
+        focal[axis] = views[camera][1][axis] * f->scale + f->offset[axis];
+    }
+    render_camera *c = &f->job.camera;
+    const double angle = camera == CAMERA_INSIDE ? 75 : 40;
+    assert_true(render_camera_look_at(c, eye, focal, (const double[]){0, 1, 0}, angle, width, height));
+    if (camera != CAMERA_OUTSIDE && camera != CAMERA_INSIDE) {
+        c->is_orthographic = true;
+        /* Along x, pixels of a sixteenth: their centres fall on lattice planes for n = 4 and images of odd height. */
+        c->half_height = (camera == CAMERA_ALONG_X ? height / 32.0 : 1.5) * f->scale;
+    }
+    for (int axis = 0; axis < 3; axis++) depth += c->forward[axis] * (f->offset[axis] - c->eye[axis]);
+    f->job.space.depth_origin = fmax(depth, 0);
+}
+
+void fixture_add_surface(render_fixture *f, const double *values, int count, float opacity)
+{
+    f->surfaces[f->job.surface_count++] =
+        (render_surface_layer){.field = {f->fields, f->ranges},
+                               .value_count = count,
+                               .values = values,
+                               .colours = surface_colours[0],
+                               .opacity = opacity,
+                               .material = {.ambient = 0.2f, .diffuse = 0.7f, .specular = 0.3f, .shininess = 12},
+                               .root_steps = 64};
+}
+
+void fixture_set_volume(render_fixture *f, double step)
+{
+    f->transfer = (render_transfer){.low = -0.7,
+                                    .high = 0.7,
+                                    .colour_count = 5,
+                                    .colours = transfer_colours[0],
+                                    .opacity_count = 3,
+                                    .opacity_values = tent_values,
+                                    .opacities = tent_opacities,
+                                    .unit_distance = 0.3 * f->scale};
+    f->volume = (render_volume_layer){{f->fields, f->ranges}, &f->transfer};
+    f->job.volume_count = 1;
+    f->job.step = step * f->cell_size;
+}
+
+double fixture_depth(const render_fixture *f, float t)
+{
+    return (double)t / f->job.space.scale + f->job.space.depth_origin;
+}
+
+static int compare_fragments(const void *left, const void *right)
+{
+    const fragment *a = left, *b = right;
+    if (a->pixel != b->pixel) return a->pixel < b->pixel ? -1 : 1;
+    if (a->t_in != b->t_in) return a->t_in < b->t_in ? -1 : 1;
+    return (a->kind < b->kind) - (a->kind > b->kind);
+}
+
+static void index_pixels(drawn_frame *out, int64_t pixels)
+{
+    if (out->list.count) qsort(out->list.items, (size_t)out->list.count, sizeof *out->list.items, compare_fragments);
+    out->first = malloc((size_t)(pixels + 1) * sizeof *out->first);
+    int64_t at = 0;
+    for (int64_t p = 0; p <= pixels; p++) {
+        while (at < out->list.count && (int64_t)out->list.items[at].pixel < p) at++;
+        out->first[p] = at;
+    }
+    assert_int_equal(out->first[pixels], out->list.count);
+}
+
+void fixture_draw(const render_fixture *f, drawn_frame *out)
+{
+    memset(out, 0, sizeof *out);
+    const int64_t pixels = (int64_t)f->job.camera.width * f->job.camera.height;
+    base_error error = {0};
+    if (render_frame(&f->job, &out->list, &out->statistics, &error) != INSITU_OK)
+        fail_msg("render_frame: %s", error.message);
+    index_pixels(out, pixels);
+    out->picture = (image){f->job.camera.width, f->job.camera.height, malloc((size_t)pixels * 4 * sizeof(float)),
+                           malloc((size_t)pixels * sizeof(float))};
+    for (int64_t p = 0; p < pixels; p++)
+        comp_merge_pixel(out->list.items + out->first[p], out->first[p + 1] - out->first[p], fixture_background,
+                         out->picture.rgba + 4 * p, out->picture.depth + p);
+}
+
+void drawn_free(drawn_frame *drawn)
+{
+    free(drawn->picture.rgba);
+    free(drawn->picture.depth);
+    free(drawn->first);
+    base_free(drawn->list.items);
+    memset(drawn, 0, sizeof *drawn);
+}
+
+void drawn_assert_same(const drawn_frame *a, const drawn_frame *b)
+{
+    const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
+    for (int64_t p = 0; p < pixels; p++) {
+        const float *x = a->picture.rgba + 4 * p, *y = b->picture.rgba + 4 * p;
+        const float zx = a->picture.depth[p], zy = b->picture.depth[p];
+        if (memcmp(x, y, 4 * sizeof *x) || memcmp(&zx, &zy, sizeof zx))
+            fail_msg("pixel %d, %d: depth %.9g and %.9g, red %.9g and %.9g, green %.9g and %.9g, alpha %.9g and %.9g",
+                     (int)(p % a->picture.width), (int)(p / a->picture.width), (double)zx, (double)zy, (double)x[0],
+                     (double)y[0], (double)x[1], (double)y[1], (double)x[3], (double)y[3]);
+    }
+}
+
+double drawn_difference(const drawn_frame *a, const drawn_frame *b)
+{
+    const int64_t numbers = 4 * (int64_t)a->picture.width * a->picture.height;
+    double worst = 0;
+    for (int64_t i = 0; i < numbers; i++)
+        worst = fmax(worst, fabs((double)a->picture.rgba[i] - (double)b->picture.rgba[i]));
+    return worst;
+}
+
+/* ---- against the reference ---- */
+
+typedef struct comparison {
+    const render_fixture *f;
+    const fixture_bounds *bounds;
+    const char *what;
+    const drawn_frame *drawn;
+    fixture_outcome outcome;
+} comparison;
+
+static bool is_excluded(const reference_ray *ray, double margin)
+{
+    return ray->edge_margin < margin || ray->value_margin < margin || ray->sample_margin < margin ||
+           ray->eye_margin < margin;
+}
+
+/* The pixel's surface fragments up to the first opaque one. */
+static int surface_fragments(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
+{
+    int count = 0;
+    for (int64_t i = drawn->first[pixel]; i < drawn->first[pixel + 1] && count < REFERENCE_MAX_HITS; i++) {
+        const fragment *item = &drawn->list.items[i];
+        if (item->kind < FRAGMENT_SURFACE) continue;
+        hits[count++] = item;
+        if (item->transmittance <= 0) break;
+    }
+    return count;
+}
+
+/* Is the root finder still on its way? Bent fields and jumps at warped faces are slow for regula falsi. */
+static bool is_slow(const comparison *c, const reference_ray *ray)
+{
+    for (int i = 0; i < ray->hit_count; i++)
+        if (ray->hits[i].falsi_error > 0.1 * c->bounds->depth * c->f->cell_size) return true;
+    return false;
+}
+
+static void tell_hits(const comparison *c, int x, int y, const reference_ray *ray, int count,
+                      const fragment *const *hits)
+{
+    fprintf(stderr, "%s, pixel %d, %d: edge margin %.3g, value margin %.3g%s%s\n", c->what, x, y, ray->edge_margin,
+            ray->value_margin, ray->ambiguous ? ", ambiguous" : "", ray->map_failed ? ", map failed" : "");
+    for (int i = 0; i < ray->hit_count; i++)
+        fprintf(stderr, "  reference: %.9g surface %d, conditioning %.3g, regula falsi off by %.3g\n",
+                ray->hits[i].depth, ray->hits[i].surface, ray->hits[i].conditioning, ray->hits[i].falsi_error);
+    for (int i = 0; i < count; i++)
+        fprintf(stderr, "  kernels:   %.9g surface %u\n", fixture_depth(c->f, hits[i]->t_in),
+                hits[i]->kind - FRAGMENT_SURFACE);
+}
+
+static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
+{
+    const double slack = 1.1; /* float32's regula falsi does not go quite the same way */
+    const fragment *hits[REFERENCE_MAX_HITS];
+    const int count = surface_fragments(c->drawn, (int64_t)y * c->f->job.camera.width + x, hits);
+    bool same = count == ray->hit_count;
+    for (int i = 0; same && i < count; i++) same = hits[i]->kind - FRAGMENT_SURFACE == (uint32_t)ray->hits[i].surface;
+    if (!same && !ray->ambiguous) {
+        tell_hits(c, x, y, ray, count, hits);
+        fail_msg("%s: not the same hits", c->what);
+    }
+    c->outcome.hits += count > 0;
+    double worst = 0;
+    for (int i = 0; same && i < count; i++) {
+        /* Float32 positions and values err by half a unit in 1, 6e-8 · 2 / cell size, some 4e-7 cells; a grazing ray
+         * turns an error across the surface into a depth by its conditioning. From 20 on that exceeds the bound. */
+        const double grazing = fmax(5e-7 * ray->hits[i].conditioning - c->bounds->depth, 0);
+        const double off = fabs(fixture_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
+        c->outcome.total_depth += off / c->f->cell_size;
+        worst = fmax(worst, (off - slack * ray->hits[i].falsi_error) / c->f->cell_size - grazing);
+    }
+    double *kept = ray->ambiguous ? &c->outcome.worst_ambiguous : &c->outcome.worst_depth;
+    if (worst > *kept && !ray->ambiguous && worst > c->bounds->depth) tell_hits(c, x, y, ray, count, hits);
+    *kept = fmax(*kept, worst);
+}
+
+static void compare_colour(comparison *c, int x, int y, const reference_ray *ray)
+{
+    const float *rgba = c->drawn->picture.rgba + 4 * ((int64_t)y * c->f->job.camera.width + x);
+    double worst = 0;
+    for (int i = 0; i < 4; i++) {
+        const double off = fabs((double)rgba[i] - ray->rgba[i]);
+        if (!(off <= worst)) worst = off;
+    }
+    if (!(worst <= c->bounds->colour) && !(worst <= c->outcome.worst_colour))
+        fprintf(stderr, "%s, pixel %d, %d: %.7g %.7g %.7g %.7g, reference %.7g %.7g %.7g %.7g, %d samples\n", c->what,
+                x, y, (double)rgba[0], (double)rgba[1], (double)rgba[2], (double)rgba[3], ray->rgba[0], ray->rgba[1],
+                ray->rgba[2], ray->rgba[3], (int)ray->samples);
+    if (!(worst <= c->outcome.worst_colour)) c->outcome.worst_colour = worst;
+}
+
+static void compare_ray(comparison *c, const reference_scene *scene, int x, int y)
+{
+    reference_ray ray;
+    reference_trace(scene, x, y, fixture_background, &ray);
+    c->outcome.rays++;
+    if (is_excluded(&ray, c->bounds->margin)) {
+        c->outcome.excluded++;
+        return;
+    }
+    const bool slow = is_slow(c, &ray);
+    c->outcome.ambiguous += ray.ambiguous;
+    c->outcome.slow += slow && !ray.ambiguous;
+    compare_hits(c, x, y, &ray);
+    if (!ray.ambiguous && !slow) compare_colour(c, x, y, &ray);
+}
+
+fixture_outcome fixture_compare(const render_fixture *f, const fixture_bounds *bounds, const char *what)
+{
+    drawn_frame drawn;
+    fixture_draw(f, &drawn);
+    comparison c = {.f = f, .bounds = bounds, .what = what, .drawn = &drawn};
+    reference_scene *scene = reference_create(&f->job);
+    for (int y = 0; y < f->job.camera.height; y++)
+        for (int x = 0; x < f->job.camera.width; x++) compare_ray(&c, scene, x, y);
+    reference_free(scene);
+    const fixture_outcome *o = &c.outcome;
+    if (getenv("INSITU_TEST_VERBOSE"))
+        fprintf(stderr,
+                "%s: %d rays, %d hits, %d excluded, %d ambiguous, %d slow; depth %.2g cells (ambiguous %.2g), colour "
+                "%.2g\n",
+                what, (int)o->rays, (int)o->hits, (int)o->excluded, (int)o->ambiguous, (int)o->slow, o->worst_depth,
+                o->worst_ambiguous, o->worst_colour);
+    if (!(o->worst_depth <= bounds->depth)) fail_msg("%s: depth off by %g cells", what, o->worst_depth);
+    if (!(o->worst_colour <= bounds->colour)) fail_msg("%s: colour off by %g", what, o->worst_colour);
+    if ((double)o->excluded > bounds->excluded * (double)o->rays + 1)
+        fail_msg("%s: %d of %d rays excluded", what, (int)o->excluded, (int)o->rays);
+    drawn_free(&drawn);
+    return c.outcome;
+}
