@@ -279,6 +279,16 @@ SIMD_INLINE void kernel_quad_corners(const kernel_cell *c, const signed char *lo
     corner[3] = forward ? behind : ahead;
 }
 
+/* A quad with two neighbouring corners in one place is a triangle, and its neighbour may have it as such. */
+SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4])
+{
+    for (int i = 0; i < 4; i++) {
+        const double *a = c->world[corner[i]], *b = c->world[corner[(i + 1) & 3]];
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) return true;
+    }
+    return false;
+}
+
 static inline void kernel_quad_plane(const kernel_cell *c, kernel_quad *q)
 {
     const double *p[4];
@@ -413,6 +423,10 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
             out[n].mask = kernel_triangle(c, &edges, rays, quad.corner[0], quad.corner[half + 1], quad.corner[half + 2],
                                           &w, &out[n].t);
             if (!vm_any(out[n].mask)) continue;
+            if (kernel_quad_collapses(c, quad.corner)) {
+                kernel_triangle_values(c, shape, &w, has_colour, &out[n++]);
+                continue;
+            }
             if (!planed) kernel_quad_plane(c, &quad);
             planed = true;
             kernel_quad_values(c, shape, &quad, &w, has_colour, &out[n++]);
