@@ -38,6 +38,8 @@
 #include <vtkCGNSReader.h>
 #endif
 
+#include "netcdf_size.h"
+
 namespace render_tool
 {
 
@@ -206,6 +208,15 @@ int count_tags(const std::string &path, const char *tag)
     return count > 0 ? count : 1;
 }
 
+void check_length(const std::string &path)
+{
+    const int64_t expected = netcdf_bytes(path);
+    struct stat info;
+    if (expected == 0 || stat(path.c_str(), &info) != 0 || info.st_size >= expected) return;
+    throw std::runtime_error(path + ": is cut short: " + std::to_string(info.st_size) + " bytes of " +
+                             std::to_string(expected));
+}
+
 bool is_empty(vtkDataObject *data)
 {
     return !data || (!vtkDataSet::SafeDownCast(data) && !vtkCompositeDataSet::SafeDownCast(data));
@@ -249,6 +260,7 @@ data_file::data_file(const std::string &path) : path_(path)
 {
     const std::string why_not = why_not_data(path);
     if (!why_not.empty()) throw std::runtime_error(why_not);
+    check_length(path);
     const file_kind *kind = kind_of(path);
     const quiet_stderr quiet;
     reader_ = kind->make(path);
