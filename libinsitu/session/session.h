@@ -1,0 +1,199 @@
+/* What a session holds, for the files of the session alone. One noun a file pair; this one is the ground they share.
+ *
+ * A step goes down this list, and every item that can fail on one rank alone ends in session_agree(), so that all
+ * ranks leave at the same place:
+ *
+ *     session_step.c       one small reduction: cycle, pending errors, what changed anywhere; the order of the rest
+ *     session_scene.c      the scene file, read again when it changed
+ *     session_check.c      deep checks of meshes that changed, their bounds and counts
+ *     session_space.c      global bounds, origin and scale, threads
+ *     session_catalogue.c  which meshes and fields there are, over all ranks
+ *     session_plan.c       due images to the scalars they need; nothing else is computed from here on
+ *     session_recentre.c   cell values to vertices, where an isosurface wants them (session_exchange.c: over ranks)
+ *     session_tree.c       trees and ranges
+ *     session_draw.c       frames, compositing, outputs (session_view.c: camera, lights, transfer functions)
+ *     session_report.c     what was done */
+#ifndef SESSION_SESSION_H
+#define SESSION_SESSION_H
+
+#include <mpi.h>
+#include <sys/stat.h>
+
+#include "error.h"
+#include "grid.h"
+#include "insitu/insitu.h"
+#include "mmbvh.h"
+#include "render.h"
+#include "scene.h"
+
+typedef struct session_field {
+    insitu_field given; /* name is a copy of ours, the values are borrowed */
+    grid_array values;
+    int64_t component_stride;
+    base_error problem; /* of the last insitu_set_field() */
+} session_field;
+
+/* One scalar of a field as a layer uses it: a component or the magnitude, as it is or recentred to vertices. */
+typedef struct session_scalar {
+    int field;     /* in the mesh's fields */
+    int component; /* as grid_field.component */
+    bool is_recentred;
+    bool is_used;          /* by an image of this step */
+    bool wants_ranges;     /* by an image of this step: colours need none */
+    double *vertex_values; /* recentred values, a declared copy; NULL until computed */
+    bool are_values_stale;
+    bool has_own_ranges; /* the tree nodes' own, else pairs */
+    float *pairs;        /* NULL until computed */
+    bool are_ranges_stale;
+    int64_t unusable;
+    bool is_extent_known;
+    double low, high; /* over drawn cells all of whose values are finite; low > high: there are none */
+} session_scalar;
+
+/* One rank's part of a mesh. */
+typedef struct session_mesh {
+    char *name;
+    insitu_mesh given;
+    grid cells;
+    bool is_given;      /* false after an insitu_set_mesh() that failed: problem says why */
+    base_error problem; /* of the last insitu_set_mesh() */
+    int field_count;
+    session_field *fields;
+
+    bool is_check_stale;
+    bool is_topology_stale;    /* the tree is of other cells */
+    bool is_geometry_stale;    /* the tree is of other coordinates */
+    double lower[3], upper[3]; /* of the drawn cells; lower > upper: there are none */
+    int64_t drawn_count, ghost_count, inverted_count;
+
+    bool is_needed; /* by an image of this step */
+    bool has_tree;
+    mmbvh tree;
+    int scalar_count;
+    session_scalar *scalars;
+} session_mesh;
+
+/* A mesh over all ranks; the same on every rank. */
+typedef struct session_catalogue_field {
+    char *name;
+    int component_count;
+    bool is_cell_centred;
+    int first_rank; /* that has it */
+    int rank_count; /* ranks that have it together with cells */
+    int odd_rank;   /* -1, or one that has it with another centring or count of components */
+} session_catalogue_field;
+
+typedef struct session_catalogue_mesh {
+    char *name;
+    int rank_count; /* ranks that have cells of it */
+    bool has_ids;   /* all of these give vertex ids */
+    int field_count;
+    session_catalogue_field *fields;
+} session_catalogue_mesh;
+
+typedef struct session_catalogue {
+    int mesh_count;
+    session_catalogue_mesh *meshes;
+} session_catalogue;
+
+/* Global bounds of the drawn cells and what follows from them; the same on every rank. */
+typedef struct session_extent {
+    double lower[3], upper[3]; /* both 0 where there are no cells */
+    double half_diagonal;
+    int64_t cell_count; /* drawn ones */
+    int rank_count;     /* ranks that have some */
+} session_extent;
+
+/* Growing text for the report; what memory cannot hold is left away. */
+typedef struct session_text {
+    char *data;
+    size_t size, capacity;
+} session_text;
+
+struct insitu_session {
+    MPI_Comm comm;      /* ours, errors return */
+    MPI_Comm comp_comm; /* compositing's own */
+    int rank, ranks, node_ranks;
+    int threads;
+
+    char *scene_path; /* the same on every rank */
+    scene scene;
+    bool has_stamp; /* rank 0 */
+    struct stat stamp;
+    char *scene_warning; /* NULL, or why the last edit of the scene file was not taken */
+
+    int mesh_count;
+    session_mesh **meshes; /* by name */
+    bool is_changed;       /* cells or coordinates, since the last agreed extent */
+    bool is_table_changed; /* names, since the last agreed catalogue */
+    base_error pending;    /* of a set call that had no mesh to stay with; for one step */
+
+    session_catalogue catalogue;
+    bool has_catalogue;
+    bool has_extent, has_space;
+    session_extent extent;
+    double space_lower[3], space_upper[3]; /* bounds for which the space was made */
+    double origin[3], scale;
+
+    mmbvh parent; /* over the meshes of this step */
+
+    base_error error;
+    insitu_report report;
+    session_text copied_why, left_out, warnings;
+};
+
+static inline int64_t session_type_size(insitu_type type)
+{
+    switch (type) {
+    case INSITU_FLOAT32:
+    case INSITU_INT32: return 4;
+    case INSITU_FLOAT64:
+    case INSITU_INT64: return 8;
+    case INSITU_UINT8: return 1;
+    }
+    return 0;
+}
+
+static inline insitu_status session_no_memory(base_error *error, int64_t bytes, const char *what)
+{
+    return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of %s", (long long)bytes, what);
+}
+
+/* session_mesh.c: the tables of meshes and fields. */
+void session_mesh_free(session_mesh *mesh);
+session_mesh *session_find_mesh(const insitu_session *session, const char *name);
+int session_find_field(const session_mesh *mesh, const char *name); /* -1: there is none */
+void session_drop_scalars(session_mesh *mesh);
+void session_drop_tree(session_mesh *mesh);
+/* The first error that a set call left behind, or NULL. */
+const base_error *session_pending_error(const insitu_session *session);
+
+/* session_check.c: prove a mesh before anything reads it; fills bounds and counts. Parallel. Local. */
+insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error);
+
+/* session_space.c */
+int session_thread_count(const insitu_session *session);
+int session_node_ranks(MPI_Comm comm);
+/* Check what changed, then global bounds, then origin and scale. Collective. */
+insitu_status session_update_extent(insitu_session *session, base_error *error);
+
+/* session_catalogue.c: collective where is_shared is false (ranks have different tables). */
+insitu_status session_update_catalogue(insitu_session *session, bool is_shared, base_error *error);
+void session_catalogue_free(session_catalogue *catalogue);
+/* A hash of this rank's names: equal on two ranks when their tables say the same. */
+uint64_t session_table_hash(const insitu_session *session);
+const session_catalogue_field *session_catalogue_find(const session_catalogue_mesh *mesh, const char *name);
+
+/* session_scene.c */
+insitu_status session_load_scene(insitu_session *session, const char *path, base_error *error); /* collective */
+bool session_scene_file_changed(const insitu_session *session); /* rank 0; false elsewhere */
+void session_reload_scene(insitu_session *session);             /* collective; a failure is a warning */
+
+/* session_report.c */
+void session_text_clear(session_text *text);
+void session_text_free(session_text *text);
+void session_text_add(session_text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void session_begin_report(insitu_session *session, int64_t cycle, double time);
+void session_end_report(insitu_session *session);
+
+#endif

@@ -1,0 +1,56 @@
+/* Why all of one mind: a rank that returned early would leave the others waiting in their next collective call. So
+ * a phase is left by all ranks or by none. The price is one reduction of an integer where nothing failed. */
+#include "session_agree.h"
+
+#include <stdio.h>
+#include <string.h>
+
+insitu_status session_mpi(base_error *error, int code, const char *what)
+{
+    if (code == MPI_SUCCESS) return INSITU_OK;
+    char reason[MPI_MAX_ERROR_STRING] = "";
+    int length = 0;
+    MPI_Error_string(code, reason, &length);
+    return base_fail(error, INSITU_ERROR_MPI, "%s: %s", what, reason);
+}
+
+insitu_status session_share_error(MPI_Comm comm, int root, base_error *error)
+{
+    base_error shared = *error;
+    const int code = MPI_Bcast(&shared, (int)sizeof shared, MPI_BYTE, root, comm);
+    if (code != MPI_SUCCESS) return session_mpi(error, code, "MPI_Bcast");
+    *error = shared;
+    return error->status;
+}
+
+static void name_rank(int rank, base_error *error)
+{
+    char message[sizeof error->message];
+    memcpy(message, error->message, sizeof message);
+    const int prefix = snprintf(error->message, sizeof error->message, "rank %d: ", rank);
+    snprintf(error->message + prefix, sizeof error->message - (size_t)prefix, "%.*s", (int)sizeof message - prefix - 1,
+             message);
+}
+
+static insitu_status agree(MPI_Comm comm, base_error *error, int with_rank)
+{
+    int rank = 0, ranks = 1, first = 0;
+    MPI_Comm_rank(comm, &rank);
+    MPI_Comm_size(comm, &ranks);
+    const int mine = error->status == INSITU_OK ? ranks : rank;
+    const int code = MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
+    if (code != MPI_SUCCESS) return session_mpi(error, code, "MPI_Allreduce");
+    if (first == ranks) return INSITU_OK;
+    if (rank == first && with_rank) name_rank(rank, error);
+    return session_share_error(comm, first, error);
+}
+
+insitu_status session_agree(MPI_Comm comm, base_error *error)
+{
+    return agree(comm, error, 1);
+}
+
+insitu_status session_agree_as_is(MPI_Comm comm, base_error *error)
+{
+    return agree(comm, error, 0);
+}

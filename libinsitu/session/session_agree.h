@@ -1,0 +1,22 @@
+/* How ranks come to one mind about an error. */
+#ifndef SESSION_AGREE_H
+#define SESSION_AGREE_H
+
+#include <mpi.h>
+
+#include "error.h"
+
+/* After a phase that may have failed on some ranks: *error becomes that of the lowest rank that failed, on every rank,
+ * with "rank N: " in front. INSITU_OK where none did. Collective. */
+insitu_status session_agree(MPI_Comm comm, base_error *error);
+
+/* The same without "rank N: ", for errors that are no rank's own. Collective. */
+insitu_status session_agree_as_is(MPI_Comm comm, base_error *error);
+
+/* Give every rank the error of one. Collective. */
+insitu_status session_share_error(MPI_Comm comm, int root, base_error *error);
+
+/* The status of an MPI call; where it failed, record what. Local. */
+insitu_status session_mpi(base_error *error, int code, const char *what);
+
+#endif

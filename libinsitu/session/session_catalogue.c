@@ -1,0 +1,274 @@
+/* Which meshes and fields there are over all ranks. With it every rank finds out alone, and all find out the same,
+ * whether a picture can be drawn: a missing field is then nobody's surprise in the middle of a collective call.
+ *
+ * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <is cell-centred>
+ * <name>" is a field of it. Ranks whose tables are alike (the usual case, found by hashes in the step's one
+ * reduction) exchange nothing; else the texts are gathered by all. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session.h"
+#include "session_agree.h"
+
+/* ---- a rank's table as text ---------------------------------------------------------------------------------- */
+
+/* Writes at most capacity bytes; returns how many there are. Names may hold anything but are shown without newlines. */
+static size_t append_line(char *text, size_t capacity, size_t at, char kind, int a, int b, const char *name)
+{
+    const size_t room = at < capacity ? capacity - at : 0;
+    const int size = snprintf(room ? text + at : NULL, room, "%c %d %d %s", kind, a, b, name);
+    if (room)
+        for (char *c = text + at; c < text + capacity && *c; c++)
+            if (*c == '\n') *c = ' ';
+    return at + (size_t)size + 1;
+}
+
+static size_t write_table(const insitu_session *session, char *text, size_t capacity)
+{
+    size_t at = 0;
+    for (int i = 0; i < session->mesh_count; i++) {
+        const session_mesh *mesh = session->meshes[i];
+        if (!mesh->is_given) continue;
+        at = append_line(text, capacity, at, 'm', mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL,
+                         mesh->name);
+        for (int f = 0; f < mesh->field_count; f++) {
+            const insitu_field *field = &mesh->fields[f].given;
+            at = append_line(text, capacity, at, 'f', field->component_count, field->centring == INSITU_CELL,
+                             field->name);
+        }
+    }
+    return at;
+}
+
+static void hash_bytes(uint64_t *hash, const void *data, size_t size)
+{
+    for (size_t i = 0; i < size; i++) *hash = (*hash ^ ((const unsigned char *)data)[i]) * 0x100000001b3u;
+}
+
+uint64_t session_table_hash(const insitu_session *session)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (int i = 0; i < session->mesh_count; i++) {
+        const session_mesh *mesh = session->meshes[i];
+        if (!mesh->is_given) continue;
+        const int head[] = {mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL, mesh->field_count};
+        hash_bytes(&hash, head, sizeof head);
+        hash_bytes(&hash, mesh->name, strlen(mesh->name) + 1);
+        for (int f = 0; f < mesh->field_count; f++) {
+            const insitu_field *field = &mesh->fields[f].given;
+            const int tail[] = {field->component_count, (int)field->centring};
+            hash_bytes(&hash, tail, sizeof tail);
+            hash_bytes(&hash, field->name, strlen(field->name) + 1);
+        }
+    }
+    return hash;
+}
+
+/* ---- texts to a catalogue ------------------------------------------------------------------------------------ */
+
+void session_catalogue_free(session_catalogue *catalogue)
+{
+    for (int i = 0; i < catalogue->mesh_count; i++) {
+        session_catalogue_mesh *mesh = &catalogue->meshes[i];
+        for (int f = 0; f < mesh->field_count; f++) base_free(mesh->fields[f].name);
+        base_free(mesh->fields);
+        base_free(mesh->name);
+    }
+    base_free(catalogue->meshes);
+    *catalogue = (session_catalogue){0};
+}
+
+static session_catalogue_mesh *add_mesh(session_catalogue *catalogue, const char *name)
+{
+    for (int i = 0; i < catalogue->mesh_count; i++)
+        if (strcmp(catalogue->meshes[i].name, name) == 0) return &catalogue->meshes[i];
+    session_catalogue_mesh *meshes =
+        base_realloc(catalogue->meshes, (size_t)(catalogue->mesh_count + 1) * sizeof *meshes);
+    if (!meshes) return NULL;
+    catalogue->meshes = meshes;
+    session_catalogue_mesh *mesh = &meshes[catalogue->mesh_count];
+    *mesh = (session_catalogue_mesh){.name = base_strdup(name), .has_ids = true};
+    if (!mesh->name) return NULL;
+    catalogue->mesh_count++;
+    return mesh;
+}
+
+static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const char *name)
+{
+    for (int i = 0; i < mesh->field_count; i++)
+        if (strcmp(mesh->fields[i].name, name) == 0) return &mesh->fields[i];
+    session_catalogue_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
+    if (!fields) return NULL;
+    mesh->fields = fields;
+    session_catalogue_field *field = &fields[mesh->field_count];
+    *field = (session_catalogue_field){.name = base_strdup(name), .first_rank = -1, .odd_rank = -1};
+    if (!field->name) return NULL;
+    mesh->field_count++;
+    return field;
+}
+
+static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int ranks, int components,
+                       bool is_cell_centred, const char *name)
+{
+    session_catalogue_field *field = add_field(mesh, name);
+    if (!field) return false;
+    if (field->first_rank < 0) {
+        field->first_rank = rank;
+        field->component_count = components;
+        field->is_cell_centred = is_cell_centred;
+    } else if (field->odd_rank < 0 &&
+               (field->component_count != components || field->is_cell_centred != is_cell_centred)) {
+        field->odd_rank = rank;
+    }
+    if (has_cells) field->rank_count += ranks;
+    return true;
+}
+
+/* The table of one rank, or of ranks alike ones. */
+static bool take_table(session_catalogue *catalogue, const char *text, size_t size, int rank, int ranks)
+{
+    session_catalogue_mesh *mesh = NULL;
+    bool has_cells = false;
+    for (const char *line = text; line < text + size; line += strlen(line) + 1) {
+        char *end = NULL;
+        const long a = strtol(line + 1, &end, 10);
+        const long b = strtol(end, &end, 10);
+        const char *name = end + 1;
+        if (line[0] == 'm') {
+            mesh = add_mesh(catalogue, name);
+            if (!mesh) return false;
+            has_cells = a != 0;
+            if (has_cells) mesh->rank_count += ranks;
+            if (has_cells && !b) mesh->has_ids = false;
+        } else if (!take_field(mesh, has_cells, rank, ranks, (int)a, b != 0, name)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+const session_catalogue_field *session_catalogue_find(const session_catalogue_mesh *mesh, const char *name)
+{
+    for (int i = 0; i < mesh->field_count; i++)
+        if (strcmp(mesh->fields[i].name, name) == 0) return &mesh->fields[i];
+    return NULL;
+}
+
+static int by_mesh_name(const void *a, const void *b)
+{
+    return strcmp(((const session_catalogue_mesh *)a)->name, ((const session_catalogue_mesh *)b)->name);
+}
+
+static int by_field_name(const void *a, const void *b)
+{
+    return strcmp(((const session_catalogue_field *)a)->name, ((const session_catalogue_field *)b)->name);
+}
+
+static void sort_catalogue(session_catalogue *catalogue)
+{
+    if (catalogue->mesh_count == 0) return;
+    qsort(catalogue->meshes, (size_t)catalogue->mesh_count, sizeof *catalogue->meshes, by_mesh_name);
+    for (int i = 0; i < catalogue->mesh_count; i++) {
+        session_catalogue_mesh *mesh = &catalogue->meshes[i];
+        if (mesh->field_count) qsort(mesh->fields, (size_t)mesh->field_count, sizeof *mesh->fields, by_field_name);
+    }
+}
+
+/* ---- over all ranks ------------------------------------------------------------------------------------------ */
+
+typedef struct gathered_tables {
+    char *mine, *all;
+    int *sizes, *places;
+    int64_t total;
+} gathered_tables;
+
+static void free_tables(gathered_tables *tables)
+{
+    base_free(tables->mine);
+    base_free(tables->all);
+    base_free(tables->sizes);
+    base_free(tables->places);
+}
+
+static insitu_status write_mine(const insitu_session *session, gathered_tables *tables, int *size, base_error *error)
+{
+    const size_t bytes = write_table(session, NULL, 0);
+    if (bytes > INT32_MAX / 2) return session_no_memory(error, (int64_t)bytes, "names of meshes and fields");
+    *size = (int)bytes;
+    tables->mine = base_alloc(bytes + 1);
+    if (!tables->mine) return session_no_memory(error, (int64_t)bytes, "names of meshes and fields");
+    write_table(session, tables->mine, bytes + 1);
+    return INSITU_OK;
+}
+
+static insitu_status place_tables(const insitu_session *session, gathered_tables *tables, base_error *error)
+{
+    tables->total = 0;
+    for (int rank = 0; rank < session->ranks; rank++) {
+        tables->places[rank] = (int)tables->total;
+        tables->total += tables->sizes[rank];
+        if (tables->total > INT32_MAX) return session_no_memory(error, tables->total, "names of meshes and fields");
+    }
+    tables->all = base_alloc((size_t)tables->total + 1);
+    return tables->all ? INSITU_OK : session_no_memory(error, tables->total, "names of meshes and fields");
+}
+
+static insitu_status gather_tables(const insitu_session *session, gathered_tables *tables, base_error *error)
+{
+    int size = 0;
+    write_mine(session, tables, &size, error);
+    tables->sizes = base_calloc((size_t)session->ranks, sizeof(int));
+    tables->places = base_calloc((size_t)session->ranks, sizeof(int));
+    if (!tables->sizes || !tables->places) session_no_memory(error, 8 * (int64_t)session->ranks, "counts");
+    insitu_status status = session_agree(session->comm, error);
+    if (status) return status;
+    status =
+        session_mpi(error, MPI_Allgather(&size, 1, MPI_INT, tables->sizes, 1, MPI_INT, session->comm), "MPI_Allgather");
+    if (status) return status;
+    place_tables(session, tables, error);
+    status = session_agree(session->comm, error);
+    if (status) return status;
+    return session_mpi(error,
+                       MPI_Allgatherv(tables->mine, size, MPI_CHAR, tables->all, tables->sizes, tables->places,
+                                      MPI_CHAR, session->comm),
+                       "MPI_Allgatherv");
+}
+
+static bool take_tables(const insitu_session *session, const gathered_tables *tables, session_catalogue *out)
+{
+    for (int rank = 0; rank < session->ranks; rank++)
+        if (!take_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank, 1)) return false;
+    return true;
+}
+
+insitu_status session_update_catalogue(insitu_session *session, bool is_shared, base_error *error)
+{
+    gathered_tables tables = {0};
+    session_catalogue catalogue = {0};
+    insitu_status status = INSITU_OK;
+    if (is_shared) {
+        int size = 0;
+        if (write_mine(session, &tables, &size, error) == INSITU_OK &&
+            !take_table(&catalogue, tables.mine, (size_t)size, 0, session->ranks))
+            session_no_memory(error, size, "the catalogue of meshes and fields");
+    } else {
+        status = gather_tables(session, &tables, error);
+        if (status == INSITU_OK && !take_tables(session, &tables, &catalogue))
+            session_no_memory(error, tables.total, "the catalogue of meshes and fields");
+    }
+    if (status == INSITU_OK) status = session_agree(session->comm, error);
+    free_tables(&tables);
+    if (status) {
+        session_catalogue_free(&catalogue);
+        return status;
+    }
+    sort_catalogue(&catalogue);
+    session_catalogue_free(&session->catalogue);
+    session->catalogue = catalogue;
+    session->has_catalogue = true;
+    session->is_table_changed = false;
+    return INSITU_OK;
+}

@@ -1,0 +1,225 @@
+/* Proof of a mesh, before anything below the session reads it: grid's accessors trust their arrays.
+ *
+ * One pass over the cells in parallel, in blocks. A thread that meets a bad cell keeps the lowest one it knows of, and
+ * the cell named in the end is the lowest of all, whatever the number of threads. What is wrong with it is worked out
+ * once, afterwards. Coordinates are looked at where a drawn cell uses them: vertices of no cell, or of ghosts alone,
+ * may hold anything. Indices are proved for ghosts too. */
+#include <omp.h>
+#include <stdio.h>
+
+#include "session.h"
+
+typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORDINATE } cell_fault;
+
+typedef struct fault_place {
+    int type;
+    int64_t first, next; /* offsets */
+    int64_t vertex;      /* index as it stands in the connectivity */
+    double position[3];
+} fault_place;
+
+static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int count, fault_place *place)
+{
+    for (int i = 0; i < count; i++) {
+        grid_vertex(g, vertices[i], place->position);
+        place->vertex = vertices[i];
+        for (int axis = 0; axis < 3; axis++)
+            if (!isfinite(place->position[axis])) return BAD_COORDINATE;
+    }
+    return CELL_GOOD;
+}
+
+static cell_fault check_cell(const session_mesh *mesh, int64_t cell, fault_place *place)
+{
+    const grid *g = &mesh->cells;
+    place->type = grid_cell_type(g, cell);
+    const int count = grid_type_vertices(place->type);
+    if (count == 0) return BAD_TYPE;
+    if (g->offsets.data) {
+        place->first = grid_array_index(&g->offsets, cell);
+        place->next = grid_array_index(&g->offsets, cell + 1);
+        if (place->first < 0 || place->next > mesh->given.connectivity_count || place->next < place->first ||
+            place->next - place->first != count)
+            return BAD_OFFSETS;
+    }
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    grid_cell_vertices(g, cell, vertices);
+    for (int i = 0; i < count; i++) {
+        place->vertex = vertices[i];
+        if (vertices[i] < 0 || vertices[i] >= g->vertex_count) return BAD_INDEX;
+    }
+    return grid_is_ghost(g, cell) ? CELL_GOOD : check_coordinates(g, vertices, count, place);
+}
+
+static const char *type_name(int type)
+{
+    switch (type) {
+    case GRID_TET: return "tet";
+    case GRID_HEX: return "hex";
+    case GRID_WEDGE: return "wedge";
+    case GRID_PYRAMID: return "pyramid";
+    default: return "unknown";
+    }
+}
+
+static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_place *place,
+                                      base_error *error)
+{
+    const long long first = place->first, next = place->next;
+    const char *format =
+        place->next < place->first
+            ? "mesh \"%s\": cell %lld (%s): offsets fall from %lld to %lld; a cell of its type has %d vertices"
+            : "mesh \"%s\": cell %lld (%s): offsets %lld and %lld do not lie %d apart, the vertices of its type";
+    if (first < 0 || (next >= first && next > mesh->given.connectivity_count))
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside 0..%lld", mesh->name,
+                         (long long)cell, type_name(place->type), first, next,
+                         (long long)mesh->given.connectivity_count);
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+    return base_fail(error, INSITU_ERROR_MESH, format, mesh->name, (long long)cell, type_name(place->type), first, next,
+                     grid_type_vertices(place->type));
+#pragma GCC diagnostic pop
+}
+
+static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
+{
+    fault_place place = {0};
+    const cell_fault fault = check_cell(mesh, cell, &place);
+    const long long at = cell, vertex = place.vertex;
+    const char *type = type_name(place.type);
+    switch (fault) {
+    case BAD_TYPE:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld: unknown cell type %d (10 tet, 12 hex, 13 wedge, 14 pyramid)",
+                         mesh->name, at, place.type);
+    case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
+    case BAD_INDEX:
+        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": cell %lld (%s): vertex index %lld is outside 0..%lld",
+                         mesh->name, at, type, vertex, (long long)mesh->given.vertex_count - 1);
+    case BAD_COORDINATE:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (%s): vertex %lld has a coordinate that is not finite: (%g, %g, %g)",
+                         mesh->name, at, type, vertex, place.position[0], place.position[1], place.position[2]);
+    case CELL_GOOD: break;
+    }
+    return INSITU_OK;
+}
+
+/* Six times the signed volume of the tet of a corner and its three neighbours, these in right-handed order. */
+static double corner_volume(double points[][3], const signed char *corner)
+{
+    double edge[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int axis = 0; axis < 3; axis++) edge[i][axis] = points[corner[i + 1]][axis] - points[corner[0]][axis];
+    return edge[0][0] * (edge[1][1] * edge[2][2] - edge[1][2] * edge[2][1]) +
+           edge[0][1] * (edge[1][2] * edge[2][0] - edge[1][0] * edge[2][2]) +
+           edge[0][2] * (edge[1][0] * edge[2][1] - edge[1][1] * edge[2][0]);
+}
+
+static bool is_inverted(int type, double points[][3])
+{
+    static const signed char tet[][4] = {{0, 1, 2, 3}};
+    static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
+                                         {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}};
+    static const signed char wedge[][4] = {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5},
+                                           {3, 5, 4, 0}, {4, 3, 5, 1}, {5, 4, 3, 2}};
+    static const signed char pyramid[][4] = {{0, 1, 3, 4}, {1, 2, 0, 4}, {2, 3, 1, 4}, {3, 0, 2, 4}};
+    const signed char(*corners)[4] = type == GRID_TET     ? tet
+                                     : type == GRID_HEX   ? hex
+                                     : type == GRID_WEDGE ? wedge
+                                                          : pyramid;
+    const int count = type == GRID_TET ? 1 : type == GRID_HEX ? 8 : type == GRID_WEDGE ? 6 : 4;
+    double sum = 0;
+    for (int i = 0; i < count; i++) sum += corner_volume(points, corners[i]);
+    return sum < 0;
+}
+
+typedef struct mesh_tally {
+    double lower[3], upper[3];
+    int64_t drawn, ghosts, inverted;
+} mesh_tally;
+
+static const mesh_tally empty_tally = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, 0, 0};
+
+static void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
+{
+    if (grid_is_ghost(g, cell)) {
+        tally->ghosts++;
+        return;
+    }
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    double points[GRID_MAX_CELL_VERTICES][3];
+    const int count = grid_cell_vertices(g, cell, vertices);
+    for (int i = 0; i < count; i++) {
+        grid_vertex(g, vertices[i], points[i]);
+        for (int axis = 0; axis < 3; axis++) {
+            tally->lower[axis] = fmin(tally->lower[axis], points[i][axis]);
+            tally->upper[axis] = fmax(tally->upper[axis], points[i][axis]);
+        }
+    }
+    tally->drawn++;
+    tally->inverted += is_inverted(grid_cell_type(g, cell), points);
+}
+
+static void merge_tally(mesh_tally *sum, const mesh_tally *part)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        sum->lower[axis] = fmin(sum->lower[axis], part->lower[axis]);
+        sum->upper[axis] = fmax(sum->upper[axis], part->upper[axis]);
+    }
+    sum->drawn += part->drawn;
+    sum->ghosts += part->ghosts;
+    sum->inverted += part->inverted;
+}
+
+/* The lowest bad cell, or cell_count. */
+static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *tally)
+{
+    const int64_t count = mesh->cells.cell_count;
+    int64_t first_bad = count;
+#pragma omp parallel num_threads(threads) reduction(min : first_bad)
+    {
+        mesh_tally mine = empty_tally;
+#pragma omp for schedule(static)
+        for (int64_t cell = 0; cell < count; cell++) {
+            fault_place place;
+            if (first_bad < count) continue;
+            if (check_cell(mesh, cell, &place) == CELL_GOOD)
+                tally_cell(&mesh->cells, cell, &mine);
+            else
+                first_bad = cell;
+        }
+#pragma omp critical(session_check_tally)
+        merge_tally(tally, &mine);
+    }
+    return first_bad;
+}
+
+static insitu_status check_last_offset(const session_mesh *mesh, base_error *error)
+{
+    const grid *g = &mesh->cells;
+    if (!g->offsets.data || g->cell_count == 0) return INSITU_OK;
+    const int64_t last = grid_array_index(&g->offsets, g->cell_count);
+    if (last == mesh->given.connectivity_count) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": the last offset is %lld, not connectivity_count, %lld",
+                     mesh->name, (long long)last, (long long)mesh->given.connectivity_count);
+}
+
+insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error)
+{
+    mesh_tally tally = empty_tally;
+    const int64_t bad = check_cells(mesh, threads, &tally);
+    if (bad < mesh->cells.cell_count) return describe_fault(mesh, bad, error);
+    const insitu_status status = check_last_offset(mesh, error);
+    if (status) return status;
+    for (int axis = 0; axis < 3; axis++) {
+        mesh->lower[axis] = tally.lower[axis];
+        mesh->upper[axis] = tally.upper[axis];
+    }
+    mesh->drawn_count = tally.drawn;
+    mesh->ghost_count = tally.ghosts;
+    mesh->inverted_count = tally.inverted;
+    mesh->is_check_stale = false;
+    return INSITU_OK;
+}

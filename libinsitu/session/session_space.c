@@ -1,0 +1,126 @@
+/* Where everything lies: global bounds, the origin and scale of float32 numbers, and how many threads a rank takes.
+ *
+ * Every number here comes out of reductions, so that it is the same on every rank and for every partition. The space
+ * is kept while the cells stay about where they were, since a new one means new trees: a moving mesh does not move it
+ * at every step. */
+#include <float.h>
+#include <omp.h>
+#include <unistd.h>
+
+#include "session.h"
+#include "session_agree.h"
+
+int session_node_ranks(MPI_Comm comm)
+{
+    MPI_Comm node = MPI_COMM_NULL;
+    int ranks = 1;
+    if (MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node) != MPI_SUCCESS) return 1;
+    MPI_Comm_size(node, &ranks);
+    MPI_Comm_free(&node);
+    return ranks;
+}
+
+int session_thread_count(const insitu_session *session)
+{
+    if (session->scene.threads > 0) return session->scene.threads;
+    /* A rank bound to some cores has them for itself; one that is bound to none shares the node's. */
+    int cores = omp_get_num_procs();
+    if (cores >= (int)sysconf(_SC_NPROCESSORS_ONLN)) cores /= session->node_ranks;
+    if (cores > omp_get_max_threads()) cores = omp_get_max_threads();
+    return cores > 1 ? cores : 1;
+}
+
+static insitu_status check_meshes(insitu_session *session, base_error *error)
+{
+    for (int i = 0; i < session->mesh_count; i++) {
+        session_mesh *mesh = session->meshes[i];
+        if (!mesh->is_check_stale) continue;
+        const insitu_status status = session_check_mesh(mesh, session->threads, error);
+        if (status) return status;
+    }
+    return INSITU_OK;
+}
+
+static insitu_status reduce_extent(insitu_session *session, session_extent *out, base_error *error)
+{
+    double mine[6], all[6];
+    int64_t counts[2] = {0, 0}, totals[2] = {0, 0};
+    for (int i = 0; i < 6; i++) mine[i] = INFINITY;
+    for (int i = 0; i < session->mesh_count; i++) {
+        const session_mesh *mesh = session->meshes[i];
+        if (mesh->drawn_count == 0) continue;
+        for (int axis = 0; axis < 3; axis++) {
+            mine[axis] = fmin(mine[axis], mesh->lower[axis]);
+            mine[3 + axis] = fmin(mine[3 + axis], -mesh->upper[axis]);
+        }
+        counts[0] += mesh->drawn_count;
+    }
+    counts[1] = counts[0] > 0;
+    insitu_status status =
+        session_mpi(error, MPI_Allreduce(mine, all, 6, MPI_DOUBLE, MPI_MIN, session->comm), "MPI_Allreduce");
+    if (!status)
+        status =
+            session_mpi(error, MPI_Allreduce(counts, totals, 2, MPI_INT64_T, MPI_SUM, session->comm), "MPI_Allreduce");
+    if (status) return status;
+    *out = (session_extent){.cell_count = totals[0], .rank_count = (int)totals[1]};
+    for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
+        out->lower[axis] = all[axis];
+        out->upper[axis] = -all[3 + axis];
+    }
+    return INSITU_OK;
+}
+
+static double half_diagonal(const double lower[3], const double upper[3])
+{
+    double half[3];
+    for (int axis = 0; axis < 3; axis++) half[axis] = 0.5 * upper[axis] - 0.5 * lower[axis];
+    return hypot(hypot(half[0], half[1]), half[2]);
+}
+
+/* Kept while the bounds' centre is inside the old ones and the size is within a factor of 4 up, 8 down. */
+static bool space_still_fits(const insitu_session *session)
+{
+    if (!session->has_space) return false;
+    const double old_half = half_diagonal(session->space_lower, session->space_upper);
+    const session_extent *e = &session->extent;
+    if (e->half_diagonal > 4 * old_half || e->half_diagonal < old_half / 8) return false;
+    for (int axis = 0; axis < 3; axis++) {
+        const double centre = 0.5 * e->lower[axis] + 0.5 * e->upper[axis];
+        if (centre < session->space_lower[axis] || centre > session->space_upper[axis]) return false;
+    }
+    return true;
+}
+
+static void make_space(insitu_session *session)
+{
+    const session_extent *e = &session->extent;
+    for (int axis = 0; axis < 3; axis++) {
+        session->origin[axis] = 0.5 * e->lower[axis] + 0.5 * e->upper[axis];
+        session->space_lower[axis] = e->lower[axis];
+        session->space_upper[axis] = e->upper[axis];
+    }
+    int exponent = 0; /* half_diagonal = m 2^exponent, m in [0.5, 1) */
+    if (e->half_diagonal > 0 && frexp(e->half_diagonal, &exponent) == 0.5) exponent--;
+    session->scale = ldexp(1.0, exponent < -1000 ? 1000 : -exponent);
+    session->has_space = true;
+    for (int i = 0; i < session->mesh_count; i++) session_drop_tree(session->meshes[i]);
+}
+
+insitu_status session_update_extent(insitu_session *session, base_error *error)
+{
+    check_meshes(session, error);
+    insitu_status status = session_agree(session->comm, error);
+    if (status) return status;
+    session_extent extent;
+    status = reduce_extent(session, &extent, error);
+    if (status) return status;
+    extent.half_diagonal = half_diagonal(extent.lower, extent.upper);
+    if (!(extent.half_diagonal <= DBL_MAX / 16))
+        return base_fail(error, INSITU_ERROR_MESH, "the meshes span more than double numbers can: %g across",
+                         2 * extent.half_diagonal);
+    session->extent = extent;
+    session->has_extent = true;
+    if (!space_still_fits(session)) make_space(session);
+    session->is_changed = false;
+    return INSITU_OK;
+}
