@@ -19,8 +19,7 @@ static insitu_status merge_alone(const comp_layout *layout, fragment_list *items
                                  comp_statistics *statistics, base_error *error)
 {
     const double start = MPI_Wtime();
-    int64_t starts[2];
-    if (!comp_bucket_by_owner(layout, items->items, items->count, starts))
+    if (!comp_bucket_fits(layout, items->items, items->count))
         return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
     comp_pixels_clear(out, background);
     const insitu_status status = comp_pixels_merge(layout, 0, items, background, out, NULL, error);

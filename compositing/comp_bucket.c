@@ -10,41 +10,40 @@
  * the bucket, the bucket would lie left of i and be full, so nothing of that key would be left to meet. So one array
  * of counters does, and in the end it holds each bucket's start.
  *
- * Order within a bucket is arbitrary; comp_merge_pixel() orders a pixel's fragments totally.
- *
- * Two passes, by slice and then by pixel within the slice, beat one by pixel: the first streams to few places, the
- * second works in cache, and slices can be dealt to threads. */
+ * Order within a bucket is arbitrary; comp_merge_pixel() orders a pixel's fragments totally. */
 #include "comp_bucket.h"
 
 #include <string.h>
 
-typedef uint32_t key_function(const comp_layout *layout, uint32_t pixel);
+typedef uint32_t key_function(const comp_layout *layout, uint32_t slice_shift, uint32_t pixel);
 
-static inline uint32_t slice_of(const comp_layout *layout, uint32_t pixel)
+static inline uint32_t owner_of(const comp_layout *layout, uint32_t slice_shift, uint32_t pixel)
 {
-    return comp_layout_index(layout, pixel) >> comp_slice_shift;
+    (void)slice_shift;
+    return comp_layout_owner(layout, pixel);
 }
 
-static inline uint32_t place_in_slice(const comp_layout *layout, uint32_t pixel)
+static inline uint32_t slice_of(const comp_layout *layout, uint32_t slice_shift, uint32_t pixel)
 {
-    return comp_layout_index(layout, pixel) & (comp_slice_pixels - 1);
+    return comp_layout_index(layout, pixel) >> slice_shift;
 }
 
-static inline void count_keys(const comp_layout *layout, const fragment *items, int64_t count, int64_t *ends,
-                              int64_t keys, key_function *key)
+static inline void count_keys(const comp_layout *layout, uint32_t shift, const fragment *items, int64_t count,
+                              int64_t *ends, int64_t keys, key_function *key)
 {
     memset(ends, 0, (size_t)keys * sizeof *ends);
-    for (int64_t i = 0; i < count; i++) ends[key(layout, items[i].pixel)]++;
+    for (int64_t i = 0; i < count; i++) ends[key(layout, shift, items[i].pixel)]++;
     for (int64_t k = 1; k < keys; k++) ends[k] += ends[k - 1];
 }
 
-static inline void place(const comp_layout *layout, fragment *items, int64_t count, int64_t *ends, key_function *key)
+static inline void place(const comp_layout *layout, uint32_t shift, fragment *items, int64_t count, int64_t *ends,
+                         key_function *key)
 {
     for (int64_t i = 0; i < count; i++) {
-        if (i >= ends[key(layout, items[i].pixel)]) continue;
+        if (i >= ends[key(layout, shift, items[i].pixel)]) continue;
         fragment lifted = items[i];
         for (int64_t to = -1; to != i;) {
-            to = --ends[key(layout, lifted.pixel)];
+            to = --ends[key(layout, shift, lifted.pixel)];
             const fragment next = items[to];
             items[to] = lifted;
             lifted = next;
@@ -52,32 +51,25 @@ static inline void place(const comp_layout *layout, fragment *items, int64_t cou
     }
 }
 
-bool comp_bucket_by_owner(const comp_layout *layout, fragment *items, int64_t count, int64_t *starts)
+bool comp_bucket_fits(const comp_layout *layout, const fragment *items, int64_t count)
 {
-    for (int64_t i = 0; i < count; i++)
-        if (items[i].pixel >= layout->pixel_count) return false;
-    starts[layout->ranks] = count;
-    count_keys(layout, items, count, starts, layout->ranks, comp_layout_owner);
-    if (layout->ranks == 1)
-        starts[0] = 0;
-    else
-        place(layout, items, count, starts, comp_layout_owner);
-    return true;
+    bool fits = true;
+#pragma omp parallel for schedule(static) reduction(&& : fits)
+    for (int64_t i = 0; i < count; i++) fits = fits && items[i].pixel < layout->pixel_count;
+    return fits;
 }
 
-void comp_bucket_by_slice(const comp_layout *layout, fragment *items, int64_t count, int64_t *starts, int64_t slices)
+void comp_bucket_by_owner(const comp_layout *layout, fragment *items, int64_t count, int64_t *starts)
+{
+    starts[layout->ranks] = count;
+    count_keys(layout, 0, items, count, starts, layout->ranks, owner_of);
+    place(layout, 0, items, count, starts, owner_of);
+}
+
+void comp_bucket_by_slice(const comp_layout *layout, uint32_t slice_shift, fragment *items, int64_t count,
+                          int64_t *starts, int64_t slices)
 {
     starts[slices] = count;
-    count_keys(layout, items, count, starts, slices, slice_of);
-    place(layout, items, count, starts, slice_of);
-}
-
-int64_t comp_bucket_by_pixel(const comp_layout *layout, fragment *items, int64_t count)
-{
-    int64_t ends[comp_slice_pixels];
-    count_keys(layout, items, count, ends, comp_slice_pixels, place_in_slice);
-    int64_t pixels = ends[0] > 0;
-    for (int64_t k = 1; k < comp_slice_pixels; k++) pixels += ends[k] > ends[k - 1];
-    place(layout, items, count, ends, place_in_slice);
-    return pixels;
+    count_keys(layout, slice_shift, items, count, starts, slices, slice_of);
+    place(layout, slice_shift, items, count, starts, slice_of);
 }

@@ -37,8 +37,9 @@ static insitu_status sort_by_owner(exchange *x, const comp_layout *layout, fragm
     x->receive_counts = base_alloc(ranks * sizeof *x->receive_counts);
     if (!x->send_starts || !x->send_counts || !x->receive_counts)
         return out_of_memory(error, "message counts", (int64_t)(3 * ranks * sizeof *x->send_counts));
-    if (!comp_bucket_by_owner(layout, items->items, items->count, x->send_starts))
+    if (!comp_bucket_fits(layout, items->items, items->count))
         return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
+    comp_bucket_by_owner(layout, items->items, items->count, x->send_starts);
     for (size_t r = 0; r < ranks; r++) x->send_counts[r] = x->send_starts[r + 1] - x->send_starts[r];
     return INSITU_OK;
 }

@@ -25,8 +25,8 @@ void comp_pixels_clear(image *out, const float background[4]);
 void comp_pixels_store(image *out, const comp_pixel *from);
 
 /* Merge the pixels that have fragments; all of fragments belong to pixels that rank owns, and are reordered. Where out
- * is given they are written there, else they become *finished, rising by owned index. Local. On an error out and
- * finished are left alone. */
+ * is given they are written there, else they become *finished, rising by owned index. Local. On an error
+ * *finished is empty, and out may hold some pixels. */
 insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
                                 const float background[4], image *out, comp_pixel_list *finished, base_error *error);
 

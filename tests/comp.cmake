@@ -8,3 +8,9 @@ add_executable(test_comp_mpi test_comp_mpi.c)
 target_link_libraries(test_comp_mpi
   PRIVATE insitu_compositing insitu_base insitu_flags PkgConfig::CMOCKA OpenMP::OpenMP_C m)
 insitu_add_mpi_test(comp_mpi test_comp_mpi 1 2 3 4 7)
+
+# The same with threads that share the merging.
+add_test(NAME comp_mpi_4_threads
+  COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} 2 $<TARGET_FILE:test_comp_mpi>)
+set_tests_properties(comp_mpi_4_threads PROPERTIES
+  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};OMP_NUM_THREADS=4;OMP_WAIT_POLICY=passive" TIMEOUT 120 PROCESSORS 2)
