@@ -28,6 +28,9 @@
 #error "WAVE_REAL, WAVE_INDEX and WAVE_TABLE say what to compile"
 #endif
 
+/* Inlined wherever the shape is a constant: the loops over a cell's faces and vertices unroll. */
+#define INLINE static inline __attribute__((always_inline))
+
 typedef WAVE_REAL real;
 typedef WAVE_INDEX local_index;
 
@@ -59,9 +62,9 @@ static layer_table make_layers(const wave_grid *grid)
     return t;
 }
 
-static inline cell_view view_cell(const wave_grid *grid, int32_t c)
+INLINE cell_view view_cell(const wave_grid *grid, const wave_cell_shape *shape, int32_t c)
 {
-    cell_view view = {.shape = wave_cell_shape_of(grid->types ? grid->types[c] : grid->uniform_type)};
+    cell_view view = {.shape = shape};
     int64_t first_vertex =
         grid->offsets ? (int64_t)((const local_index *)grid->offsets)[c] : (int64_t)c * view.shape->vertex_count;
     int64_t first_face = grid->face_offsets ? grid->face_offsets[c] : (int64_t)c * view.shape->face_count;
@@ -92,7 +95,7 @@ static void to_vertices(const wave_grid *grid)
 }
 
 /* The vertex states of a cell. */
-static inline void load_vertices(const wave_grid *grid, const cell_view *view, real p[8][4])
+INLINE void load_vertices(const wave_grid *grid, const cell_view *view, real p[8][4])
 {
     const real *values = grid->vertex_state.values;
     int64_t stride = grid->vertex_state.stride, apart = grid->vertex_state.component_stride;
@@ -103,7 +106,7 @@ static inline void load_vertices(const wave_grid *grid, const cell_view *view, r
 }
 
 /* Opposite vertices of a quad are summed first: the mean then rounds alike on both sides. */
-static inline void face_mean(const wave_cell_shape *shape, int f, const real p[8][4], real mean[4])
+INLINE void face_mean(const wave_cell_shape *shape, int f, const real p[8][4], real mean[4])
 {
     const int8_t *v = shape->face[f];
     if (shape->face_size[f] == 3) {
@@ -114,7 +117,7 @@ static inline void face_mean(const wave_cell_shape *shape, int f, const real p[8
 }
 
 /* Integrals over the cell's surface of u.n and of p n. */
-static inline void integrate_faces(const cell_view *view, const real p[8][4], real integral[4])
+INLINE void integrate_faces(const cell_view *view, const real p[8][4], real integral[4])
 {
     for (int k = 0; k < 4; ++k) integral[k] = 0;
     for (int f = 0; f < view->shape->face_count; ++f) {
@@ -126,11 +129,23 @@ static inline void integrate_faces(const cell_view *view, const real p[8][4], re
     }
 }
 
-static inline void find_jump(const wave_grid *grid, const layer_table *layers, real half_step, int32_t c)
+/* Call pass(grid, shape, layers, step, cell) for every own cell, compiled for each shape. */
+#define FOR_EACH_CELL(grid, pass, layers, step)                                                                        \
+    for (int32_t c = 0; c < (grid)->own_cells; ++c) {                                                                  \
+        switch ((grid)->types ? (grid)->types[c] : (grid)->uniform_type) {                                             \
+        case WAVE_TYPE_TET: pass(grid, &wave_tet_shape, layers, step, c); break;                                       \
+        case WAVE_TYPE_HEX: pass(grid, &wave_hex_shape, layers, step, c); break;                                       \
+        case WAVE_TYPE_WEDGE: pass(grid, &wave_wedge_shape, layers, step, c); break;                                   \
+        default: pass(grid, &wave_pyramid_shape, layers, step, c); break;                                              \
+        }                                                                                                              \
+    }
+
+INLINE void find_jump(const wave_grid *grid, const wave_cell_shape *shape, const layer_table *layers, real half_step,
+                      int32_t c)
 {
     const real *state = (const real *)grid->state.values + c * grid->state.stride;
     real *jump = (real *)grid->jump + 4 * (int64_t)c;
-    cell_view view = view_cell(grid, c);
+    cell_view view = view_cell(grid, shape, c);
     real p[8][4], integral[4];
     load_vertices(grid, &view, p);
     integrate_faces(&view, p, integral);
@@ -148,7 +163,7 @@ static void find_jumps(const wave_grid *grid, double time_step)
 {
     if (grid->second_order) {
         layer_table layers = make_layers(grid);
-        for (int32_t c = 0; c < grid->own_cells; ++c) find_jump(grid, &layers, (real)(0.5 * time_step), c);
+        FOR_EACH_CELL(grid, find_jump, &layers, (real)(0.5 * time_step));
         return;
     }
     for (int32_t c = 0; c < grid->own_cells; ++c) {
@@ -158,8 +173,8 @@ static void find_jumps(const wave_grid *grid, double time_step)
 }
 
 /* p* and u* of a face with normal n, between jumps a and b over the common mean; b is NULL at a wall. */
-static inline void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
-                                 const real *a, int layer_a, const real *b, int layer_b, real star[2])
+INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
+                          const real *a, int layer_a, const real *b, int layer_b, real star[2])
 {
     real za = layers->impedance[layer_a], pa = mean[0] + a[0];
     real ua = n[0] * (mean[1] + a[1]) + n[1] * (mean[2] + a[2]) + n[2] * (mean[3] + a[3]);
@@ -176,10 +191,11 @@ static inline void solve_riemann(const wave_grid *grid, const layer_table *layer
     star[1] = ((za * ua + zb * ub) + (pa - pb)) * inverse;
 }
 
-static inline void apply_flux(const wave_grid *grid, const layer_table *layers, real time_step, int32_t c)
+INLINE void apply_flux(const wave_grid *grid, const wave_cell_shape *shape, const layer_table *layers, real time_step,
+                       int32_t c)
 {
     const real *jumps = grid->jump;
-    cell_view view = view_cell(grid, c);
+    cell_view view = view_cell(grid, shape, c);
     real p[8][4], mean[4] = {0, 0, 0, 0}, sum[4] = {0, 0, 0, 0};
     int layer = grid->layers[c];
     if (grid->second_order) load_vertices(grid, &view, p);
@@ -204,7 +220,7 @@ static inline void apply_flux(const wave_grid *grid, const layer_table *layers, 
 static void apply_fluxes(const wave_grid *grid, double time_step)
 {
     layer_table layers = make_layers(grid);
-    for (int32_t c = 0; c < grid->own_cells; ++c) apply_flux(grid, &layers, (real)time_step, c);
+    FOR_EACH_CELL(grid, apply_flux, &layers, (real)time_step);
 }
 
 static void move_vertices(const wave_grid *grid, double scale)

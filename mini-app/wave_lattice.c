@@ -14,8 +14,6 @@
 
 #include <stddef.h>
 
-enum { TET = 10, HEX = 12, WEDGE = 13, PYRAMID = 14 };
-
 static const int8_t corner_offset[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                            {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
@@ -25,36 +23,6 @@ static const struct {
     int8_t axis, step;
 } cube_face[6] = {{{0, 4, 7, 3}, 0, -1}, {{1, 2, 6, 5}, 0, 1},  {{0, 1, 5, 4}, 1, -1},
                   {{3, 7, 6, 2}, 1, 1},  {{0, 3, 2, 1}, 2, -1}, {{4, 5, 6, 7}, 2, 1}};
-
-static const wave_cell_shape tet_shape = {
-    4, 4, {3, 3, 3, 3}, {{0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {0, 2, 1}}, {0.25, 0.25, 0.25, 0.25}};
-static const wave_cell_shape hex_shape = {
-    8,
-    6,
-    {4, 4, 4, 4, 4, 4},
-    {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}},
-    {0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125, 0.125}};
-static const wave_cell_shape wedge_shape = {6,
-                                            5,
-                                            {3, 3, 4, 4, 4},
-                                            {{0, 2, 1}, {3, 4, 5}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}},
-                                            {1.0 / 6, 1.0 / 6, 1.0 / 6, 1.0 / 6, 1.0 / 6, 1.0 / 6}};
-static const wave_cell_shape pyramid_shape = {5,
-                                              5,
-                                              {4, 3, 3, 3, 3},
-                                              {{0, 3, 2, 1}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}},
-                                              {0.1875, 0.1875, 0.1875, 0.1875, 0.25}};
-
-const wave_cell_shape *wave_cell_shape_of(int type)
-{
-    switch (type) {
-    case TET: return &tet_shape;
-    case HEX: return &hex_shape;
-    case WEDGE: return &wedge_shape;
-    case PYRAMID: return &pyramid_shape;
-    default: return NULL;
-    }
-}
 
 wave_lattice wave_lattice_make(const int size[3], wave_cells cells, double jitter)
 {
@@ -133,15 +101,15 @@ static int cut_tets(const int64_t v[8], wave_cell *cells)
     /* From corner 0 to corner 6 along the axes in each of six orders; odd orders are mirrored. */
     static const int8_t path[6][2] = {{1, 2}, {3, 7}, {4, 5}, {2, 3}, {7, 4}, {5, 1}};
     for (int t = 0; t < 6; ++t) {
-        cells[t] = (wave_cell){TET, {v[0], v[path[t][0]], v[path[t][1]], v[6]}};
+        cells[t] = (wave_cell){WAVE_TYPE_TET, {v[0], v[path[t][0]], v[path[t][1]], v[6]}};
     }
     return 6;
 }
 
 static int cut_wedges(const int64_t v[8], wave_cell *cells)
 {
-    cells[0] = (wave_cell){WEDGE, {v[0], v[1], v[2], v[4], v[5], v[6]}};
-    cells[1] = (wave_cell){WEDGE, {v[0], v[2], v[3], v[4], v[6], v[7]}};
+    cells[0] = (wave_cell){WAVE_TYPE_WEDGE, {v[0], v[1], v[2], v[4], v[5], v[6]}};
+    cells[1] = (wave_cell){WAVE_TYPE_WEDGE, {v[0], v[2], v[3], v[4], v[6], v[7]}};
     return 2;
 }
 
@@ -159,10 +127,10 @@ static int cut_pyramids(const wave_lattice *lattice, const int ijk[3], const int
         }
         int64_t a = q[least], b = q[(least + 1) % 4], c = q[(least + 2) % 4], d = q[(least + 3) % 4];
         if (neighbour_wants_split(lattice, ijk, f)) {
-            cells[count++] = (wave_cell){TET, {a, c, b, centre}};
-            cells[count++] = (wave_cell){TET, {a, d, c, centre}};
+            cells[count++] = (wave_cell){WAVE_TYPE_TET, {a, c, b, centre}};
+            cells[count++] = (wave_cell){WAVE_TYPE_TET, {a, d, c, centre}};
         } else {
-            cells[count++] = (wave_cell){PYRAMID, {a, d, c, b, centre}};
+            cells[count++] = (wave_cell){WAVE_TYPE_PYRAMID, {a, d, c, b, centre}};
         }
     }
     return count;
@@ -178,13 +146,13 @@ int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cell
     case WAVE_TETS: return cut_tets(v, cells);
     case WAVE_WEDGES: return cut_wedges(v, cells);
     case WAVE_PYRAMIDS: return cut_pyramids(lattice, ijk, v, lattice_vertex_count(lattice) + cube, cells);
-    default: cells[0] = (wave_cell){HEX, {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]}}; return 1;
+    default: cells[0] = (wave_cell){WAVE_TYPE_HEX, {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]}}; return 1;
     }
 }
 
 uint8_t wave_lattice_uniform_type(const wave_lattice *lattice)
 {
-    static const uint8_t type[] = {TET, HEX, WEDGE, PYRAMID, 0};
+    static const uint8_t type[] = {WAVE_TYPE_TET, WAVE_TYPE_HEX, WAVE_TYPE_WEDGE, WAVE_TYPE_PYRAMID, 0};
     return type[lattice->cells];
 }
 

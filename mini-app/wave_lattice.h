@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "wave_shape.h"
+
 typedef enum wave_cells { WAVE_TETS, WAVE_HEXES, WAVE_WEDGES, WAVE_PYRAMIDS, WAVE_MIXED } wave_cells;
 
 typedef struct wave_lattice {
@@ -17,18 +19,10 @@ typedef struct wave_lattice {
     double origin[3]; /* the corner of least x, y, z */
 } wave_lattice;
 
-/* Vertices and faces of a cell type. Faces are listed outward for cells of positive volume. */
-typedef struct wave_cell_shape {
-    int vertex_count, face_count;
-    int face_size[6];  /* 3 or 4 */
-    int8_t face[6][4]; /* the cell's vertices around each face */
-    double centre[8];  /* weights of the vertices in the centroid: exact for affine images of the regular cell */
-} wave_cell_shape;
-
 enum { WAVE_CELLS_PER_CUBE = 12 }; /* the most there are: cell ids are cube id * 12 + number in the cube */
 
 typedef struct wave_cell {
-    uint8_t type;      /* VTK's id: 10 tet, 12 hex, 13 wedge, 14 pyramid */
+    uint8_t type;      /* WAVE_TYPE_* */
     int64_t vertex[8]; /* ids: of lattice vertices, then of cube centres */
 } wave_cell;
 
@@ -51,9 +45,6 @@ void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz
 
 /* Bits 1, 2, 4: the vertex lies on a wall across x, y, z. */
 uint8_t wave_lattice_walls(const wave_lattice *lattice, int64_t vertex);
-
-/* NULL for a type that is none of the four. */
-const wave_cell_shape *wave_cell_shape_of(int type);
 
 /* A fixed hash of 64 bits (the finalizer of splitmix64). */
 static inline uint64_t wave_hash(uint64_t x)

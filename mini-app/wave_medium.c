@@ -37,7 +37,7 @@ wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *
     double depth = lattice->origin[2];
     wave_source source = {.position = {0.2 * lattice->origin[0], 0.1 * lattice->origin[1], 0.52 * depth},
                           .frequency = 2.5,
-                          .delay = 0.45};
+                          .delay = 0.36};
     int layer = wave_medium_layer(medium, source.position[2]);
     source.amplitude = 4 * pi * 0.5 / medium->density[layer];
     /* A ninth of a wavelength where cells resolve it; never less than a cube, which sampling needs to see the ball. */

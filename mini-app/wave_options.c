@@ -14,8 +14,8 @@ static const char help_text[] =
     "  mpirun -n 4 insitu-wave [options]\n"
     "\n"
     "  --cells KIND        tet (default), hex, wedge, pyramid, mixed\n"
-    "  --size N | X,Y,Z    cubes of the lattice that the cells are cut from (32)\n"
-    "  --steps N           time steps (100)\n"
+    "  --size N | X,Y,Z    cubes of the lattice that the cells are cut from (40)\n"
+    "  --steps N           time steps (400)\n"
     "  --precision TYPE    float (default) or double: computed on and handed over\n"
     "  --index TYPE        int32 (default) or int64: of the connectivity\n"
     "  --layout HOW        aos (default): components interleaved; soa: an array each\n"
@@ -173,8 +173,8 @@ static bool read_option(int argc, char **argv, int *at, raw_options *raw, char *
 
 bool wave_options_parse(int argc, char **argv, wave_options *options, char *message, int message_size)
 {
-    raw_options raw = {.steps = 100,
-                       .size = {32, 32, 32},
+    raw_options raw = {.steps = 400,
+                       .size = {40, 40, 40},
                        .real_bytes = 4,
                        .index_bytes = 4,
                        .order = 2,

@@ -63,6 +63,21 @@ void wave_report_step(wave_report *report, int64_t cycle, double time, double si
     fflush(stdout);
 }
 
+/* End a YAML scalar that begins at text: at its closing quote, or before a comma, a blank or a brace that it did not
+ * open itself ("{cycle}" it did). */
+static void cut_scalar(char *text)
+{
+    char quote = *text == '"' || *text == '\'' ? *text : 0;
+    int open = 0;
+    if (quote) memmove(text, text + 1, strlen(text));
+    for (; *text; ++text) {
+        if (quote ? *text == quote : strchr(" \t\r\n,]", *text) != NULL) break;
+        open += *text == '{';
+        if (!quote && *text == '}' && --open < 0) break;
+    }
+    *text = 0;
+}
+
 /* The public face does not tell where pictures go; the scene does. Show its output paths as they are written there. */
 static void show_paths(const char *scene)
 {
@@ -73,9 +88,8 @@ static void show_paths(const char *scene)
         char *path = strstr(line, "path:"), *comment = strchr(line, '#');
         if (!path || (comment && comment < path)) continue;
         path += strlen("path:");
-        path += strspn(path, " \t\"'");
-        path[strcspn(path, "\"'}],\n")] = 0;
-        /* {cycle} ends with a brace of its own: take the line's rest up to the ending's last letter. */
+        path += strspn(path, " \t");
+        cut_scalar(path);
         printf("  %s\n", path);
     }
     fclose(file);
