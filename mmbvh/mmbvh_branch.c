@@ -126,9 +126,11 @@ static void part(const branch_builder *builder, const branch *b, splitting *s)
     bin_box bounds[2];
     bins_split_bounds(&s->total, &s->mapping, s->split, bounds);
     for (int side = 0; side < 2; side++) s->sides[side].bounds = bounds[side];
-#pragma omp taskloop grainsize(1) if (b->count > PARALLEL_MIN) default(shared)
+#pragma omp taskgroup
     for (int chunk = 0; chunk < s->chunks.count; chunk++) {
-        move_chunk(builder, b, s, chunk, starts[chunk], s->left_count + chunk * s->chunks.size - starts[chunk]);
+        const int64_t left = starts[chunk], right = s->left_count + chunk * s->chunks.size - left;
+#pragma omp task if (b->count > PARALLEL_MIN) default(none) firstprivate(builder, b, s, chunk, left, right)
+        move_chunk(builder, b, s, chunk, left, right);
     }
 }
 
@@ -141,8 +143,11 @@ static void split_branch(const branch_builder *builder, branch *b, splitting *s)
     s->sides[0] = s->sides[1] = bin_set_empty();
     if (b->depth < SUBTREE_MEDIAN_DEPTH) {
         bins_clear(&s->total, s->mapping.count);
-#pragma omp taskloop grainsize(1) if (b->count > PARALLEL_MIN) default(shared)
-        for (int chunk = 0; chunk < s->chunks.count; chunk++) bin_chunk(builder, b, s, chunk);
+#pragma omp taskgroup
+        for (int chunk = 0; chunk < s->chunks.count; chunk++) {
+#pragma omp task if (b->count > PARALLEL_MIN) default(none) firstprivate(builder, b, s, chunk)
+            bin_chunk(builder, b, s, chunk);
+        }
         s->split = bins_choose(&s->total, &s->mapping, &b->set.bounds);
     }
     if (s->split.axis < 0) {
