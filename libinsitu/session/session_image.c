@@ -11,6 +11,7 @@
 #include <dlfcn.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -25,8 +26,11 @@ static void *open_library(const char *path, char *why, size_t size)
     pthread_sigmask(SIG_SETMASK, &all, &before);
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (!handle && !*why) snprintf(why, size, "%s", dlerror());
-    return handle;
+    if (handle) return handle;
+    const char *reason = dlerror();
+    const bool is_absent = strncmp(reason, path, strlen(path)) == 0; /* else it is there, but not what it needs */
+    if (!*why || !is_absent) snprintf(why, size, "%s", reason);
+    return NULL;
 }
 
 /* folder: between the object's own folder and the library's name. */
