@@ -24,7 +24,7 @@ static const char help_text[] =
     "  --order N           2 (default) or 1: of the scheme\n"
     "  --jitter A          inner vertices move by up to A edges, 0 to 0.3 (0)\n"
     "  --moving            vertices are drawn displaced by the wave\n"
-    "  --swell S           how much --moving exaggerates (0.05)\n"
+    "  --swell S           how much --moving exaggerates (0.2)\n"
     "  --centring WHERE    cell (default) or vertex: of the fields handed over\n"
     "  --ghosts            hand over the halo cells too, flagged\n"
     "  --ids               hand over global vertex ids\n"
@@ -178,7 +178,7 @@ bool wave_options_parse(int argc, char **argv, wave_options *options, char *mess
                        .real_bytes = 4,
                        .index_bytes = 4,
                        .order = 2,
-                       .swell = 0.05,
+                       .swell = 0.2,
                        .scene = "examples/wave.yaml"};
     for (int i = 1; i < argc; ++i) {
         if (!read_option(argc, argv, &i, &raw, message, (size_t)message_size)) return false;

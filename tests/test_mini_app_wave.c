@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "wave_options.h"
 #include "wave_solver.h"
 
 typedef struct model {
@@ -230,6 +231,55 @@ static void absorbing_walls_let_a_wave_go(void **state)
     }
 }
 
+/* The signed volume of a tet as it is drawn. */
+static double drawn_volume(const model *m, int32_t cell)
+{
+    const float *x = m->solver.grid.coordinates.values;
+    int32_t v[8];
+    double e[3][3];
+    wave_mesh_cell(&m->mesh, cell, v);
+    for (int i = 0; i < 3; ++i) {
+        for (int a = 0; a < 3; ++a) e[i][a] = (double)x[3 * v[i + 1] + a] - (double)x[3 * v[0] + a];
+    }
+    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
+           6;
+}
+
+/* The default swell must show, and turn no cell inside out: the pictures are to be of a wave, not of torn cells. */
+static void moving_mesh_swells_without_turning_cells_inside_out(void **state)
+{
+    (void)state;
+    const int size[3] = {24, 24, 24};
+    char *arguments[] = {"insitu-wave", "--moving"};
+    char message[80];
+    wave_options options;
+    wave_setup setup = plain_setup(2);
+    wave_lattice lattice = wave_lattice_make(size, WAVE_TETS, 0);
+    model m;
+    assert_true(wave_options_parse(2, arguments, &options, message, sizeof message));
+    setup.real_bytes = 4;
+    setup.reflecting = false;
+    setup.swell = options.swell;
+    setup.medium = wave_medium_layered(&lattice);
+    setup.source = wave_source_default(&lattice, &setup.medium);
+    make_model(&m, size, WAVE_TETS, 0, &setup);
+    wave_solver_start(&m.solver);
+    double least = 1, most = 1;
+    while (m.solver.time < 2 * setup.source.delay) {
+        wave_solver_step(&m.solver);
+        for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
+            double ratio = drawn_volume(&m, c) / m.solver.volume[c];
+            least = fmin(least, ratio);
+            most = fmax(most, ratio);
+        }
+    }
+    print_message("drawn volumes from %.2f to %.2f of those at rest\n", least, most);
+    assert_true(least > 0.2);
+    assert_true(most > 1.05);
+    free_model(&m);
+}
+
 static void float_stays_near_double(void **state)
 {
     (void)state;
@@ -262,6 +312,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(source_adds_the_volume_it_promises),
         cmocka_unit_test(energy_never_rises),
         cmocka_unit_test(absorbing_walls_let_a_wave_go),
+        cmocka_unit_test(moving_mesh_swells_without_turning_cells_inside_out),
         cmocka_unit_test(float_stays_near_double),
     };
     MPI_Init(&argc, &argv);
