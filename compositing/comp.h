@@ -24,7 +24,7 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
 
 typedef struct comp_statistics {
     int64_t sent_fragments; /* by this rank, own ones included */
-    int64_t sent_bytes;     /* to other ranks */
+    int64_t sent_bytes;     /* by this rank to others: fragments and finished pixels */
     double exchange_ms, merge_ms, gather_ms;
 } comp_statistics;
 

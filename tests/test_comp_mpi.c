@@ -167,6 +167,13 @@ static void composite_equals_serial_merge(void **context)
                 check_composite(sizes[s][0], sizes[s][1], counts[c], how, seed++);
 }
 
+/* More pixels than 512 slices of 256 a rank, so that slices grow, and fewer fragments than pixels. */
+static void large_image_equals_serial_merge(void **context)
+{
+    (void)context;
+    check_composite(601, 401 * rank_count, 40000, deal_random, 1001);
+}
+
 static void statistics_count_what_travelled(void **context)
 {
     (void)context;
@@ -275,6 +282,7 @@ int main(int argc, char **argv)
     MPI_Comm_size(comm, &rank_count);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(composite_equals_serial_merge),
+        cmocka_unit_test(large_image_equals_serial_merge),
         cmocka_unit_test(statistics_count_what_travelled),
         cmocka_unit_test(long_messages_are_cut),
         cmocka_unit_test(failed_allocation_is_an_error_on_all),
