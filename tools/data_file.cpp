@@ -72,6 +72,7 @@ vtkStandardNewMacro(message_catcher)
 /* VTK writes "ERROR: In file, line n\nclass (0x...): what\n\n"; only the last part is of use to a person. */
 std::string plain_words(std::string text)
 {
+    if (text.find("returned failure for request") != std::string::npos) return "VTK's reader failed";
     const size_t address = text.find("): ");
     if (address != std::string::npos) text.erase(0, address + 3);
     while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();

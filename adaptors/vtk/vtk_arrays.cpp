@@ -11,6 +11,7 @@
 #include "vtk_arrays.h"
 
 #include <cstring>
+#include <type_traits>
 
 #include <vtkAOSDataArrayTemplate.h>
 #include <vtkDataArray.h>
@@ -22,27 +23,13 @@ namespace insitu_vtk
 namespace
 {
 
-template <typename T> struct type_of;
-template <> struct type_of<float> {
-    static constexpr insitu_type value = INSITU_FLOAT32;
-};
-template <> struct type_of<double> {
-    static constexpr insitu_type value = INSITU_FLOAT64;
-};
-template <> struct type_of<int32_t> {
-    static constexpr insitu_type value = INSITU_INT32;
-};
-template <> struct type_of<int64_t> {
-    static constexpr insitu_type value = INSITU_INT64;
-};
-
 /* long and long long are both 64 bits wide and different types to VTK. */
 template <typename T> constexpr insitu_type element_type()
 {
     if constexpr (std::is_integral_v<T>)
         return sizeof(T) == 4 ? INSITU_INT32 : INSITU_INT64;
     else
-        return type_of<T>::value;
+        return sizeof(T) == 4 ? INSITU_FLOAT32 : INSITU_FLOAT64;
 }
 
 array_view shape_of(vtkDataArray *array, insitu_type type)
