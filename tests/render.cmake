@@ -22,3 +22,14 @@ foreach(isa plain sse4.2 avx2 avx512)
   add_test(NAME render_${isa} COMMAND test_render)
   set_tests_properties(render_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 180)
 endforeach()
+
+insitu_render_program(test_render_invariance)
+add_test(NAME render_invariance COMMAND test_render_invariance)
+set_tests_properties(render_invariance PROPERTIES TIMEOUT 120)
+
+insitu_render_program(test_render_isa)
+add_test(NAME render_isa COMMAND test_render_isa)
+set_tests_properties(render_isa PROPERTIES TIMEOUT 120)
+
+insitu_render_program(test_partition_mpi)
+insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7)

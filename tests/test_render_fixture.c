@@ -170,14 +170,22 @@ static void index_pixels(drawn_frame *out, int64_t pixels)
 
 void fixture_draw(const render_fixture *f, drawn_frame *out)
 {
+    fixture_draw_apart(f, 1, out);
+}
+
+void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out)
+{
+    const int width = fixtures[0].job.camera.width, height = fixtures[0].job.camera.height;
+    const int64_t pixels = (int64_t)width * height;
     memset(out, 0, sizeof *out);
-    const int64_t pixels = (int64_t)f->job.camera.width * f->job.camera.height;
-    base_error error = {0};
-    if (render_frame(&f->job, &out->list, &out->statistics, &error) != INSITU_OK)
-        fail_msg("render_frame: %s", error.message);
+    for (int i = 0; i < count; i++) {
+        base_error error = {0};
+        if (render_frame(&fixtures[i].job, &out->list, &out->statistics, &error) != INSITU_OK)
+            fail_msg("render_frame: %s", error.message);
+    }
     index_pixels(out, pixels);
-    out->picture = (image){f->job.camera.width, f->job.camera.height, malloc((size_t)pixels * 4 * sizeof(float)),
-                           malloc((size_t)pixels * sizeof(float))};
+    out->picture =
+        (image){width, height, malloc((size_t)pixels * 4 * sizeof(float)), malloc((size_t)pixels * sizeof(float))};
     for (int64_t p = 0; p < pixels; p++)
         comp_merge_pixel(out->list.items + out->first[p], out->first[p + 1] - out->first[p], fixture_background,
                          out->picture.rgba + 4 * p, out->picture.depth + p);
@@ -192,25 +200,38 @@ void drawn_free(drawn_frame *drawn)
     memset(drawn, 0, sizeof *drawn);
 }
 
+static void tell_difference(const drawn_frame *a, const drawn_frame *b, int64_t p)
+{
+    const float *x = a->picture.rgba + 4 * p, *y = b->picture.rgba + 4 * p;
+    fail_msg("pixel %d, %d: depth %.9g and %.9g, red %.9g and %.9g, green %.9g and %.9g, alpha %.9g and %.9g",
+             (int)(p % a->picture.width), (int)(p / a->picture.width), (double)a->picture.depth[p],
+             (double)b->picture.depth[p], (double)x[0], (double)y[0], (double)x[1], (double)y[1], (double)x[3],
+             (double)y[3]);
+}
+
+void drawn_assert_same_depth(const drawn_frame *a, const drawn_frame *b)
+{
+    const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
+    for (int64_t p = 0; p < pixels; p++)
+        if (memcmp(a->picture.depth + p, b->picture.depth + p, sizeof(float))) tell_difference(a, b, p);
+}
+
 void drawn_assert_same(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t pixels = (int64_t)a->picture.width * a->picture.height;
-    for (int64_t p = 0; p < pixels; p++) {
-        const float *x = a->picture.rgba + 4 * p, *y = b->picture.rgba + 4 * p;
-        const float zx = a->picture.depth[p], zy = b->picture.depth[p];
-        if (memcmp(x, y, 4 * sizeof *x) || memcmp(&zx, &zy, sizeof zx))
-            fail_msg("pixel %d, %d: depth %.9g and %.9g, red %.9g and %.9g, green %.9g and %.9g, alpha %.9g and %.9g",
-                     (int)(p % a->picture.width), (int)(p / a->picture.width), (double)zx, (double)zy, (double)x[0],
-                     (double)y[0], (double)x[1], (double)y[1], (double)x[3], (double)y[3]);
-    }
+    drawn_assert_same_depth(a, b);
+    for (int64_t p = 0; p < pixels; p++)
+        if (memcmp(a->picture.rgba + 4 * p, b->picture.rgba + 4 * p, 4 * sizeof(float))) tell_difference(a, b, p);
 }
 
 double drawn_difference(const drawn_frame *a, const drawn_frame *b)
 {
     const int64_t numbers = 4 * (int64_t)a->picture.width * a->picture.height;
     double worst = 0;
-    for (int64_t i = 0; i < numbers; i++)
-        worst = fmax(worst, fabs((double)a->picture.rgba[i] - (double)b->picture.rgba[i]));
+    for (int64_t i = 0; i < numbers; i++) {
+        const double off = fabs((double)a->picture.rgba[i] - (double)b->picture.rgba[i]);
+        if (!(off <= worst)) worst = off;
+    }
     return worst;
 }
 

@@ -64,8 +64,12 @@ extern const float fixture_background[4];
 double fixture_depth(const render_fixture *f, float t);
 
 void fixture_draw(const render_fixture *f, drawn_frame *out);
+/* Each fixture drawn as a rank of its own, all their fragments merged. */
+void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out);
 void drawn_free(drawn_frame *drawn);
 
+/* Every pixel's depth the same bits; the first that is not fails the test. */
+void drawn_assert_same_depth(const drawn_frame *a, const drawn_frame *b);
 /* Every pixel's colour and depth the same bits; the first that is not fails the test. */
 void drawn_assert_same(const drawn_frame *a, const drawn_frame *b);
 /* The largest difference of a channel. */

@@ -1,0 +1,177 @@
+/* One image from any number of ranks: each rank draws its part of a mesh, dealt in blocks, at random or as a
+ * checkerboard, with vertices of its own numbering, and compositing makes the picture; rank 0 draws the whole alone and
+ * compares. Surfaces: the depth image the same bits everywhere, and the colours too. Volumes: within 1e-6, for
+ * fragments blend in other groups. Ranks without a cell, without a mesh, and ranks that hold the others' cells as
+ * ghosts take part. */
+#include "comp.h"
+#include "memory.h"
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+typedef enum scene_kind { OPAQUE, TRANSPARENT, VOLUME, OPAQUE_VOLUME, TRANSPARENT_VOLUME, SCENE_COUNT } scene_kind;
+
+enum { WIDTH = 67, HEIGHT = 51, PIXELS = WIDTH * HEIGHT, SIDE = 4 };
+
+static int my_rank, rank_count;
+
+static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera, MPI_Comm comm, bool is_alone,
+                 image *out)
+{
+    static const double values[2] = {-0.2, 0.3};
+    render_fixture f;
+    fragment_list list = {0};
+    base_error error = {0};
+    fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
+                   (const double[]){0, 0, 0});
+    fixture_look(&f, camera, WIDTH, HEIGHT);
+    if (scene != VOLUME) fixture_add_surface(&f, values, 2, scene == OPAQUE || scene == OPAQUE_VOLUME ? 1 : 0.4f);
+    if (scene != VOLUME) f.surfaces[0].root_steps = 2;
+    if (scene >= VOLUME) fixture_set_volume(&f, 0.3);
+    f.job.is_alone = is_alone;
+    assert_int_equal(render_frame(&f.job, &list, NULL, &error), INSITU_OK);
+    out->width = WIDTH;
+    out->height = HEIGHT;
+    out->rgba = malloc(4 * PIXELS * sizeof(float));
+    out->depth = malloc(PIXELS * sizeof(float));
+    assert_int_equal(comp_composite(comm, &list, fixture_background, out, NULL, &error), INSITU_OK);
+    base_free(list.items);
+    fixture_free(&f);
+}
+
+static void free_image(image *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+static bool same_images(const image *whole, const image *other, scene_kind scene, const char *what)
+{
+    int depths = 0;
+    double colour = 0;
+    for (int p = 0; p < PIXELS; p++) {
+        depths += memcmp(whole->depth + p, other->depth + p, sizeof(float)) != 0;
+        for (int c = 0; c < 4; c++) {
+            const double off = fabs((double)whole->rgba[4 * p + c] - (double)other->rgba[4 * p + c]);
+            if (!(off <= colour)) colour = off;
+        }
+    }
+    const double bound = scene == OPAQUE || scene == TRANSPARENT ? 0 : 1e-6;
+    if (depths || !(colour <= bound))
+        fprintf(stderr, "%s, %d ranks, scene %d: %d depths differ, colour by %g\n", what, rank_count, (int)scene,
+                depths, colour);
+    return !depths && colour <= bound;
+}
+
+/* This rank's share: ghosts: all cells, those of others as ghosts. */
+static void take_part(const test_mesh *mesh, const int *owners, bool ghosts, test_mesh *out)
+{
+    int *all = calloc((size_t)mesh->cell_count, sizeof *all);
+    test_mesh_part(mesh, ghosts ? all : owners, ghosts ? 0 : my_rank, out);
+    for (int64_t i = 0; ghosts && i < mesh->cell_count; i++) out->ghosts[i] = owners[i] != my_rank;
+    free(all);
+}
+
+static void compare(const test_mesh *mesh, const int *owners, bool ghosts, scene_kind scene, const char *what)
+{
+    const fixture_camera camera = (int)scene % 2    ? CAMERA_ORTHOGRAPHIC
+                                  : scene == VOLUME ? CAMERA_INSIDE
+                                                    : CAMERA_OUTSIDE;
+    test_mesh part;
+    image whole = {0}, ours = {0};
+    int good = 1;
+    take_part(mesh, owners, ghosts, &part);
+    draw(&part, scene, camera, MPI_COMM_WORLD, rank_count == 1, &ours);
+    if (my_rank == 0) {
+        draw(mesh, scene, camera, MPI_COMM_SELF, true, &whole);
+        good = same_images(&whole, &ours, scene, what);
+        free_image(&whole);
+    }
+    MPI_Bcast(&good, 1, MPI_INT, 0, MPI_COMM_WORLD);
+    free_image(&ours);
+    test_mesh_free(&part);
+    assert_true(good);
+}
+
+static void compare_partition(test_partition_kind partition)
+{
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+        int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
+        test_partition(&mesh, partition, SIDE, rank_count, owners);
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
+            compare(&mesh, owners, false, scene, test_partition_kind_name(partition));
+        free(owners);
+        test_mesh_free(&mesh);
+    }
+}
+
+static void blocks_make_the_whole_image(void **state)
+{
+    (void)state;
+    compare_partition(TEST_BLOCK);
+}
+
+static void random_cells_make_the_whole_image(void **state)
+{
+    (void)state;
+    compare_partition(TEST_RANDOM);
+}
+
+static void checkerboards_make_the_whole_image(void **state)
+{
+    (void)state;
+    compare_partition(TEST_CHECKERBOARD);
+}
+
+/* All cells with the last rank, and one cell each for the ranks there are. */
+static void empty_ranks_take_part(void **state)
+{
+    (void)state;
+    test_mesh mesh;
+    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &mesh);
+    int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
+    for (int64_t i = 0; i < mesh.cell_count; i++) owners[i] = rank_count - 1;
+    for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) compare(&mesh, owners, false, scene, "all with the last");
+    free(owners);
+    test_mesh_free(&mesh);
+    test_mesh_single(TEST_UNIT_HEX, test_linear, &mesh);
+    const int nobody_else[1] = {0};
+    for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
+        compare(&mesh, nobody_else, false, scene, "fewer cells than ranks");
+    test_mesh_free(&mesh);
+}
+
+static void ghosts_of_other_ranks_change_nothing(void **state)
+{
+    (void)state;
+    test_mesh mesh;
+    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &mesh);
+    int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
+    test_partition(&mesh, TEST_RANDOM, SIDE, rank_count, owners);
+    for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) compare(&mesh, owners, true, scene, "ghosts");
+    free(owners);
+    test_mesh_free(&mesh);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(blocks_make_the_whole_image),          cmocka_unit_test(random_cells_make_the_whole_image),
+        cmocka_unit_test(checkerboards_make_the_whole_image),   cmocka_unit_test(empty_ranks_take_part),
+        cmocka_unit_test(ghosts_of_other_ranks_change_nothing),
+    };
+    MPI_Init(&argc, &argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &my_rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &rank_count);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    MPI_Finalize();
+    return failed;
+}

@@ -1,0 +1,427 @@
+/* What must not change a picture: threads, groups of samples, the order and numbering of cells and vertices, layouts,
+ * how cells are dealt to parts and ranks, ghosts; and what values that are not finite may change. */
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static const double values[2] = {-0.2, 0.3};
+static const double origin[3] = {0, 0, 0};
+static const test_layout wide = {.wide_coordinates = true, .wide_values = true};
+
+/* What is drawn: an opaque surface, transparent ones, a volume, and mixtures. */
+typedef enum scene_kind { OPAQUE, TRANSPARENT, VOLUME, OPAQUE_VOLUME, TRANSPARENT_VOLUME, SCENE_COUNT } scene_kind;
+
+static void add_layers(render_fixture *f, scene_kind scene)
+{
+    if (scene != VOLUME) fixture_add_surface(f, values, 2, scene == OPAQUE || scene == OPAQUE_VOLUME ? 1 : 0.4f);
+    if (scene >= VOLUME) fixture_set_volume(f, 0.3);
+    if (scene != VOLUME) f->surfaces[0].root_steps = 3;
+}
+
+static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, int n, scene_kind scene,
+                         fixture_camera camera)
+{
+    fixture_create(f, meshes, count, wide, 2.0 / n, 1, origin);
+    fixture_look(f, camera, 61, 47);
+    add_layers(f, scene);
+}
+
+static void lattice_fixture(render_fixture *f, test_mesh_kind kind, scene_kind scene, fixture_camera camera)
+{
+    fixture_create_lattice(f, kind, 4, 0.2, test_wave);
+    fixture_look(f, camera, 61, 47);
+    add_layers(f, scene);
+}
+
+static void threads_do_not_change_a_bit(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        render_fixture f;
+        drawn_frame one, more;
+        lattice_fixture(&f, kind, TRANSPARENT_VOLUME, CAMERA_OUTSIDE);
+        fixture_draw(&f, &one);
+        for (f.job.threads = 2; f.job.threads <= 3; f.job.threads++) {
+            fixture_draw(&f, &more);
+            drawn_assert_same(&one, &more);
+            drawn_free(&more);
+        }
+        drawn_free(&one);
+        fixture_free(&f);
+    }
+}
+
+/* Groups only say how many samples are gathered before they are blended: the blend itself may round elsewhere. */
+static void sample_groups_draw_the_same(void **state)
+{
+    (void)state;
+    static const int groups[4] = {1, 4, 16, 64};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (scene_kind scene = VOLUME; scene < SCENE_COUNT; scene++) {
+            render_fixture f;
+            drawn_frame one, more;
+            lattice_fixture(&f, kind, scene, CAMERA_OUTSIDE);
+            f.job.sample_group = 1;
+            fixture_draw(&f, &one);
+            for (int i = 1; i < 4; i++) {
+                f.job.sample_group = groups[i];
+                fixture_draw(&f, &more);
+                drawn_assert_same_depth(&one, &more);
+                assert_true(drawn_difference(&one, &more) <= 1e-6);
+                drawn_free(&more);
+            }
+            drawn_free(&one);
+            fixture_free(&f);
+        }
+}
+
+static void order_and_numbering_do_not_change_a_bit(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
+            test_mesh mesh;
+            render_fixture f;
+            drawn_frame first, other;
+            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            fixture_draw(&f, &first);
+            fixture_free(&f);
+            test_mesh_shuffle(&mesh, 77);
+            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            fixture_draw(&f, &other);
+            drawn_assert_same(&first, &other);
+            drawn_free(&first);
+            drawn_free(&other);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+}
+
+/* The largest difference of depth, in t; infinite where one has a hit and the other none. */
+static double depth_difference(const drawn_frame *a, const drawn_frame *b)
+{
+    double worst = 0;
+    for (int64_t p = 0; p < (int64_t)a->picture.width * a->picture.height; p++) {
+        const double x = (double)a->picture.depth[p], y = (double)b->picture.depth[p];
+        if (isinf(x) && isinf(y)) continue;
+        worst = fmax(worst, fabs(x - y));
+    }
+    return worst;
+}
+
+/* A cell told by another of its symmetries has the same faces, so the same hits to the bit of the decision; the map
+ * inside is written in other coordinates and rounds otherwise: t to some 1e-7 times the conditioning, of which 61 × 47
+ * rays have some of 30. */
+static void turned_cells_draw_the_same(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
+            test_mesh mesh;
+            render_fixture f;
+            drawn_frame first, other;
+            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            fixture_draw(&f, &first);
+            fixture_free(&f);
+            test_mesh_turn(&mesh, 78);
+            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            fixture_draw(&f, &other);
+            if (getenv("INSITU_TEST_VERBOSE"))
+                fprintf(stderr, "turned %s, scene %d: depth %.2g, colour %.2g\n", test_mesh_kind_name(kind), (int)scene,
+                        depth_difference(&first, &other), drawn_difference(&first, &other));
+            if (kind == TEST_TETS) drawn_assert_same(&first, &other);
+            assert_true(depth_difference(&first, &other) < 5e-6);
+            assert_true(drawn_difference(&first, &other) < 2e-5);
+            drawn_free(&first);
+            drawn_free(&other);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+}
+
+static void layouts_do_not_change_a_bit(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        drawn_frame first;
+        test_mesh_lattice(kind, 3, 0.2, test_wave, &mesh);
+        test_mesh_round(&mesh);
+        for (unsigned bits = 0; bits < 32; bits++) {
+            const test_layout layout = {bits & 1, bits & 2, bits & 4, bits & 8, bits & 16};
+            render_fixture f;
+            drawn_frame other;
+            fixture_create(&f, &mesh, 1, layout, 2.0 / 3, 1, origin);
+            fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+            add_layers(&f, TRANSPARENT_VOLUME);
+            fixture_draw(&f, bits ? &other : &first);
+            if (bits) {
+                drawn_assert_same(&first, &other);
+                drawn_free(&other);
+            }
+            fixture_free(&f);
+        }
+        drawn_free(&first);
+        test_mesh_free(&mesh);
+    }
+}
+
+/* ---- parts and ranks ---- */
+
+/* The mesh's cells dealt out; ghosts: every part holds all cells, those of others as ghosts. */
+static void deal(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts, test_mesh *out)
+{
+    int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
+    test_partition(mesh, partition, n, parts, owners);
+    for (int part = 0; part < parts; part++) {
+        if (!ghosts) {
+            test_mesh_part(mesh, owners, part, &out[part]);
+            continue;
+        }
+        int *all = calloc((size_t)mesh->cell_count, sizeof *all);
+        test_mesh_part(mesh, all, 0, &out[part]);
+        for (int64_t i = 0; i < mesh->cell_count; i++) out[part].ghosts[i] = owners[i] != part;
+        free(all);
+    }
+    free(owners);
+}
+
+/* Volumes are blended in other groups: each fragment's colour rounds to 6e-8, a pixel has some 30. */
+static void assert_same_to_rounding(const drawn_frame *whole, const drawn_frame *parts, scene_kind scene)
+{
+    drawn_assert_same_depth(whole, parts);
+    const double off = drawn_difference(whole, parts);
+    if (off > 1e-6) fail_msg("colour off by %g", off);
+    if (scene == OPAQUE || scene == TRANSPARENT) drawn_assert_same(whole, parts);
+}
+
+static void compare_dealt(test_mesh_kind kind, scene_kind scene, test_partition_kind partition, int parts, bool ghosts)
+{
+    const fixture_camera camera = (int)scene % 2 ? CAMERA_INSIDE : CAMERA_OUTSIDE;
+    test_mesh mesh, dealt[5];
+    render_fixture f, apart[5];
+    drawn_frame whole, other;
+    test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+    mesh_fixture(&f, &mesh, 1, 4, scene, camera);
+    fixture_draw(&f, &whole);
+    fixture_free(&f);
+    deal(&mesh, partition, 4, parts, ghosts, dealt);
+    for (int i = 0; i < parts; i++) {
+        mesh_fixture(&apart[i], &dealt[i], 1, 4, scene, camera);
+        apart[i].job.is_alone = false;
+    }
+    fixture_draw_apart(apart, parts, &other);
+    assert_same_to_rounding(&whole, &other, scene);
+    drawn_free(&other);
+    mesh_fixture(&f, dealt, parts, 4, scene, camera);
+    fixture_draw(&f, &other);
+    assert_same_to_rounding(&whole, &other, scene);
+    drawn_free(&other);
+    drawn_free(&whole);
+    fixture_free(&f);
+    for (int i = 0; i < parts; i++) {
+        fixture_free(&apart[i]);
+        test_mesh_free(&dealt[i]);
+    }
+    test_mesh_free(&mesh);
+}
+
+static void parts_and_ranks_draw_the_whole(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
+            for (test_partition_kind partition = 0; partition < TEST_PARTITION_COUNT; partition++)
+                compare_dealt(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
+}
+
+static void ghosts_change_nothing(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) compare_dealt(kind, scene, TEST_RANDOM, 3, true);
+}
+
+static void parent_tree_changes_nothing(void **state)
+{
+    (void)state;
+    for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
+        test_mesh mesh, dealt[5];
+        render_fixture f;
+        drawn_frame without, with;
+        float lower[5][3], upper[5][3], ranges[5][2];
+        mmbvh parent;
+        base_error error = {0};
+        test_mesh_lattice(TEST_MIXED, 4, 0.2, test_wave, &mesh);
+        deal(&mesh, TEST_BLOCK, 4, 5, false, dealt);
+        mesh_fixture(&f, dealt, 5, 4, scene, CAMERA_OUTSIDE);
+        fixture_draw(&f, &without);
+        for (int i = 0; i < 5; i++) {
+            const mmbvh_node *root = &f.trees[i].nodes[0];
+            memcpy(lower[i], root->lower, sizeof lower[i]);
+            memcpy(upper[i], root->upper, sizeof upper[i]);
+            ranges[i][0] = root->range_low;
+            ranges[i][1] = root->range_high;
+        }
+        assert_int_equal(
+            mmbvh_build_boxes(lower[0], upper[0], ranges[0], 5, &(mmbvh_options){.threads = 1}, &parent, &error),
+            INSITU_OK);
+        f.job.parent = &parent;
+        fixture_draw(&f, &with);
+        drawn_assert_same(&without, &with);
+        mmbvh_free(&parent);
+        drawn_free(&without);
+        drawn_free(&with);
+        fixture_free(&f);
+        for (int i = 0; i < 5; i++) test_mesh_free(&dealt[i]);
+        test_mesh_free(&mesh);
+    }
+}
+
+/* ---- values that are not finite ---- */
+
+static bool touches(const test_mesh *mesh, int64_t cell)
+{
+    for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++)
+        if (!isfinite(mesh->values[mesh->connectivity[i]])) return true;
+    return false;
+}
+
+/* Cells with a NaN or an infinity are as if they were not there, to the bit. */
+static void cells_with_values_not_finite_are_not_there(void **state)
+{
+    (void)state;
+    static const double wrong[3] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
+            test_mesh mesh, without;
+            render_fixture f;
+            drawn_frame first, other;
+            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+            for (int i = 0; i < 3; i++) mesh.values[31 + 20 * i] = wrong[i];
+            int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
+            for (int64_t i = 0; i < mesh.cell_count; i++) owners[i] = touches(&mesh, i);
+            test_mesh_part(&mesh, owners, 0, &without);
+            assert_true(without.cell_count < mesh.cell_count);
+            mesh_fixture(&f, &mesh, 1, 4, scene, CAMERA_OUTSIDE);
+            fixture_draw(&f, &first);
+            fixture_free(&f);
+            mesh_fixture(&f, &without, 1, 4, scene, CAMERA_OUTSIDE);
+            fixture_draw(&f, &other);
+            drawn_assert_same(&first, &other);
+            for (int i = 0; i < 4 * 61 * 47; i++) assert_true(isfinite(first.picture.rgba[i]));
+            drawn_free(&first);
+            drawn_free(&other);
+            fixture_free(&f);
+            free(owners);
+            test_mesh_free(&mesh);
+            test_mesh_free(&without);
+        }
+}
+
+static double constant_field(const double p[3])
+{
+    (void)p;
+    return 0.3;
+}
+
+/* A constant field equal to an isovalue has no surface: nowhere does its side change. */
+static void constant_equal_to_the_isovalue_has_no_surface(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        render_fixture f;
+        drawn_frame drawn;
+        fixture_create_lattice(&f, kind, 3, 0.2, constant_field);
+        fixture_add_surface(&f, values, 2, 1);
+        fixture_draw(&f, &drawn);
+        assert_int_equal(drawn.list.count, 0);
+        drawn_free(&drawn);
+        fixture_free(&f);
+    }
+}
+
+/* x alone: whole planes of vertices hold the isovalue 0 exactly. A ray through an edge that lies in the surface passes
+ * cells where the value is zero to rounding, on either side: its hits are an odd number at one place. */
+static double plane_field(const double p[3])
+{
+    return p[0];
+}
+
+static void isovalue_at_vertices_leaves_no_hole(void **state)
+{
+    (void)state;
+    static const double zero[1] = {0};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+            render_fixture f;
+            drawn_frame drawn;
+            int met = 0, several = 0;
+            if (camera == CAMERA_INSIDE) continue; /* looks away from the plane */
+            fixture_create_lattice(&f, kind, 4, 0, plane_field);
+            fixture_look(&f, camera, 43, 41);
+            fixture_add_surface(&f, zero, 1, 0.5f);
+            fixture_draw(&f, &drawn);
+            for (int p = 0; p < 43 * 41; p++) {
+                double base[3], d[3];
+                render_camera_ray(&f.job.camera, p % 43, p / 43, base, d);
+                const double z = -base[0] / d[0], y = base[1] + z * d[1], w = base[2] + z * d[2];
+                if (fabs(fabs(y) - 1) < 1e-5 || fabs(fabs(w) - 1) < 1e-5 || fabs(z) < 1e-5) continue;
+                const bool inside = z > 0 && fabs(y) < 1 && fabs(w) < 1;
+                met += inside;
+                const int hits = (int)(drawn.first[p + 1] - drawn.first[p]);
+                several += hits > 1;
+                for (int64_t i = drawn.first[p]; i < drawn.first[p + 1]; i++)
+                    assert_true(fabs(fixture_depth(&f, drawn.list.items[i].t_in) - z) < 1e-5);
+                if (hits % 2 != inside)
+                    fail_msg("%s, %s, pixel %d, %d: %d hits", test_mesh_kind_name(kind), fixture_camera_name(camera),
+                             p % 43, p / 43, hits);
+            }
+            assert_true(met > 0 && several <= 43);
+            drawn_free(&drawn);
+            fixture_free(&f);
+        }
+}
+
+static void jitter_is_uniform_and_of_pixel_and_frame(void **state)
+{
+    (void)state;
+    double sum = 0, product = 0;
+    for (uint32_t pixel = 0; pixel < 100; pixel++)
+        for (uint32_t frame = 0; frame < 100; frame++) {
+            const double a = render_jitter(pixel, frame), b = render_jitter(pixel + 1, frame);
+            assert_true(a >= 0 && a < 1);
+            sum += a;
+            product += (a - 0.5) * (b - 0.5);
+        }
+    /* 10,000 uniform numbers: the mean within 4 sigma of 0.0029, the correlation within 4 of 1/12/100. */
+    assert_true(fabs(sum / 10000 - 0.5) < 0.012);
+    assert_true(fabs(product / 10000) < 0.0034);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(threads_do_not_change_a_bit),
+        cmocka_unit_test(sample_groups_draw_the_same),
+        cmocka_unit_test(order_and_numbering_do_not_change_a_bit),
+        cmocka_unit_test(turned_cells_draw_the_same),
+        cmocka_unit_test(layouts_do_not_change_a_bit),
+        cmocka_unit_test(parts_and_ranks_draw_the_whole),
+        cmocka_unit_test(ghosts_change_nothing),
+        cmocka_unit_test(parent_tree_changes_nothing),
+        cmocka_unit_test(cells_with_values_not_finite_are_not_there),
+        cmocka_unit_test(constant_equal_to_the_isovalue_has_no_surface),
+        cmocka_unit_test(isovalue_at_vertices_leaves_no_hole),
+        cmocka_unit_test(jitter_is_uniform_and_of_pixel_and_frame),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
