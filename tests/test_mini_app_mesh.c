@@ -67,6 +67,50 @@ static void volumes_of_every_kind_fill_the_box_and_faces_meet(void **state)
     }
 }
 
+/* Of a cell with flat faces: cones from vertex 0 over each face's triangles. */
+static void exact_centroid(const wave_cell_shape *shape, double x[8][3], double centroid[3])
+{
+    double volume = 0, e[3][3];
+    for (int a = 0; a < 3; ++a) centroid[a] = 0;
+    for (int f = 0; f < shape->face_count; ++f) {
+        for (int t = 2; t < shape->face_size[f]; ++t) {
+            const int corner[3] = {shape->face[f][0], shape->face[f][t - 1], shape->face[f][t]};
+            for (int i = 0; i < 3; ++i) {
+                for (int a = 0; a < 3; ++a) e[i][a] = x[corner[i]][a] - x[0][a];
+            }
+            double v =
+                (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+                 e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
+                6;
+            volume += v;
+            for (int a = 0; a < 3; ++a) centroid[a] += v * (x[0][a] + 0.25 * (e[0][a] + e[1][a] + e[2][a]));
+        }
+    }
+    for (int a = 0; a < 3; ++a) centroid[a] /= volume;
+}
+
+static void centroids_of_flat_cells_are_exact(void **state)
+{
+    (void)state;
+    for (int kind = WAVE_TETS; kind <= WAVE_MIXED; ++kind) {
+        wave_lattice lattice = wave_lattice_make(sizes[2], (wave_cells)kind, 0);
+        wave_cell cells[WAVE_CELLS_PER_CUBE];
+        for (int64_t cube = 0; cube < wave_lattice_cube_count(&lattice); ++cube) {
+            int count = wave_lattice_cells(&lattice, cube, cells);
+            for (int c = 0; c < count; ++c) {
+                const wave_cell_shape *shape = wave_cell_shape_of(cells[c].type);
+                wave_cell_geometry g;
+                double x[8][3], exact[3];
+                for (int i = 0; i < shape->vertex_count; ++i) wave_lattice_vertex(&lattice, cells[c].vertex[i], x[i]);
+                wave_cell_measure(shape, (const double(*)[3])x, cells[c].vertex, &g);
+                exact_centroid(shape, x, exact);
+                /* some 50 roundings of coordinates of at most 2 */
+                for (int a = 0; a < 3; ++a) assert_true(fabs(g.centroid[a] - exact[a]) <= 50 * 2 * 2.3e-16);
+            }
+        }
+    }
+}
+
 static void mixed_mesh_has_all_four_types(void **state)
 {
     (void)state;
@@ -165,6 +209,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(volumes_of_every_kind_fill_the_box_and_faces_meet),
+        cmocka_unit_test(centroids_of_flat_cells_are_exact),
         cmocka_unit_test(mixed_mesh_has_all_four_types),
         cmocka_unit_test(faces_that_do_not_meet_are_counted),
         cmocka_unit_test(partitions_give_each_cell_to_one_rank),

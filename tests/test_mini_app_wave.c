@@ -100,19 +100,19 @@ static void plane_wave_converges_with_order_2_on_hexes(void **state)
 static void plane_wave_converges_on_tets(void **state)
 {
     (void)state;
-    check_order(WAVE_TETS, 2, 1.5, 0.02);
+    check_order(WAVE_TETS, 2, 1.8, 0.02);
 }
 
 static void plane_wave_converges_on_wedges(void **state)
 {
     (void)state;
-    check_order(WAVE_WEDGES, 2, 1.5, 0.02);
+    check_order(WAVE_WEDGES, 2, 1.8, 0.02);
 }
 
 static void plane_wave_converges_on_pyramids(void **state)
 {
     (void)state;
-    check_order(WAVE_PYRAMIDS, 2, 1.5, 0.02);
+    check_order(WAVE_PYRAMIDS, 2, 1.8, 0.02);
 }
 
 /* Godunov's scheme is of order 1, reached from below as the pulse stops being flattened. */
@@ -120,6 +120,55 @@ static void plane_wave_converges_with_order_1_by_the_first_order_scheme(void **s
 {
     (void)state;
     check_order(WAVE_HEXES, 1, 0.7, 0.25);
+}
+
+static double bell(double r)
+{
+    return exp(-0.5 * r * r);
+}
+
+/* What a downward pulse has become 0.8 later: half of it has turned round at z = -1, where the impedance goes from 1 to
+ * 3 (R = (3 - 1) / (3 + 1)), and 1 + R of its pressure has gone on, faster and so stretched by 1.5. */
+static double parted_pulse(double z)
+{
+    double width = 0.08;
+    return z > -1 ? 0.5 * bell((z + 0.6) / width) : 1.5 * bell((z + 1.6) / (1.5 * width));
+}
+
+static void interface_reflects_and_transmits_by_its_impedances(void **state)
+{
+    (void)state;
+    const int size[3] = {4, 4, 160};
+    for (int kind = WAVE_TETS; kind <= WAVE_HEXES; ++kind) {
+        wave_setup setup = plain_setup(2);
+        model m;
+        double error = 0, whole = 0;
+        setup.medium = (wave_medium){.count = 2, .bottom = {-1, -2}, .speed = {1, 1.5}, .density = {1, 2}};
+        make_model(&m, size, (wave_cells)kind, 0, &setup);
+        for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
+            double x[3];
+            wave_solver_centroid(&m.solver, c, x);
+            double p = bell((x[2] + 0.6) / 0.08), q[4] = {p, 0, 0, -p};
+            wave_solver_set(&m.solver, c, q);
+        }
+        wave_solver_start(&m.solver);
+        int steps = (int)ceil(0.8 / m.solver.time_step);
+        m.solver.time_step = 0.8 / steps;
+        for (int i = 0; i < steps; ++i) wave_solver_step(&m.solver);
+        for (int32_t c = 0; c < m.mesh.own_cells; ++c) {
+            double x[3], q[4];
+            wave_solver_centroid(&m.solver, c, x);
+            wave_solver_get(&m.solver, c, q);
+            error += m.solver.volume[c] * fabs(q[0] - parted_pulse(x[2]));
+            whole += m.solver.volume[c] * parted_pulse(x[2]);
+        }
+        print_message("cells %d: error %.4f behind an interface\n", kind, error / whole);
+        /* A width is 6.4 cubes; between their sizes the plane pulses above give 0.01 at 4.8 and 0.002 at 9.6. The
+         * reconstruction smears the kink at the interface over two cells: twice that. Impedances taken the wrong way
+         * round give 0.1 and more. */
+        assert_true(error / whole <= 0.02);
+        free_model(&m);
+    }
 }
 
 /* Gaussian in pressure, at rest, a little off the middle. */
@@ -308,6 +357,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(plane_wave_converges_on_wedges),
         cmocka_unit_test(plane_wave_converges_on_pyramids),
         cmocka_unit_test(plane_wave_converges_with_order_1_by_the_first_order_scheme),
+        cmocka_unit_test(interface_reflects_and_transmits_by_its_impedances),
         cmocka_unit_test(mass_is_conserved_between_rigid_walls),
         cmocka_unit_test(source_adds_the_volume_it_promises),
         cmocka_unit_test(energy_never_rises),
