@@ -108,12 +108,13 @@ MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape
     if (entry < PREFETCH_CELLS) return;
     const int64_t later = s->tree->cells[entry - PREFETCH_CELLS];
     const int64_t sooner = s->tree->cells[entry - PREFETCH_VALUES];
-    if (shape == FETCH_BY_CELL) return;
-    const int count = fetch_vertex_count(s->g, sooner, shape);
+    const int later_count = fetch_vertex_count(s->g, later, shape), count = fetch_vertex_count(s->g, sooner, shape);
+    const int64_t later_first = fetch_first(s->g, later, later_count, shape);
+    const int64_t first = fetch_first(s->g, sooner, count, shape);
     const grid_array *connectivity = &s->g->connectivity;
-    __builtin_prefetch(connectivity->data + later * count * connectivity->stride);
+    __builtin_prefetch(connectivity->data + later_first * connectivity->stride);
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_index(connectivity, sooner * count + i, wide_index);
+        const int64_t vertex = fetch_index(connectivity, first + i, wide_index);
         __builtin_prefetch(s->values.data + vertex * s->values.stride);
     }
 }

@@ -181,7 +181,8 @@ static void ghosts_are_not_in_the_tree(void **state)
     l.ghosts = calloc((size_t)l.g.cell_count, 3);
     int64_t ghosts = 0;
     for (int64_t cell = 0; cell < l.g.cell_count; cell++) {
-        l.ghosts[3 * cell] = hash_unit((uint64_t)cell) < 0.4 ? 2 : 0;
+        const bool outer = cell < l.g.cell_count / 3; /* so that the others' bounds are smaller than all cells' */
+        l.ghosts[3 * cell] = outer || hash_unit((uint64_t)cell) < 0.4 ? 2 : 0;
         ghosts += l.ghosts[3 * cell] != 0;
     }
     l.g.ghosts = l.ghosts;
@@ -396,25 +397,60 @@ static void coincident_cells_are_halved(void **state)
     }
 }
 
-/* Cells that shrink towards a point by a third each: every plane of equal bins peels a few off. */
+/* Boxes on the six half axes, each 17 times nearer to the origin than the one before: a plane between 16 equal bins
+ * peels off hardly more than one of the 174. copies of each. */
+static void assert_depth_of_shrinking_boxes(int64_t copies)
+{
+    enum { STEPS = 29, PLACES = 6 * STEPS };
+    const int64_t count = PLACES * copies;
+    float *lower = calloc((size_t)(3 * count), sizeof *lower), *upper = calloc((size_t)(3 * count), sizeof *upper);
+    float *ranges = calloc((size_t)(2 * count), sizeof *ranges);
+    for (int64_t i = 0; i < count; i++) {
+        const int64_t step = i % PLACES / 6, axis = i % 3;
+        const float x = powf(17, (float)-step) * (i % 6 < 3 ? 1.0f : -1.0f);
+        lower[3 * i + axis] = fminf(x, 1.1f * x);
+        upper[3 * i + axis] = fmaxf(x, 1.1f * x);
+    }
+    mmbvh tree;
+    assert_int_equal(mmbvh_build_boxes(lower, upper, ranges, count, NULL, &tree, NULL), INSITU_OK);
+    base_error error = {0};
+    mmbvh_statistics s = {0};
+    if (mmbvh_check(&tree, NULL, NULL, &s, &error)) fail_msg("%s", error.message);
+    assert_true(s.depth > MMBVH_MAX_DEPTH - 32); /* or the test tests nothing */
+    mmbvh_free(&tree);
+    free(lower);
+    free(upper);
+    free(ranges);
+}
+
 static void depth_is_bounded_where_cells_shrink_without_end(void **state)
 {
     (void)state;
-    enum { COUNT = 60000 };
-    float *boxes = malloc(6 * COUNT * sizeof *boxes), *ranges = calloc(2 * COUNT, sizeof *ranges);
-    for (int64_t i = 0; i < COUNT; i++) {
-        const float x = powf(0.67f, (float)(i % 300));
-        for (int axis = 0; axis < 3; axis++) {
-            boxes[3 * i + axis] = x;
-            boxes[3 * (COUNT + i) + axis] = 1.2f * x;
+    assert_depth_of_shrinking_boxes(1);
+    assert_depth_of_shrinking_boxes(2000); /* deep before one thread takes over */
+}
+
+/* One cell far off on either side: the root's children are a leaf and all the rest, whichever way round. */
+static void refit_reaches_all_below_a_leafs_sibling(void **state)
+{
+    (void)state;
+    for (int side = 0; side < 2; side++) {
+        lattice l = make_lattice(25, LATTICE_HEXES, (lattice_layout){0});
+        const int64_t vertex = side ? l.g.vertex_count - 1 : 0;
+        for (int axis = 0; axis < 3; axis++) put_number(&l.g.coordinates[axis], vertex, side ? 1e4 : -1e4);
+        mmbvh tree = build_by(&l, &l.field, 2);
+        assert_true(tree.nodes[1 + side].count > 0 && tree.nodes[2 - side].count == 0);
+        for (int64_t i = 0; i < tree.node_count; i++) {
+            tree.nodes[i].range_low = tree.nodes[i].range_high = NAN;
+            tree.nodes[i].lower[0] = tree.nodes[i].upper[2] = NAN;
         }
+        mmbvh_refit_ranges(&tree, &l.g, &l.field, &(mmbvh_options){2});
+        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){2});
+        assert_proved(&tree, &l.g, &l.field);
+        assert_tight(&l, &tree, &l.field);
+        mmbvh_free(&tree);
+        free_lattice(&l);
     }
-    mmbvh tree;
-    assert_int_equal(mmbvh_build_boxes(boxes, boxes + 3 * COUNT, ranges, COUNT, NULL, &tree, NULL), INSITU_OK);
-    assert_proved(&tree, NULL, NULL);
-    mmbvh_free(&tree);
-    free(boxes);
-    free(ranges);
 }
 
 static void parent_tree_holds_every_mesh(void **state)
@@ -573,6 +609,7 @@ int main(void)
         cmocka_unit_test(further_fields_have_ranges_beside_the_tree),
         cmocka_unit_test(coincident_cells_are_halved),
         cmocka_unit_test(depth_is_bounded_where_cells_shrink_without_end),
+        cmocka_unit_test(refit_reaches_all_below_a_leafs_sibling),
         cmocka_unit_test(parent_tree_holds_every_mesh),
         cmocka_unit_test(descent_to_a_point_misses_no_cell),
         cmocka_unit_test(cost_grows_with_the_side_not_the_cells),
