@@ -78,14 +78,15 @@ typedef struct session_catalogue_field {
     char *name;
     int component_count;
     bool is_cell_centred;
-    int first_rank; /* that has it */
-    int rank_count; /* ranks that have it together with cells */
-    int odd_rank;   /* -1, or one that has it with another centring or count of components */
+    int first_rank;   /* that has it */
+    int last_rank;    /* that has it together with cells; -1: none */
+    int odd_rank;     /* -1, or one that has it with another centring or count of components */
+    int lacking_rank; /* -1, or one that has cells of the mesh but not the field */
 } session_catalogue_field;
 
 typedef struct session_catalogue_mesh {
     char *name;
-    int rank_count; /* ranks that have cells of it */
+    int first_rank; /* that has cells of it; -1: none */
     bool has_ids;   /* all of these give vertex ids */
     int field_count;
     session_catalogue_field *fields;
@@ -135,7 +136,9 @@ struct insitu_session {
     double space_lower[3], space_upper[3]; /* bounds for which the space was made */
     double origin[3], scale;
 
-    mmbvh parent; /* over the meshes of this step */
+    mmbvh parent; /* over the trees of parent_key; none where that is one tree or none */
+    uint64_t parent_key;
+    bool is_parent_stale;
 
     base_error error;
     insitu_report report;

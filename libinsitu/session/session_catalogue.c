@@ -90,7 +90,7 @@ static session_catalogue_mesh *add_mesh(session_catalogue *catalogue, const char
     if (!meshes) return NULL;
     catalogue->meshes = meshes;
     session_catalogue_mesh *mesh = &meshes[catalogue->mesh_count];
-    *mesh = (session_catalogue_mesh){.name = base_strdup(name), .has_ids = true};
+    *mesh = (session_catalogue_mesh){.name = base_strdup(name), .has_ids = true, .first_rank = -1};
     if (!mesh->name) return NULL;
     catalogue->mesh_count++;
     return mesh;
@@ -104,14 +104,15 @@ static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const ch
     if (!fields) return NULL;
     mesh->fields = fields;
     session_catalogue_field *field = &fields[mesh->field_count];
-    *field = (session_catalogue_field){.name = base_strdup(name), .first_rank = -1, .odd_rank = -1};
+    *field = (session_catalogue_field){
+        .name = base_strdup(name), .first_rank = -1, .last_rank = -1, .odd_rank = -1, .lacking_rank = mesh->first_rank};
     if (!field->name) return NULL;
     mesh->field_count++;
     return field;
 }
 
-static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int ranks, int components,
-                       bool is_cell_centred, const char *name)
+static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int components, bool is_cell_centred,
+                       const char *name)
 {
     session_catalogue_field *field = add_field(mesh, name);
     if (!field) return false;
@@ -123,30 +124,42 @@ static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, i
                (field->component_count != components || field->is_cell_centred != is_cell_centred)) {
         field->odd_rank = rank;
     }
-    if (has_cells) field->rank_count += ranks;
+    if (has_cells) field->last_rank = rank;
     return true;
 }
 
-/* The table of one rank, or of ranks alike ones. */
-static bool take_table(session_catalogue *catalogue, const char *text, size_t size, int rank, int ranks)
+/* After a rank's table of a mesh: which fields were not in it? */
+static void close_mesh(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
+{
+    if (!mesh || !has_cells) return;
+    if (mesh->first_rank < 0) mesh->first_rank = rank;
+    if (!has_ids) mesh->has_ids = false;
+    for (int i = 0; i < mesh->field_count; i++) {
+        session_catalogue_field *field = &mesh->fields[i];
+        if (field->lacking_rank < 0 && field->last_rank != rank) field->lacking_rank = rank;
+    }
+}
+
+static bool take_table(session_catalogue *catalogue, const char *text, size_t size, int rank)
 {
     session_catalogue_mesh *mesh = NULL;
-    bool has_cells = false;
+    bool has_cells = false, has_ids = false;
     for (const char *line = text; line < text + size; line += strlen(line) + 1) {
         char *end = NULL;
         const long a = strtol(line + 1, &end, 10);
         const long b = strtol(end, &end, 10);
         const char *name = end + 1;
         if (line[0] == 'm') {
+            close_mesh(mesh, has_cells, has_ids, rank);
             mesh = add_mesh(catalogue, name);
             if (!mesh) return false;
             has_cells = a != 0;
-            if (has_cells) mesh->rank_count += ranks;
-            if (has_cells && !b) mesh->has_ids = false;
-        } else if (!take_field(mesh, has_cells, rank, ranks, (int)a, b != 0, name)) {
+            has_ids = b != 0;
+        } else if (!take_field(mesh, has_cells, rank, (int)a, b != 0, name)) {
             return false;
         }
     }
+    close_mesh(mesh, has_cells, has_ids, rank);
     return true;
 }
 
@@ -240,7 +253,7 @@ static insitu_status gather_tables(const insitu_session *session, gathered_table
 static bool take_tables(const insitu_session *session, const gathered_tables *tables, session_catalogue *out)
 {
     for (int rank = 0; rank < session->ranks; rank++)
-        if (!take_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank, 1)) return false;
+        if (!take_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank)) return false;
     return true;
 }
 
@@ -252,7 +265,7 @@ insitu_status session_update_catalogue(insitu_session *session, bool is_shared, 
     if (is_shared) {
         int size = 0;
         if (write_mine(session, &tables, &size, error) == INSITU_OK &&
-            !take_table(&catalogue, tables.mine, (size_t)size, 0, session->ranks))
+            !take_table(&catalogue, tables.mine, (size_t)size, 0))
             session_no_memory(error, size, "the catalogue of meshes and fields");
     } else {
         status = gather_tables(session, &tables, error);

@@ -1,8 +1,218 @@
+/* Drawing: each due image in turn, frame by frame, so that the memory of one is given back before the next begins.
+ *
+ * What may fail on one rank alone (memory, mostly) is agreed on before the next collective call. An image that fails is
+ * left out, the next is tried; the first reason is the step's. */
 #include "session_draw.h"
+
+#include <stdint.h>
+
+#include "comp.h"
+#include "memory.h"
+#include "session_agree.h"
+#include "session_image.h"
+#include "session_layers.h"
+#include "session_plan.h"
+#include "session_recentre.h"
+#include "session_tree.h"
+#include "session_view.h"
+
+/* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. */
+typedef struct canvas {
+    image frame;
+    double *sum;
+} canvas;
+
+static void canvas_free(canvas *c)
+{
+    base_free(c->frame.rgba);
+    base_free(c->frame.depth);
+    base_free(c->sum);
+}
+
+static insitu_status canvas_create(const insitu_session *session, const scene_image *image, canvas *out,
+                                   base_error *error)
+{
+    const size_t pixels = (size_t)image->width * (size_t)image->height;
+    out->frame.width = image->width;
+    out->frame.height = image->height;
+    if (session->rank != 0) return INSITU_OK;
+    out->frame.rgba = base_alloc(pixels * 4 * sizeof(float));
+    out->frame.depth = base_alloc(pixels * sizeof(float));
+    if (image->frames > 1) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
+    if (!out->frame.rgba || !out->frame.depth || (image->frames > 1 && !out->sum))
+        return session_no_memory(error, (int64_t)pixels * (image->frames > 1 ? 52 : 20), "a picture");
+    return INSITU_OK;
+}
+
+static void add_frame(canvas *c, int threads)
+{
+    const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t i = 0; i < count; i++) c->sum[i] += (double)c->frame.rgba[i];
+}
+
+static void average_frames(canvas *c, int frames, int threads)
+{
+    const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t i = 0; i < count; i++) c->frame.rgba[i] = (float)(c->sum[i] / frames);
+}
+
+/* Depths of fragments are the rays' t: to the distance along the camera's axis. Infinity stays. */
+static void scale_depths(canvas *c, const render_space *space, int threads)
+{
+    const int64_t count = (int64_t)c->frame.width * c->frame.height;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t i = 0; i < count; i++)
+        c->frame.depth[i] = (float)((double)c->frame.depth[i] / space->scale + space->depth_origin);
+}
+
+/* ---- frames -------------------------------------------------------------------------------------------------- */
+
+static render_job make_job(const insitu_session *session, const scene_image *image, const session_view *view,
+                           const session_layers *layers)
+{
+    return (render_job){.camera = view->camera,
+                        .space = view->space,
+                        .parts = layers->parts,
+                        .part_count = layers->part_count,
+                        .parent = layers->part_count > 1 ? &session->parent : NULL,
+                        .surfaces = layers->surfaces,
+                        .surface_count = image->isosurface_count,
+                        .volumes = layers->volumes,
+                        .volume_count = image->volume_count,
+                        .lights = view->lights,
+                        .light_count = image->light_count,
+                        .step = view->step,
+                        .sample_group = image->sample_group,
+                        .jitter = image->jitter,
+                        .is_alone = session->extent.rank_count <= 1,
+                        .threads = session->threads};
+}
+
+static insitu_status draw_frame(insitu_session *session, const render_job *job, const scene_image *image,
+                                canvas *target, base_error *error)
+{
+    fragment_list fragments = {0};
+    render_statistics rendered = {0};
+    comp_statistics composited = {0};
+    if (job->part_count > 0) render_frame(job, &fragments, &rendered, error);
+    const double start = MPI_Wtime();
+    insitu_status status = session_agree(session->comm, error);
+    if (status == INSITU_OK)
+        status = comp_composite(session->comp_comm, &fragments, image->background, &target->frame, &composited, error);
+    base_free(fragments.items);
+    insitu_report *report = &session->report;
+    report->rays += rendered.rays;
+    report->map_failures += rendered.map_failures;
+    report->surface_ms += rendered.surface_ms;
+    report->volume_ms += rendered.volume_ms;
+    report->fragments += composited.sent_fragments;
+    report->composite_ms += 1e3 * (MPI_Wtime() - start);
+    return status;
+}
+
+static insitu_status draw_frames(insitu_session *session, const scene_image *image, const session_view *view,
+                                 const session_layers *layers, canvas *target, base_error *error)
+{
+    render_job job = make_job(session, image, view, layers);
+    for (job.frame = 0; job.frame < image->frames; job.frame++) {
+        const insitu_status status = draw_frame(session, &job, image, target, error);
+        if (status) return status;
+        if (target->sum) add_frame(target, session->threads);
+    }
+    if (target->sum) average_frames(target, image->frames, session->threads);
+    if (session->rank == 0) scale_depths(target, &view->space, session->threads);
+    return INSITU_OK;
+}
+
+/* ---- outputs ------------------------------------------------------------------------------------------------- */
+
+static insitu_image_format format_of(scene_format format)
+{
+    switch (format) {
+    case SCENE_PNG8: return INSITU_PNG8;
+    case SCENE_PNG16: return INSITU_PNG16;
+    case SCENE_EXR: return INSITU_EXR;
+    }
+    return INSITU_PNG8;
+}
+
+static void write_output(const scene_image *image, const scene_output *output, const canvas *source, int64_t cycle,
+                         base_error *error)
+{
+    char *path = scene_output_path(output->path, image->name, (long long)cycle);
+    if (!path) {
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for the name of a picture");
+        return;
+    }
+    const insitu_image picture = {.width = image->width,
+                                  .height = image->height,
+                                  .rgba = source->frame.rgba,
+                                  .depth = output->format == SCENE_EXR ? source->frame.depth : NULL};
+    base_error reason = {0};
+    if (session_write_image(&picture, format_of(output->format), path, &reason) != INSITU_OK)
+        base_fail(error, reason.status, "image \"%s\": %.900s", image->name, reason.message);
+    base_free(path);
+}
+
+static insitu_status write_outputs(insitu_session *session, const scene_image *image, const canvas *source,
+                                   int64_t cycle, base_error *error)
+{
+    const double start = MPI_Wtime();
+    for (int i = 0; i < image->output_count && session->rank == 0; i++)
+        write_output(image, &image->outputs[i], source, cycle, error);
+    if (session->rank == 0) session->report.write_ms += 1e3 * (MPI_Wtime() - start);
+    return session_agree(session->comm, error);
+}
+
+/* ---- images -------------------------------------------------------------------------------------------------- */
+
+static insitu_status draw_image(insitu_session *session, const scene_image *image, int64_t cycle, base_error *error)
+{
+    session_view view;
+    session_layers layers = {0};
+    canvas target = {0};
+    insitu_status status = session_make_view(session, image, &view, error);
+    if (status) return status;
+    status = session_make_layers(session, image, &layers, error);
+    if (status) return status;
+    canvas_create(session, image, &target, error);
+    status = session_agree(session->comm, error);
+    if (!status) status = draw_frames(session, image, &view, &layers, &target, error);
+    session_layers_free(&layers);
+    if (!status) {
+        status = write_outputs(session, image, &target, cycle, error);
+        session->report.images++;
+    }
+    canvas_free(&target);
+    return status;
+}
+
+static insitu_status prepare(insitu_session *session, const session_plan *plan, base_error *error)
+{
+    const double start = MPI_Wtime();
+    const insitu_status status = session_recentre(session, plan, error);
+    session->report.prepare_ms += 1e3 * (MPI_Wtime() - start);
+    if (status) return status;
+    session_update_trees(session, error);
+    return session_agree(session->comm, error);
+}
 
 insitu_status session_draw_images(insitu_session *session, const scene_image *const *due, int count, int64_t cycle,
                                   base_error *error)
 {
-    (void)session, (void)due, (void)count, (void)cycle, (void)error;
-    return INSITU_OK;
+    session_plan plan = {0};
+    base_error first = {0};
+    insitu_status status = session_make_plan(session, due, count, &plan, &first, error);
+    if (status) return status;
+    status = prepare(session, &plan, error);
+    for (int i = 0; i < plan.image_count && !status; i++) {
+        base_error reason = {0};
+        draw_image(session, plan.images[i], cycle, &reason);
+        if (first.status == INSITU_OK) first = reason;
+    }
+    session_plan_free(&plan);
+    if (!status && first.status) *error = first;
+    return error->status;
 }

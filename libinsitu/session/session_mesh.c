@@ -213,6 +213,13 @@ void session_drop_tree(session_mesh *mesh)
     if (mesh->has_tree) mmbvh_free(&mesh->tree);
     mesh->tree = (mmbvh){0};
     mesh->has_tree = false;
+    for (int i = 0; i < mesh->scalar_count; i++) {
+        session_scalar *scalar = &mesh->scalars[i];
+        base_free(scalar->pairs);
+        scalar->pairs = NULL;
+        scalar->has_own_ranges = false;
+        scalar->are_ranges_stale = true;
+    }
 }
 
 static void drop_fields(session_mesh *mesh)

@@ -1,0 +1,43 @@
+/* Keys of vertices, and words sent from all ranks to all. */
+#ifndef SESSION_EXCHANGE_H
+#define SESSION_EXCHANGE_H
+
+#include <mpi.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "error.h"
+
+/* What makes two vertices one: a global id, or the bits of three coordinates. */
+typedef struct session_key {
+    uint64_t words[3];
+} session_key;
+
+uint64_t session_key_hash(const session_key *key);
+
+/* Keys numbered 0, 1, ... in the order of their first appearance. */
+typedef struct session_key_table {
+    session_key *keys; /* count */
+    int64_t count;
+    int64_t *slots; /* mask + 1; -1: free */
+    uint64_t mask;
+} session_key_table;
+
+/* Room for up to most keys. False where memory runs out; there is nothing to free then. */
+bool session_keys_create(session_key_table *table, int64_t most);
+int64_t session_keys_add(session_key_table *table, const session_key *key);
+void session_keys_free(session_key_table *table);
+
+/* 8-byte words for or from every rank, in the order of ranks. */
+typedef struct session_mail {
+    int64_t *counts; /* ranks */
+    uint64_t *words;
+    int64_t total;
+} session_mail;
+
+void session_mail_free(session_mail *mail);
+
+/* Every rank's out to their places; *in owns its memory. Collective, agreed. */
+insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, session_mail *in, base_error *error);
+
+#endif

@@ -1,0 +1,144 @@
+/* A part is a mesh of this rank that has a tree with cells in it. A layer's field stands once for each part; where a
+ * part does not have it, its ranges are none, and the renderer passes by. */
+#include "session_layers.h"
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_tree.h"
+
+static bool is_part(const session_mesh *mesh)
+{
+    return mesh->is_needed && mesh->has_tree && mesh->tree.node_count > 0;
+}
+
+static bool allocate_layers(const insitu_session *session, const scene_image *image, session_layers *out)
+{
+    const size_t surfaces = (size_t)image->isosurface_count, volumes = (size_t)image->volume_count;
+    for (int i = 0; i < session->mesh_count; i++) out->part_count += is_part(session->meshes[i]);
+    const size_t fields = (size_t)out->part_count * (2 * surfaces + volumes);
+    out->parts = base_calloc((size_t)out->part_count, sizeof *out->parts);
+    out->surfaces = base_calloc(surfaces, sizeof *out->surfaces);
+    out->volumes = base_calloc(volumes, sizeof *out->volumes);
+    out->transfers = base_calloc(surfaces + volumes, sizeof *out->transfers);
+    out->fields = base_calloc(fields, sizeof *out->fields);
+    out->ranges = base_calloc(fields, sizeof *out->ranges);
+    return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->ranges;
+}
+
+void session_layers_free(session_layers *layers)
+{
+    base_free(layers->parts);
+    base_free(layers->surfaces);
+    base_free(layers->volumes);
+    base_free(layers->transfers);
+    base_free(layers->fields);
+    base_free(layers->ranges);
+    *layers = (session_layers){0};
+}
+
+static void fill_parts(const insitu_session *session, session_layers *layers)
+{
+    int part = 0;
+    for (int i = 0; i < session->mesh_count; i++) {
+        const session_mesh *mesh = session->meshes[i];
+        if (is_part(mesh)) layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree};
+    }
+}
+
+/* slot: which run of part_count fields. */
+static render_field place_field(const insitu_session *session, session_layers *layers, int slot,
+                                const scene_field *field, bool at_vertices, bool wants_ranges)
+{
+    const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
+    const render_field out = {layers->fields + first, layers->ranges + first};
+    ptrdiff_t at = first;
+    for (int i = 0; i < session->mesh_count; i++) {
+        const session_mesh *mesh = session->meshes[i];
+        if (!is_part(mesh)) continue;
+        const session_scalar *scalar = session_find_scalar(mesh, field, at_vertices);
+        if (scalar) layers->fields[at] = session_scalar_field(mesh, scalar);
+        if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
+        at++;
+    }
+    return out;
+}
+
+/* Least and greatest value of a field over all ranks' drawn cells. Collective. */
+static insitu_status data_range(insitu_session *session, const scene_field *field, double *low, double *high,
+                                base_error *error)
+{
+    double mine[2] = {INFINITY, INFINITY}, all[2];
+    for (int i = 0; i < session->mesh_count; i++) {
+        const session_mesh *mesh = session->meshes[i];
+        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field, false) : NULL;
+        if (!scalar) continue;
+        double least, most;
+        session_scalar_extent(mesh, scalar, session->threads, &least, &most);
+        mine[0] = fmin(mine[0], least);
+        mine[1] = fmin(mine[1], -most);
+    }
+    const insitu_status status =
+        session_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, session->comm), "MPI_Allreduce");
+    *low = all[0];
+    *high = -all[1];
+    return status;
+}
+
+static insitu_status make_transfer(insitu_session *session, const scene_field *field, scene_colour_map map,
+                                   const scene_range *range, const scene_volume *volume, session_transfer *out,
+                                   base_error *error)
+{
+    double low = range->low, high = range->high;
+    if (!range->is_fixed) {
+        const insitu_status status = data_range(session, field, &low, &high, error);
+        if (status) return status;
+    }
+    return session_make_transfer(session, map, low, high, volume, out, error);
+}
+
+static insitu_status fill_surface(insitu_session *session, const scene_isosurface *layer, int index,
+                                  session_layers *layers, base_error *error)
+{
+    render_surface_layer *out = &layers->surfaces[index];
+    const scene_material *m = &layer->material;
+    *out = (render_surface_layer){.field = place_field(session, layers, 2 * index, &layer->field, true, true),
+                                  .value_count = layer->value_count,
+                                  .values = layer->values,
+                                  .colours = layer->colours,
+                                  .opacity = layer->opacity,
+                                  .material = {m->ambient, m->diffuse, m->specular, m->shininess},
+                                  .root_steps = layer->root_steps};
+    if (!layer->has_colour_by) return INSITU_OK;
+    out->colour_field = place_field(session, layers, 2 * index + 1, &layer->colour_by, false, false);
+    out->colour_map = &layers->transfers[index].transfer;
+    return make_transfer(session, &layer->colour_by, layer->colour_map, &layer->colour_range, NULL,
+                         &layers->transfers[index], error);
+}
+
+static insitu_status fill_volume(insitu_session *session, const scene_image *image, int index, session_layers *layers,
+                                 base_error *error)
+{
+    const scene_volume *layer = &image->volumes[index];
+    session_transfer *transfer = &layers->transfers[image->isosurface_count + index];
+    layers->volumes[index] = (render_volume_layer){
+        .field = place_field(session, layers, 2 * image->isosurface_count + index, &layer->field, false, true),
+        .transfer = &transfer->transfer};
+    return make_transfer(session, &layer->field, layer->colour_map, &layer->range, layer, transfer, error);
+}
+
+insitu_status session_make_layers(insitu_session *session, const scene_image *image, session_layers *out,
+                                  base_error *error)
+{
+    session_layers layers = {0};
+    if (!allocate_layers(session, image, &layers)) session_no_memory(error, 1 << 10, "an image's layers");
+    insitu_status status = session_agree(session->comm, error);
+    if (!status) fill_parts(session, &layers);
+    for (int i = 0; i < image->isosurface_count && !status; i++)
+        status = fill_surface(session, &image->isosurfaces[i], i, &layers, error);
+    for (int i = 0; i < image->volume_count && !status; i++) status = fill_volume(session, image, i, &layers, error);
+    if (status)
+        session_layers_free(&layers);
+    else
+        *out = layers;
+    return status;
+}

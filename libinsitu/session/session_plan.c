@@ -1,0 +1,255 @@
+/* The plan: nothing is built, recentred or ranged but what an image of this step names. Whether an image can be drawn
+ * is read off the catalogue, which all ranks share, so all come to the same answer without asking. */
+#include "session_plan.h"
+
+#include <stdio.h>
+
+#include "memory.h"
+#include "session_agree.h"
+
+static int resolve_component(const scene_field *field, int component_count)
+{
+    if (field->component != SCENE_COMPONENT_DEFAULT) return field->component;
+    return component_count == 1 ? 0 : -1;
+}
+
+/* ---- can the image be drawn? --------------------------------------------------------------------------------- */
+
+static insitu_status refuse_missing(const insitu_session *session, const scene_field *field, base_error *error)
+{
+    char names[700] = "";
+    size_t size = 0;
+    for (int m = 0; m < session->catalogue.mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
+        for (int f = 0; f < mesh->field_count && size < sizeof names; f++)
+            size += (size_t)snprintf(names + size, sizeof names - size, "%s\"%s\" (mesh \"%s\")", size ? ", " : "",
+                                     mesh->fields[f].name, mesh->name);
+    }
+    return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"; there are: %s",
+                     session->scene_path, field->line, field->name, size ? names : "none");
+}
+
+static insitu_status check_on_mesh(const insitu_session *session, const scene_field *field,
+                                   const session_catalogue_mesh *mesh, const session_catalogue_field *found,
+                                   base_error *error)
+{
+    if (found->odd_rank >= 0)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "rank %d: mesh \"%s\": field \"%s\" has another centring or number of components than on "
+                         "rank %d",
+                         found->odd_rank, mesh->name, field->name, found->first_rank);
+    if (found->lacking_rank >= 0)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "rank %d: mesh \"%s\": field \"%s\" is not set, other ranks have it (%s:%d asks for it)",
+                         found->lacking_rank, mesh->name, field->name, session->scene_path, field->line);
+    if (field->component >= found->component_count)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "%s:%d: component %d of field \"%s\" is asked for; on mesh \"%s\" it has %d, counted from 0",
+                         session->scene_path, field->line, field->component, field->name, mesh->name,
+                         found->component_count);
+    return INSITU_OK;
+}
+
+static insitu_status check_layer_field(const insitu_session *session, const scene_field *field, base_error *error)
+{
+    int found_count = 0;
+    for (int m = 0; m < session->catalogue.mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
+        const session_catalogue_field *found = session_catalogue_find(mesh, field->name);
+        if (!found) continue;
+        found_count++;
+        const insitu_status status = check_on_mesh(session, field, mesh, found, error);
+        if (status) return status;
+    }
+    return found_count ? INSITU_OK : refuse_missing(session, field, error);
+}
+
+/* Where the surface is, its colour's field must be too. */
+static insitu_status check_colour_by(const insitu_session *session, const scene_isosurface *layer, base_error *error)
+{
+    const insitu_status status = check_layer_field(session, &layer->colour_by, error);
+    for (int m = 0; m < session->catalogue.mesh_count && !status; m++) {
+        const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
+        if (session_catalogue_find(mesh, layer->field.name) && !session_catalogue_find(mesh, layer->colour_by.name))
+            return base_fail(error, INSITU_ERROR_FIELD,
+                             "%s:%d: mesh \"%s\" has the isosurface's field \"%s\" but not \"%s\", which colours it",
+                             session->scene_path, layer->colour_by.line, mesh->name, layer->field.name,
+                             layer->colour_by.name);
+    }
+    return status;
+}
+
+static insitu_status check_image(const insitu_session *session, const scene_image *image, base_error *error)
+{
+    int values = 0;
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < image->isosurface_count && !status; i++) {
+        const scene_isosurface *layer = &image->isosurfaces[i];
+        values += layer->value_count;
+        status = check_layer_field(session, &layer->field, error);
+        if (!status && layer->has_colour_by) status = check_colour_by(session, layer, error);
+    }
+    for (int i = 0; i < image->volume_count && !status; i++)
+        status = check_layer_field(session, &image->volumes[i].field, error);
+    if (!status && (values > RENDER_MAX_ISOVALUES || image->volume_count > RENDER_MAX_VOLUMES))
+        status = base_fail(error, INSITU_ERROR_SCENE,
+                           "%s:%d: image \"%s\" has %d isovalues and %d volumes, at most %d and %d are supported",
+                           session->scene_path, image->line, image->name, values, image->volume_count,
+                           RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES);
+    return status;
+}
+
+/* ---- what it needs of this rank ------------------------------------------------------------------------------ */
+
+static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred)
+{
+    for (int i = 0; i < mesh->scalar_count; i++) {
+        session_scalar *scalar = &mesh->scalars[i];
+        if (scalar->field == field && scalar->component == component && scalar->is_recentred == is_recentred)
+            return scalar;
+    }
+    return NULL;
+}
+
+session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field, bool at_vertices)
+{
+    const int index = session_find_field(mesh, field->name);
+    if (index < 0) return NULL;
+    const insitu_field *given = &mesh->fields[index].given;
+    return find_scalar(mesh, index, resolve_component(field, given->component_count),
+                       at_vertices && given->centring == INSITU_CELL);
+}
+
+grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
+{
+    const session_field *field = &mesh->fields[scalar->field];
+    if (scalar->is_recentred)
+        return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
+                            .component_stride = (int64_t)sizeof(double),
+                            .component_count = 1};
+    return (grid_field){.values = field->values,
+                        .component_stride = field->component_stride,
+                        .component_count = field->given.component_count,
+                        .component = scalar->component,
+                        .is_cell_centred = field->given.centring == INSITU_CELL};
+}
+
+static bool add_scalar(session_mesh *mesh, int field, int component, bool is_recentred)
+{
+    session_scalar *scalars = base_realloc(mesh->scalars, (size_t)(mesh->scalar_count + 1) * sizeof *scalars);
+    if (!scalars) return false;
+    mesh->scalars = scalars;
+    scalars[mesh->scalar_count++] = (session_scalar){.field = field,
+                                                     .component = component,
+                                                     .is_recentred = is_recentred,
+                                                     .are_values_stale = true,
+                                                     .are_ranges_stale = true};
+    return true;
+}
+
+static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_vertices, bool wants_ranges)
+{
+    const int index = session_find_field(mesh, field->name);
+    if (index < 0) return true;
+    const insitu_field *given = &mesh->fields[index].given;
+    session_scalar *scalar = session_find_scalar(mesh, field, at_vertices);
+    if (!scalar) {
+        if (!add_scalar(mesh, index, resolve_component(field, given->component_count),
+                        at_vertices && given->centring == INSITU_CELL))
+            return false;
+        scalar = &mesh->scalars[mesh->scalar_count - 1];
+    }
+    scalar->is_used = true;
+    scalar->wants_ranges = scalar->wants_ranges || wants_ranges;
+    mesh->is_needed = mesh->is_needed || wants_ranges;
+    return true;
+}
+
+static bool mark_image(session_mesh *mesh, const scene_image *image)
+{
+    bool is_marked = true;
+    for (int i = 0; i < image->isosurface_count && is_marked; i++) {
+        const scene_isosurface *layer = &image->isosurfaces[i];
+        is_marked = mark_scalar(mesh, &layer->field, true, true);
+        if (is_marked && layer->has_colour_by) is_marked = mark_scalar(mesh, &layer->colour_by, false, false);
+    }
+    for (int i = 0; i < image->volume_count && is_marked; i++)
+        is_marked = mark_scalar(mesh, &image->volumes[i].field, false, true);
+    return is_marked;
+}
+
+static bool mark_meshes(insitu_session *session, const session_plan *plan)
+{
+    for (int m = 0; m < session->mesh_count; m++) {
+        session_mesh *mesh = session->meshes[m];
+        mesh->is_needed = false;
+        for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].is_used = mesh->scalars[i].wants_ranges = false;
+        for (int i = 0; i < plan->image_count && mesh->is_given; i++)
+            if (!mark_image(mesh, plan->images[i])) return false;
+    }
+    return true;
+}
+
+/* ---- what is to be recentred --------------------------------------------------------------------------------- */
+
+static bool add_recentring(session_plan *plan, session_recentring item)
+{
+    for (int i = 0; i < plan->recentring_count; i++) {
+        const session_recentring *other = &plan->recentrings[i];
+        if (other->mesh == item.mesh && other->field == item.field && other->component == item.component) return true;
+    }
+    session_recentring *items =
+        base_realloc(plan->recentrings, (size_t)(plan->recentring_count + 1) * sizeof *plan->recentrings);
+    if (!items) return false;
+    plan->recentrings = items;
+    items[plan->recentring_count++] = item;
+    return true;
+}
+
+static bool add_recentrings(const insitu_session *session, session_plan *plan, const scene_field *field)
+{
+    for (int m = 0; m < session->catalogue.mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
+        const session_catalogue_field *found = session_catalogue_find(mesh, field->name);
+        if (!found || !found->is_cell_centred) continue;
+        const session_recentring item = {mesh, found->name, resolve_component(field, found->component_count)};
+        if (!add_recentring(plan, item)) return false;
+    }
+    return true;
+}
+
+static bool plan_recentrings(const insitu_session *session, session_plan *plan)
+{
+    for (int i = 0; i < plan->image_count; i++)
+        for (int s = 0; s < plan->images[i]->isosurface_count; s++)
+            if (!add_recentrings(session, plan, &plan->images[i]->isosurfaces[s].field)) return false;
+    return true;
+}
+
+/* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+void session_plan_free(session_plan *plan)
+{
+    base_free(plan->images);
+    base_free(plan->recentrings);
+    *plan = (session_plan){0};
+}
+
+insitu_status session_make_plan(insitu_session *session, const scene_image *const *due, int count, session_plan *out,
+                                base_error *refusal, base_error *error)
+{
+    session_plan plan = {.images = base_calloc((size_t)count, sizeof *plan.images)};
+    bool is_whole = plan.images != NULL;
+    for (int i = 0; i < count && is_whole; i++)
+        /* Without cells anywhere no field can be asked of anyone: the picture is its background. */
+        if (session->extent.cell_count == 0 || check_image(session, due[i], refusal) == INSITU_OK)
+            plan.images[plan.image_count++] = due[i];
+    is_whole = is_whole && plan_recentrings(session, &plan) && mark_meshes(session, &plan);
+    if (!is_whole) session_no_memory(error, count * (int64_t)sizeof *plan.images, "the plan of the images");
+    const insitu_status status = session_agree(session->comm, error);
+    if (status)
+        session_plan_free(&plan);
+    else
+        *out = plan;
+    return status;
+}

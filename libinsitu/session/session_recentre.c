@@ -1,0 +1,468 @@
+/* Recentring: the value at a vertex is the mean over its cells on all ranks, and bitwise the same for any partition.
+ *
+ * Sums depend on their order, so partial sums of ranks would not do: every rank's single values come together, are
+ * sorted, and summed in that order. Vertices are one where their keys are (global ids where all ranks give them, else
+ * the bits of the coordinates, -0 as +0), on one rank as on several: else a mesh that doubles its vertices along a
+ * crack would look one way on one rank and another on two.
+ *
+ *     local:  vertices -> groups of equal keys -> values of incident cells, group by group -> means
+ *     shared: groups inside another rank's box  --(key, values)-->  rank hash(key) % ranks: merged by key, means
+ *             means  <-------------------------------------------
+ *
+ * The boxes are of the drawn cells of the mesh; with ids they are widened a little, since ids may be equal where
+ * coordinates differ in their last bits. */
+#include "session_recentre.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_exchange.h"
+
+/* Values by group: those of group g are values[starts[g]] .. values[starts[g + 1] - 1]. */
+typedef struct value_groups {
+    int64_t count;
+    int64_t *starts; /* count + 1 */
+    double *values;
+    double *means; /* count */
+} value_groups;
+
+typedef struct vertex_groups {
+    session_key_table keys;
+    int64_t *of_vertex; /* -1: a vertex of no drawn cell */
+    int64_t *vertex;    /* one of each group */
+    value_groups values;
+} vertex_groups;
+
+/* ---- values by group ----------------------------------------------------------------------------------------- */
+
+static bool groups_create(value_groups *groups, int64_t count)
+{
+    *groups = (value_groups){.count = count};
+    groups->starts = base_calloc((size_t)count + 1, sizeof *groups->starts);
+    groups->means = base_alloc((size_t)count * sizeof *groups->means);
+    return groups->starts && groups->means;
+}
+
+/* After starts[g + 1] was filled with the count of group g: values get their room. Filling then moves starts[g] to
+ * where g ends; groups_close() moves them back. */
+static bool groups_open(value_groups *groups)
+{
+    for (int64_t g = 0; g < groups->count; g++) groups->starts[g + 1] += groups->starts[g];
+    groups->values = base_alloc((size_t)groups->starts[groups->count] * sizeof *groups->values);
+    return groups->values != NULL;
+}
+
+static void groups_close(value_groups *groups)
+{
+    for (int64_t g = groups->count; g > 0; g--) groups->starts[g] = groups->starts[g - 1];
+    groups->starts[0] = 0;
+}
+
+static void groups_free(value_groups *groups)
+{
+    base_free(groups->starts);
+    base_free(groups->values);
+    base_free(groups->means);
+    *groups = (value_groups){0};
+}
+
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double mean_of(double *values, int64_t count)
+{
+    double sum = 0;
+    if (count == 0) return NAN;
+    qsort(values, (size_t)count, sizeof *values, by_value);
+    for (int64_t i = 0; i < count; i++) sum += values[i];
+    return sum / (double)count;
+}
+
+static void groups_average(value_groups *groups, int threads)
+{
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t g = 0; g < groups->count; g++)
+        groups->means[g] = mean_of(groups->values + groups->starts[g], groups->starts[g + 1] - groups->starts[g]);
+}
+
+/* ---- this rank's part ---------------------------------------------------------------------------------------- */
+
+static session_key vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
+{
+    session_key key = {{0}};
+    if (by_id) {
+        const insitu_array *ids = &mesh->given.vertex_ids;
+        const int64_t size = session_type_size(ids->type);
+        const grid_array a = {ids->data, ids->stride_bytes ? ids->stride_bytes : size, size == 8, true};
+        key.words[0] = (uint64_t)grid_array_index(&a, vertex);
+        return key;
+    }
+    double position[3];
+    grid_vertex(&mesh->cells, vertex, position);
+    for (int axis = 0; axis < 3; axis++) {
+        const double unsigned_zero = position[axis] + 0.0;
+        memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
+    }
+    return key;
+}
+
+static void group_vertices(const session_mesh *mesh, bool by_id, vertex_groups *groups)
+{
+    const grid *g = &mesh->cells;
+    for (int64_t v = 0; v < g->vertex_count; v++) groups->of_vertex[v] = -1;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (grid_is_ghost(g, cell)) continue;
+        int64_t vertices[GRID_MAX_CELL_VERTICES];
+        const int count = grid_cell_vertices(g, cell, vertices);
+        for (int i = 0; i < count; i++) {
+            if (groups->of_vertex[vertices[i]] >= 0) continue;
+            const session_key key = vertex_key(mesh, vertices[i], by_id);
+            const int64_t group = session_keys_add(&groups->keys, &key);
+            groups->of_vertex[vertices[i]] = group;
+            groups->vertex[group] = vertices[i];
+        }
+    }
+}
+
+/* The groups of a cell's vertices, each once; none for a cell without a value. */
+static int cell_groups(const grid *g, const grid_field *field, const vertex_groups *groups, int64_t cell,
+                       int64_t out[GRID_MAX_CELL_VERTICES], double *value)
+{
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    int distinct = 0;
+    if (grid_is_ghost(g, cell)) return 0;
+    *value = grid_field_value(field, cell);
+    if (!isfinite(*value)) return 0;
+    const int count = grid_cell_vertices(g, cell, vertices);
+    for (int i = 0; i < count; i++) {
+        const int64_t group = groups->of_vertex[vertices[i]];
+        int at = 0;
+        while (at < distinct && out[at] != group) at++;
+        if (at == distinct) out[distinct++] = group;
+    }
+    return distinct;
+}
+
+static bool collect_values(const session_mesh *mesh, const grid_field *field, vertex_groups *groups)
+{
+    const grid *g = &mesh->cells;
+    value_groups *values = &groups->values;
+    int64_t at[GRID_MAX_CELL_VERTICES];
+    double value = 0;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        const int count = cell_groups(g, field, groups, cell, at, &value);
+        for (int i = 0; i < count; i++) values->starts[at[i] + 1]++;
+    }
+    if (!groups_open(values)) return false;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        const int count = cell_groups(g, field, groups, cell, at, &value);
+        for (int i = 0; i < count; i++) values->values[values->starts[at[i]]++] = value;
+    }
+    groups_close(values);
+    return true;
+}
+
+static void vertex_groups_free(vertex_groups *groups)
+{
+    session_keys_free(&groups->keys);
+    base_free(groups->of_vertex);
+    base_free(groups->vertex);
+    groups_free(&groups->values);
+}
+
+/* mesh may be NULL: no groups then. */
+static insitu_status make_groups(const session_mesh *mesh, const grid_field *field, bool by_id, int threads,
+                                 vertex_groups *groups, base_error *error)
+{
+    const int64_t count = mesh ? mesh->given.vertex_count : 0;
+    groups->of_vertex = base_alloc((size_t)count * sizeof *groups->of_vertex);
+    groups->vertex = base_alloc((size_t)count * sizeof *groups->vertex);
+    bool is_made = groups->of_vertex && groups->vertex && session_keys_create(&groups->keys, count);
+    if (is_made && mesh) group_vertices(mesh, by_id, groups);
+    is_made = is_made && groups_create(&groups->values, groups->keys.count);
+    is_made = is_made && (mesh ? collect_values(mesh, field, groups) : groups_open(&groups->values));
+    if (!is_made) return session_no_memory(error, count * 80, "values recentred to vertices");
+    groups_average(&groups->values, threads);
+    return INSITU_OK;
+}
+
+/* ---- what ranks share ---------------------------------------------------------------------------------------- */
+
+typedef struct rank_box {
+    double lower[3], upper[3];
+} rank_box;
+
+static bool do_boxes_meet(const rank_box *a, const rank_box *b)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (!(a->lower[axis] <= b->upper[axis] && b->lower[axis] <= a->upper[axis])) return false;
+    return true;
+}
+
+/* The other ranks' boxes that meet this one's: to the front of boxes; returns how many. Collective. */
+static insitu_status gather_boxes(const insitu_session *session, const session_mesh *mesh, double margin,
+                                  rank_box *boxes, int *count, base_error *error)
+{
+    rank_box mine = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
+        mine.lower[axis] = mesh->lower[axis] - margin;
+        mine.upper[axis] = mesh->upper[axis] + margin;
+    }
+    const insitu_status status =
+        session_mpi(error, MPI_Allgather(&mine, 6, MPI_DOUBLE, boxes, 6, MPI_DOUBLE, session->comm), "MPI_Allgather");
+    *count = 0;
+    for (int rank = 0; rank < session->ranks && !status; rank++)
+        if (rank != session->rank && do_boxes_meet(&boxes[rank], &mine)) boxes[(*count)++] = boxes[rank];
+    return status;
+}
+
+static bool is_shared(const session_mesh *mesh, int64_t vertex, const rank_box *boxes, int count)
+{
+    rank_box point;
+    grid_vertex(&mesh->cells, vertex, point.lower);
+    memcpy(point.upper, point.lower, sizeof point.upper);
+    for (int i = 0; i < count; i++)
+        if (do_boxes_meet(&boxes[i], &point)) return true;
+    return false;
+}
+
+enum { RECORD_HEAD = 4 }; /* words before the values: the key and the count */
+
+typedef struct shared_groups {
+    int64_t count;
+    int64_t *groups; /* in the order in which they are sent */
+    session_mail mail;
+} shared_groups;
+
+static int home_of(const session_key *key, int ranks)
+{
+    return (int)(session_key_hash(key) % (uint64_t)ranks);
+}
+
+static int64_t value_count(const value_groups *values, int64_t group)
+{
+    return values->starts[group + 1] - values->starts[group];
+}
+
+static void write_record(const vertex_groups *groups, int64_t group, uint64_t *record)
+{
+    const int64_t count = value_count(&groups->values, group);
+    memcpy(record, groups->keys.keys[group].words, sizeof groups->keys.keys[group].words);
+    record[RECORD_HEAD - 1] = (uint64_t)count;
+    memcpy(record + RECORD_HEAD, groups->values.values + groups->values.starts[group], (size_t)count * sizeof(double));
+}
+
+/* Shared groups sorted by their home ranks into records. */
+static bool pack_records(const vertex_groups *groups, int ranks, shared_groups *shared)
+{
+    session_mail *mail = &shared->mail;
+    int64_t *places = base_calloc((size_t)ranks * 2, sizeof *places);
+    int64_t *ordered = base_alloc((size_t)shared->count * sizeof *ordered);
+    mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
+    if (!places || !ordered || !mail->counts) goto fail;
+    int64_t *orders = places + ranks;
+    for (int64_t i = 0; i < shared->count; i++) {
+        const int home = home_of(&groups->keys.keys[shared->groups[i]], ranks);
+        mail->counts[home] += RECORD_HEAD + value_count(&groups->values, shared->groups[i]);
+        if (home + 1 < ranks) orders[home + 1]++;
+    }
+    for (int rank = 1; rank < ranks; rank++) {
+        places[rank] = places[rank - 1] + mail->counts[rank - 1];
+        orders[rank] += orders[rank - 1];
+    }
+    mail->total = places[ranks - 1] + mail->counts[ranks - 1];
+    mail->words = base_alloc((size_t)mail->total * sizeof *mail->words);
+    if (!mail->words) goto fail;
+    for (int64_t i = 0; i < shared->count; i++) {
+        const int64_t group = shared->groups[i];
+        const int home = home_of(&groups->keys.keys[group], ranks);
+        write_record(groups, group, mail->words + places[home]);
+        places[home] += RECORD_HEAD + value_count(&groups->values, group);
+        ordered[orders[home]++] = group;
+    }
+    base_free(shared->groups);
+    shared->groups = ordered;
+    base_free(places);
+    return true;
+fail:
+    base_free(places);
+    base_free(ordered);
+    return false;
+}
+
+static bool find_shared(const session_mesh *mesh, const vertex_groups *groups, const rank_box *boxes, int box_count,
+                        shared_groups *out)
+{
+    out->groups = base_alloc((size_t)groups->keys.count * sizeof *out->groups);
+    if (!out->groups) return false;
+    for (int64_t group = 0; group < groups->keys.count; group++)
+        if (is_shared(mesh, groups->vertex[group], boxes, box_count)) out->groups[out->count++] = group;
+    return true;
+}
+
+/* ---- the homes' part: merge by key --------------------------------------------------------------------------- */
+
+static const uint64_t *next_record(const uint64_t *record)
+{
+    return record + RECORD_HEAD + record[RECORD_HEAD - 1];
+}
+
+/* Means of the records' keys, one a record, into reply->words and reply->counts. */
+static bool merge_records(const session_mail *in, int ranks, int threads, session_mail *reply)
+{
+    session_key_table keys = {0};
+    value_groups values = {0};
+    const uint64_t *end = in->words + in->total;
+    int64_t records = 0;
+    bool is_done = false;
+    for (const uint64_t *r = in->words; r < end; r = next_record(r)) records++;
+    int64_t *groups = base_alloc((size_t)records * sizeof *groups);
+    reply->words = base_alloc((size_t)records * sizeof *reply->words);
+    reply->counts = base_calloc((size_t)ranks, sizeof *reply->counts);
+    if (!groups || !reply->words || !reply->counts || !session_keys_create(&keys, records)) goto done;
+    for (const uint64_t *r = in->words; r < end; r = next_record(r)) {
+        session_key key;
+        memcpy(key.words, r, sizeof key.words);
+        groups[reply->total++] = session_keys_add(&keys, &key);
+    }
+    if (!groups_create(&values, keys.count)) goto done;
+    int64_t i = 0;
+    for (const uint64_t *r = in->words; r < end; r = next_record(r))
+        values.starts[groups[i++] + 1] += (int64_t)r[RECORD_HEAD - 1];
+    if (!groups_open(&values)) goto done;
+    i = 0;
+    for (const uint64_t *r = in->words; r < end; r = next_record(r), i++) {
+        const int64_t count = (int64_t)r[RECORD_HEAD - 1];
+        memcpy(values.values + values.starts[groups[i]], r + RECORD_HEAD, (size_t)count * sizeof(double));
+        values.starts[groups[i]] += count;
+    }
+    groups_close(&values);
+    groups_average(&values, threads);
+    for (i = 0; i < records; i++) memcpy(&reply->words[i], &values.means[groups[i]], sizeof(double));
+    const uint64_t *record = in->words;
+    for (int rank = 0; rank < ranks; rank++)
+        for (const uint64_t *stop = record + in->counts[rank]; record < stop; record = next_record(record))
+            reply->counts[rank]++;
+    is_done = true;
+done:
+    base_free(groups);
+    session_keys_free(&keys);
+    groups_free(&values);
+    return is_done;
+}
+
+static insitu_status exchange_means(insitu_session *session, const shared_groups *shared, vertex_groups *groups,
+                                    base_error *error)
+{
+    session_mail in = {0}, reply = {0}, means = {0};
+    insitu_status status = session_mail_exchange(session->comm, &shared->mail, &in, error);
+    if (status) return status;
+    if (!merge_records(&in, session->ranks, session->threads, &reply))
+        session_no_memory(error, in.total * 24, "values at vertices that ranks share");
+    session_mail_free(&in);
+    status = session_agree(session->comm, error);
+    if (status == INSITU_OK) status = session_mail_exchange(session->comm, &reply, &means, error);
+    session_mail_free(&reply);
+    if (status) return status;
+    for (int64_t i = 0; i < shared->count; i++)
+        memcpy(&groups->values.means[shared->groups[i]], &means.words[i], sizeof(double));
+    session_mail_free(&means);
+    return INSITU_OK;
+}
+
+static insitu_status merge_shared(insitu_session *session, const session_mesh *mesh, bool by_id, vertex_groups *groups,
+                                  base_error *error)
+{
+    shared_groups shared = {0};
+    int box_count = 0;
+    rank_box *boxes = base_alloc((size_t)session->ranks * sizeof *boxes);
+    if (!boxes) session_no_memory(error, session->ranks * (int64_t)sizeof *boxes, "boxes of ranks");
+    insitu_status status = session_agree(session->comm, error);
+    const double margin = by_id ? 1e-6 * session->extent.half_diagonal : 0;
+    if (!status) status = gather_boxes(session, mesh, margin, boxes, &box_count, error);
+    if (!status) {
+        if (!find_shared(mesh, groups, boxes, box_count, &shared) || !pack_records(groups, session->ranks, &shared))
+            session_no_memory(error, groups->keys.count * 40, "values at vertices that ranks share");
+        status = session_agree(session->comm, error);
+    }
+    if (!status) status = exchange_means(session, &shared, groups, error);
+    base_free(boxes);
+    base_free(shared.groups);
+    session_mail_free(&shared.mail);
+    return status;
+}
+
+/* ---- one scalar ---------------------------------------------------------------------------------------------- */
+
+static session_scalar *scalar_of(const session_mesh *mesh, const session_recentring *item)
+{
+    const int field = mesh ? session_find_field(mesh, item->field) : -1;
+    for (int i = 0; field >= 0 && i < mesh->scalar_count; i++) {
+        session_scalar *scalar = &mesh->scalars[i];
+        if (scalar->field == field && scalar->component == item->component && scalar->is_recentred) return scalar;
+    }
+    return NULL;
+}
+
+static void spread_means(const vertex_groups *groups, int64_t count, double *values, int threads)
+{
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t v = 0; v < count; v++)
+        values[v] = groups->of_vertex[v] < 0 ? NAN : groups->values.means[groups->of_vertex[v]];
+}
+
+static insitu_status recentre(insitu_session *session, const session_recentring *item, base_error *error)
+{
+    session_mesh *mesh = session_find_mesh(session, item->mesh->name);
+    session_scalar *scalar = scalar_of(mesh, item);
+    if (!scalar) mesh = NULL;
+    const bool by_id = item->mesh->has_ids;
+    vertex_groups groups = {0};
+    if (scalar) {
+        if (!scalar->vertex_values)
+            scalar->vertex_values = base_alloc((size_t)mesh->given.vertex_count * sizeof(double));
+        if (!scalar->vertex_values)
+            session_no_memory(error, mesh->given.vertex_count * (int64_t)sizeof(double), "recentred values");
+        grid_field field =
+            session_scalar_field(mesh, &(session_scalar){.field = scalar->field, .component = scalar->component});
+        if (scalar->vertex_values) make_groups(mesh, &field, by_id, session->threads, &groups, error);
+    } else {
+        make_groups(NULL, NULL, by_id, session->threads, &groups, error);
+    }
+    insitu_status status = session_agree(session->comm, error);
+    if (!status && session->ranks > 1) status = merge_shared(session, mesh, by_id, &groups, error);
+    if (!status && scalar) {
+        spread_means(&groups, mesh->given.vertex_count, scalar->vertex_values, session->threads);
+        scalar->are_values_stale = false;
+        scalar->are_ranges_stale = true;
+        scalar->is_extent_known = false;
+    }
+    vertex_groups_free(&groups);
+    return status;
+}
+
+insitu_status session_recentre(insitu_session *session, const session_plan *plan, base_error *error)
+{
+    if (plan->recentring_count == 0) return INSITU_OK;
+    const size_t count = (size_t)plan->recentring_count;
+    int *stale = base_calloc(count, sizeof *stale);
+    if (!stale) session_no_memory(error, (int64_t)(count * sizeof *stale), "flags");
+    insitu_status status = session_agree(session->comm, error);
+    for (size_t i = 0; i < count && !status; i++) {
+        const session_recentring *item = &plan->recentrings[i];
+        const session_scalar *scalar = scalar_of(session_find_mesh(session, item->mesh->name), item);
+        stale[i] = scalar && scalar->are_values_stale;
+    }
+    if (!status)
+        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, (int)count, MPI_INT, MPI_MAX, session->comm),
+                             "MPI_Allreduce");
+    for (size_t i = 0; i < count && !status; i++)
+        if (stale[i]) status = recentre(session, &plan->recentrings[i], error);
+    base_free(stale);
+    return status;
+}
