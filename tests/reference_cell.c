@@ -349,7 +349,8 @@ static bool newton(const reference_cell *cell, const double *point, double param
         if (!solve3(columns[0], columns[1], columns[2], left, move)) return false;
         const double length = length3(move), limit = length > 0.5 ? 0.5 / length : 1;
         for (int k = 0; k < 3; k++) parameter[k] += limit * move[k];
-        if (length3(left) <= tolerance || length < 1e-14) return isfinite(length);
+        /* The error goes as the square of the step: the next would be below 1e-16. */
+        if (length3(left) <= tolerance || length < 1e-9) return isfinite(length);
     }
     return false;
 }

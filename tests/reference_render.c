@@ -183,7 +183,7 @@ static double bisect(trace *t, const placed_cell *c, const double *values, doubl
                      bool side_in)
 {
     double low = z_in, high = z_out;
-    for (int step = 0; step < 44; step++) {
+    for (int step = 0; step < 36; step++) {
         const double middle = 0.5 * (low + high);
         if (middle <= low || middle >= high) break;
         if ((value_along(t, c, values, middle) >= iso) == side_in)
@@ -199,8 +199,9 @@ static double falsi(trace *t, const placed_cell *c, const double *values, double
                     const double face[2], int steps)
 {
     double z0 = ends[0].z, z1 = ends[1].z, v0 = face[0] - iso, v1 = face[1] - iso;
-    for (int n = 0; n < steps && z1 - z0 > 1e-12 * c->size; n++) {
-        const double z = z0 - v0 * (z1 - z0) / (v1 - v0), v = value_along(t, c, values, z) - iso;
+    double z = z0 - v0 * (z1 - z0) / (v1 - v0), last = (double)INFINITY;
+    for (int n = 0; n < steps && fabs(z - last) > 1e-12 * c->size; n++) {
+        const double v = value_along(t, c, values, z) - iso;
         if ((v < 0) == (v0 < 0)) {
             z0 = z;
             v0 = v;
@@ -208,15 +209,17 @@ static double falsi(trace *t, const placed_cell *c, const double *values, double
             z1 = z;
             v1 = v;
         }
+        last = z;
+        z = z0 - v0 * (z1 - z0) / (v1 - v0);
     }
-    return z0 - v0 * (z1 - z0) / (v1 - v0);
+    return z;
 }
 
 /* More sign changes than the one that the ends promise? */
 static bool is_ambiguous(trace *t, const placed_cell *c, const double *values, double iso, double z_in, double z_out,
                          bool side_in)
 {
-    enum { PIECES = 24 };
+    enum { PIECES = 16 };
     bool side = side_in;
     int changes = 0;
     for (int i = 0; i <= PIECES; i++) {

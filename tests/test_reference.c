@@ -328,7 +328,8 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
                 ambiguous++;
                 continue;
             }
-            assert_true(fabs(ray.hits[0].depth - z) < 1e-12);
+            /* Bisection ends at 2^-36 of a cell. */
+            assert_true(fabs(ray.hits[0].depth - z) < 2e-11);
             const double scale = (slope > 0 ? -1 : 1) / sqrt(0.83);
             assert_true(fabs(ray.hits[0].normal[0] - 0.3 * scale) < 1e-12);
             assert_true(fabs(ray.hits[0].normal[1] + 0.7 * scale) < 1e-12);
