@@ -373,7 +373,7 @@ void quadratic_cells_are_their_corners_with_a_warning(void **)
     assert_int_equal(f.report.cells_linear, 1);
     for (int i = 0; i < 4; i++) assert_int_equal(integer_at(f.mesh().mesh.connectivity, i), i);
     assert_int_equal(f.mesh().mesh.connectivity_count, 4);
-    assert_non_null(strstr(f.report.warnings, "1 higher-order cells"));
+    assert_non_null(strstr(f.report.cells_why, "1 higher-order cells"));
 }
 
 void every_higher_order_type_has_its_linear_one(void **)
@@ -411,7 +411,7 @@ void flat_cells_are_left_out_and_fields_follow(void **)
     assert_true(c[0] == 1 && c[1] == 3);
     assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - 1.0 / 6) < rounding);
     assert_true(std::fabs(cell_volume(f.mesh().mesh, 1) - 1.0 / 3) < rounding);
-    assert_non_null(strstr(f.report.warnings, "2 cells of less than 3 dimensions"));
+    assert_non_null(strstr(f.report.cells_why, "2 cells of less than 3 dimensions"));
 }
 
 void add_polyhedron(vtkUnstructuredGrid *grid)
@@ -448,7 +448,7 @@ void some_polyhedra_are_warned_about(void **)
     assert_int_equal(f.set(grid), INSITU_OK);
     assert_int_equal(f.report.cells, 1);
     assert_int_equal(integer_at(f.mesh().mesh.connectivity, 0), 4);
-    assert_non_null(strstr(f.report.warnings, "1 cells of type 42"));
+    assert_non_null(strstr(f.report.cells_why, "1 cells of type 42"));
 }
 
 void ghost_flags_that_hide_are_handed_over(void **)

@@ -143,13 +143,13 @@ void show_warnings(const world &w, const std::string &text, run_state &run, prog
         bar.note("warning: and " + std::to_string(fresh.size() - warnings_at_once) + " more");
 }
 
-/* Warnings about cells carry counts, which are a rank's own: said here of all ranks together. */
+/* The adaptor counts the cells of a rank; here they are counted over all. */
 std::string cell_warnings(const int64_t sums[4])
 {
     std::string text;
     const char *const what[] = {"", " higher-order cells drawn by their corners as linear ones",
                                 " cells of less than 3 dimensions are not drawn",
-                                " cells of types that cannot be drawn (see --info) are not drawn"};
+                                " cells left out, of types that cannot be drawn (see --info)"};
     for (int i = 1; i < 4; i++)
         if (sums[i] > 0) text += std::to_string(sums[i]) + what[i] + "\n";
     return text;
@@ -165,16 +165,6 @@ std::string check_cells(const world &w, const insitu_vtk_report &report, const s
     if (sums[3] > 0) why += "; " + std::to_string(sums[3]) + " cells of types that cannot be drawn (see --info)";
     if (sums[2] > 0) why += "; " + std::to_string(sums[2]) + " cells of less than 3 dimensions";
     throw std::runtime_error(why);
-}
-
-/* What the adaptor says beside what check_cells() sums up. */
-std::string other_warnings(const char *warnings)
-{
-    std::string text;
-    std::istringstream in(warnings);
-    for (std::string line; std::getline(in, line);)
-        if (line.find("drawn") == std::string::npos || line.find(": a vtk") != std::string::npos) text += line + "\n";
-    return text;
 }
 
 std::string milliseconds(double ms)
@@ -220,7 +210,7 @@ void draw_step(const world &w, step_source &source, stage &on, size_t index, run
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
     /* Of all ranks one time, whichever of them read a part without it. */
     MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
-    std::string warnings = check_cells(w, report, name) + other_warnings(report.warnings);
+    std::string warnings = check_cells(w, report, name) + report.warnings + "\n";
     const insitu_report &done = on.step(source.cycle(index), part.time);
     if (done.warnings) warnings += done.warnings;
     run.images += done.images;

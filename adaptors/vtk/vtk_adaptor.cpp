@@ -55,7 +55,7 @@ struct outcome {
 struct insitu_vtk_adaptor {
     insitu_session *session = nullptr;
     std::map<std::string, std::map<std::string, part>> parts; // by the name of the call, then of the mesh
-    std::string error, copied_why, warnings;
+    std::string error, copied_why, cells_why, warnings;
 };
 
 namespace
@@ -167,7 +167,7 @@ void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out,
     tally count;
     std::string error;
     if (!view_cells(grid, what, p.held, count, p.mesh, cells, counts, error)) throw failure{INSITU_ERROR_MESH, error};
-    warn_about_cells(counts, what, out.count);
+    tell_about_cells(counts, what, out.count);
     out.cells.split += counts.split;
     out.cells.linear += counts.linear;
     out.cells.flat += counts.flat;
@@ -182,11 +182,7 @@ void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out,
     add_point_fields(grid, what, count, p);
     add_cell_fields(grid, cells, what, count, p);
 
-    out.count.bytes_borrowed += count.bytes_borrowed;
-    out.count.bytes_copied += count.bytes_copied;
-    if (!count.copied_why.empty())
-        out.count.copied_why += (out.count.copied_why.empty() ? "" : "\n") + count.copied_why;
-    if (!count.warnings.empty()) out.count.warn(count.warnings);
+    out.count.add(count);
     out.cells_set += cells.count;
 }
 
@@ -266,12 +262,13 @@ void set_all(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data,
     if (out.cells_set == 0 && out.cells.not_drawn > 0)
         throw failure{INSITU_ERROR_MESH, "mesh '" + std::string(name) + "': none of its " +
                                              std::to_string(out.cells.not_drawn) +
-                                             " cells can be drawn: " + out.count.warnings};
+                                             " cells can be drawn: " + out.count.cells_why};
 }
 
 void fill_report(insitu_vtk_adaptor *adaptor, outcome &out, insitu_vtk_report *report)
 {
     adaptor->copied_why = std::move(out.count.copied_why);
+    adaptor->cells_why = std::move(out.count.cells_why);
     adaptor->warnings = std::move(out.count.warnings);
     if (!report) return;
     *report = {out.meshes,
@@ -284,6 +281,7 @@ void fill_report(insitu_vtk_adaptor *adaptor, outcome &out, insitu_vtk_report *r
                out.count.bytes_borrowed,
                out.count.bytes_copied,
                adaptor->copied_why.c_str(),
+               adaptor->cells_why.c_str(),
                adaptor->warnings.c_str()};
 }
 
@@ -327,7 +325,7 @@ insitu_status insitu_vtk_create(insitu_session *session, insitu_vtk_adaptor **ou
 insitu_status insitu_vtk_set(insitu_vtk_adaptor *adaptor, const char *name, vtkDataObject *data,
                              insitu_vtk_report *report)
 {
-    if (report) *report = {0, 0, 0, 0, 0, 0, 0, 0, 0, "", ""};
+    if (report) *report = {0, 0, 0, 0, 0, 0, 0, 0, 0, "", "", ""};
     if (!adaptor) return INSITU_ERROR_ARGUMENT;
     outcome out;
     const insitu_status status = guarded(adaptor, [&] { set_all(adaptor, name, data, out); });

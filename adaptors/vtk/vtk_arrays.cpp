@@ -158,6 +158,12 @@ template <typename T> bool borrow_soa_points(vtkDataArray *points, insitu_array 
     return true;
 }
 
+void add_lines(std::string &text, const std::string &lines)
+{
+    if (!text.empty() && !lines.empty()) text += '\n';
+    text += lines;
+}
+
 } // namespace
 
 std::byte *hold::allocate(size_t bytes)
@@ -169,15 +175,26 @@ std::byte *hold::allocate(size_t bytes)
 void tally::copied(const std::string &what, const std::string &why, int64_t bytes)
 {
     bytes_copied += bytes;
-    if (!copied_why.empty()) copied_why += '\n';
-    copied_why += what + ": " + why + " (" + std::to_string(bytes) + " bytes)";
+    add_lines(copied_why, what + ": " + why + " (" + std::to_string(bytes) + " bytes)");
+}
+
+void tally::about_cells(const std::string &text)
+{
+    add_lines(cells_why, text);
 }
 
 void tally::warn(const std::string &text)
 {
-    if (('\n' + warnings + '\n').find('\n' + text + '\n') != std::string::npos) return;
-    if (!warnings.empty()) warnings += '\n';
-    warnings += text;
+    add_lines(warnings, text);
+}
+
+void tally::add(const tally &other)
+{
+    bytes_borrowed += other.bytes_borrowed;
+    bytes_copied += other.bytes_copied;
+    add_lines(copied_why, other.copied_why);
+    add_lines(cells_why, other.cells_why);
+    add_lines(warnings, other.warnings);
 }
 
 const std::byte *array_view::element(int64_t tuple, int component) const

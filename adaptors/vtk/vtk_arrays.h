@@ -32,10 +32,13 @@ struct tally {
     int64_t bytes_borrowed = 0;
     int64_t bytes_copied = 0;
     std::string copied_why;
+    std::string cells_why;
     std::string warnings;
 
     void copied(const std::string &what, const std::string &why, int64_t bytes);
-    void warn(const std::string &text); // once, however often it is said
+    void about_cells(const std::string &text);
+    void warn(const std::string &text);
+    void add(const tally &other);
 };
 
 /* A data array of tuple_count × component_count elements in memory. */

@@ -279,18 +279,18 @@ bool view_cells(vtkUnstructuredGrid *grid, const std::string &what, hold &held, 
                       counts, error);
 }
 
-void warn_about_cells(const cell_counts &counts, const std::string &what, tally &count)
+void tell_about_cells(const cell_counts &counts, const std::string &what, tally &count)
 {
     if (counts.linear > 0)
-        count.warn(what + ": " + std::to_string(counts.linear) +
-                   " higher-order cells drawn by their corners as linear ones");
+        count.about_cells(what + ": " + std::to_string(counts.linear) +
+                          " higher-order cells drawn by their corners as linear ones");
     for (const auto &[type, number] : counts.left_out) {
         const char *why = recipes()[static_cast<size_t>(type)].piece_count > 0 ? " with too few points" : "";
-        count.warn(what + ": " + std::to_string(number) + " cells of type " + std::to_string(type) + " (" +
-                   vtkCellTypes::GetClassNameFromTypeId(type) + ")" + why + " are not drawn");
+        count.about_cells(what + ": " + std::to_string(number) + " cells of type " + std::to_string(type) + " (" +
+                          vtkCellTypes::GetClassNameFromTypeId(type) + ")" + why + " are not drawn");
     }
     if (counts.flat > 0)
-        count.warn(what + ": " + std::to_string(counts.flat) + " cells of less than 3 dimensions are not drawn");
+        count.about_cells(what + ": " + std::to_string(counts.flat) + " cells of less than 3 dimensions are not drawn");
 }
 
 } // namespace insitu_vtk

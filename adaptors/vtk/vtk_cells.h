@@ -34,8 +34,8 @@ struct cell_list {
 bool view_cells(vtkUnstructuredGrid *grid, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
                 cell_list &cells, cell_counts &counts, std::string &error);
 
-/* What is worth a warning about the cells that were left out or simplified. */
-void warn_about_cells(const cell_counts &counts, const std::string &what, tally &count);
+/* Say in count which cells were left out or simplified. */
+void tell_about_cells(const cell_counts &counts, const std::string &what, tally &count);
 
 } // namespace insitu_vtk
 

@@ -17,8 +17,8 @@
  *  - Cells 10, 12, 13, 14: borrowed, with 32- or 64-bit storage.
  *  - Voxels (11): drawn as hexahedra; a copy of the connectivity.
  *  - Pentagonal and hexagonal prisms (15, 16): split into a hexahedron and a wedge, or two hexahedra; copied.
- *  - Quadratic and higher-order 3-D cells: drawn by their corners as linear cells, with a warning; copied.
- *  - Polyhedra and what else is left of 3-D cells: not drawn, with a warning; flat, line and point cells: not drawn.
+ *  - Quadratic and higher-order 3-D cells: drawn by their corners as linear cells, and reported; copied.
+ *  - Polyhedra and what else is left of 3-D cells: not drawn, and reported; so are flat, line and point cells.
  *  - Fields: float, double and 32- or 64-bit signed integers borrowed; other types copied.
  *  - vtkGhostType of the cells: duplicate, hidden and refined cells are not drawn. Hidden points are ignored.
  *
@@ -46,7 +46,8 @@ typedef struct insitu_vtk_report {
     int64_t bytes_borrowed;  /* of VTK's arrays handed over as they are */
     int64_t bytes_copied;    /* of arrays converted, held until the mesh is set again */
     const char *copied_why;  /* "" or one "what: why (bytes)" a line; valid until the next call on the adaptor */
-    const char *warnings;    /* "" or one warning a line; as above */
+    const char *cells_why;   /* "" or one kind of cell a line that is simplified or not drawn, and how many; as above */
+    const char *warnings;    /* "" or one other warning a line; as above */
 } insitu_vtk_report;
 
 /* An adaptor for a session, which must outlive it. On an error *out is NULL. Local. */
