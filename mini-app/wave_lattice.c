@@ -7,8 +7,8 @@
  *   pyramids  six around a vertex in the centre. A face that a neighbour wants split becomes two tets with that
  *             diagonal instead: these cubes are the transition between all others.
  *
- * Mixed, from below: tets, wedges (their z faces meet split as both want), one layer of pyramid cubes (tets below,
- * pyramids above), then hexes, with pyramid cubes in a third of them.
+ * Mixed, from below: hexes, one layer of pyramid cubes, tets, wedges (their z faces meet split as both want), another
+ * layer of pyramid cubes, hexes; a third of the hexes are pyramid cubes too.
  */
 #include "wave_lattice.h"
 
@@ -79,10 +79,9 @@ static int64_t corner_vertex(const wave_lattice *lattice, const int ijk[3], int 
 static wave_cells cube_kind(const wave_lattice *lattice, const int ijk[3])
 {
     if (lattice->cells != WAVE_MIXED) return lattice->cells;
-    int transition = lattice->size[2] / 2;
-    if (ijk[2] < lattice->size[2] / 4) return WAVE_TETS;
-    if (ijk[2] < transition) return WAVE_WEDGES;
-    if (ijk[2] == transition) return WAVE_PYRAMIDS;
+    int low = lattice->size[2] / 5, high = 3 * lattice->size[2] / 4;
+    if (ijk[2] == low || ijk[2] == high) return WAVE_PYRAMIDS;
+    if (ijk[2] > low && ijk[2] < high) return ijk[2] <= (low + high) / 2 ? WAVE_TETS : WAVE_WEDGES;
     return ijk[0] < lattice->size[0] / 3 ? WAVE_PYRAMIDS : WAVE_HEXES;
 }
 
