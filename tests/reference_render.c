@@ -429,6 +429,25 @@ static void blend(double rgb[3], double *transmittance, const event *e)
     *transmittance *= e->transmittance;
 }
 
+/* Samples of several volumes at one place share what all absorb in proportion to what each alone would: into the last
+ * of them, whose index is returned. */
+static int64_t gather_samples(event *events, int64_t count, int64_t i)
+{
+    int64_t last = i;
+    while (last + 1 < count && events[last + 1].is_sample && events[last + 1].depth == events[i].depth) last++;
+    if (last == i) return i;
+    double colour[3] = {0, 0, 0}, weight = 0, through = 1;
+    for (int64_t k = i; k <= last; k++) {
+        const double absorbed = 1 - events[k].transmittance;
+        for (int c = 0; c < 3; c++) colour[c] += absorbed * events[k].hit.colour[c];
+        weight += absorbed;
+        through *= events[k].transmittance;
+    }
+    for (int c = 0; c < 3; c++) events[last].hit.colour[c] = weight > 0 ? colour[c] / weight : 0;
+    events[last].transmittance = through;
+    return last;
+}
+
 static void blend_events(trace *t, const float background[4])
 {
     reference_ray *out = t->out;
@@ -436,6 +455,7 @@ static void blend_events(trace *t, const float background[4])
     out->volume_transmittance = 1;
     if (t->count) qsort(t->events, (size_t)t->count, sizeof *t->events, compare_events);
     for (int64_t i = 0; i < t->count; i++) {
+        if (t->events[i].is_sample) i = gather_samples(t->events, t->count, i);
         const event *e = &t->events[i];
         blend(out->rgba, &transmittance, e);
         if (e->is_sample) {

@@ -243,6 +243,47 @@ static void parts_and_ranks_draw_the_whole(void **state)
                 compare_dealt(kind, scene, partition, 2 + ((int)kind + (int)partition) % 4, false);
 }
 
+/* Samples exactly on the faces between ranks: the eye 3.125 from the middle of a lattice of half units, samples at (k +
+ * 1/2) / 4, all of it exact in float32. Eight samples between x = 1 and x = -1, the first face's counted, the last
+ * one's not. */
+static void samples_on_faces_have_one_owner(void **state)
+{
+    (void)state;
+    static const float constant[1] = {0.2f};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (test_partition_kind partition = 0; partition < TEST_PARTITION_COUNT; partition++) {
+            test_mesh mesh, dealt[3];
+            render_fixture apart[3];
+            drawn_frame drawn;
+            test_mesh_lattice(kind, 4, 0, test_wave, &mesh);
+            deal(&mesh, partition, 4, 3, false, dealt);
+            for (int i = 0; i < 3; i++) {
+                mesh_fixture(&apart[i], &dealt[i], 1, 4, VOLUME, CAMERA_ALONG_X);
+                apart[i].job.camera.eye[0] = 3.125;
+                apart[i].job.space.depth_origin = 3;
+                apart[i].job.is_alone = apart[i].job.jitter = false;
+                apart[i].job.step = 0.25;
+                apart[i].transfer.opacity_count = 1;
+                apart[i].transfer.opacities = constant;
+                apart[i].transfer.unit_distance = 0.25;
+            }
+            fixture_draw_apart(apart, 3, &drawn);
+            const double clear = pow(0.8, 8) * (1 - (double)fixture_background[3]);
+            for (int p = 0; p < 61 * 47; p++) {
+                double base[3], d[3];
+                render_camera_ray(&apart[0].job.camera, p % 61, p / 61, base, d);
+                if (fabs(base[1]) >= 1 || fabs(base[2]) >= 1) continue;
+                assert_true(fabs(1 - (double)drawn.picture.rgba[4 * p + 3] - clear) < 1e-6);
+            }
+            drawn_free(&drawn);
+            for (int i = 0; i < 3; i++) {
+                fixture_free(&apart[i]);
+                test_mesh_free(&dealt[i]);
+            }
+            test_mesh_free(&mesh);
+        }
+}
+
 static void ghosts_change_nothing(void **state)
 {
     (void)state;
@@ -416,6 +457,7 @@ int main(void)
         cmocka_unit_test(turned_cells_draw_the_same),
         cmocka_unit_test(layouts_do_not_change_a_bit),
         cmocka_unit_test(parts_and_ranks_draw_the_whole),
+        cmocka_unit_test(samples_on_faces_have_one_owner),
         cmocka_unit_test(ghosts_change_nothing),
         cmocka_unit_test(parent_tree_changes_nothing),
         cmocka_unit_test(cells_with_values_not_finite_are_not_there),
