@@ -1,0 +1,148 @@
+#include "test_session_fixture.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session_image.h"
+
+int own_rank, rank_count;
+caught_picture caught[MAX_CAUGHT];
+int caught_count;
+const char *unwritable;
+
+static const char *folder = ".";
+static char scene_name[1024];
+
+void assert_everywhere(bool is_well, const char *what, const char *file, int line)
+{
+    int mine = is_well, all = 0;
+    if (!is_well) fprintf(stderr, "%s:%d: rank %d of %d: not so: %s\n", file, line, own_rank, rank_count, what);
+    MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    assert_true(all);
+}
+
+void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
+                 const char *file, int line)
+{
+    char first[1024] = "";
+    const char *message = insitu_error(session);
+    if (own_rank == 0) snprintf(first, sizeof first, "%s", message);
+    MPI_Bcast(first, sizeof first, MPI_CHAR, 0, MPI_COMM_WORLD);
+    if (status != expected) fprintf(stderr, "rank %d: %s: %s\n", own_rank, insitu_status_name(status), message);
+    assert_everywhere(status == expected, "the status is as expected", file, line);
+    if (strcmp(first, message) != 0) fprintf(stderr, "rank %d: %s\nrank 0: %s\n", own_rank, message, first);
+    assert_everywhere(strcmp(first, message) == 0, "all ranks are told the same", file, line);
+    bool has_all = true;
+    for (; *words; words++)
+        if (!strstr(message, *words)) {
+            has_all = false;
+            fprintf(stderr, "rank %d: \"%s\" is not in: %s\n", own_rank, *words, message);
+        }
+    assert_everywhere(has_all, "the message names the thing", file, line);
+}
+
+int run_session_tests(int argc, char **argv, int (*run)(void))
+{
+    MPI_Init(&argc, &argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &own_rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &rank_count);
+    if (argc > 1) folder = argv[1];
+    snprintf(scene_name, sizeof scene_name, "%s/%s_np%d.yaml", folder,
+             strrchr(argv[0], '/') ? strrchr(argv[0], '/') + 1 : argv[0], rank_count);
+    const int failed = run();
+    forget_pictures();
+    MPI_Finalize();
+    return failed;
+}
+
+const char *write_scene(const char *text)
+{
+    bool is_written = true;
+    if (own_rank == 0) {
+        FILE *file = fopen(scene_name, "w");
+        is_written = file && fputs(text, file) >= 0 && fclose(file) == 0;
+    }
+    everywhere(is_written);
+    return scene_name;
+}
+
+insitu_session *open_session(MPI_Comm comm, const char *scene)
+{
+    insitu_session *session = NULL;
+    const insitu_status status = insitu_create(comm, scene, &session);
+    if (status) fprintf(stderr, "rank %d: insitu_create: %s\n", own_rank, insitu_error(NULL));
+    assert_int_equal(status, INSITU_OK);
+    return session;
+}
+
+void input_describe(session_input *in)
+{
+    test_mesh *part = &in->part;
+    insitu_mesh *mesh = &in->mesh;
+    insitu_mesh_defaults(mesh);
+    mesh->vertex_count = part->vertex_count;
+    insitu_mesh_interleaved(mesh, part->coordinates, INSITU_FLOAT64);
+    mesh->cell_count = part->cell_count;
+    mesh->connectivity_count = part->connectivity_count;
+    mesh->connectivity = (insitu_array){part->connectivity, INSITU_INT64, 0};
+    mesh->cell_types = (insitu_array){part->types, INSITU_UINT8, 0};
+    mesh->offsets = (insitu_array){part->offsets, INSITU_INT64, 0};
+    mesh->ghosts = (insitu_array){part->ghosts, INSITU_UINT8, 0};
+    insitu_field_defaults(&in->field);
+    in->field.name = "f";
+    in->field.count = part->vertex_count;
+    in->field.values = (insitu_array){part->values, INSITU_FLOAT64, 0};
+}
+
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count)
+{
+    test_mesh whole;
+    test_mesh_lattice(kind, side, 0.2, test_wave, &whole);
+    int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
+    assert_non_null(owners);
+    test_partition(&whole, dealt, side, count, owners);
+    test_mesh_part(&whole, owners, rank, &in->part);
+    free(owners);
+    test_mesh_free(&whole);
+    input_describe(in);
+}
+
+void input_free(session_input *in)
+{
+    test_mesh_free(&in->part);
+}
+
+insitu_status hand_over(insitu_session *session, const session_input *in)
+{
+    const insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
+    return status ? status : insitu_set_field(session, "m", &in->field);
+}
+
+void forget_pictures(void)
+{
+    for (int i = 0; i < caught_count; i++) {
+        free(caught[i].rgba);
+        free(caught[i].depth);
+    }
+    caught_count = 0;
+}
+
+insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
+                                  base_error *error)
+{
+    (void)format;
+    if (unwritable && strstr(path, unwritable)) return base_fail(error, INSITU_ERROR_IO, "%s: cannot be written", path);
+    if (caught_count == MAX_CAUGHT) return base_fail(error, INSITU_ERROR_INTERNAL, "too many pictures for the test");
+    caught_picture *picture = &caught[caught_count++];
+    const size_t pixels = (size_t)image->width * (size_t)image->height;
+    *picture = (caught_picture){.width = image->width, .height = image->height};
+    snprintf(picture->path, sizeof picture->path, "%s", path);
+    picture->rgba = malloc(pixels * 4 * sizeof(float));
+    memcpy(picture->rgba, image->rgba, pixels * 4 * sizeof(float));
+    if (image->depth) {
+        picture->depth = malloc(pixels * sizeof(float));
+        memcpy(picture->depth, image->depth, pixels * sizeof(float));
+    }
+    return INSITU_OK;
+}

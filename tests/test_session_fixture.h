@@ -1,0 +1,68 @@
+/* Sessions under test: a rank's part of a known mesh as a caller would hand it over, scene files, and pictures caught
+ * before they are written (this defines session_write_image() in place of the library's).
+ *
+ * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+#ifndef TEST_SESSION_FIXTURE_H
+#define TEST_SESSION_FIXTURE_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "insitu/insitu.h"
+#include "test_meshes.h"
+
+extern int own_rank, rank_count;
+
+#define everywhere(condition) assert_everywhere((condition), #condition, __FILE__, __LINE__)
+void assert_everywhere(bool is_well, const char *what, const char *file, int line);
+
+/* Every rank was told the same, and it holds all of the count words (NULL ones are passed over). */
+#define told_everywhere(session, status, expected, ...)                                                                \
+    assert_told((session), (status), (expected), (const char *const[]){__VA_ARGS__, NULL}, __FILE__, __LINE__)
+void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
+                 const char *file, int line);
+
+/* MPI, and argv[1]: a folder for scene files. Returns what main returns. */
+int run_session_tests(int argc, char **argv, int (*run)(void));
+
+/* Rank 0 writes a scene file, which all then know by this name. */
+const char *write_scene(const char *text);
+
+insitu_session *open_session(MPI_Comm comm, const char *scene);
+
+/* A rank's part of a mesh, and what is said of it; the arrays are the test_mesh's, to be spoilt at will. */
+typedef struct session_input {
+    test_mesh part;
+    insitu_mesh mesh;
+    insitu_field field; /* "f", at vertices */
+} session_input;
+
+/* Hexes or any kind, side^3 cubes, dealt to count ranks; the part of rank. */
+void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count);
+/* Describe the part again, after it was spoilt. */
+void input_describe(session_input *in);
+void input_free(session_input *in);
+
+/* Set the mesh "m" and its field; the first status that is not OK. */
+insitu_status hand_over(insitu_session *session, const session_input *in);
+
+/* Pictures caught on rank 0 since the last forget_pictures(). */
+typedef struct caught_picture {
+    int width, height;
+    float *rgba, *depth; /* depth NULL where none was given */
+    char path[256];
+} caught_picture;
+
+enum { MAX_CAUGHT = 64 };
+extern caught_picture caught[MAX_CAUGHT];
+extern int caught_count;
+void forget_pictures(void);
+
+/* Paths with this in them cannot be written. NULL: all can. */
+extern const char *unwritable;
+
+#endif

@@ -1,0 +1,351 @@
+/* What a user gets wrong in a mesh or a field, on one rank alone: every rank is told the same, the rank and the thing
+ * are named, nothing is drawn; and once the thing is right the next step draws. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+static const char scene_text[] = "images:\n"
+                                 "  - name: a\n"
+                                 "    size: [24, 16]\n"
+                                 "    layers:\n"
+                                 "      - isosurface: {field: f, values: [0.1]}\n"
+                                 "    outputs:\n"
+                                 "      - path: a_{cycle}.exr\n";
+
+static insitu_session *session;
+static session_input input;
+
+typedef void spoil_function(session_input *in);
+
+/* ---- spoilt meshes ------------------------------------------------------------------------------------------- */
+
+static void index_too_large(session_input *in)
+{
+    in->part.connectivity[8 * 2 + 3] = in->part.vertex_count + 12;
+}
+static void index_negative(session_input *in)
+{
+    in->part.connectivity[8 * 1 + 7] = -3;
+}
+static void index_bad_in_two(session_input *in)
+{
+    in->part.connectivity[8 * 3] = -1;
+    in->part.connectivity[8 * 1] = -9;
+}
+static void coordinate_nan(session_input *in)
+{
+    in->part.coordinates[3 * in->part.connectivity[0] + 1] = NAN;
+}
+static void coordinate_infinite(session_input *in)
+{
+    in->part.coordinates[3 * in->part.connectivity[0]] = INFINITY;
+}
+static void offsets_fall(session_input *in)
+{
+    in->part.offsets[2] = 3;
+}
+static void offsets_far(session_input *in)
+{
+    in->part.offsets[1] = 1 << 30;
+}
+static void offsets_wrong_step(session_input *in)
+{
+    in->part.offsets[1] = 7;
+}
+static void offsets_end_early(session_input *in)
+{
+    in->mesh.connectivity_count += 8;
+}
+static void type_unknown(session_input *in)
+{
+    in->part.types[1] = 9;
+}
+static void types_without_offsets(session_input *in)
+{
+    in->mesh.offsets.data = NULL;
+}
+static void one_type_unknown(session_input *in)
+{
+    in->mesh.cell_types.data = NULL;
+    in->mesh.cell_type = (insitu_cell_type)42;
+}
+static void one_type_wrong_count(session_input *in)
+{
+    in->mesh.cell_types.data = in->mesh.offsets.data = NULL;
+    in->mesh.cell_type = INSITU_WEDGE;
+}
+static void no_coordinates(session_input *in)
+{
+    in->mesh.coordinates[2].data = NULL;
+}
+static void no_connectivity(session_input *in)
+{
+    in->mesh.connectivity.data = NULL;
+}
+static void count_negative(session_input *in)
+{
+    in->mesh.vertex_count = -1;
+}
+static void cells_too_many(session_input *in)
+{
+    in->mesh.cell_count = 4294967295;
+}
+static void float_indices(session_input *in)
+{
+    in->mesh.connectivity.type = INSITU_FLOAT64;
+}
+static void integer_coordinates(session_input *in)
+{
+    in->mesh.coordinates[0].type = INSITU_INT32;
+}
+static void type_of_no_array(session_input *in)
+{
+    in->mesh.offsets.type = (insitu_type)77;
+}
+static void stride_odd(session_input *in)
+{
+    in->mesh.coordinates[1].stride_bytes = 20;
+}
+static void ghosts_wide(session_input *in)
+{
+    in->mesh.ghosts.type = INSITU_INT32;
+}
+static void changed_unknown(session_input *in)
+{
+    in->mesh.changed = 64;
+}
+
+/* ---- spoilt fields ------------------------------------------------------------------------------------------- */
+
+static void values_too_few(session_input *in)
+{
+    in->field.count--;
+}
+static void values_not_given(session_input *in)
+{
+    in->field.values.data = NULL;
+}
+static void values_bytes(session_input *in)
+{
+    in->field.values.type = INSITU_UINT8;
+}
+static void centring_unknown(session_input *in)
+{
+    in->field.centring = (insitu_centring)5;
+}
+static void centring_other(session_input *in)
+{
+    in->field.centring = INSITU_CELL;
+}
+static void no_components(session_input *in)
+{
+    in->field.component_count = 0;
+}
+static void component_stride_odd(session_input *in)
+{
+    in->field.component_stride_bytes = 3;
+}
+static void field_without_name(session_input *in)
+{
+    in->field.name = NULL;
+}
+
+typedef struct spoilt_case {
+    const char *name;
+    spoil_function *spoil;
+    insitu_status status;
+    bool at_once; /* the set call fails too */
+    const char *words[2];
+} spoilt_case;
+
+static const spoilt_case cases[] = {
+    {"index too large", index_too_large, INSITU_ERROR_MESH, false, {"cell 2 (hex): vertex index ", " is outside 0.."}},
+    {"index negative", index_negative, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -3 is outside 0.."}},
+    {"lowest cell", index_bad_in_two, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -9"}},
+    {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {"cell 0 (hex): vertex ", "coordinate that is not finite"}},
+    {"infinite", coordinate_infinite, INSITU_ERROR_MESH, false, {"cell 0 (hex)", "not finite: (inf"}},
+    {"offsets fall", offsets_fall, INSITU_ERROR_MESH, false, {"cell 1 (hex): offsets fall from 8 to 3"}},
+    {"offsets far", offsets_far, INSITU_ERROR_MESH, false, {"cell 0 (hex): offsets 0 and 1073741824 are outside 0.."}},
+    {"offsets step",
+     offsets_wrong_step,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 0 (hex): offsets 0 and 7 do not lie 8 apart"}},
+    {"last offset", offsets_end_early, INSITU_ERROR_MESH, false, {"the last offset is ", "not connectivity_count"}},
+    {"unknown type", type_unknown, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 9"}},
+    {"types alone", types_without_offsets, INSITU_ERROR_MESH, true, {"offsets are not given"}},
+    {"one unknown type", one_type_unknown, INSITU_ERROR_MESH, true, {"unknown cell_type 42"}},
+    {"one type's count", one_type_wrong_count, INSITU_ERROR_MESH, true, {"connectivity_count is ", "of 6 vertices"}},
+    {"no coordinates", no_coordinates, INSITU_ERROR_MESH, true, {"z coordinates are not given"}},
+    {"no connectivity", no_connectivity, INSITU_ERROR_MESH, true, {"connectivity indices are not given"}},
+    {"negative count", count_negative, INSITU_ERROR_ARGUMENT, true, {"vertex_count is -1"}},
+    {"too many cells", cells_too_many, INSITU_ERROR_ARGUMENT, true, {"cell_count is 4294967295"}},
+    {"float indices", float_indices, INSITU_ERROR_ARGUMENT, true, {"connectivity indices", "not int32 or int64"}},
+    {"int coordinates", integer_coordinates, INSITU_ERROR_ARGUMENT, true, {"x coordinates", "float32 or float64"}},
+    {"no such type", type_of_no_array, INSITU_ERROR_ARGUMENT, true, {"offsets are of element type 77"}},
+    {"odd stride", stride_odd, INSITU_ERROR_MESH, true, {"y coordinates have a stride of 20 bytes"}},
+    {"wide ghosts", ghosts_wide, INSITU_ERROR_ARGUMENT, true, {"ghost flags", "not uint8"}},
+    {"unknown bits", changed_unknown, INSITU_ERROR_ARGUMENT, true, {"changed is 64"}},
+    {"too few values", values_too_few, INSITU_ERROR_FIELD, true, {"field \"f\": has ", " values, the mesh has "}},
+    {"no values", values_not_given, INSITU_ERROR_FIELD, true, {"field \"f\": values are not given"}},
+    {"byte values", values_bytes, INSITU_ERROR_ARGUMENT, true, {"field \"f\": values", "float32, float64"}},
+    {"unknown centring", centring_unknown, INSITU_ERROR_ARGUMENT, true, {"field \"f\": unknown centring 5"}},
+    {"other centring", centring_other, INSITU_ERROR_FIELD, true, {"field \"f\": has ", " cells"}},
+    {"no components", no_components, INSITU_ERROR_ARGUMENT, true, {"field \"f\": component_count is 0"}},
+    {"odd components", component_stride_odd, INSITU_ERROR_FIELD, true, {"component stride of 3 bytes"}},
+};
+
+static void step_is_good(int cycle)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    told_everywhere(session, status, INSITU_OK, "");
+    everywhere(insitu_last_report(session)->images == 1);
+    everywhere(caught_count == (own_rank == 0));
+}
+
+static void input_is_renewed(void)
+{
+    input_free(&input);
+    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+}
+
+static void spoilt_input_is_told_to_all(void **context)
+{
+    (void)context;
+    const int bad_rank = rank_count - 1;
+    char rank_words[32];
+    snprintf(rank_words, sizeof rank_words, "rank %d: ", bad_rank);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const spoilt_case *c = &cases[i];
+        const bool is_bad = own_rank == bad_rank;
+        if (is_bad) c->spoil(&input);
+        const insitu_status at_once = hand_over(session, &input);
+        everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
+        everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
+        for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
+            forget_pictures();
+            const insitu_status status = insitu_step(session, 1, 0);
+            told_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
+                            c->words[1] ? c->words[1] : "");
+            everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
+        }
+        input_is_renewed();
+        everywhere(hand_over(session, &input) == INSITU_OK);
+        step_is_good(2);
+    }
+}
+
+static void call_without_a_mesh_is_told_once(void **context)
+{
+    (void)context;
+    const bool is_bad = own_rank == 0;
+    everywhere(!is_bad || insitu_set_field(session, "nowhere", &input.field) == INSITU_ERROR_FIELD);
+    insitu_status status = insitu_step(session, 3, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
+    step_is_good(4);
+    everywhere(!is_bad || insitu_set_mesh(session, NULL, &input.mesh) == INSITU_ERROR_ARGUMENT);
+    status = insitu_step(session, 5, 0);
+    told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
+    step_is_good(6);
+    if (is_bad) field_without_name(&input);
+    everywhere(!is_bad || insitu_set_field(session, "m", &input.field) == INSITU_ERROR_ARGUMENT);
+    status = insitu_step(session, 7, 0);
+    told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
+    input_is_renewed();
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(8);
+}
+
+static void field_missing_on_one_rank_names_it(void **context)
+{
+    (void)context;
+    if (rank_count < 2) return;
+    char words[64];
+    snprintf(words, sizeof words, "rank %d: mesh \"m\": field \"f\" is not set", rank_count - 1);
+    everywhere(insitu_set_mesh(session, "m", &input.mesh) == INSITU_OK);
+    everywhere(own_rank == rank_count - 1 || insitu_set_field(session, "m", &input.field) == INSITU_OK);
+    insitu_status status = insitu_step(session, 9, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, words);
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(10);
+}
+
+static void field_of_two_centrings_is_refused(void **context)
+{
+    (void)context;
+    if (rank_count < 2) return;
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    insitu_field other = input.field;
+    other.centring = INSITU_CELL;
+    other.count = input.part.cell_count; /* fewer than vertices: the array is long enough */
+    everywhere(own_rank != 1 || insitu_set_field(session, "m", &other) == INSITU_OK);
+    const insitu_status status = insitu_step(session, 11, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(12);
+}
+
+static void nan_where_no_drawn_cell_is_is_fine(void **context)
+{
+    (void)context;
+    /* The mesh gets one vertex more, of no cell. */
+    double *coordinates = test_calloc((size_t)input.part.vertex_count * 3 + 3, sizeof *coordinates);
+    double *values = test_calloc((size_t)input.part.vertex_count + 1, sizeof *values);
+    memcpy(coordinates, input.part.coordinates, (size_t)input.part.vertex_count * 3 * sizeof *coordinates);
+    memcpy(values, input.part.values, (size_t)input.part.vertex_count * sizeof *values);
+    coordinates[3 * input.part.vertex_count] = values[input.part.vertex_count] = NAN;
+    session_input more = input;
+    more.mesh.vertex_count++;
+    more.field.count++;
+    insitu_mesh_interleaved(&more.mesh, coordinates, INSITU_FLOAT64);
+    more.field.values.data = values;
+    everywhere(hand_over(session, &more) == INSITU_OK);
+    step_is_good(13);
+    everywhere(insitu_last_report(session)->cells_unusable == 0);
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    test_free(coordinates);
+    test_free(values);
+}
+
+static void value_that_is_not_finite_is_counted(void **context)
+{
+    (void)context;
+    const bool is_bad = own_rank == rank_count - 1;
+    if (is_bad) input.part.values[input.part.connectivity[0]] = NAN;
+    int64_t expected = 0;
+    for (int64_t cell = 0; cell < input.part.cell_count && is_bad; cell++) {
+        bool is_hit = false;
+        for (int v = 0; v < 8; v++) is_hit = is_hit || isnan(input.part.values[input.part.connectivity[8 * cell + v]]);
+        expected += is_hit;
+    }
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(14);
+    const insitu_report *report = insitu_last_report(session);
+    everywhere(report->cells_unusable == expected);
+    everywhere(!is_bad || strstr(report->warnings, "values of field \"f\" are not finite"));
+    input_is_renewed();
+    everywhere(hand_over(session, &input) == INSITU_OK);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(spoilt_input_is_told_to_all),        cmocka_unit_test(call_without_a_mesh_is_told_once),
+        cmocka_unit_test(field_missing_on_one_rank_names_it), cmocka_unit_test(field_of_two_centrings_is_refused),
+        cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine), cmocka_unit_test(value_that_is_not_finite_is_counted),
+    };
+    session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    insitu_destroy(&session);
+    input_free(&input);
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
