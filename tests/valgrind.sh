@@ -11,6 +11,8 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 status=0
+export HWLOC_COMPONENTS=-x86 # which valgrind cannot run
+[ $# -gt 0 ] || set -- --size 4 --steps 20
 OMP_NUM_THREADS=2 mpirun -n 2 valgrind -q --keep-debuginfo=yes --num-callers=40 --error-exitcode=99 --leak-check=full --errors-for-leak-kinds=definite \
     --show-leak-kinds=definite --suppressions=/usr/share/openmpi/openmpi-valgrind.supp \
     --suppressions="$here/valgrind.supp" "$program" --scene "$scene" "$@" || status=$?
