@@ -45,4 +45,5 @@ images:
     outputs: [{path: "{name}_{cycle}.png"}]
 END
 expect 0 "^ *3 .*|" "$@" "$wave" $small --scene scene.yaml
+expect 0 "rank 0: in situ step: .*no_such_field" "$@" "$wave" $small --scene scene.yaml
 exit $failed
