@@ -1,0 +1,308 @@
+/* Cell values at vertices: for any dealing of the cells, by coordinates or by ids, bit for bit the mean that a search
+ * over the whole mesh gives; and the picture of a dealt mesh is that of the whole one. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4 };
+
+static const char surface_scene[] = "images:\n"
+                                    "  - name: a\n"
+                                    "    size: [40, 30]\n"
+                                    "    layers:\n"
+                                    "      - isosurface: {field: c, values: [8]}\n"
+                                    "    outputs:\n"
+                                    "      - path: a.exr\n";
+
+static const char mixed_scene[] = "images:\n"
+                                  "  - name: a\n"
+                                  "    size: [40, 30]\n"
+                                  "    layers:\n"
+                                  "      - isosurface:\n"
+                                  "          field: c\n"
+                                  "          values: [4, 12]\n"
+                                  "          opacity: 0.5\n"
+                                  "          colour_by: {field: c}\n"
+                                  "      - volume:\n"
+                                  "          field: c\n"
+                                  "          opacity: [[0, 0.4], [1, 0.1]]\n"
+                                  "    outputs:\n"
+                                  "      - path: a.exr\n";
+
+static test_mesh whole;
+static int *owners;
+
+/* A value of the whole mesh's cell: of many magnitudes, so that the order of a sum shows. */
+static double cell_value(int64_t cell)
+{
+    const double u = test_uniform((uint64_t)cell, 5);
+    return cell % 17 == 3 ? NAN : u * pow(10, floor(6 * test_uniform((uint64_t)cell, 6)) - 3);
+}
+
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Over all cells that have a vertex at this place. */
+static double expected_at(const double position[3])
+{
+    double values[256], sum = 0;
+    int count = 0;
+    for (int64_t cell = 0; cell < whole.cell_count; cell++) {
+        bool is_at = false;
+        for (int64_t i = whole.offsets[cell]; i < whole.offsets[cell + 1]; i++) {
+            const double *p = whole.coordinates + 3 * whole.connectivity[i];
+            is_at = is_at || (p[0] == position[0] && p[1] == position[1] && p[2] == position[2]);
+        }
+        if (is_at && isfinite(cell_value(cell))) values[count++] = cell_value(cell);
+    }
+    qsort(values, (size_t)count, sizeof *values, by_value);
+    for (int i = 0; i < count; i++) sum += values[i];
+    return count ? sum / count : NAN;
+}
+
+typedef struct part_input {
+    test_mesh part;
+    double *values; /* cells */
+    int64_t *ids;   /* vertices */
+    insitu_mesh mesh;
+    insitu_field field;
+} part_input;
+
+static int64_t whole_vertex(const double position[3])
+{
+    for (int64_t v = 0; v < whole.vertex_count; v++)
+        if (memcmp(whole.coordinates + 3 * v, position, 3 * sizeof(double)) == 0) return v;
+    return -1;
+}
+
+static void describe(part_input *in)
+{
+    insitu_mesh_defaults(&in->mesh);
+    in->mesh.vertex_count = in->part.vertex_count;
+    insitu_mesh_interleaved(&in->mesh, in->part.coordinates, INSITU_FLOAT64);
+    in->mesh.cell_count = in->part.cell_count;
+    in->mesh.connectivity_count = in->part.connectivity_count;
+    in->mesh.connectivity = (insitu_array){in->part.connectivity, INSITU_INT64, 0};
+    in->mesh.cell_types = (insitu_array){in->part.types, INSITU_UINT8, 0};
+    in->mesh.offsets = (insitu_array){in->part.offsets, INSITU_INT64, 0};
+    in->mesh.ghosts = (insitu_array){in->part.ghosts, INSITU_UINT8, 0};
+    insitu_field_defaults(&in->field);
+    in->field.name = "c";
+    in->field.centring = INSITU_CELL;
+    in->field.count = in->part.cell_count;
+    in->field.values = (insitu_array){in->values, INSITU_FLOAT64, 0};
+}
+
+/* The part of rank, or the whole with the others' cells as ghosts that hold rubbish. */
+static void part_create(part_input *in, int rank, bool with_ghosts)
+{
+    int *all = test_calloc((size_t)whole.cell_count, sizeof *all);
+    test_mesh_part(&whole, with_ghosts ? all : owners, with_ghosts ? 0 : rank, &in->part);
+    test_free(all);
+    in->values = test_calloc((size_t)in->part.cell_count + 1, sizeof *in->values);
+    in->ids = test_calloc((size_t)in->part.vertex_count + 1, sizeof *in->ids);
+    for (int64_t cell = 0, at = 0; cell < whole.cell_count; cell++) {
+        if (!with_ghosts && owners[cell] != rank) continue;
+        const bool is_ghost = owners[cell] != rank;
+        in->part.ghosts[at] = is_ghost;
+        in->values[at++] = is_ghost ? 1e6 : cell_value(cell);
+    }
+    for (int64_t v = 0; v < in->part.vertex_count; v++)
+        in->ids[v] = 7 * whole_vertex(in->part.coordinates + 3 * v) - 100;
+    describe(in);
+}
+
+static void part_free(part_input *in)
+{
+    test_mesh_free(&in->part);
+    test_free(in->values);
+    test_free(in->ids);
+}
+
+static bool are_means_right(const insitu_session *session, const part_input *in)
+{
+    const session_mesh *mesh = session_find_mesh(session, "m");
+    const double *means = mesh && mesh->scalar_count == 1 ? mesh->scalars[0].vertex_values : NULL;
+    if (!means) return false;
+    for (int64_t v = 0; v < in->part.vertex_count; v++) {
+        bool is_drawn = false;
+        for (int64_t cell = 0; cell < in->part.cell_count; cell++)
+            for (int64_t i = in->part.offsets[cell]; i < in->part.offsets[cell + 1]; i++)
+                is_drawn = is_drawn || (in->part.connectivity[i] == v && !in->part.ghosts[cell]);
+        const double expected = is_drawn ? expected_at(in->part.coordinates + 3 * v) : NAN;
+        if (isnan(expected) && isnan(means[v])) continue;
+        if (memcmp(&expected, &means[v], sizeof expected) != 0) {
+            fprintf(stderr, "vertex %lld: %.17g, expected %.17g\n", (long long)v, means[v], expected);
+            return false;
+        }
+    }
+    return true;
+}
+
+static insitu_status draw(insitu_session *session, const part_input *in, int cycle)
+{
+    forget_pictures();
+    insitu_status status = INSITU_OK;
+    if (in) status = insitu_set_mesh(session, "m", &in->mesh);
+    if (in && !status) status = insitu_set_field(session, "m", &in->field);
+    const insitu_status stepped = insitu_step(session, cycle, 0);
+    if (stepped) fprintf(stderr, "rank %d: %s\n", own_rank, insitu_error(session));
+    return status ? status : stepped;
+}
+
+/* ids of mixed widths and signs; with a ghost layer; or plain. */
+typedef enum variant { BY_COORDINATES, BY_IDS, WITH_GHOSTS, VARIANT_COUNT } variant;
+
+static void means_equal_a_search_over_all_cells(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
+    for (int dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+        test_partition(&whole, (test_partition_kind)dealt, SIDE, rank_count, owners);
+        for (int v = 0; v < VARIANT_COUNT; v++) {
+            part_input in;
+            part_create(&in, own_rank, v == WITH_GHOSTS);
+            if (v == BY_IDS) in.mesh.vertex_ids = (insitu_array){in.ids, INSITU_INT64, 0};
+            everywhere(draw(session, &in, v) == INSITU_OK);
+            everywhere(are_means_right(session, &in));
+            const insitu_report *report = insitu_last_report(session);
+            everywhere(report->bytes_copied == in.part.vertex_count * (int64_t)sizeof(double));
+            everywhere(strstr(report->copied_why, "field \"c\" recentred") != NULL);
+            everywhere(insitu_set_mesh(session, "m", NULL) == INSITU_OK);
+            part_free(&in);
+        }
+    }
+    insitu_destroy(&session);
+}
+
+/* Vertices doubled within a rank are one, as they would be on two. */
+static void doubled_vertices_are_one(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
+    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    part_input in;
+    part_create(&in, own_rank, false);
+    const int64_t count = in.part.connectivity_count;
+    double *coordinates = calloc((size_t)count * 3 + 1, sizeof *coordinates);
+    for (int64_t i = 0; i < count; i++) {
+        memcpy(coordinates + 3 * i, in.part.coordinates + 3 * in.part.connectivity[i], 3 * sizeof *coordinates);
+        for (int axis = 0; axis < 3; axis++) /* 0 and -0 are the same place */
+            if (coordinates[3 * i + axis] == 0 && i % 2) coordinates[3 * i + axis] = -0.0;
+        in.part.connectivity[i] = i;
+    }
+    free(in.part.coordinates);
+    in.part.coordinates = coordinates;
+    in.part.vertex_count = count;
+    describe(&in);
+    everywhere(draw(session, &in, 0) == INSITU_OK);
+    everywhere(are_means_right(session, &in));
+    insitu_destroy(&session);
+    part_free(&in);
+}
+
+static void means_follow_values_that_changed_on_one_rank(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(surface_scene));
+    test_partition(&whole, TEST_CHECKERBOARD, SIDE, rank_count, owners);
+    part_input in;
+    part_create(&in, own_rank, false);
+    double *right = test_calloc((size_t)in.part.cell_count + 1, sizeof *right);
+    memcpy(right, in.values, (size_t)in.part.cell_count * sizeof *right);
+    for (int64_t cell = 0; cell < in.part.cell_count && own_rank == 0; cell++) in.values[cell] = 3;
+    everywhere(draw(session, &in, 0) == INSITU_OK);
+    memcpy(in.values, right, (size_t)in.part.cell_count * sizeof *right);
+    in.mesh.changed = INSITU_CHANGED_NOTHING;
+    in.field.changed = own_rank == 0 ? INSITU_CHANGED_VALUES : INSITU_CHANGED_NOTHING;
+    everywhere(draw(session, &in, 1) == INSITU_OK);
+    everywhere(are_means_right(session, &in));
+    in.field.changed = INSITU_CHANGED_NOTHING;
+    everywhere(draw(session, &in, 2) == INSITU_OK);
+    everywhere(insitu_last_report(session)->refit_ms == 0);
+    insitu_destroy(&session);
+    part_free(&in);
+    test_free(right);
+}
+
+/* Rank 0 alone draws the whole; its picture against that of all ranks. Surfaces alone the same bits; with a volume
+ * behind transparent surfaces within the rounding of "over" (1e-6, as everywhere). */
+static void compare_with_alone(const char *scene, double bound)
+{
+    for (int dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+        part_input in, all;
+        caught_picture alone = {0};
+        const char *name = write_scene(scene);
+        for (int64_t cell = 0; cell < whole.cell_count; cell++) owners[cell] = 0;
+        part_create(&all, 0, false);
+        if (own_rank == 0) {
+            insitu_session *session = open_session(MPI_COMM_SELF, name);
+            draw(session, &all, 0);
+            if (caught_count == 1) alone = caught[0];
+            caught_count = 0;
+            insitu_destroy(&session);
+        }
+        test_partition(&whole, (test_partition_kind)dealt, SIDE, rank_count, owners);
+        part_create(&in, own_rank, false);
+        insitu_session *session = open_session(MPI_COMM_WORLD, name);
+        everywhere(draw(session, in.part.cell_count ? &in : NULL, 0) == INSITU_OK);
+        insitu_destroy(&session);
+        bool is_same = own_rank != 0 || (caught_count == 1 && alone.rgba && alone.depth);
+        double worst = 0;
+        int covered = 0;
+        for (int i = 0; is_same && own_rank == 0 && i < 40 * 30; i++) {
+            is_same = memcmp(&alone.depth[i], &caught[0].depth[i], sizeof(float)) == 0;
+            covered += isfinite(alone.depth[i]);
+            for (int c = 0; c < 4; c++)
+                worst = fmax(worst, fabs((double)(alone.rgba[4 * i + c] - caught[0].rgba[4 * i + c])));
+        }
+        everywhere(is_same);
+        everywhere(worst <= bound);
+        everywhere(own_rank != 0 || covered > 100);
+        free(alone.rgba);
+        free(alone.depth);
+        part_free(&in);
+        part_free(&all);
+    }
+}
+
+static void surfaces_of_dealt_cells_are_those_of_one_rank(void **context)
+{
+    (void)context;
+    compare_with_alone(surface_scene, 0);
+}
+
+static void volumes_of_dealt_cells_are_those_of_one_rank(void **context)
+{
+    (void)context;
+    compare_with_alone(mixed_scene, 1e-6);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(means_equal_a_search_over_all_cells),
+        cmocka_unit_test(doubled_vertices_are_one),
+        cmocka_unit_test(means_follow_values_that_changed_on_one_rank),
+        cmocka_unit_test(surfaces_of_dealt_cells_are_those_of_one_rank),
+        cmocka_unit_test(volumes_of_dealt_cells_are_those_of_one_rank),
+    };
+    test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole);
+    owners = calloc((size_t)whole.cell_count, sizeof *owners);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    free(owners);
+    test_mesh_free(&whole);
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
