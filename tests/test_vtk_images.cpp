@@ -40,7 +40,8 @@ struct subject {
     std::vector<std::string> files;
     std::string field;
     double value, low, high;
-    int shown_in; // step in which there is something to see
+    int shown_in;          // step in which there is something to see
+    int tangled_step = -1; // step in which cells lie in one another
 };
 
 struct picture {
@@ -70,17 +71,6 @@ picture read_picture(const std::string &path)
         }
     assert_int_equal(p.rgba.size(), pixels * 4);
     return p;
-}
-
-double difference(const std::vector<float> &a, const std::vector<float> &b)
-{
-    assert_int_equal(a.size(), b.size());
-    double most = 0;
-    for (size_t i = 0; i < a.size(); i++) {
-        assert_true(std::isfinite(a[i]) && std::isfinite(b[i]));
-        most = std::fmax(most, std::fabs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
-    }
-    return most;
 }
 
 bool is_bitwise(const std::vector<float> &a, const std::vector<float> &b)
@@ -127,34 +117,52 @@ std::string file_of(const std::string &folder, const char *image, size_t step)
     return folder + "/" + image + "_" + std::to_string(step) + ".exr";
 }
 
-void expect_same_pictures(const std::string &alone, const std::string &others, size_t steps)
+/* How many pixels differ by more than the tolerance, in any channel. */
+int differing(const picture &a, const picture &b)
 {
-    for (size_t step = 0; step < steps; step++) {
+    int count = 0;
+    for (size_t i = 0; i < a.rgba.size(); i += 4) {
+        double most = 0;
+        for (size_t c = i; c < i + 4; c++) {
+            assert_true(std::isfinite(a.rgba[c]) && std::isfinite(b.rgba[c]));
+            most = std::fmax(most, std::fabs(static_cast<double>(a.rgba[c]) - static_cast<double>(b.rgba[c])));
+        }
+        count += most > volume_tolerance;
+    }
+    return count;
+}
+
+/* Where cells lie in one another a point has as many values as cells, and ranks that hold one each draw each. Of 27
+ * points inside each cell of the crushed can's last step 0.29 % lie in a second cell too (tested against all cells). So
+ * there up to 1 % of the covered pixels may differ, and nowhere else any. */
+void expect_same_pictures(const subject &s, const std::string &alone, const std::string &others)
+{
+    for (size_t step = 0; step < s.files.size(); step++) {
         const picture iso = read_picture(file_of(alone, "iso", step)),
                       iso2 = read_picture(file_of(others, "iso", step));
         assert_true(is_bitwise(iso.depth, iso2.depth));
         assert_true(is_bitwise(iso.rgba, iso2.rgba));
         const picture volume = read_picture(file_of(alone, "volume", step));
-        const double most = difference(volume.rgba, read_picture(file_of(others, "volume", step)).rgba);
-        if (most > volume_tolerance) print_error("%s: volumes differ by %g\n", others.c_str(), most);
-        assert_true(most <= volume_tolerance);
+        const int count = differing(volume, read_picture(file_of(others, "volume", step)));
+        const int allowed = static_cast<int>(step) == s.tangled_step ? covered(volume) / 100 : 0;
+        if (count > allowed) print_error("%s: step %zu: %d pixels of the volume differ\n", others.c_str(), step, count);
+        assert_true(count <= allowed);
     }
 }
 
-/* At least a hundredth of the picture: the camera is automatic, and every one of these surfaces is larger. */
+/* The smallest surface here is that of the notch's stress, of some 20 pixels. */
 void expect_something_to_see(const subject &s, const std::string &folder)
 {
     const auto step = static_cast<size_t>(s.shown_in);
-    assert_in_range(covered(read_picture(file_of(folder, "iso", step))), width * height / 100, width * height);
-    assert_in_range(covered(read_picture(file_of(folder, "volume", step))), width * height / 100, width * height);
+    assert_in_range(covered(read_picture(file_of(folder, "iso", step))), 10, width * height);
+    assert_in_range(covered(read_picture(file_of(folder, "volume", step))), 10, width * height);
 }
 
 void draws_the_same_on_ranks(const subject &s)
 {
     const std::string alone = draw(s, 0, "block");
     expect_something_to_see(s, alone);
-    for (const char *partition : {"block", "random"})
-        expect_same_pictures(alone, draw(s, 3, partition), s.files.size());
+    for (const char *partition : {"block", "random"}) expect_same_pictures(s, alone, draw(s, 3, partition));
 }
 
 void draws_alone(const subject &s)
@@ -181,7 +189,7 @@ void disk_is_the_same_on_ranks(void **)
 
 void can_series_is_the_same_on_ranks(void **)
 {
-    draws_the_same_on_ranks({"can", {"can_0.vtu", "can_1.vtu", "can_2.vtu"}, "EQPS_pt", 0.7, 0, 2.7, 2});
+    draws_the_same_on_ranks({"can", {"can_0.vtu", "can_1.vtu", "can_2.vtu"}, "EQPS_pt", 0.7, 0, 2.7, 2, 2});
 }
 
 void cells_of_a_series_show_by_cell_field(void **)

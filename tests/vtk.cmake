@@ -12,3 +12,16 @@ target_include_directories(test_vtk_deal PRIVATE ${PROJECT_SOURCE_DIR}/tools)
 target_link_libraries(test_vtk_deal PRIVATE insitu_flags PkgConfig::CMOCKA VTK::CommonDataModel VTK::FiltersExtraction)
 add_test(NAME vtk_deal COMMAND test_vtk_deal)
 set_tests_properties(vtk_deal PROPERTIES TIMEOUT 60)
+
+add_executable(test_vtk_tool test_vtk_tool.cpp test_vtk_run.cpp)
+target_link_libraries(test_vtk_tool PRIVATE insitu_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)
+add_test(NAME vtk_tool COMMAND test_vtk_tool $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
+
+add_executable(test_vtk_images test_vtk_images.cpp test_vtk_run.cpp)
+target_include_directories(test_vtk_images SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
+target_link_libraries(test_vtk_images PRIVATE
+  insitu_flags PkgConfig::CMOCKA ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
+add_test(NAME vtk_images COMMAND test_vtk_images $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
+
+set_tests_properties(vtk_tool vtk_images PROPERTIES
+  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
