@@ -70,6 +70,7 @@ void collect(vtkUnstructuredGrid *grid, std::map<int, corners> &found)
     auto *x = vtkDoubleArray::SafeDownCast(grid->GetPointData()->GetArray("x"));
     assert_non_null(id);
     assert_non_null(x);
+    assert_int_equal(grid->GetCellData()->GetNumberOfArrays() + grid->GetPointData()->GetNumberOfArrays(), 2);
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
         vtkIdType count;
         const vtkIdType *points;

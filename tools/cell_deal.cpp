@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <vtkBoundingBox.h>
+#include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkExtractCells.h>
@@ -115,6 +116,9 @@ vtkSmartPointer<vtkDataObject> part_of(vtkUnstructuredGrid *grid, int64_t first_
     extract->AssumeSortedAndUniqueIdsOn();
     extract->SetCellList(mine);
     extract->Update();
+    /* The filter's own note of where cells came from is no field of the file's. */
+    const char *const note = "vtkOriginalCellIds";
+    if (!grid->GetCellData()->HasArray(note)) extract->GetOutput()->GetCellData()->RemoveArray(note);
     return extract->GetOutput();
 }
 
