@@ -1,0 +1,211 @@
+/* The installed face alone: the public header and the shared library, pictures written for real. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "insitu/insitu.h"
+
+static int own_rank, rank_count;
+static const char *folder = ".";
+static char scene_name[1024];
+
+static void assert_everywhere(bool is_well, int line)
+{
+    int mine = is_well, all = 0;
+    if (!is_well) fprintf(stderr, "%s:%d: rank %d of %d: not so\n", __FILE__, line, own_rank, rank_count);
+    MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    assert_true(all);
+}
+#define everywhere(condition) assert_everywhere((condition), __LINE__)
+
+static void write_scene(const char *output)
+{
+    if (own_rank == 0) {
+        FILE *file = fopen(scene_name, "w");
+        fprintf(file,
+                "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - isosurface: {field: x, values: [0.4]}\n"
+                "    outputs:\n      - path: %s\n",
+                output);
+        fclose(file);
+    }
+    MPI_Barrier(MPI_COMM_WORLD);
+}
+
+/* A hex a rank, side by side along y. */
+static float corners[8][3], values[8];
+static const int32_t indices[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+
+static void hand_over(insitu_session *session)
+{
+    for (int i = 0; i < 8; i++) {
+        corners[i][0] = i % 4 == 1 || i % 4 == 2;
+        corners[i][1] = (float)(own_rank + i % 4 / 2);
+        corners[i][2] = (float)(i / 4);
+        values[i] = corners[i][0];
+    }
+    insitu_mesh mesh;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = 8;
+    insitu_mesh_interleaved(&mesh, corners, INSITU_FLOAT32);
+    mesh.cell_count = 1;
+    mesh.cell_type = INSITU_HEX;
+    mesh.connectivity_count = 8;
+    mesh.connectivity = (insitu_array){indices, INSITU_INT32, 0};
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "x";
+    field.count = 8;
+    field.values = (insitu_array){values, INSITU_FLOAT32, 0};
+    everywhere(insitu_set_mesh(session, "hex", &mesh) == INSITU_OK);
+    everywhere(insitu_set_field(session, "hex", &field) == INSITU_OK);
+}
+
+static bool exists(const char *name, int64_t least_bytes)
+{
+    char path[8192];
+    struct stat found;
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return own_rank != 0 || (stat(path, &found) == 0 && found.st_size >= least_bytes);
+}
+
+static void picture_is_written_where_the_scene_says(void **context)
+{
+    (void)context;
+    char output[2048];
+    snprintf(output, sizeof output, "%s/api_np%d/deep/{name}_{cycle:03}.png", folder, rank_count);
+    write_scene(output);
+    insitu_session *session = NULL;
+    everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
+    everywhere(insitu_last_report(session)->images == 0 && !strcmp(insitu_last_report(session)->warnings, ""));
+    hand_over(session);
+    everywhere(insitu_step(session, 7, 0.5) == INSITU_OK && !strcmp(insitu_error(session), ""));
+    everywhere(insitu_last_report(session)->images == 1);
+    snprintf(output, sizeof output, "api_np%d/deep/a_007.png", rank_count);
+    everywhere(exists(output, 60));
+    insitu_destroy(&session);
+    everywhere(session == NULL);
+}
+
+static void folder_that_cannot_be_written_is_named(void **context)
+{
+    (void)context;
+    /* A file stands where the folder should be: that holds for root too. */
+    char output[2048];
+    snprintf(output, sizeof output, "%s/a.png", scene_name);
+    write_scene(output);
+    insitu_session *session = NULL;
+    everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
+    hand_over(session);
+    for (int cycle = 0; cycle < 2; cycle++) {
+        everywhere(insitu_step(session, cycle, 0) == INSITU_ERROR_IO);
+        everywhere(strstr(insitu_error(session), "rank 0: image \"a\": ") && strstr(insitu_error(session), scene_name));
+    }
+    insitu_destroy(&session);
+}
+
+static int handled;
+
+static void count_error(MPI_Comm *comm, int *code, ...)
+{
+    (void)comm, (void)code;
+    handled++;
+}
+
+static void callers_error_handler_stays(void **context)
+{
+    (void)context;
+    MPI_Errhandler ours, found;
+    MPI_Comm comm;
+    insitu_session *session = NULL;
+    MPI_Comm_dup(MPI_COMM_WORLD, &comm);
+    MPI_Comm_create_errhandler(count_error, &ours);
+    MPI_Comm_set_errhandler(comm, ours);
+    write_scene("unused_{name}.png");
+    everywhere(insitu_create(comm, "/no/such.yaml", &session) == INSITU_ERROR_SCENE);
+    everywhere(insitu_create(comm, scene_name, &session) == INSITU_OK);
+    MPI_Comm_get_errhandler(comm, &found);
+    everywhere(found == ours && handled == 0);
+    MPI_Errhandler_free(&found);
+    int nowhere = 0;
+    MPI_Send(&nowhere, 1, MPI_INT, rank_count + 5, 0,
+             comm); /* the caller's own mistake comes to the caller's handler */
+    everywhere(handled == 1);
+    insitu_destroy(&session);
+    MPI_Errhandler_free(&ours);
+    MPI_Comm_free(&comm);
+}
+
+static void sessions_of_split_ranks_live_side_by_side(void **context)
+{
+    (void)context;
+    MPI_Comm half;
+    char output[2048], name[64];
+    insitu_session *session = NULL;
+    MPI_Comm_split(MPI_COMM_WORLD, own_rank % 2, 0, &half);
+    snprintf(output, sizeof output, "%s/api_np%d_{cycle}.exr", folder, rank_count);
+    write_scene(output);
+    const insitu_status status = insitu_create(half, scene_name, &session);
+    MPI_Comm_free(&half); /* the session has its own */
+    everywhere(status == INSITU_OK);
+    hand_over(session);
+    everywhere(insitu_step(session, own_rank % 2, 0) == INSITU_OK);
+    for (int cycle = 0; cycle < 2 && cycle < rank_count; cycle++) {
+        snprintf(name, sizeof name, "api_np%d_%d.exr", rank_count, cycle);
+        everywhere(exists(name, 100));
+    }
+    insitu_destroy(&session);
+}
+
+static void calls_on_no_session_are_errors(void **context)
+{
+    (void)context;
+    insitu_mesh mesh;
+    insitu_field field;
+    insitu_mesh_defaults(&mesh);
+    insitu_field_defaults(&field);
+    insitu_mesh_defaults(NULL);
+    insitu_field_defaults(NULL);
+    insitu_mesh_interleaved(NULL, NULL, INSITU_FLOAT64);
+    assert_int_equal(mesh.changed, INSITU_CHANGED_ALL);
+    assert_int_equal(field.component_count, 1);
+    assert_int_equal(insitu_set_mesh(NULL, "m", &mesh), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(insitu_set_field(NULL, "m", &field), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(insitu_step(NULL, 0, 0), INSITU_ERROR_ARGUMENT);
+    assert_null(insitu_last_report(NULL));
+    assert_string_equal(insitu_status_name(INSITU_ERROR_MESH), "INSITU_ERROR_MESH");
+    assert_int_equal(insitu_destroy(NULL), INSITU_OK);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(picture_is_written_where_the_scene_says),
+        cmocka_unit_test(folder_that_cannot_be_written_is_named),
+        cmocka_unit_test(callers_error_handler_stays),
+        cmocka_unit_test(sessions_of_split_ranks_live_side_by_side),
+        cmocka_unit_test(calls_on_no_session_are_errors),
+    };
+    insitu_session *early = NULL, *late = NULL;
+    const bool is_refused = insitu_create(MPI_COMM_WORLD, "x", &early) == INSITU_ERROR_MPI && !early;
+    MPI_Init(&argc, &argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &own_rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &rank_count);
+    if (argc > 1) folder = argv[1];
+    snprintf(scene_name, sizeof scene_name, "%s/test_api_np%d.yaml", folder, rank_count);
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    write_scene("unused.png");
+    failed += insitu_create(MPI_COMM_WORLD, scene_name, &late) != INSITU_OK;
+    MPI_Finalize();
+    failed += insitu_destroy(&late) != INSITU_OK || late || !is_refused; /* destroyed too late: still no crash */
+    return failed;
+}

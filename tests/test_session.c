@@ -1,0 +1,569 @@
+/* A session's life on any number of ranks: what is built when, what is borrowed and copied, empty ranks, scenes edited
+ * on the way, ranks that disagree, memory that runs out. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session.h"
+#include "test_session_fixture.h"
+
+#define IMAGE(name, every, layer, rest)                                                                                \
+    "  - name: " name "\n    size: [24, 16]\n    every: " every "\n    background: [0, 0, 0, 1]\n    layers:\n"        \
+    "      - " layer "\n" rest "    outputs:\n      - path: " name "_{cycle}.exr\n"
+#define SURFACE "isosurface: {field: f, values: [0.1]}"
+#define VOLUME "volume: {field: f, opacity: [[0, 0.5], [1, 0.5]]}"
+
+static const char plain_scene[] = "images:\n" IMAGE("a", "1", SURFACE, "");
+
+static session_input input;
+
+static void step_draws(insitu_session *session, int64_t cycle, int images)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0.5 * (double)cycle);
+    told_everywhere(session, status, INSITU_OK, "");
+    everywhere(insitu_last_report(session)->images == images);
+    everywhere(caught_count == (own_rank == 0 ? images : 0));
+}
+
+static bool is_same_picture(const caught_picture *a, const caught_picture *b)
+{
+    const size_t pixels = (size_t)a->width * (size_t)a->height;
+    return a->width == b->width && a->height == b->height && !memcmp(a->rgba, b->rgba, pixels * 4 * sizeof(float)) &&
+           !memcmp(a->depth, b->depth, pixels * sizeof(float));
+}
+
+static int covered_pixels(const caught_picture *picture)
+{
+    int count = 0;
+    for (int i = 0; i < picture->width * picture->height; i++)
+        count += picture->rgba[4 * i] + picture->rgba[4 * i + 1] + picture->rgba[4 * i + 2] > 0;
+    return count;
+}
+
+/* ---- due or not, built or not -------------------------------------------------------------------------------- */
+
+static void images_are_drawn_when_due(void **context)
+{
+    (void)context;
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "2", SURFACE, "") IMAGE("b", "3", VOLUME, "")));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    const int expected[] = {2, 0, 1, 1, 1, 0, 2};
+    for (int cycle = 0; cycle < 7; cycle++) step_draws(session, cycle, expected[cycle]);
+    everywhere(own_rank != 0 || (!strcmp(caught[0].path, "a_6.exr") && !strcmp(caught[1].path, "b_6.exr")));
+    everywhere(insitu_last_report(session)->cycle == 6 && insitu_last_report(session)->time == 3);
+    insitu_destroy(&session);
+}
+
+static void unchanged_input_rebuilds_nothing(void **context)
+{
+    (void)context;
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "      - " VOLUME "\n")));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    const caught_picture first = caught[0];
+    caught_count = 0;
+    everywhere(insitu_last_report(session)->build_ms > 0 || input.part.cell_count == 0);
+    session_input same = input;
+    same.mesh.changed = same.field.changed = INSITU_CHANGED_NOTHING;
+    everywhere(hand_over(session, &same) == INSITU_OK);
+    step_draws(session, 1, 1);
+    const insitu_report *report = insitu_last_report(session);
+    everywhere(report->build_ms == 0 && report->refit_ms == 0);
+    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    same.field.changed = INSITU_CHANGED_VALUES;
+    everywhere(hand_over(session, &same) == INSITU_OK);
+    step_draws(session, 2, 1);
+    everywhere(report->build_ms == 0 && (report->refit_ms > 0 || input.part.cell_count == 0));
+    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    same.field.changed = INSITU_CHANGED_NOTHING;
+    same.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    everywhere(hand_over(session, &same) == INSITU_OK);
+    step_draws(session, 3, 1);
+    everywhere(report->build_ms == 0 && (report->refit_ms > 0 || input.part.cell_count == 0));
+    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    if (own_rank == 0) free(first.rgba), free(first.depth);
+    insitu_destroy(&session);
+}
+
+/* Moved and scaled by powers of two, everything is as before: so is the picture, but for its depth, which scales. */
+static void moved_mesh_gives_the_moved_picture(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    const caught_picture first = caught[0];
+    caught_count = 0;
+    session_input moved = input;
+    double *coordinates = test_calloc((size_t)input.part.vertex_count * 3 + 1, sizeof *coordinates);
+    for (int64_t i = 0; i < 3 * input.part.vertex_count; i++) coordinates[i] = 64 * input.part.coordinates[i];
+    insitu_mesh_interleaved(&moved.mesh, coordinates, INSITU_FLOAT64);
+    moved.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    moved.field.changed = INSITU_CHANGED_NOTHING;
+    everywhere(hand_over(session, &moved) == INSITU_OK);
+    step_draws(session, 1, 1);
+    for (int i = 0; own_rank == 0 && i < 24 * 16; i++) caught[0].depth[i] /= 64;
+    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    if (own_rank == 0) free(first.rgba), free(first.depth);
+    insitu_destroy(&session);
+    test_free(coordinates);
+}
+
+/* ---- borrowed and copied ------------------------------------------------------------------------------------- */
+
+static insitu_array as_array(const grid_array *a)
+{
+    const insitu_type type =
+        a->is_integer ? (a->is_wide ? INSITU_INT64 : INSITU_INT32) : (a->is_wide ? INSITU_FLOAT64 : INSITU_FLOAT32);
+    return (insitu_array){a->data, type, a->stride};
+}
+
+static void plain_layouts_are_not_copied(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    test_mesh rounded;
+    session_input in;
+    input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
+    rounded = in.part;
+    test_mesh_round(&rounded);
+    caught_picture first = {0};
+    for (int bits = 0; bits < 32; bits++) {
+        const test_layout layout = {.wide_coordinates = bits & 1,
+                                    .wide_indices = bits & 2,
+                                    .wide_values = bits & 4,
+                                    .is_interleaved = bits & 8,
+                                    .with_types = bits & 16};
+        test_view view;
+        test_view_create(&rounded, layout, &view);
+        insitu_mesh mesh;
+        insitu_field field = in.field;
+        insitu_mesh_defaults(&mesh);
+        mesh.vertex_count = view.cells.vertex_count;
+        for (int axis = 0; axis < 3; axis++) mesh.coordinates[axis] = as_array(&view.cells.coordinates[axis]);
+        mesh.cell_count = view.cells.cell_count;
+        mesh.cell_type = INSITU_HEX;
+        mesh.connectivity_count = rounded.connectivity_count;
+        mesh.connectivity = as_array(&view.cells.connectivity);
+        if (view.cells.offsets.data) mesh.offsets = as_array(&view.cells.offsets);
+        if (view.cells.cell_types) {
+            const insitu_type types[] = {[1] = INSITU_UINT8, [4] = INSITU_INT32, [8] = INSITU_INT64};
+            mesh.cell_types =
+                (insitu_array){view.cells.cell_types, types[view.cells.cell_types_bytes], view.cells.cell_types_stride};
+        }
+        field.values = as_array(&view.field.values);
+        everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+        step_draws(session, bits, 1);
+        const insitu_report *report = insitu_last_report(session);
+        int64_t borrowed = rounded.vertex_count * (layout.wide_coordinates ? 24 : 12) +
+                           rounded.connectivity_count * (layout.wide_indices ? 8 : 4) +
+                           rounded.vertex_count * (layout.wide_values ? 8 : 4);
+        if (view.cells.offsets.data) borrowed += (rounded.cell_count + 1) * (view.cells.offsets.is_wide ? 8 : 4);
+        if (view.cells.cell_types) borrowed += rounded.cell_count * view.cells.cell_types_bytes;
+        everywhere(report->bytes_copied == 0 && !strcmp(report->copied_why, ""));
+        everywhere(report->bytes_borrowed == borrowed);
+        everywhere(report->cells == rounded.cell_count && report->cells_ghost == 0 && report->cells_inverted == 0);
+        if (own_rank == 0 && bits == 0) {
+            first = caught[0];
+            caught_count = 0;
+        }
+        everywhere(own_rank != 0 || bits == 0 || is_same_picture(&first, &caught[0]));
+        test_view_free(&view);
+    }
+    free(first.rgba);
+    free(first.depth);
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+static void what_no_picture_shows_is_left_out(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    insitu_field other = input.field;
+    other.name = "g";
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    const int64_t trees = insitu_last_report(session)->bytes_trees;
+    everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
+    everywhere(insitu_set_mesh(session, "unseen", &input.mesh) == INSITU_OK);
+    step_draws(session, 1, 1);
+    const insitu_report *report = insitu_last_report(session);
+    everywhere(strstr(report->left_out, "mesh \"m\": field \"g\"") != NULL);
+    everywhere(strstr(report->left_out, "mesh \"unseen\"") != NULL);
+    everywhere(report->bytes_trees == trees);
+    insitu_destroy(&session);
+}
+
+static int64_t over_ranks(int64_t value)
+{
+    int64_t sum = 0;
+    MPI_Allreduce(&value, &sum, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    return sum;
+}
+
+/* Half of the lattice's pyramids are left-handed as they come: their bases are numbered alike on both sides of a cube.
+ */
+static void mirrored_cells_are_counted(void **context)
+{
+    (void)context;
+    for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+        session_input in;
+        input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, own_rank, rank_count);
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        step_draws(session, 0, 1);
+        const int64_t before = insitu_last_report(session)->cells_inverted, cells = in.part.cell_count;
+        if (kind == TEST_PYRAMIDS)
+            everywhere(2 * over_ranks(before) == over_ranks(cells));
+        else
+            everywhere(kind == TEST_MIXED || before == 0);
+        test_mesh_mirror(&in.part, false);
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        step_draws(session, 1, 1);
+        everywhere(insitu_last_report(session)->cells_inverted == cells - before);
+        insitu_destroy(&session);
+        input_free(&in);
+    }
+}
+
+static void ghosts_are_counted_and_not_drawn(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    session_input in;
+    input_create(&in, TEST_HEXES, 4, TEST_BLOCK, own_rank, rank_count);
+    for (int64_t cell = 0; cell < in.part.cell_count; cell += 3) in.part.ghosts[cell] = 1;
+    test_mesh_mirror(&in.part, false);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    step_draws(session, 0, 1);
+    const int64_t ghosts = (in.part.cell_count + 2) / 3;
+    everywhere(insitu_last_report(session)->cells_ghost == ghosts);
+    everywhere(insitu_last_report(session)->cells_inverted == in.part.cell_count - ghosts);
+    memset(in.part.ghosts, 1, (size_t)in.part.cell_count);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    step_draws(session, 1, 1);
+    everywhere(own_rank != 0 || covered_pixels(&caught[0]) == 0);
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* ---- few or no cells ----------------------------------------------------------------------------------------- */
+
+static void no_cells_anywhere_give_the_background(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    step_draws(session, 0, 1);
+    everywhere(own_rank != 0 || (covered_pixels(&caught[0]) == 0 && isinf(caught[0].depth[0])));
+    insitu_mesh none;
+    insitu_mesh_defaults(&none);
+    everywhere(insitu_set_mesh(session, "m", &none) == INSITU_OK);
+    step_draws(session, 1, 1);
+    everywhere(own_rank != 0 || covered_pixels(&caught[0]) == 0);
+    insitu_destroy(&session);
+}
+
+static void cells_of_one_rank_are_seen(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    session_input all;
+    input_create(&all, TEST_MIXED, 3, TEST_BLOCK, 0, 1);
+    caught_picture first = {0};
+    for (int holder = 0; holder < rank_count; holder++) {
+        insitu_mesh none;
+        insitu_mesh_defaults(&none);
+        if (own_rank == holder)
+            everywhere(hand_over(session, &all) == INSITU_OK);
+        else /* an empty mesh on odd ranks, none on even ones */
+            everywhere(insitu_set_mesh(session, "m", own_rank % 2 ? &none : NULL) == INSITU_OK);
+        step_draws(session, holder, 1);
+        everywhere(own_rank != 0 || covered_pixels(&caught[0]) > 20);
+        if (own_rank == 0 && holder == 0) {
+            first = caught[0];
+            caught_count = 0;
+        }
+        everywhere(own_rank != 0 || holder == 0 || is_same_picture(&first, &caught[0]));
+    }
+    free(first.rgba);
+    free(first.depth);
+    insitu_destroy(&session);
+    input_free(&all);
+}
+
+/* Every rank's part under a name of its own, and cut in two: the picture is that of one mesh. */
+static void meshes_of_many_names_make_one_picture(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    const caught_picture first = caught[0];
+    caught_count = 0;
+    everywhere(insitu_set_mesh(session, "m", NULL) == INSITU_OK);
+    session_input halves[2];
+    for (int half = 0; half < 2; half++) {
+        char name[32];
+        snprintf(name, sizeof name, "part %d", 2 * (rank_count - own_rank) + half);
+        input_create(&halves[half], TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+        session_input *in = &halves[half];
+        for (int64_t cell = 0; cell < in->part.cell_count; cell++) in->part.ghosts[cell] = cell % 2 == half;
+        everywhere(insitu_set_mesh(session, name, &in->mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, name, &in->field) == INSITU_OK);
+    }
+    step_draws(session, 1, 1);
+    everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+    if (own_rank == 0) free(first.rgba), free(first.depth);
+    insitu_destroy(&session);
+    for (int half = 0; half < 2; half++) input_free(&halves[half]);
+}
+
+static void constant_fields_are_drawn(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", VOLUME, "")));
+    session_input in;
+    input_create(&in, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+    const double constants[] = {0, 7, -1e30, 1e-300};
+    for (int i = 0; i < 4; i++) {
+        for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.values[v] = constants[i];
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        step_draws(session, i, 1);
+        bool is_finite = true;
+        for (int p = 0; own_rank == 0 && p < 24 * 16 * 4; p++) is_finite = is_finite && isfinite(caught[0].rgba[p]);
+        everywhere(is_finite);
+        everywhere(own_rank != 0 || covered_pixels(&caught[0]) > 20);
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* ---- what is wrong on all ------------------------------------------------------------------------------------ */
+
+static void missing_field_leaves_the_other_picture(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(
+        MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", "isosurface: {field: presure, values: [1]}", "") IMAGE(
+                            "b", "1", SURFACE, "") IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    forget_pictures();
+    const insitu_status status = insitu_step(session, 0, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: no mesh has the field \"presure\"",
+                    "\"f\" (mesh \"m\")");
+    everywhere(insitu_last_report(session)->images == 1);
+    everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_0.exr")));
+    insitu_destroy(&session);
+}
+
+static void component_that_is_not_there_is_named(void **context)
+{
+    (void)context;
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"", "it has 1");
+    insitu_destroy(&session);
+}
+
+static void ranks_at_different_cycles_are_told(void **context)
+{
+    (void)context;
+    if (rank_count < 2) return;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    const insitu_status status = insitu_step(session, own_rank == 1 ? 5 : 4, 0);
+    told_everywhere(session, status, INSITU_ERROR_MPI, "ranks disagree on the cycle: 4 on one, 5 on another");
+    step_draws(session, 6, 1);
+    insitu_destroy(&session);
+}
+
+static void picture_that_cannot_be_written_is_told_to_all(void **context)
+{
+    (void)context;
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", SURFACE, "") IMAGE("b", "1", VOLUME, "")));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    forget_pictures();
+    unwritable = "a_";
+    const insitu_status status = insitu_step(session, 3, 0);
+    unwritable = NULL;
+    told_everywhere(session, status, INSITU_ERROR_IO, "rank 0: image \"a\": a_3.exr: cannot be written");
+    everywhere(own_rank != 0 || (caught_count == 1 && !strcmp(caught[0].path, "b_3.exr")));
+    step_draws(session, 4, 2);
+    insitu_destroy(&session);
+}
+
+static void edited_scene_is_taken_and_a_broken_one_is_not(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    write_scene("images:\n" IMAGE("first", "1", SURFACE, "") IMAGE("second", "1", VOLUME, ""));
+    step_draws(session, 1, 2);
+    everywhere(!strcmp(insitu_last_report(session)->warnings, ""));
+    write_scene("images:\n  - nmae: a\n");
+    for (int cycle = 2; cycle < 4; cycle++) {
+        step_draws(session, cycle, 2);
+        everywhere(strstr(insitu_last_report(session)->warnings, "last edit was not taken") != NULL);
+        everywhere(strstr(insitu_last_report(session)->warnings, ".yaml:2: ") != NULL);
+    }
+    write_scene(plain_scene);
+    step_draws(session, 4, 1);
+    everywhere(!strcmp(insitu_last_report(session)->warnings, ""));
+    insitu_destroy(&session);
+}
+
+static void bad_scene_opens_no_session(void **context)
+{
+    (void)context;
+    insitu_session *session = (insitu_session *)&input;
+    insitu_status status = insitu_create(MPI_COMM_WORLD, write_scene("images:\n  - nmae: a\n"), &session);
+    everywhere(session == NULL);
+    told_everywhere(NULL, status, INSITU_ERROR_SCENE, ".yaml:2: ", "nmae");
+    status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? "/nowhere/at/all.yaml" : NULL, &session);
+    told_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
+    status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? NULL : "x", &session);
+    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no scene file");
+    write_scene(plain_scene);
+    status = insitu_create(MPI_COMM_WORLD, write_scene(plain_scene), own_rank == rank_count - 1 ? NULL : &session);
+    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");
+    everywhere(insitu_create(MPI_COMM_NULL, "x", &session) == INSITU_ERROR_ARGUMENT);
+    everywhere(insitu_destroy(&session) == INSITU_OK && insitu_destroy(NULL) == INSITU_OK);
+}
+
+/* ---- memory -------------------------------------------------------------------------------------------------- */
+
+static const char full_scene[] =
+    "images:\n" IMAGE("a", "1", SURFACE,
+                      "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
+                      "      - " VOLUME "\n    sampling: {frames: 2}\n");
+
+static insitu_status hand_over_both(insitu_session *session, insitu_field *cells)
+{
+    const insitu_status status = hand_over(session, &input);
+    return status ? status : insitu_set_field(session, "m", cells);
+}
+
+static void memory_is_given_back(void **context)
+{
+    (void)context;
+    const int64_t before = base_memory_held();
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
+    insitu_field cells = input.field;
+    cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
+    int64_t held = 0;
+    for (int cycle = 0; cycle < 4; cycle++) {
+        everywhere(hand_over_both(session, &cells) == INSITU_OK);
+        step_draws(session, cycle, 1);
+        everywhere(cycle < 2 || base_memory_held() == held);
+        held = base_memory_held();
+        everywhere(insitu_last_report(session)->bytes_peak >= held && held > before);
+    }
+    insitu_destroy(&session);
+    everywhere(session == NULL && base_memory_held() == before);
+}
+
+/* Allocation n of a set and a step fails, on one rank or on all; then everything is as if it had not. */
+static void failing_allocation_is_an_error_and_no_more(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
+    insitu_field cells = input.field;
+    cells.name = "c", cells.centring = INSITU_CELL, cells.count = input.part.cell_count;
+    everywhere(hand_over_both(session, &cells) == INSITU_OK);
+    step_draws(session, 0, 1);
+    const caught_picture first = caught[0];
+    caught_count = 0;
+    const int64_t before = base_memory_held();
+    for (int with_all = 0; with_all < 2; with_all++) {
+        int failures = 0;
+        for (int n = 1;; n++) {
+            const int64_t count_before = base_memory_allocations();
+            const bool is_armed = with_all || own_rank == rank_count - 1;
+            base_memory_fail_nth(is_armed ? n : 0);
+            hand_over_both(session, &cells);
+            const insitu_status status = insitu_step(session, n, 0);
+            base_memory_fail_nth(0);
+            int is_over = !is_armed || base_memory_allocations() - count_before < n;
+            MPI_Allreduce(MPI_IN_PLACE, &is_over, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+            if (is_over) {
+                told_everywhere(session, status, INSITU_OK, "");
+                break;
+            }
+            failures += status != INSITU_OK;
+            if (status != INSITU_OK && status != INSITU_ERROR_FIELD) /* a field may follow on a refused mesh */
+                told_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+            everywhere(hand_over_both(session, &cells) == INSITU_OK);
+            step_draws(session, n, 1);
+            everywhere(own_rank != 0 || is_same_picture(&first, &caught[0]));
+        }
+        everywhere(failures > 20);
+    }
+    /* Texts of the report may have grown; nothing else. */
+    everywhere(base_memory_held() <= before + 4096);
+    if (own_rank == 0) free(first.rgba), free(first.depth);
+    insitu_destroy(&session);
+}
+
+static void failing_allocation_opens_no_session(void **context)
+{
+    (void)context;
+    const char *scene = write_scene(full_scene);
+    const int64_t before = base_memory_held();
+    for (int n = 1;; n++) {
+        insitu_session *session = NULL;
+        base_memory_fail_nth(own_rank == rank_count - 1 ? n : 0);
+        const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
+        base_memory_fail_nth(0);
+        everywhere((status == INSITU_OK) == (session != NULL));
+        if (status != INSITU_OK) told_everywhere(NULL, status, INSITU_ERROR_MEMORY, "memory");
+        insitu_destroy(&session);
+        everywhere(base_memory_held() == before);
+        if (status == INSITU_OK) break;
+    }
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(images_are_drawn_when_due),
+        cmocka_unit_test(unchanged_input_rebuilds_nothing),
+        cmocka_unit_test(moved_mesh_gives_the_moved_picture),
+        cmocka_unit_test(plain_layouts_are_not_copied),
+        cmocka_unit_test(what_no_picture_shows_is_left_out),
+        cmocka_unit_test(mirrored_cells_are_counted),
+        cmocka_unit_test(ghosts_are_counted_and_not_drawn),
+        cmocka_unit_test(no_cells_anywhere_give_the_background),
+        cmocka_unit_test(cells_of_one_rank_are_seen),
+        cmocka_unit_test(meshes_of_many_names_make_one_picture),
+        cmocka_unit_test(constant_fields_are_drawn),
+        cmocka_unit_test(missing_field_leaves_the_other_picture),
+        cmocka_unit_test(component_that_is_not_there_is_named),
+        cmocka_unit_test(ranks_at_different_cycles_are_told),
+        cmocka_unit_test(picture_that_cannot_be_written_is_told_to_all),
+        cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
+        cmocka_unit_test(bad_scene_opens_no_session),
+        cmocka_unit_test(memory_is_given_back),
+        cmocka_unit_test(failing_allocation_is_an_error_and_no_more),
+        cmocka_unit_test(failing_allocation_opens_no_session),
+    };
+    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    input_free(&input);
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
