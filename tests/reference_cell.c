@@ -154,26 +154,42 @@ static double solve_u(const double *a, const double *b, const double *c, const d
     return below != 0 ? -(a[axis] + w * c[axis]) / below : 0.5;
 }
 
-/* The (u, w) nearest to the unit square with a + u b + w c + u w d = 0: eliminating u leaves a quadratic in w. */
-static void solve_bilinear(const double *a, const double *b, const double *c, const double *d, double *u, double *w)
+/* What a + u b + w c + u w d is short of 0, relative to the quad's size. */
+static double bilinear_residual(const double *a, const double *b, const double *c, const double *d, double u, double w)
+{
+    double residual = 0, size = 0;
+    for (int i = 0; i < 2; i++) {
+        residual += fabs(a[i] + u * b[i] + w * c[i] + u * w * d[i]);
+        size += fabs(b[i]) + fabs(c[i]) + fabs(d[i]);
+    }
+    return size > 0 ? residual / size : 0;
+}
+
+/* The (u, w) nearest to the unit square with a + u b + w c + u w d = 0: eliminating u leaves a quadratic in w. Of a
+ * quad with two corners in one place one root is none. */
+static bool solve_bilinear(const double *a, const double *b, const double *c, const double *d, double *u, double *w)
 {
     const double qa = (double)cross(d, c), qb = (double)(cross(b, c) + cross(d, a)), qc = (double)cross(b, a);
     const double root = sqrt(fmax(qb * qb - 4 * qa * qc, 0)), h = -0.5 * (qb + (qb < 0 ? -root : root));
     const double candidates[2] = {h != 0 ? qc / h : 0.5, qa != 0 ? h / qa : (double)INFINITY};
     double best = (double)INFINITY;
+    int inside = 0;
     *u = *w = 0.5;
     for (int i = 0; i < 2; i++) {
         if (!isfinite(candidates[i])) continue;
         const double v = solve_u(a, b, c, d, candidates[i]);
-        const double beyond = beyond_unit(candidates[i]) + beyond_unit(v);
+        const double beyond =
+            beyond_unit(candidates[i]) + beyond_unit(v) + bilinear_residual(a, b, c, d, v, candidates[i]);
+        inside += beyond < 1e-9;
         if (beyond >= best) continue;
         best = beyond;
         *u = v;
         *w = candidates[i];
     }
+    return inside == 1;
 }
 
-static double quad_value(const double *const p[4], const double *values, const double point[3])
+static double quad_value(const double *const p[4], const double *values, const double point[3], bool *is_folded)
 {
     const int drop = dropped_axis(p), axes[2] = {drop == 0 ? 1 : 0, drop == 2 ? 1 : 2};
     double a[2], b[2], c[2], d[2], u, w;
@@ -184,16 +200,17 @@ static double quad_value(const double *const p[4], const double *values, const d
         c[i] = p[3][k] - p[0][k];
         d[i] = p[0][k] - p[1][k] + p[2][k] - p[3][k];
     }
-    solve_bilinear(a, b, c, d, &u, &w);
+    *is_folded = !solve_bilinear(a, b, c, d, &u, &w);
     u = clamp_unit(u);
     w = clamp_unit(w);
     return (1 - w) * ((1 - u) * values[0] + u * values[1]) + w * ((1 - u) * values[3] + u * values[2]);
 }
 
 double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
-                            const double *values)
+                            const double *values, bool *is_folded)
 {
     const int *face = faces_of(cell->type)->vertices[crossing->face];
+    *is_folded = false;
     if (face[3] < 0) {
         double weights[3], value = 0;
         triangle_weights(cell, line, face, weights);
@@ -206,7 +223,7 @@ double reference_face_value(const reference_cell *cell, const reference_line *li
         corners[i] = cell->world[face[i]];
         corner_values[i] = values[face[i]];
     }
-    return quad_value(corners, corner_values, crossing->world);
+    return quad_value(corners, corner_values, crossing->world, is_folded);
 }
 
 static double segment_distance(const double *a, const double *b)

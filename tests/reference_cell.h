@@ -35,7 +35,7 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
  * bilinear coordinates are those of the point in the projection along the world axis nearest to the normal, kept in [0,
  * 1]. */
 double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
-                            const double *values);
+                            const double *values, bool *is_folded);
 
 /* The smallest distance, in a plane of constant z, between the line and an edge of the cell. */
 double reference_edge_distance(const reference_cell *cell, const reference_line *line);

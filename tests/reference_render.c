@@ -18,6 +18,7 @@ typedef struct event {
     bool is_sample;
     int order; /* surface id or volume layer */
     double transmittance;
+    double blur;       /* of a hit: cell size × conditioning, by which rounding moves it */
     reference_hit hit; /* of a sample: colour alone */
 } event;
 
@@ -274,6 +275,7 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     const double along = dot(e->hit.normal, t->direction) / sqrt(dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
     e->hit.conditioning = 1 / fabs(along);
+    e->blur = c->size * e->hit.conditioning;
     surface_colour(t, c, layer, value_index, point, colour);
     shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
     return &e->hit;
@@ -284,7 +286,11 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
 {
     double face[2], low, high;
     range_of(values, c->cell.count, &low, &high);
-    for (int i = 0; i < 2; i++) face[i] = reference_face_value(&c->cell, &t->line, &ends[i], values);
+    for (int i = 0; i < 2; i++) {
+        bool is_folded;
+        face[i] = reference_face_value(&c->cell, &t->line, &ends[i], values, &is_folded);
+        if (is_folded) t->out->ambiguous = true;
+    }
     for (int i = 0; i < layer->value_count; i++) {
         const double iso = layer->values[i];
         for (int end = 0; end < 2 && high > low; end++)
@@ -294,9 +300,10 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
         const double z = bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
         if (is_ambiguous(t, c, values, iso, ends[0].z, ends[1].z, side)) t->out->ambiguous = true;
         lessen(&t->out->eye_margin, fabs(z) / c->size);
+        const double found = falsi(t, c, values, iso, ends, face, layer->root_steps);
+        if ((found < 0) != (z < 0)) t->out->eye_margin = 0;
         if (z < 0) continue;
-        reference_hit *hit = add_hit(t, c, layer, i, first_surface + i, values, z);
-        hit->falsi_error = fabs(falsi(t, c, values, iso, ends, face, layer->root_steps) - z);
+        add_hit(t, c, layer, i, first_surface + i, values, z)->falsi_error = fabs(found - z);
     }
 }
 
@@ -448,12 +455,21 @@ static int64_t gather_samples(event *events, int64_t count, int64_t i)
     return last;
 }
 
+/* A sample and a hit in nearly one place may be seen in the other order. */
+static void margins_between(const event *events, int64_t count, double *margin)
+{
+    for (int64_t i = 0; i + 1 < count; i++)
+        if (events[i].is_sample != events[i + 1].is_sample)
+            lessen(margin, (events[i + 1].depth - events[i].depth) / fmax(events[i].blur, events[i + 1].blur));
+}
+
 static void blend_events(trace *t, const float background[4])
 {
     reference_ray *out = t->out;
     double transmittance = 1;
     out->volume_transmittance = 1;
     if (t->count) qsort(t->events, (size_t)t->count, sizeof *t->events, compare_events);
+    margins_between(t->events, t->count, &out->sample_margin);
     for (int64_t i = 0; i < t->count; i++) {
         if (t->events[i].is_sample) i = gather_samples(t->events, t->count, i);
         const event *e = &t->events[i];

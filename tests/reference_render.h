@@ -28,10 +28,11 @@ typedef struct reference_ray {
     /* How near to another answer, in cell sizes (cube root of the cell's box) or of the range of the cell's values: */
     double edge_margin;   /* between the ray and an edge of a cell */
     double value_margin;  /* between a face's value and an isovalue */
-    double sample_margin; /* between a sample and the cell interval's ends */
+    double sample_margin; /* between a sample and the cell interval's ends, or a hit and a sample */
     double eye_margin;    /* between a hit and the eye's plane */
     bool ambiguous;       /* a cell met more than one root, or its interpolant at a face has the other side of the
-                             isovalue than the face: the first hit is then a matter of the root finder */
+                             isovalue than the face: the first hit is then a matter of the root finder. Or a face's
+                             bilinear map is folded where the ray meets it. */
     bool map_failed;      /* an inverse map had no solution */
 } reference_ray;
 
