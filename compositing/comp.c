@@ -4,6 +4,8 @@
  * and the finished pixels. One rank alone merges its list where it lies. */
 #include "comp.h"
 
+#include <omp.h>
+
 #include "comp_agree.h"
 #include "comp_bucket.h"
 #include "comp_exchange.h"
@@ -21,7 +23,7 @@ static insitu_status merge_alone(const comp_layout *layout, fragment_list *items
     const double start = MPI_Wtime();
     if (!comp_bucket_fits(layout, items->items, items->count))
         return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
-    comp_pixels_clear(out, background);
+    comp_pixels_clear(layout, out, background);
     const insitu_status status = comp_pixels_merge(layout, 0, items, background, out, NULL, error);
     statistics->merge_ms = milliseconds_since(start);
     return status;
@@ -34,7 +36,7 @@ static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, 
     const double start = MPI_Wtime();
     comp_pixel_list finished = {NULL, 0};
     image *const here = rank == 0 ? out : NULL;
-    if (here) comp_pixels_clear(here, background);
+    if (here) comp_pixels_clear(layout, here, background);
     insitu_status status = comp_pixels_merge(layout, rank, owned, background, here, &finished, error);
     base_free(owned->items);
     status = comp_agree(comm, status, error);
@@ -48,7 +50,7 @@ static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, 
     return status;
 }
 
-static insitu_status composite(MPI_Comm comm, fragment_list *items, const float background[4], image *out,
+static insitu_status composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
                                comp_statistics *statistics, base_error *error)
 {
     int rank = 0, ranks = 1;
@@ -58,7 +60,8 @@ static insitu_status composite(MPI_Comm comm, fragment_list *items, const float 
     if (out->width < 1 || out->height < 1 || pixel_count > UINT32_MAX)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "compositing: no image of %d by %d pixels", out->width,
                          out->height);
-    const comp_layout layout = comp_layout_of((uint32_t)pixel_count, ranks);
+    comp_layout layout = comp_layout_of((uint32_t)pixel_count, ranks);
+    layout.threads = threads > 0 ? threads : omp_get_max_threads();
     statistics->sent_fragments = items->count;
     if (ranks == 1) return merge_alone(&layout, items, background, out, statistics, error);
     const double start = MPI_Wtime();
@@ -70,11 +73,11 @@ static insitu_status composite(MPI_Comm comm, fragment_list *items, const float 
     return merge_and_gather(comm, &layout, rank, &owned, background, out, statistics, error);
 }
 
-insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], image *out,
+insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
                              comp_statistics *statistics, base_error *error)
 {
     comp_statistics unwanted;
     if (!statistics) statistics = &unwanted;
     *statistics = (comp_statistics){0};
-    return composite(comm, items, background, out, statistics, error);
+    return composite(comm, items, background, threads, out, statistics, error);
 }

@@ -30,8 +30,9 @@ typedef struct comp_statistics {
 
 /* Collective over comm, on which only compositing talks. out->rgba and out->depth must be allocated on rank 0 (width
  * and height set on all ranks) and are filled there; elsewhere they are not touched. items is reordered. An error on
- * one rank (memory) is an error on all. statistics may be NULL. */
-insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], image *out,
+ * one rank (memory) is an error on all. threads: of this rank, 0: as many as OpenMP would take. statistics may be NULL.
+ */
+insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
                              comp_statistics *statistics, base_error *error);
 
 #endif

@@ -54,7 +54,7 @@ static inline void place(const comp_layout *layout, uint32_t shift, fragment *it
 bool comp_bucket_fits(const comp_layout *layout, const fragment *items, int64_t count)
 {
     bool fits = true;
-#pragma omp parallel for schedule(static) reduction(&& : fits)
+#pragma omp parallel for num_threads(layout->threads) schedule(static) reduction(&& : fits)
     for (int64_t i = 0; i < count; i++) fits = fits && items[i].pixel < layout->pixel_count;
     return fits;
 }

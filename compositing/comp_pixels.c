@@ -46,10 +46,10 @@ void comp_pixels_store(image *out, const comp_pixel *from)
     out->depth[from->pixel] = from->depth;
 }
 
-void comp_pixels_clear(image *out, const float background[4])
+void comp_pixels_clear(const comp_layout *layout, image *out, const float background[4])
 {
     const int64_t count = (int64_t)out->width * out->height;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for num_threads(layout->threads) schedule(static)
     for (int64_t i = 0; i < count; i++) {
         for (int c = 0; c < 4; c++) out->rgba[4 * i + c] = background[c];
         out->depth[i] = INFINITY;
@@ -67,7 +67,7 @@ static int64_t slice_fragments(const merging *m, int64_t slice)
 
 static void sort_blocks(merging *m)
 {
-#pragma omp parallel for schedule(dynamic, 1)
+#pragma omp parallel for num_threads(m->layout->threads) schedule(dynamic, 1)
     for (int64_t b = 0; b < m->blocks; b++) {
         const int64_t first = b * block_fragments, left = m->count - first;
         comp_bucket_by_slice(m->layout, m->slice_shift, m->items + first,
@@ -138,7 +138,7 @@ static void blend_slice(merging *m, int64_t slice, scratch *own)
 static bool merge_slices(merging *m)
 {
     bool well = true;
-#pragma omp parallel reduction(&& : well)
+#pragma omp parallel num_threads(m->layout->threads) reduction(&& : well)
     {
         scratch own = {NULL, 0, NULL};
 #pragma omp for schedule(dynamic, 1)

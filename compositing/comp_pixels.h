@@ -20,7 +20,7 @@ typedef struct comp_pixel_list {
 } comp_pixel_list;
 
 /* Every pixel of out becomes background, without depth. Local. */
-void comp_pixels_clear(image *out, const float background[4]);
+void comp_pixels_clear(const comp_layout *layout, image *out, const float background[4]);
 
 void comp_pixels_store(image *out, const comp_pixel *from);
 

@@ -9,7 +9,7 @@ enum { longest_run_shift = 6 };
 
 comp_layout comp_layout_of(uint32_t pixel_count, int ranks)
 {
-    comp_layout layout = {pixel_count, (uint32_t)ranks, longest_run_shift};
+    comp_layout layout = {pixel_count, (uint32_t)ranks, longest_run_shift, 1};
     while (layout.run_shift > 0 && pixel_count >> layout.run_shift < layout.ranks) layout.run_shift--;
     return layout;
 }

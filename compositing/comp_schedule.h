@@ -11,6 +11,7 @@ typedef struct comp_layout {
     uint32_t pixel_count;
     uint32_t ranks; /* >= 1 */
     uint32_t run_shift;
+    int threads; /* that work on an owner's pixels; 1 from comp_layout_of() */
 } comp_layout;
 
 comp_layout comp_layout_of(uint32_t pixel_count, int ranks);

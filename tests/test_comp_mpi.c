@@ -146,7 +146,7 @@ static void check_composite(int width, int height, uint32_t count, dealing how, 
     comp_statistics statistics;
     base_error error = {INSITU_OK, ""};
     const int64_t held = base_memory_held();
-    const insitu_status status = comp_composite(comm, &s.own, background, &s.out, &statistics, &error);
+    const insitu_status status = comp_composite(comm, &s.own, background, 0, &s.out, &statistics, &error);
     assert_everywhere(status == INSITU_OK && error.message[0] == '\0', "composite succeeds");
     assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
     assert_everywhere(base_memory_held() == held, "nothing is left allocated");
@@ -179,7 +179,7 @@ static void statistics_count_what_travelled(void **context)
     (void)context;
     setting s = make_setting(64 * rank_count, 1, 1000, deal_all_to_last, 5);
     comp_statistics statistics;
-    const insitu_status status = comp_composite(comm, &s.own, background, &s.out, &statistics, NULL);
+    const insitu_status status = comp_composite(comm, &s.own, background, 0, &s.out, &statistics, NULL);
     assert_everywhere(status == INSITU_OK, "composite succeeds");
     int64_t foreign = 0, touched = 0;
     for (int64_t i = 0; i < s.own.count; i++) foreign += (int)(s.own.items[i].pixel / 64) != own_rank;
@@ -211,7 +211,7 @@ static void long_messages_are_cut(void **context)
     assert_everywhere(all == s.count, "no fragment is lost");
     image *const here = own_rank == 0 ? &s.out : NULL;
     comp_pixel_list finished = {NULL, 0};
-    if (here) comp_pixels_clear(here, background);
+    if (here) comp_pixels_clear(&layout, here, background);
     status = comp_pixels_merge(&layout, own_rank, &owned, background, here, &finished, NULL);
     assert_everywhere(status == INSITU_OK, "merge succeeds");
     status = comp_gather(comm, &finished, 5, &s.out, &bytes, NULL);
@@ -233,7 +233,7 @@ static void failed_allocation_is_an_error_on_all(void **context)
         for (insitu_status status = INSITU_ERROR_MEMORY; status != INSITU_OK; n++) {
             base_error error = {INSITU_OK, ""};
             if (own_rank == victim) base_memory_fail_nth(n);
-            status = comp_composite(comm, &s.own, background, &s.out, NULL, &error);
+            status = comp_composite(comm, &s.own, background, 0, &s.out, NULL, &error);
             base_memory_fail_nth(0);
             int lowest = 0, highest = 0, mine = (int)status;
             MPI_Allreduce(&mine, &lowest, 1, MPI_INT, MPI_MIN, comm);
@@ -256,7 +256,7 @@ static void pixel_beyond_the_image_is_an_error_on_all(void **context)
     fragment stray = {.pixel = 64};
     fragment_list bad = own_rank == rank_count - 1 ? (fragment_list){&stray, 1, 1} : s.own;
     base_error error = {INSITU_OK, ""};
-    const insitu_status status = comp_composite(comm, &bad, background, &s.out, NULL, &error);
+    const insitu_status status = comp_composite(comm, &bad, background, 0, &s.out, NULL, &error);
     assert_everywhere(status == INSITU_ERROR_INTERNAL, "a stray pixel is refused");
     char name[32];
     snprintf(name, sizeof name, "rank %d", rank_count - 1);
@@ -269,8 +269,8 @@ static void image_without_pixels_is_refused(void **context)
     (void)context;
     image none = {0, 4, NULL, NULL}, huge = {65536, 65536, NULL, NULL};
     fragment_list items = {NULL, 0, 0};
-    assert_everywhere(comp_composite(comm, &items, background, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
-    assert_everywhere(comp_composite(comm, &items, background, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");
+    assert_everywhere(comp_composite(comm, &items, background, 0, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
+    assert_everywhere(comp_composite(comm, &items, background, 0, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");
 }
 
 int main(int argc, char **argv)

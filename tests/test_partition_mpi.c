@@ -40,7 +40,7 @@ static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera,
     out->height = HEIGHT;
     out->rgba = malloc(4 * PIXELS * sizeof(float));
     out->depth = malloc(PIXELS * sizeof(float));
-    assert_int_equal(comp_composite(comm, &list, fixture_background, out, NULL, &error), INSITU_OK);
+    assert_int_equal(comp_composite(comm, &list, fixture_background, 0, out, NULL, &error), INSITU_OK);
     base_free(list.items);
     fixture_free(&f);
 }

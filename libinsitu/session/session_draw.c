@@ -100,7 +100,9 @@ static insitu_status draw_frame(insitu_session *session, const render_job *job, 
     const double start = MPI_Wtime();
     insitu_status status = session_agree(session->comm, error);
     if (status == INSITU_OK)
-        status = comp_composite(session->comp_comm, &fragments, image->background, &target->frame, &composited, error);
+        status = comp_composite(session->comp_comm, &fragments, image->background, session->threads, &target->frame,
+                                &composited, error);
+    if (status) status = session_agree_as_is(session->comm, error); /* compositing agrees on the status alone */
     base_free(fragments.items);
     insitu_report *report = &session->report;
     report->rays += rendered.rays;

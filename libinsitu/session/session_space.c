@@ -9,6 +9,7 @@
 
 #include "session.h"
 #include "session_agree.h"
+#include "session_guard.h"
 
 int session_node_ranks(MPI_Comm comm)
 {
@@ -22,12 +23,13 @@ int session_node_ranks(MPI_Comm comm)
 
 int session_thread_count(const insitu_session *session)
 {
-    if (session->scene.threads > 0) return session->scene.threads;
+    if (session->scene.threads > 0)
+        return session->scene.threads < SESSION_MAX_THREADS ? session->scene.threads : SESSION_MAX_THREADS;
     /* A rank bound to some cores has them for itself; one that is bound to none shares the node's. */
     int cores = omp_get_num_procs();
     if (cores >= (int)sysconf(_SC_NPROCESSORS_ONLN)) cores /= session->node_ranks;
     if (cores > omp_get_max_threads()) cores = omp_get_max_threads();
-    return cores > 1 ? cores : 1;
+    return cores > SESSION_MAX_THREADS ? SESSION_MAX_THREADS : cores > 1 ? cores : 1;
 }
 
 static insitu_status check_meshes(insitu_session *session, base_error *error)

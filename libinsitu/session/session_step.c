@@ -9,6 +9,7 @@
 #include "session.h"
 #include "session_agree.h"
 #include "session_draw.h"
+#include "session_guard.h"
 
 enum step_word {
     CYCLE_HIGH,
@@ -88,7 +89,6 @@ static insitu_status draw_due(insitu_session *session, const step_message *messa
     const int64_t cycle = message->words[CYCLE_HIGH];
     const bool are_names_alike = message->words[NAMES_HIGH] == ~message->words[NAMES_LOW];
     insitu_status status = INSITU_OK;
-    session->threads = session_thread_count(session);
     if (message->words[CELLS_CHANGED]) status = session_update_extent(session, error);
     if (!status && message->words[NAMES_CHANGED]) status = session_update_catalogue(session, are_names_alike, error);
     session->report.prepare_ms = 1e3 * (MPI_Wtime() - start);
@@ -98,6 +98,16 @@ static insitu_status draw_due(insitu_session *session, const step_message *messa
     for (int i = 0; i < session->scene.image_count; i++)
         if (is_due(&session->scene.images[i], cycle)) due[count++] = &session->scene.images[i];
     return session_draw_images(session, due, count, cycle, error);
+}
+
+static insitu_status draw_guarded(insitu_session *session, const step_message *message, base_error *error)
+{
+    session_guard guard;
+    session->threads = session_thread_count(session);
+    session_guard_begin(&guard, session->threads);
+    const insitu_status status = draw_due(session, message, error);
+    session_guard_end(&guard);
+    return status;
 }
 
 static insitu_status step(insitu_session *session, int64_t cycle, double time, base_error *error)
@@ -112,7 +122,7 @@ static insitu_status step(insitu_session *session, int64_t cycle, double time, b
     if (high != low)
         return base_fail(error, INSITU_ERROR_MPI, "ranks disagree on the cycle: %lld on one, %lld on another",
                          (long long)low, (long long)high);
-    return due_count(&session->scene, high) ? draw_due(session, &message, error) : INSITU_OK;
+    return due_count(&session->scene, high) ? draw_guarded(session, &message, error) : INSITU_OK;
 }
 
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
