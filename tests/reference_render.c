@@ -301,7 +301,7 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
         if (is_ambiguous(t, c, values, iso, ends[0].z, ends[1].z, side)) t->out->ambiguous = true;
         lessen(&t->out->eye_margin, fabs(z) / c->size);
         const double found = falsi(t, c, values, iso, ends, face, layer->root_steps);
-        if ((found < 0) != (z < 0)) t->out->eye_margin = 0;
+        if ((found < 0) != (z < 0)) t->out->ambiguous = true;
         if (z < 0) continue;
         add_hit(t, c, layer, i, first_surface + i, values, z)->falsi_error = fabs(found - z);
     }

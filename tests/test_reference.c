@@ -309,7 +309,7 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
     for (int pass = 0; pass < 2 * TEST_KIND_COUNT; pass++) {
         frame_fixture f;
         int hits = 0, ambiguous = 0;
-        frame_setup(&f, pass / 2, pass % 2);
+        frame_setup(&f, (test_mesh_kind)(pass / 2), pass % 2);
         f.job.surface_count = 1;
         reference_scene *scene = reference_create(&f.job);
         for (int pixel = 0; pixel < 24 * 20; pixel++) {
@@ -349,7 +349,7 @@ static void volume_of_constant_extinction_is_beers_law(void **state)
     for (int pass = 0; pass < 2 * TEST_KIND_COUNT; pass++) {
         frame_fixture f;
         int met = 0;
-        frame_setup(&f, pass / 2, pass % 2);
+        frame_setup(&f, (test_mesh_kind)(pass / 2), pass % 2);
         f.job.volume_count = 1;
         reference_scene *scene = reference_create(&f.job);
         for (int pixel = 0; pixel < 24 * 20; pixel++) {

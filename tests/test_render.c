@@ -18,6 +18,8 @@ static const double linear_values[3] = {-0.6, 0.1, 0.5};
 static void assert_few_ambiguous(const fixture_outcome *o, double share)
 {
     if ((double)o->ambiguous > share * (double)o->rays) fail_msg("%d of %d ambiguous", (int)o->ambiguous, (int)o->rays);
+    /* Of 64 steps of regula falsi. */
+    if ((double)o->slow > 0.01 * (double)o->rays) fail_msg("%d of %d slow", (int)o->slow, (int)o->rays);
 }
 
 static const char *case_name(test_mesh_kind kind, fixture_camera camera, const char *what)
