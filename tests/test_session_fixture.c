@@ -27,6 +27,7 @@ void assert_told(const insitu_session *session, insitu_status status, insitu_sta
 {
     char first[1024] = "";
     const char *message = insitu_error(session);
+    if (!message) message = "";
     if (own_rank == 0) snprintf(first, sizeof first, "%s", message);
     MPI_Bcast(first, sizeof first, MPI_CHAR, 0, MPI_COMM_WORLD);
     if (status != expected) fprintf(stderr, "rank %d: %s: %s\n", own_rank, insitu_status_name(status), message);
