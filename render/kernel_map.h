@@ -72,8 +72,9 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0]);
     kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0]);
     kernel_polynomial_of_floats(&m->field, c->type, c->f, 0);
-    /* The error goes as the square of the step: below 3e-4 the next one would be under float32's resolution. */
-    m->tolerance = 3e-4f;
+    /* The error goes as the square of the step, times the map's curvature: below 5e-5 the next one would be under
+     * float32's resolution for all but the most warped cells. */
+    m->tolerance = 5e-5f;
 }
 
 SIMD_INLINE void kernel_map_colour(kernel_map *m, const kernel_cell *c)

@@ -95,44 +95,8 @@ static bool triangle_crossed(const reference_cell *cell, const reference_line *l
     if ((axis_crosses(p[0], p[1]) + axis_crosses(p[1], p[2]) + axis_crosses(p[2], p[0])) % 2 == 0) return false;
     triangle_weights(cell, line, triangle, weights);
     memset(out, 0, sizeof *out);
-    for (int i = 0; i < 3; i++) {
-        out->z += weights[i] * cell->position[triangle[i]][2];
-        for (int axis = 0; axis < 3; axis++) out->world[axis] += weights[i] * cell->world[triangle[i]][axis];
-    }
+    for (int i = 0; i < 3; i++) out->z += weights[i] * cell->position[triangle[i]][2];
     return true;
-}
-
-int reference_crossings(const reference_cell *cell, const reference_line *line,
-                        reference_crossing crossings[REFERENCE_MAX_CROSSINGS])
-{
-    const cell_faces *faces = faces_of(cell->type);
-    int count = 0;
-    for (int face = 0; face < faces->count; face++) {
-        int triangles[2][3];
-        const int halves = split_face(cell, faces->vertices[face], triangles);
-        for (int half = 0; half < halves; half++) {
-            reference_crossing found;
-            if (!triangle_crossed(cell, line, triangles[half], &found)) continue;
-            found.face = face;
-            int at = count++;
-            for (; at > 0 && crossings[at - 1].z > found.z; at--) crossings[at] = crossings[at - 1];
-            crossings[at] = found;
-        }
-    }
-    return count;
-}
-
-/* The axis that the quad's plane is projected along. */
-static int dropped_axis(const double *const p[4])
-{
-    double a[3], b[3];
-    for (int axis = 0; axis < 3; axis++) {
-        a[axis] = p[2][axis] - p[0][axis];
-        b[axis] = p[3][axis] - p[1][axis];
-    }
-    const double n[3] = {fabs(a[1] * b[2] - a[2] * b[1]), fabs(a[2] * b[0] - a[0] * b[2]),
-                         fabs(a[0] * b[1] - a[1] * b[0])};
-    return n[0] >= n[1] && n[0] >= n[2] ? 0 : n[1] >= n[2] ? 1 : 2;
 }
 
 static double beyond_unit(double u)
@@ -189,41 +153,66 @@ static bool solve_bilinear(const double *a, const double *b, const double *c, co
     return inside == 1;
 }
 
-static double quad_value(const double *const p[4], const double *values, const double point[3], bool *is_folded)
+static double bilinear(const double values[4], double u, double w)
 {
-    const int drop = dropped_axis(p), axes[2] = {drop == 0 ? 1 : 0, drop == 2 ? 1 : 2};
-    double a[2], b[2], c[2], d[2], u, w;
-    for (int i = 0; i < 2; i++) {
-        const int k = axes[i];
-        a[i] = p[0][k] - point[k];
-        b[i] = p[1][k] - p[0][k];
-        c[i] = p[3][k] - p[0][k];
-        d[i] = p[0][k] - p[1][k] + p[2][k] - p[3][k];
-    }
-    *is_folded = !solve_bilinear(a, b, c, d, &u, &w);
-    u = clamp_unit(u);
-    w = clamp_unit(w);
     return (1 - w) * ((1 - u) * values[0] + u * values[1]) + w * ((1 - u) * values[3] + u * values[2]);
+}
+
+/* From a quad's triangle to its patch. */
+static void move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
+                          reference_crossing *crossing)
+{
+    double p[4][2], z[4], a[2], b[2], c[2], d[2];
+    for (int i = 0; i < 4; i++) {
+        shear(line, cell->position[face[i]], p[i]);
+        z[i] = cell->position[face[i]][2];
+    }
+    for (int i = 0; i < 2; i++) {
+        a[i] = p[0][i];
+        b[i] = p[1][i] - p[0][i];
+        c[i] = p[3][i] - p[0][i];
+        d[i] = p[0][i] - p[1][i] + p[2][i] - p[3][i];
+    }
+    crossing->is_folded = !solve_bilinear(a, b, c, d, &crossing->u, &crossing->w);
+    crossing->u = clamp_unit(crossing->u);
+    crossing->w = clamp_unit(crossing->w);
+    if (!crossing->is_folded) crossing->z = bilinear(z, crossing->u, crossing->w);
+}
+
+int reference_crossings(const reference_cell *cell, const reference_line *line,
+                        reference_crossing crossings[REFERENCE_MAX_CROSSINGS])
+{
+    const cell_faces *faces = faces_of(cell->type);
+    int count = 0;
+    for (int face = 0; face < faces->count; face++) {
+        int triangles[2][3];
+        const int halves = split_face(cell, faces->vertices[face], triangles);
+        for (int half = 0; half < halves; half++) {
+            reference_crossing found;
+            if (!triangle_crossed(cell, line, triangles[half], &found)) continue;
+            found.face = face;
+            if (halves == 2) move_to_patch(cell, line, faces->vertices[face], &found);
+            int at = count++;
+            for (; at > 0 && crossings[at - 1].z > found.z; at--) crossings[at] = crossings[at - 1];
+            crossings[at] = found;
+        }
+    }
+    return count;
 }
 
 double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
                             const double *values, bool *is_folded)
 {
     const int *face = faces_of(cell->type)->vertices[crossing->face];
-    *is_folded = false;
+    *is_folded = crossing->is_folded;
     if (face[3] < 0) {
         double weights[3], value = 0;
         triangle_weights(cell, line, face, weights);
         for (int i = 0; i < 3; i++) value += weights[i] * values[face[i]];
         return value;
     }
-    const double *corners[4];
-    double corner_values[4];
-    for (int i = 0; i < 4; i++) {
-        corners[i] = cell->world[face[i]];
-        corner_values[i] = values[face[i]];
-    }
-    return quad_value(corners, corner_values, crossing->world, is_folded);
+    const double corners[4] = {values[face[0]], values[face[1]], values[face[2]], values[face[3]]};
+    return bilinear(corners, crossing->u, crossing->w);
 }
 
 static double segment_distance(const double *a, const double *b)

@@ -9,7 +9,7 @@
 typedef struct reference_cell {
     int type; /* GRID_* */
     int count;
-    double world[8][3]; /* as the simulation has them: decides how quads are split and projected */
+    double world[8][3]; /* as the simulation has them: decides how quads are split */
     double position[8][3];
 } reference_cell;
 
@@ -18,11 +18,13 @@ typedef struct reference_line {
     double base[2], slope[2];
 } reference_line;
 
-/* Where a line meets the cell's closed surface of triangles. */
+/* Where a line meets the cell's surface. That a face is met is decided on its triangles; where a quad is met, on its
+ * bilinear patch, at the coordinates u, w. */
 typedef struct reference_crossing {
     double z;
-    double world[3];
     int face;
+    double u, w;
+    bool is_folded; /* the patch has no or no single such point: z is the triangle's */
 } reference_crossing;
 
 enum { REFERENCE_MAX_CROSSINGS = 12 };
@@ -31,9 +33,7 @@ enum { REFERENCE_MAX_CROSSINGS = 12 };
 int reference_crossings(const reference_cell *cell, const reference_line *line,
                         reference_crossing crossings[REFERENCE_MAX_CROSSINGS]);
 
-/* The field at a crossing from the face's own vertices: linear on triangles, bilinear on quads. A warped quad's
- * bilinear coordinates are those of the point in the projection along the world axis nearest to the normal, kept in [0,
- * 1]. */
+/* The field at a crossing from the face's own vertices: linear on triangles, bilinear on quads. */
 double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
                             const double *values, bool *is_folded);
 

@@ -340,6 +340,7 @@ static void cross_volume(trace *t, const placed_cell *c, int layer, const double
                          const reference_crossing ends[2])
 {
     const double spacing = t->scene->job->step / t->length;
+    if (ends[0].is_folded || ends[1].is_folded) t->out->ambiguous = true;
     int64_t k = (int64_t)floor(ends[0].z / spacing - t->jitter) - 1;
     for (k = k < 0 ? 0 : k;; k++) {
         const double z = ((double)k + t->jitter) * spacing;

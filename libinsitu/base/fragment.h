@@ -9,9 +9,9 @@
 #include <stdint.h>
 
 typedef struct fragment {
-    uint32_t pixel;      /* y * width + x, y = 0 at the top */
-    float t_in;          /* depth along the camera's axis, in scene units (render.h), of the first sample or the hit */
-    float t_out;         /* of the last sample; == t_in and kind bit set for a hit */
+    uint32_t pixel; /* y * width + x, y = 0 at the top */
+    float t_in;     /* the ray's parameter, (depth - depth_origin) * scale (render.h), of the first sample or the hit */
+    float t_out;    /* of the last sample; == t_in and kind bit set for a hit */
     float colour[3];     /* premultiplied linear RGB */
     float transmittance; /* 0 opaque .. 1 clear */
     uint32_t kind;       /* FRAGMENT_VOLUME, or FRAGMENT_SURFACE + surface id (0, 1, ...) */

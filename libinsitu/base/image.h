@@ -6,7 +6,7 @@ typedef struct image {
     int width;
     int height;
     float *rgba;  /* row-major, height × width × 4, top row first, premultiplied, linear light */
-    float *depth; /* row-major, height × width: depth along the camera's axis, as fragment.t_in, of the nearest
+    float *depth; /* row-major, height × width: fragment.t_in of the nearest
                      surface hit; +infinity where there is none */
 } image;
 
