@@ -142,12 +142,19 @@ INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insi
  * insitu_error(NULL). MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
 INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
 
-/* Hand over this rank's part of the mesh called name: borrowed arrays, checked when a step needs them. Local. Ranks
- * that have no part of it need not call it; meshes of different names are drawn together. A mesh with
- * INSITU_CHANGED_TOPOLOGY drops the fields set on it before. NULL for mesh takes it away. */
+/* Hand over this rank's part of the mesh called name: borrowed arrays. Local. Ranks that have no part of it need not
+ * call it; meshes of different names are drawn together. A mesh with INSITU_CHANGED_TOPOLOGY drops the fields set on it
+ * before. NULL for mesh takes it away. A mesh that is not set again is taken as unchanged.
+ *
+ * What can be seen at once (counts, types, strides) is checked here; the arrays' contents when a step first needs
+ * them: every cell's vertex indices and type, and the coordinates that cells without a ghost flag use. Either way the
+ * next insitu_step() returns the error on every rank, and each step after it until the mesh is set right or taken
+ * away. */
 INSITU_API insitu_status insitu_set_mesh(insitu_session *session, const char *name, const insitu_mesh *mesh);
 
-/* Hand over this rank's part of a field on the mesh called mesh, which must be set. Local. */
+/* Hand over this rank's part of a field on the mesh called mesh, which must be set. Local. A field that is not set
+ * again is taken as unchanged. Values that are NaN or infinite are no error: cells that have one are not drawn, and
+ * counted in the report. */
 INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *mesh, const insitu_field *field);
 
 /* Draw what is due at this cycle and time. Collective. Where nothing is due it costs one small reduction. An error
