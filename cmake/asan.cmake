@@ -6,4 +6,4 @@ add_link_options(-fsanitize=address,undefined)
 # nowhere and cannot be told from ours; so no program unloads anything.
 file(WRITE ${CMAKE_BINARY_DIR}/keep_loaded.c "int dlclose(void *library);\nint dlclose(void *library) { return !library; }\n")
 add_library(keep_loaded OBJECT ${CMAKE_BINARY_DIR}/keep_loaded.c)
-link_libraries($<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:$<TARGET_OBJECTS:keep_loaded>>)
+link_libraries($<BUILD_INTERFACE:$<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:$<TARGET_OBJECTS:keep_loaded>>>)
