@@ -115,7 +115,7 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
         vf value = i->v_in + slope * (t - i->t_in);
         if (map) value = kernel_value_at(p, map, i, own, t);
         const vf kept = s->value[state->volume][n];
-        const vm apart = p->frame->job->separate_samples ? own : vm_and(own, vf_eq(kept, kept));
+        const vm apart = vm_and(own, vf_eq(kept, kept));
         if (__builtin_expect(vm_any(apart), 0)) {
             kernel_emit_sample(p, state, apart, t, value);
             own = vm_andnot(own, apart);
@@ -267,6 +267,8 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
     kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
     int first, last;
     if (!kernel_sample_range(p, &first, &last)) return;
+    /* Where samples are separate, all places count as taken, and what is there is not looked at. */
+    const vf nothing = vf_set(f->job->separate_samples ? 0 : NAN);
     s.marked = vm_none();
     b.contact_in = b.contact_out = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] = vf_set(0);
     for (; first <= last; first += f->job->sample_group) {
@@ -279,13 +281,13 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
         const vm active = p->active;
         p->active = lit;
         for (int v = 0; v < f->volume_count; v++) {
-            for (int n = 0; n < s.count; n++) s.value[v][n] = vf_set(NAN);
+            for (int n = 0; n < s.count; n++) s.value[v][n] = nothing;
             kernel_volume_state state = {v, &s};
             kernel_trace_parts(p, &f->job->volumes[v].field, &f->volumes[v].interest, t_first, &t_end,
                                kernel_volume_leaf, &state);
         }
         p->active = active;
-        kernel_blend_window(p, &b, &s, hits);
+        if (!f->job->separate_samples) kernel_blend_window(p, &b, &s, hits);
     }
     kernel_blend_close(p, &b, p->active);
 }
