@@ -18,26 +18,26 @@ static double milliseconds_since(double start)
 }
 
 static insitu_status merge_alone(const comp_layout *layout, fragment_list *items, const float background[4], image *out,
-                                 comp_statistics *statistics, base_error *error)
+                                 unsigned char *overlaps, comp_statistics *statistics, base_error *error)
 {
     const double start = MPI_Wtime();
     if (!comp_bucket_fits(layout, items->items, items->count))
         return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
     comp_pixels_clear(layout, out, background);
-    const insitu_status status = comp_pixels_merge(layout, 0, items, background, out, NULL, error);
+    const insitu_status status = comp_pixels_merge(layout, 0, items, background, out, NULL, overlaps, error);
     statistics->merge_ms = milliseconds_since(start);
     return status;
 }
 
 static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, int rank, fragment_list *owned,
-                                      const float background[4], image *out, comp_statistics *statistics,
-                                      base_error *error)
+                                      const float background[4], image *out, unsigned char *overlaps,
+                                      comp_statistics *statistics, base_error *error)
 {
     const double start = MPI_Wtime();
     comp_pixel_list finished = {NULL, 0};
     image *const here = rank == 0 ? out : NULL;
     if (here) comp_pixels_clear(layout, here, background);
-    insitu_status status = comp_pixels_merge(layout, rank, owned, background, here, &finished, error);
+    insitu_status status = comp_pixels_merge(layout, rank, owned, background, here, &finished, overlaps, error);
     base_free(owned->items);
     status = comp_agree(comm, status, error);
     statistics->merge_ms = milliseconds_since(start);
@@ -50,34 +50,81 @@ static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, 
     return status;
 }
 
-static insitu_status composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
-                               comp_statistics *statistics, base_error *error)
+static insitu_status layout_of(MPI_Comm comm, const image *out, int threads, comp_layout *layout, base_error *error)
 {
-    int rank = 0, ranks = 1;
-    MPI_Comm_rank(comm, &rank);
+    int ranks = 1;
     MPI_Comm_size(comm, &ranks);
     const int64_t pixel_count = (int64_t)out->width * out->height;
     if (out->width < 1 || out->height < 1 || pixel_count > UINT32_MAX)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "compositing: no image of %d by %d pixels", out->width,
                          out->height);
-    comp_layout layout = comp_layout_of((uint32_t)pixel_count, ranks);
-    layout.threads = threads > 0 ? threads : omp_get_max_threads();
+    *layout = comp_layout_of((uint32_t)pixel_count, ranks);
+    layout->threads = threads > 0 ? threads : omp_get_max_threads();
+    return INSITU_OK;
+}
+
+static insitu_status composite(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
+                               const float background[4], image *out, unsigned char *overlaps,
+                               comp_statistics *statistics, base_error *error)
+{
+    int rank = 0;
+    MPI_Comm_rank(comm, &rank);
     statistics->sent_fragments = items->count;
-    if (ranks == 1) return merge_alone(&layout, items, background, out, statistics, error);
+    if (layout->ranks == 1) return merge_alone(layout, items, background, out, overlaps, statistics, error);
     const double start = MPI_Wtime();
     fragment_list owned = {NULL, 0, 0};
     const insitu_status status =
-        comp_exchange_direct(comm, &layout, items, comp_message_fragments, &owned, &statistics->sent_bytes, error);
+        comp_exchange_direct(comm, layout, items, comp_message_fragments, &owned, &statistics->sent_bytes, error);
     statistics->exchange_ms = milliseconds_since(start);
     if (status != INSITU_OK) return status;
-    return merge_and_gather(comm, &layout, rank, &owned, background, out, statistics, error);
+    return merge_and_gather(comm, layout, rank, &owned, background, out, overlaps, statistics, error);
 }
 
 insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
                              comp_statistics *statistics, base_error *error)
 {
     comp_statistics unwanted;
+    comp_layout layout;
     if (!statistics) statistics = &unwanted;
     *statistics = (comp_statistics){0};
-    return composite(comm, items, background, threads, out, statistics, error);
+    const insitu_status status = layout_of(comm, out, threads, &layout, error);
+    return status ? status : composite(comm, &layout, items, background, out, NULL, statistics, error);
+}
+
+/* ---- overlaps ------------------------------------------------------------------------------------------------ */
+
+/* From what owners found in their pixels (NULL: no memory for it) to what all know. */
+static insitu_status share_overlaps(MPI_Comm comm, const comp_layout *layout, unsigned char *found,
+                                    comp_overlaps *overlaps, base_error *error)
+{
+    const int64_t own[2] = {found ? pixel_set_count(found, layout->pixel_count) : 0, !found};
+    int64_t all[2] = {0, 0};
+    insitu_status status = comp_mpi_status(MPI_Allreduce(own, all, 2, MPI_INT64_T, MPI_SUM, comm), error);
+    if (!status && all[1])
+        status = base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels",
+                           (long long)layout->pixel_count);
+    if (status || all[0] == 0) return status;
+    const int bytes = (int)pixel_set_bytes(layout->pixel_count);
+    status = comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, found, bytes, MPI_BYTE, MPI_BOR, comm), error);
+    status = comp_agree(comm, status, error);
+    if (!status) *overlaps = (comp_overlaps){all[0], found};
+    return status;
+}
+
+insitu_status comp_composite_overlaps(MPI_Comm comm, fragment_list *items, const float background[4], int threads,
+                                      image *out, comp_overlaps *overlaps, comp_statistics *statistics,
+                                      base_error *error)
+{
+    comp_statistics unwanted;
+    comp_layout layout;
+    if (!statistics) statistics = &unwanted;
+    *statistics = (comp_statistics){0};
+    *overlaps = (comp_overlaps){0, NULL};
+    insitu_status status = layout_of(comm, out, threads, &layout, error);
+    if (status) return status;
+    unsigned char *const found = base_calloc(pixel_set_bytes(layout.pixel_count), 1);
+    status = composite(comm, &layout, items, background, out, found, statistics, error);
+    if (!status) status = share_overlaps(comm, &layout, found, overlaps, error);
+    if (!overlaps->pixels) base_free(found);
+    return status;
 }

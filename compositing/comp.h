@@ -3,15 +3,22 @@
  * Pixels are owned in turn by ranks (comp_owner: plain arithmetic). Every rank sends each pixel owner its fragments
  * (direct send), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels. Fragments
  * need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The result is a function
- * of the set of fragments alone: not of ranks, of order of arrival, nor of threads. */
+ * of the set of fragments alone: not of ranks, of order of arrival, nor of threads.
+ *
+ * Sorting by t makes the picture where fragments do not overlap. Volume fragments that do, because cells do, can be put
+ * right only by who made them: comp_composite_overlaps() tells the pixels in which they overlap. Volume fragments of no
+ * length at one t are samples of one place and may be any number: they share what all of them absorb in proportion to
+ * what each would, in whatever order. */
 #ifndef COMP_COMP_H
 #define COMP_COMP_H
 
 #include <mpi.h>
+#include <stdbool.h>
 
 #include "error.h"
 #include "fragment.h"
 #include "image.h"
+#include "pixel_set.h"
 
 /* Which rank of ranks owns pixel (of pixel_count pixels)? Runs of consecutive pixels go round, so that an object
  * in the middle of the image is shared out. */
@@ -21,6 +28,11 @@ int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
  * over background (linear premultiplied RGBA). out_rgba gets 4 floats, out_depth the nearest surface's t_in or
  * +infinity. Local; the whole rule of merging is here. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
+
+/* Of a pixel's fragments as comp_merge_pixel() left them: does one begin, in front of what is opaque, where a volume
+ * fragment has not ended? Two volume fragments that hold the same t overlap; so do a volume's that holds a surface's t,
+ * unless it begins there, and that surface. Local. */
+bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
     int64_t sent_fragments; /* by this rank, own ones included */
@@ -34,5 +46,17 @@ typedef struct comp_statistics {
  */
 insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
                              comp_statistics *statistics, base_error *error);
+
+/* Pixels whose fragments overlap; the same on every rank. */
+typedef struct comp_overlaps {
+    int64_t count;
+    unsigned char *pixels; /* pixel_set.h, of the whole image; the caller's to base_free(). NULL where count is 0 */
+} comp_overlaps;
+
+/* The same, and tells every rank the overlaps. Costs one small reduction more, and one of a bit a pixel where there are
+ * any. On an error overlaps is empty. */
+insitu_status comp_composite_overlaps(MPI_Comm comm, fragment_list *items, const float background[4], int threads,
+                                      image *out, comp_overlaps *overlaps, comp_statistics *statistics,
+                                      base_error *error);
 
 #endif

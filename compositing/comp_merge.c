@@ -2,7 +2,11 @@
  *
  * The order is total, down to the last bit of a fragment: what compares equal is the same. So the blend, whose
  * rounding depends on the order, is a function of the set alone. Depth alone decides wherever depths differ;
- * where a surface and a volume begin at the same depth the surface is in front, being the nearer end of a stretch. */
+ * where a surface and a volume begin at the same depth the surface is in front, being the nearer end of a stretch.
+ *
+ * Samples of one place have no order: their media are mixed there. What each absorbs adds up to more than what they
+ * absorb together, 1 - T1 T2 ... Tn, which they share in proportion. In double, so that the shares are no less exact
+ * than the samples. */
 #include "comp.h"
 
 #include <math.h>
@@ -89,14 +93,56 @@ static float nearest_surface(const fragment *sorted, int64_t count)
     return INFINITY;
 }
 
+bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
+{
+    float reach = -INFINITY;
+    for (int64_t i = 0; i < count; i++) {
+        if (sorted[i].t_in <= reach) return true;
+        if (sorted[i].transmittance == 0) return false;
+        if (sorted[i].kind < FRAGMENT_SURFACE && sorted[i].t_out > reach) reach = sorted[i].t_out;
+    }
+    return false;
+}
+
+static bool is_sample(const fragment *f)
+{
+    return f->kind < FRAGMENT_SURFACE && f->t_in == f->t_out;
+}
+
+/* How many samples at the place of the first follow each other? 1 where it is none. */
+static int64_t samples_at(const fragment *sorted, int64_t count)
+{
+    int64_t n = 1;
+    while (n < count && is_sample(&sorted[0]) && is_sample(&sorted[n]) && sorted[n].t_in == sorted[0].t_in) n++;
+    return n;
+}
+
+static fragment mix_samples(const fragment *samples, int64_t count)
+{
+    fragment mixed = samples[0];
+    double colour[3] = {0, 0, 0}, weight = 0, absorbed = 0;
+    for (int64_t i = 0; i < count; i++) {
+        const double own = 1 - (double)samples[i].transmittance;
+        for (int c = 0; c < 3; c++) colour[c] += (double)samples[i].colour[c];
+        weight += own;
+        absorbed += own * (1 - absorbed);
+    }
+    const double share = weight > 0 ? absorbed / weight : 1;
+    for (int c = 0; c < 3; c++) mixed.colour[c] = (float)(colour[c] * share);
+    mixed.transmittance = (float)(1 - absorbed);
+    return mixed;
+}
+
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
 {
     if (count > 1) sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
-    for (int64_t i = 0; i < count && transmittance != 0; i++) {
-        for (int c = 0; c < 3; c++) colour[c] += transmittance * items[i].colour[c];
-        transmittance *= items[i].transmittance;
+    for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
+        n = samples_at(items + i, count - i);
+        const fragment f = n == 1 ? items[i] : mix_samples(items + i, n);
+        for (int c = 0; c < 3; c++) colour[c] += transmittance * f.colour[c];
+        transmittance *= f.transmittance;
     }
     for (int c = 0; c < 3; c++) out_rgba[c] = colour[c] + transmittance * background[c];
     out_rgba[3] = 1 - transmittance + transmittance * background[3];

@@ -31,6 +31,7 @@ typedef struct merging {
     int64_t *pixel_counts; /* slices: of pixels that have fragments */
     image *out;
     comp_pixel *finished;
+    unsigned char *overlaps;
 } merging;
 
 /* One thread's. */
@@ -116,6 +117,12 @@ static void collect_slice(const merging *m, int64_t slice, int64_t count, scratc
     ends[slice_pixels] = count;
 }
 
+/* Atomic, for threads may have pixels of one byte. */
+static void add_overlap(unsigned char *overlaps, uint32_t pixel)
+{
+    __atomic_fetch_or(&overlaps[pixel >> 3], (unsigned char)(1u << (pixel & 7)), __ATOMIC_RELAXED);
+}
+
 static void blend_slice(merging *m, int64_t slice, scratch *own)
 {
     comp_pixel *const first = m->finished ? m->finished + m->pixel_starts[slice] : NULL;
@@ -126,6 +133,7 @@ static void blend_slice(merging *m, int64_t slice, scratch *own)
         if (count == 0) continue;
         comp_pixel pixel = {.pixel = items->pixel};
         comp_merge_pixel(items, count, m->background, pixel.rgba, &pixel.depth);
+        if (m->overlaps && comp_pixel_overlaps(items, count)) add_overlap(m->overlaps, pixel.pixel);
         if (m->out)
             comp_pixels_store(m->out, &pixel);
         else
@@ -183,12 +191,13 @@ static bool merge(merging *m)
 }
 
 insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
-                                const float background[4], image *out, comp_pixel_list *finished, base_error *error)
+                                const float background[4], image *out, comp_pixel_list *finished,
+                                unsigned char *overlaps, base_error *error)
 {
     if (!out) *finished = (comp_pixel_list){NULL, 0};
     if (fragments->count == 0) return INSITU_OK;
     const int64_t owned = comp_layout_owned(layout, rank);
-    merging m = {.layout = layout, .background = background, .out = out};
+    merging m = {.layout = layout, .background = background, .out = out, .overlaps = overlaps};
     m.items = fragments->items;
     m.count = fragments->count;
     m.slice_shift = least_slice_shift;

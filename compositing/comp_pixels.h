@@ -25,9 +25,10 @@ void comp_pixels_clear(const comp_layout *layout, image *out, const float backgr
 void comp_pixels_store(image *out, const comp_pixel *from);
 
 /* Merge the pixels that have fragments; all of fragments belong to pixels that rank owns, and are reordered. Where out
- * is given they are written there, else they become *finished, rising by owned index. Local. On an error
- * *finished is empty, and out may hold some pixels. */
+ * is given they are written there, else they become *finished, rising by owned index. Those whose fragments overlap are
+ * added to overlaps (pixel_set.h; may be NULL). Local. On an error *finished is empty, and out may hold some pixels. */
 insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
-                                const float background[4], image *out, comp_pixel_list *finished, base_error *error);
+                                const float background[4], image *out, comp_pixel_list *finished,
+                                unsigned char *overlaps, base_error *error);
 
 #endif

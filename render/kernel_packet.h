@@ -173,8 +173,9 @@ static inline void kernel_packet_setup(kernel_packet *p, const kernel_frame *f, 
     p->thread = thread;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const int x = x0 + lane % KERNEL_PACKET_COLUMNS, y = y0 + lane / KERNEL_PACKET_COLUMNS;
-        if (x < camera->width && y < camera->height) bits |= 1u << lane;
+        const bool is_inside = x < camera->width && y < camera->height;
         p->pixel[lane] = (uint32_t)y * (uint32_t)camera->width + (uint32_t)x;
+        if (is_inside && (!f->job->pixels || pixel_set_has(f->job->pixels, p->pixel[lane]))) bits |= 1u << lane;
         l.px[lane] = kernel_column(f, x);
         l.py[lane] = kernel_row(f, y);
     }

@@ -86,6 +86,16 @@ SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
     g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
 }
 
+/* A hit in the place of the nearest, as folded cells may have them: compositing decides, by bits that do not know which
+ * cell came first. */
+static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
+                                                             vm tied, vf t, const vf normal[3], const vf colour[3])
+{
+    vf lit[3] = {colour[0], colour[1], colour[2]};
+    kernel_shade(p, &s->layer->material, normal, lit);
+    kernel_emit(p, tied, s->first_kind + (uint32_t)value, vf_set(0), t, t, lit, vf_set(0));
+}
+
 /* Hits at depth t: kept where the nearest, or written at once where the surface is transparent. */
 SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, int value, vm hit, vf t,
                                const vf normal[3], vf w)
@@ -95,6 +105,11 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, in
     vf colour[3];
     kernel_base_colour(s, value, w, colour);
     if (state->is_opaque) {
+        const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
+        if (__builtin_expect(vm_any(tied), 0)) {
+            kernel_emit_tied(p, s, value, tied, t, normal, colour);
+            hit = vm_andnot(hit, tied);
+        }
         p->t_far = vf_select(hit, t, p->t_far);
         hits->found = vm_or(hits->found, hit);
         for (int a = 0; a < 3; a++) {
@@ -119,7 +134,7 @@ SIMD_INLINE vm kernel_changes_sign(const kernel_packet *p, const kernel_interval
 {
     const vf zero = vf_set(0);
     const vm change = vm_xor(vf_lt(i->v_in, zero), vf_lt(i->v_out, zero));
-    return vm_and(vm_and(i->mask, change), vm_and(vf_lt(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
+    return vm_and(vm_and(i->mask, change), vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
 /* Where the line through the ends is zero. */
@@ -130,7 +145,7 @@ SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
 
 SIMD_INLINE vm kernel_visible(const kernel_packet *p, vm hit, vf t)
 {
-    return vm_and(hit, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
+    return vm_and(hit, vm_and(vf_le(p->t_near, t), vf_le(t, p->t_far)));
 }
 
 /* The gradient of a tet's field, by Cramer's rule in double; its length and sign do not matter. */

@@ -4,7 +4,7 @@
  * the N samples are blended front to back, and the next N follow.
  *
  * A sample's place depends on its number and its ray alone, so that every rank means the same samples; each sample
- * has one owner, for neighbours share the bits of t at their face. */
+ * has one owner, for neighbours share the bits of t at their face. Only where cells overlap has it several. */
 #ifndef RENDER_KERNEL_VOLUME_H
 #define RENDER_KERNEL_VOLUME_H
 
@@ -18,6 +18,7 @@ typedef struct kernel_samples {
     int first, count;
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* of the owning interval; only where contact is asked for */
+    vm marked; /* rays of which a sample, in this window or before, has two owners */
 } kernel_samples;
 
 /* A fragment under way on each ray. */
@@ -78,6 +79,27 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
     *end = (int)last;
 }
 
+/* A sample as a fragment of its own, in front of what is opaque. Of a sample that another cell owns too, which marks
+ * its ray (render.h), one a ray is enough, and a clear one beside it makes sure that it overlaps something. */
+static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state, vm mask,
+                                                               vf t, vf value)
+{
+    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    const vf zero = vf_set(0), clear[3] = {zero, zero, zero};
+    vf absorbed, colour[3];
+    const vf left = kernel_transmittance(kernel_opacity(transfer, value), transfer->exponent, &absorbed);
+    kernel_table_colour(transfer, value, colour);
+    for (int a = 0; a < 3; a++) colour[a] *= absorbed;
+    mask = vm_and(mask, vm_and(vf_lt(t, p->t_far), vf_lt(zero, absorbed)));
+    if (!p->frame->job->separate_samples) {
+        mask = vm_andnot(mask, state->samples->marked);
+        state->samples->marked = vm_or(state->samples->marked, mask);
+        kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, clear, vf_set(1));
+    }
+    kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, colour, left);
+}
+
+/* A sample that another cell owns too stays the other's. */
 SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
                              const kernel_interval *i)
 {
@@ -88,11 +110,17 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
     for (int n = begin; n < end; n++) {
         const vf t = kernel_sample_t(p, s->first + n);
-        const vm own = vm_and(i->mask, vm_andnot(vf_lt(t, i->t_out), vf_lt(t, i->t_in)));
+        vm own = vm_and(i->mask, vm_andnot(vf_lt(t, i->t_out), vf_lt(t, i->t_in)));
         if (!vm_any(own)) continue;
         vf value = i->v_in + slope * (t - i->t_in);
         if (map) value = kernel_value_at(p, map, i, own, t);
-        s->value[state->volume][n] = vf_select(own, value, s->value[state->volume][n]);
+        const vf kept = s->value[state->volume][n];
+        const vm apart = vm_and(own, vf_eq(kept, kept));
+        if (__builtin_expect(vm_any(apart), 0)) {
+            kernel_emit_sample(p, state, apart, t, value);
+            own = vm_andnot(own, apart);
+        }
+        s->value[state->volume][n] = vf_select(own, value, kept);
         if (p->frame->needs_contact) {
             s->t_in[n] = vf_select(own, i->t_in, s->t_in[n]);
             s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);
@@ -239,6 +267,9 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
     kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
     int first, last;
     if (!kernel_sample_range(p, &first, &last)) return;
+    /* Where samples are separate, all places count as taken, and what is there is not looked at. */
+    const vf nothing = vf_set(f->job->separate_samples ? 0 : NAN);
+    s.marked = vm_none();
     b.contact_in = b.contact_out = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] = vf_set(0);
     for (; first <= last; first += f->job->sample_group) {
         s.first = first;
@@ -250,13 +281,13 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
         const vm active = p->active;
         p->active = lit;
         for (int v = 0; v < f->volume_count; v++) {
-            for (int n = 0; n < s.count; n++) s.value[v][n] = vf_set(NAN);
+            for (int n = 0; n < s.count; n++) s.value[v][n] = nothing;
             kernel_volume_state state = {v, &s};
             kernel_trace_parts(p, &f->job->volumes[v].field, &f->volumes[v].interest, t_first, &t_end,
                                kernel_volume_leaf, &state);
         }
         p->active = active;
-        kernel_blend_window(p, &b, &s, hits);
+        if (!f->job->separate_samples) kernel_blend_window(p, &b, &s, hits);
     }
     kernel_blend_close(p, &b, p->active);
 }

@@ -6,12 +6,20 @@
  * stand at distances (k + jitter) * step from the eye (perspective) or the eye's plane (orthographic), k = 0, 1, ...
  *
  * What a frame makes is a function of the cells and the job alone: not of the rank that holds a cell, of the order of
- * the cells, of the trees, nor of the number of threads. */
+ * the cells, of the trees, nor of the number of threads.
+ *
+ * Where cells overlap, each contributes its own sample: samples at one place, of several cells as of several volumes,
+ * share what all of them absorb in proportion to what each would. One rank cannot know which cells of others overlap
+ * its own. So a frame keeps one cell's sample and marks the ray, by a further one as a fragment of its own at the same
+ * depth; compositing finds the pixels in which fragments overlap (comp.h), whoever made them; and these are traced
+ * again with separate_samples, which leaves the sharing to compositing. What a frame makes of such pixels otherwise is
+ * not the picture. */
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 
 #include "fragment.h"
 #include "mmbvh.h"
+#include "pixel_set.h"
 
 typedef struct render_camera {
     double eye[3];
@@ -109,11 +117,14 @@ typedef struct render_job {
     bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
     int frame;        /* 0 .. : which of the accumulated frames this is */
     bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */
-    int threads;      /* >= 1; 0: as many as OpenMP would take */
+    /* The pixels to trace (pixel_set.h); NULL: all. */
+    const unsigned char *pixels;
+    bool separate_samples; /* every cell's every sample of every volume becomes a fragment, of no length */
+    int threads;           /* >= 1; 0: as many as OpenMP would take */
 } render_job;
 
 typedef struct render_statistics {
-    int64_t rays;
+    int64_t rays; /* traced: one a pixel */
     int64_t map_failures;
     double surface_ms, volume_ms;
 } render_statistics;

@@ -81,7 +81,8 @@ static insitu_status trace_frame(const kernel_frame *frame, fragment_list *lists
         return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments of %d x %d pixels",
                          frame->job->camera.width, frame->job->camera.height);
     if (statistics) {
-        statistics->rays = (int64_t)frame->job->camera.width * frame->job->camera.height;
+        const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
+        statistics->rays = frame->job->pixels ? pixel_set_count(frame->job->pixels, pixels) : pixels;
         statistics->map_failures = failures;
         statistics->surface_ms = 1e3 * surface;
         statistics->volume_ms = 1e3 * volume;

@@ -64,6 +64,17 @@ static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_
     }
 }
 
+/* Is one of the packet's pixels to be traced? */
+static bool is_wanted(const render_job *job, int x0, int y0)
+{
+    const int x1 = x0 + KERNEL_PACKET_COLUMNS, y1 = y0 + KERNEL_PACKET_ROWS;
+    if (!job->pixels) return true;
+    for (int y = y0; y < y1 && y < job->camera.height; y++)
+        for (int x = x0; x < x1 && x < job->camera.width; x++)
+            if (pixel_set_has(job->pixels, (int64_t)y * job->camera.width + x)) return true;
+    return false;
+}
+
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
     const render_camera *camera = &f->job->camera;
@@ -72,7 +83,7 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     kernel_tile_setup(&tile, f, x0, y0);
     for (int y = y0; y < y0 + KERNEL_TILE && y < camera->height; y += KERNEL_PACKET_ROWS)
         for (int x = x0; x < x0 + KERNEL_TILE && x < camera->width; x += KERNEL_PACKET_COLUMNS)
-            trace_packet(f, &tile, thread, x, y);
+            if (is_wanted(f->job, x, y)) trace_packet(f, &tile, thread, x, y);
 }
 
 const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_cache), trace_tile};

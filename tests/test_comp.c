@@ -376,6 +376,76 @@ static void bucket_by_slice_sorts_by_owned_index(void **context)
     }
 }
 
+/* In whatever order: they absorb together what light passes none of them, each in proportion to its own. */
+static void samples_of_one_place_share_what_they_absorb(void **context)
+{
+    (void)context;
+    state = 9;
+    for (int count = 1; count <= 20; count++) {
+        fragment items[20];
+        double colour[3] = {0, 0, 0}, through = 1, weight = 0;
+        float rgba[4], depth;
+        for (int i = 0; i < count; i++) {
+            items[i] = random_fragment();
+            items[i].kind = FRAGMENT_VOLUME;
+            items[i].t_in = items[i].t_out = 3;
+            for (int c = 0; c < 3; c++) colour[c] += (double)items[i].colour[c];
+            through *= (double)items[i].transmittance;
+            weight += 1 - (double)items[i].transmittance;
+        }
+        comp_merge_pixel(items, count, black, rgba, &depth);
+        const double share = weight > 0 ? (1 - through) / weight : 1;
+        for (int c = 0; c < 3; c++) assert_true(fabs((double)rgba[c] - colour[c] * share) <= tolerance(1));
+        assert_true(fabs((double)rgba[3] - (1 - through)) <= tolerance(1));
+    }
+}
+
+static bool do_overlap(const fragment *given, int count)
+{
+    fragment items[4];
+    float rgba[4], depth;
+    memcpy(items, given, (size_t)count * sizeof *items);
+    comp_merge_pixel(items, count, black, rgba, &depth);
+    return comp_pixel_overlaps(items, count);
+}
+
+static void overlaps_are_where_a_volume_has_not_ended(void **context)
+{
+    (void)context;
+    enum { V = FRAGMENT_VOLUME, S = FRAGMENT_SURFACE };
+    const struct {
+        int count;
+        fragment items[3];
+        bool overlap;
+    } cases[] = {
+        {0, {{0}}, false},
+        {1, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f, .kind = V}}, false},
+        {2, {{.t_in = 2, .t_out = 3, .transmittance = 0.5f}, {.t_in = 0, .t_out = 1, .transmittance = 0.5f}}, false},
+        {2, {{.t_in = 1, .t_out = 3, .transmittance = 0.5f}, {.t_in = 0, .t_out = 1, .transmittance = 0.5f}}, true},
+        {2, {{.t_in = 1, .t_out = 1, .transmittance = 0.5f}, {.t_in = 1, .t_out = 1, .transmittance = 1}}, true},
+        /* within a long one, behind a short one */
+        {3,
+         {{.t_in = 0, .t_out = 9, .transmittance = 0.5f},
+          {.t_in = 1, .t_out = 2, .transmittance = 0.5f},
+          {.t_in = 4, .t_out = 5, .transmittance = 0.5f}},
+         true},
+        /* surfaces: in front of, within, at the last sample of, behind a volume; two in one place */
+        {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {1, 1, 1, {0}, 0.5f, S}}, false},
+        {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 1.5f, 1.5f, {0}, 0.5f, S}}, true},
+        {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 2, 2, {0}, 0, S}}, true},
+        {2, {{.t_in = 1, .t_out = 2, .transmittance = 0.5f}, {0, 3, 3, {0}, 0, S}}, false},
+        {2, {{0, 1, 1, {0}, 0.5f, S}, {0, 1, 1, {0}, 0.5f, S + 1}}, false},
+        /* nothing shows behind what is opaque */
+        {3,
+         {{0, 1, 1, {0}, 0, S},
+          {.t_in = 2, .t_out = 4, .transmittance = 0.5f},
+          {.t_in = 3, .t_out = 5, .transmittance = 0.5f}},
+         false},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        if (do_overlap(cases[i].items, cases[i].count) != cases[i].overlap) fail_msg("case %d", (int)i);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -387,6 +457,8 @@ int main(void)
         cmocka_unit_test(depth_is_of_the_surface_though_fog_is_opaque),
         cmocka_unit_test(joining_neighbours_changes_rounding_alone),
         cmocka_unit_test(permutations_give_the_same_bits),
+        cmocka_unit_test(samples_of_one_place_share_what_they_absorb),
+        cmocka_unit_test(overlaps_are_where_a_volume_has_not_ended),
         cmocka_unit_test(owners_share_all_pixels_evenly),
         cmocka_unit_test(owners_of_the_largest_image_add_up),
         cmocka_unit_test(bucket_by_owner_keeps_the_set),

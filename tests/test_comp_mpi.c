@@ -167,6 +167,57 @@ static void composite_equals_serial_merge(void **context)
                 check_composite(sizes[s][0], sizes[s][1], counts[c], how, seed++);
 }
 
+/* Every pair of every pixel; nothing is opaque here. */
+static void find_overlaps(const fragment *all, uint32_t count, unsigned char *pixels)
+{
+    for (uint32_t i = 0; i < count; i++)
+        for (uint32_t j = 0; j < count; j++) {
+            const fragment *a = &all[i], *b = &all[j];
+            if (i == j || a->pixel != b->pixel || a->kind >= FRAGMENT_SURFACE) continue;
+            const bool is_behind = b->kind < FRAGMENT_SURFACE ? b->t_in >= a->t_in : b->t_in > a->t_in;
+            if (is_behind && b->t_in <= a->t_out) pixel_set_add(pixels, a->pixel);
+        }
+}
+
+static void check_overlaps(int width, int height, uint32_t count, dealing how, uint32_t seed)
+{
+    const int64_t pixel_count = (int64_t)width * height, held = base_memory_held();
+    fragment *all = base_alloc(count * sizeof *all);
+    unsigned char *expected = base_calloc(pixel_set_bytes(pixel_count), 1);
+    assert_true(all && expected);
+    for (uint32_t i = 0; i < count; i++) {
+        all[i] = make_fragment(i, seed, (uint32_t)pixel_count);
+        assert_true(all[i].transmittance > 0);
+    }
+    find_overlaps(all, count, expected);
+    const int64_t wanted = pixel_set_count(expected, pixel_count);
+    setting s = make_setting(width, height, count, how, seed);
+    comp_overlaps found;
+    const insitu_status status =
+        comp_composite_overlaps(comm, &s.own, background, 0, &s.out, &found, NULL, &(base_error){0});
+    assert_everywhere(status == INSITU_OK && found.count == wanted, "all overlaps are found");
+    assert_everywhere(wanted ? !memcmp(found.pixels, expected, pixel_set_bytes(pixel_count)) : !found.pixels,
+                      "all ranks know the pixels");
+    assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
+    free_setting(&s);
+    base_free(found.pixels);
+    base_free(all);
+    base_free(expected);
+    assert_everywhere(base_memory_held() == held, "nothing is left allocated");
+}
+
+static void overlaps_are_told_to_all(void **context)
+{
+    (void)context;
+    const int sizes[][2] = {{1, 1}, {1, 7}, {65, 3}, {101, 67}};
+    const uint32_t counts[] = {0, 1, 2, 50, 1500};
+    uint32_t seed = 5001;
+    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
+        for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
+            for (dealing how = deal_random; how <= deal_all_to_last; how++)
+                check_overlaps(sizes[s][0], sizes[s][1], counts[c], how, seed++);
+}
+
 /* More pixels than 512 slices of 256 a rank, so that slices grow, and fewer fragments than pixels. */
 static void large_image_equals_serial_merge(void **context)
 {
@@ -212,7 +263,7 @@ static void long_messages_are_cut(void **context)
     image *const here = own_rank == 0 ? &s.out : NULL;
     comp_pixel_list finished = {NULL, 0};
     if (here) comp_pixels_clear(&layout, here, background);
-    status = comp_pixels_merge(&layout, own_rank, &owned, background, here, &finished, NULL);
+    status = comp_pixels_merge(&layout, own_rank, &owned, background, here, &finished, NULL, NULL);
     assert_everywhere(status == INSITU_OK, "merge succeeds");
     status = comp_gather(comm, &finished, 5, &s.out, &bytes, NULL);
     assert_everywhere(status == INSITU_OK, "gather in messages of 5 succeeds");
@@ -282,6 +333,7 @@ int main(int argc, char **argv)
     MPI_Comm_size(comm, &rank_count);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(composite_equals_serial_merge),
+        cmocka_unit_test(overlaps_are_told_to_all),
         cmocka_unit_test(large_image_equals_serial_merge),
         cmocka_unit_test(statistics_count_what_travelled),
         cmocka_unit_test(long_messages_are_cut),

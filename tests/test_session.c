@@ -325,6 +325,54 @@ static void meshes_of_many_names_make_one_picture(void **context)
     for (int half = 0; half < 2; half++) input_free(&halves[half]);
 }
 
+static bool warns_of_overlaps(const insitu_session *session)
+{
+    return strstr(insitu_last_report(session)->warnings, "where cells overlap") != NULL;
+}
+
+/* Two meshes in one place, both on one rank or dealt: one picture, and a warning on every rank. */
+static void overlapping_meshes_make_one_picture(void **context)
+{
+    (void)context;
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("a", "1", VOLUME, "    sampling: {frames: 2}\n")));
+    session_input whole[2], dealt[2];
+    caught_picture first = {0};
+    for (int i = 0; i < 2; i++) {
+        const test_mesh_kind kind = i ? TEST_TETS : TEST_HEXES;
+        input_create(&whole[i], kind, 3 + i, TEST_BLOCK, 0, 1);
+        input_create(&dealt[i], kind, 3 + i, TEST_RANDOM, own_rank, rank_count);
+    }
+    for (int turn = 0; turn < 2; turn++) {
+        const session_input *in = turn ? dealt : whole;
+        for (int i = 0; i < 2; i++) {
+            const bool has_part = turn || own_rank == rank_count - 1;
+            const char *const name = i ? "tets" : "hexes";
+            everywhere(insitu_set_mesh(session, name, has_part ? &in[i].mesh : NULL) == INSITU_OK);
+            everywhere(!has_part || insitu_set_field(session, name, &in[i].field) == INSITU_OK);
+        }
+        step_draws(session, turn, 1);
+        everywhere(warns_of_overlaps(session));
+        if (own_rank != 0 || turn) continue;
+        first = caught[0];
+        caught_count = 0;
+    }
+    double worst = 0;
+    for (int i = 0; own_rank == 0 && i < 24 * 16 * 4; i++)
+        worst = fmax(worst, fabs((double)first.rgba[i] - (double)caught[0].rgba[i]));
+    everywhere(worst <= 1e-6 && (own_rank != 0 || covered_pixels(&first) > 20));
+    everywhere(insitu_set_mesh(session, "tets", NULL) == INSITU_OK);
+    step_draws(session, 2, 1);
+    everywhere(!warns_of_overlaps(session));
+    free(first.rgba);
+    free(first.depth);
+    insitu_destroy(&session);
+    for (int i = 0; i < 2; i++) {
+        input_free(&whole[i]);
+        input_free(&dealt[i]);
+    }
+}
+
 static void constant_fields_are_drawn(void **context)
 {
     (void)context;
@@ -546,6 +594,7 @@ static int run(void)
         cmocka_unit_test(no_cells_anywhere_give_the_background),
         cmocka_unit_test(cells_of_one_rank_are_seen),
         cmocka_unit_test(meshes_of_many_names_make_one_picture),
+        cmocka_unit_test(overlapping_meshes_make_one_picture),
         cmocka_unit_test(constant_fields_are_drawn),
         cmocka_unit_test(missing_field_leaves_the_other_picture),
         cmocka_unit_test(component_that_is_not_there_is_named),

@@ -11,7 +11,8 @@
  *     session_plan.c       due images to the scalars they need; nothing else is computed from here on
  *     session_recentre.c   cell values to vertices, where an isosurface wants them (session_exchange.c: over ranks)
  *     session_tree.c       trees and ranges
- *     session_draw.c       frames, compositing, outputs (session_view.c: camera, lights, transfer functions)
+ *     session_draw.c       frames, outputs (session_view.c: camera, lights, transfer functions)
+ *     session_frame.c      one frame: tracing, compositing, pixels where cells overlap
  *     session_report.c     what was done */
 #ifndef SESSION_SESSION_H
 #define SESSION_SESSION_H

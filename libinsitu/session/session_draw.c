@@ -6,15 +6,18 @@
 
 #include <stdint.h>
 
-#include "comp.h"
 #include "memory.h"
 #include "session_agree.h"
+#include "session_frame.h"
 #include "session_image.h"
 #include "session_layers.h"
 #include "session_plan.h"
 #include "session_recentre.h"
 #include "session_tree.h"
 #include "session_view.h"
+
+/* Of pixels where cells overlap, on all ranks together, at once: 128 MiB. */
+enum { overlap_fragments = 1 << 22 };
 
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. */
 typedef struct canvas {
@@ -90,39 +93,40 @@ static render_job make_job(const insitu_session *session, const scene_image *ima
                         .threads = session->threads};
 }
 
-static insitu_status draw_frame(insitu_session *session, const render_job *job, const scene_image *image,
-                                canvas *target, base_error *error)
+static void report_frame(insitu_report *report, const session_frame *frame)
 {
-    fragment_list fragments = {0};
-    render_statistics rendered = {0};
-    comp_statistics composited = {0};
-    if (job->part_count > 0) render_frame(job, &fragments, &rendered, error);
-    const double start = MPI_Wtime();
-    insitu_status status = session_agree(session->comm, error);
-    if (status == INSITU_OK)
-        status = comp_composite(session->comp_comm, &fragments, image->background, session->threads, &target->frame,
-                                &composited, error);
-    if (status) status = session_agree_as_is(session->comm, error); /* compositing agrees on the status alone */
-    base_free(fragments.items);
-    insitu_report *report = &session->report;
-    report->rays += rendered.rays;
-    report->map_failures += rendered.map_failures;
-    report->surface_ms += rendered.surface_ms;
-    report->volume_ms += rendered.volume_ms;
-    report->fragments += composited.sent_fragments;
-    report->composite_ms += 1e3 * (MPI_Wtime() - start);
-    return status;
+    report->rays += frame->rays;
+    report->map_failures += frame->map_failures;
+    report->surface_ms += frame->surface_ms;
+    report->volume_ms += frame->volume_ms;
+    report->fragments += frame->fragments;
+    report->composite_ms += frame->composite_ms;
+}
+
+static void warn_of_overlaps(insitu_session *session, const scene_image *image, int64_t pixels)
+{
+    if (pixels)
+        session_text_add(&session->warnings,
+                         "image \"%s\": %lld pixels where cells overlap: each cell adds its own volume (are ghost "
+                         "cells flagged?)",
+                         image->name, (long long)pixels);
 }
 
 static insitu_status draw_frames(insitu_session *session, const scene_image *image, const session_view *view,
                                  const session_layers *layers, canvas *target, base_error *error)
 {
     render_job job = make_job(session, image, view, layers);
+    int64_t overlaps = 0;
     for (job.frame = 0; job.frame < image->frames; job.frame++) {
-        const insitu_status status = draw_frame(session, &job, image, target, error);
+        session_frame frame;
+        const insitu_status status = session_draw_frame(session->comm, session->comp_comm, &job, image->background,
+                                                        overlap_fragments, &target->frame, &frame, error);
+        report_frame(&session->report, &frame);
         if (status) return status;
+        if (frame.overlaps > overlaps) overlaps = frame.overlaps;
         if (target->sum) add_frame(target, session->threads);
     }
+    warn_of_overlaps(session, image, overlaps);
     if (target->sum) average_frames(target, image->frames, session->threads);
     if (session->rank == 0) scale_depths(target, &view->space, session->threads);
     return INSITU_OK;

@@ -1,0 +1,131 @@
+/* A frame, and the second look at its pixels where cells overlap.
+ *
+ * Fragments that overlap cannot be sorted into a picture, and the ranks that made them have thrown away what it would
+ * take: where each sample stood. So these pixels, which compositing finds and tells all ranks, are traced once more
+ * with every sample on its own (render.h), composited beside the picture, and take their place in it. In a mesh whose
+ * cells overlap here and there that is a few pixels more. Two meshes that fill the same space may make a thousand
+ * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as all ranks together hold the
+ * fragments of. */
+#include "session_frame.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+
+typedef struct frame_target {
+    MPI_Comm comm, comp_comm;
+    const float *background;
+    session_frame *frame;
+} frame_target;
+
+static insitu_status draw(const frame_target *t, const render_job *job, image *out, comp_overlaps *overlaps,
+                          base_error *error)
+{
+    fragment_list fragments = {0};
+    render_statistics rendered = {0};
+    comp_statistics composited = {0};
+    if (job->part_count > 0) render_frame(job, &fragments, &rendered, error);
+    const double start = MPI_Wtime();
+    insitu_status status = session_agree(t->comm, error);
+    if (status == INSITU_OK && overlaps)
+        status = comp_composite_overlaps(t->comp_comm, &fragments, t->background, job->threads, out, overlaps,
+                                         &composited, error);
+    else if (status == INSITU_OK)
+        status = comp_composite(t->comp_comm, &fragments, t->background, job->threads, out, &composited, error);
+    if (status) status = session_agree_as_is(t->comm, error); /* compositing agrees on the status alone */
+    base_free(fragments.items);
+    t->frame->rays += rendered.rays;
+    t->frame->map_failures += rendered.map_failures;
+    t->frame->fragments += composited.sent_fragments;
+    t->frame->surface_ms += rendered.surface_ms;
+    t->frame->volume_ms += rendered.volume_ms;
+    t->frame->composite_ms += 1e3 * (MPI_Wtime() - start);
+    return status;
+}
+
+/* ---- overlaps ------------------------------------------------------------------------------------------------ */
+
+/* Samples that a ray may have: the scene's extent is near 1 in scaled units, and at most sqrt(3) times that long. */
+static int64_t turn_pixels(const render_job *job, int64_t fragment_limit)
+{
+    const double samples = 2 * job->volume_count / (job->step * job->space.scale) + 1;
+    const double pixels = (double)fragment_limit / samples;
+    return pixels > 1 ? (int64_t)pixels : 1;
+}
+
+/* The next pixels of a set, at most so many; returns where to go on. */
+static int64_t take_pixels(const unsigned char *from, int64_t first, int64_t end, int64_t most, unsigned char *taken)
+{
+    memset(taken, 0, pixel_set_bytes(end));
+    for (; first < end && most > 0; first++)
+        if (pixel_set_has(from, first)) {
+            pixel_set_add(taken, first);
+            most--;
+        }
+    return first;
+}
+
+static void copy_pixels(const unsigned char *pixels, const image *from, image *to)
+{
+    const int64_t count = (int64_t)to->width * to->height;
+    for (int64_t p = 0; p < count; p++) {
+        if (!pixel_set_has(pixels, p)) continue;
+        memcpy(to->rgba + 4 * p, from->rgba + 4 * p, 4 * sizeof *to->rgba);
+        to->depth[p] = from->depth[p];
+    }
+}
+
+static insitu_status redraw(const frame_target *t, const render_job *job, int64_t fragment_limit,
+                            const comp_overlaps *overlaps, unsigned char *turn, image *beside, image *out,
+                            base_error *error)
+{
+    const int64_t end = (int64_t)out->width * out->height, most = turn_pixels(job, fragment_limit);
+    render_job again = *job;
+    again.pixels = turn;
+    again.separate_samples = true;
+    for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
+        at = take_pixels(overlaps->pixels, at, end, most, turn);
+        const insitu_status status = draw(t, &again, beside, NULL, error);
+        if (status) return status;
+        if (beside->rgba) copy_pixels(turn, beside, out);
+    }
+    return INSITU_OK;
+}
+
+/* Rank 0 makes a second picture, all a set of pixels. */
+static insitu_status draw_overlaps(const frame_target *t, const render_job *job, int64_t fragment_limit,
+                                   const comp_overlaps *overlaps, image *out, base_error *error)
+{
+    const int64_t pixels = (int64_t)out->width * out->height;
+    image beside = {.width = out->width, .height = out->height};
+    unsigned char *turn = base_alloc(pixel_set_bytes(pixels));
+    int rank = 0;
+    MPI_Comm_rank(t->comm, &rank);
+    if (rank == 0) {
+        beside.rgba = base_alloc((size_t)pixels * 4 * sizeof *beside.rgba);
+        beside.depth = base_alloc((size_t)pixels * sizeof *beside.depth);
+    }
+    if (!turn || (rank == 0 && (!beside.rgba || !beside.depth)))
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld pixels in which cells overlap",
+                  (long long)overlaps->count);
+    insitu_status status = session_agree(t->comm, error);
+    if (!status) status = redraw(t, job, fragment_limit, overlaps, turn, &beside, out, error);
+    base_free(turn);
+    base_free(beside.rgba);
+    base_free(beside.depth);
+    return status;
+}
+
+insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render_job *job, const float background[4],
+                                 int64_t fragment_limit, image *out, session_frame *frame, base_error *error)
+{
+    *frame = (session_frame){0};
+    const frame_target t = {comm, comp_comm, background, frame};
+    comp_overlaps overlaps = {0};
+    insitu_status status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
+    frame->overlaps = overlaps.count;
+    if (!status && overlaps.count) status = draw_overlaps(&t, job, fragment_limit, &overlaps, out, error);
+    base_free(overlaps.pixels);
+    return status;
+}

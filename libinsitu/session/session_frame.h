@@ -1,0 +1,21 @@
+/* One frame on all ranks: traced, composited, and put right where cells overlap. */
+#ifndef SESSION_FRAME_H
+#define SESSION_FRAME_H
+
+#include "comp.h"
+#include "render.h"
+
+/* What a frame took on this rank, but for overlaps, which is the same on every rank. */
+typedef struct session_frame {
+    int64_t rays, map_failures, fragments;
+    double surface_ms, volume_ms, composite_ms;
+    int64_t overlaps; /* pixels in which cells overlap */
+} session_frame;
+
+/* Draw one frame of the job, which differs between ranks in its parts alone, into out (comp.h). fragment_limit is for
+ * all ranks together: more pixels in which cells overlap than make so many fragments are drawn in turns; the same on
+ * every rank. comp_comm is compositing's own. Collective; returns the same on all ranks. */
+insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render_job *job, const float background[4],
+                                 int64_t fragment_limit, image *out, session_frame *frame, base_error *error);
+
+#endif

@@ -1,0 +1,338 @@
+/* Cells that overlap, on any number of ranks: each adds its own sample. Two lattices in one another, and lattices whose
+ * vertices were thrown about, dealt to ranks at random, must make the picture that one rank makes and that the
+ * brute-force renderer makes, which knows nothing of cells' neighbours: it collects the samples of all cells. Meshes
+ * that do not overlap must not have a single pixel that is drawn twice.
+ *
+ * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+#include "session_frame.h"
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+typedef enum scene_kind { VOLUME, OPAQUE_VOLUME, TRANSPARENT_VOLUME, TWO_VOLUMES, SCENE_COUNT } scene_kind;
+
+enum { WIDTH = 67, HEIGHT = 51, PIXELS = WIDTH * HEIGHT, SIDE = 4, MANY = 1 << 22 };
+
+static int my_rank, rank_count;
+
+/* ---- meshes -------------------------------------------------------------------------------------------------- */
+
+static void *grown(void *block, int64_t count, size_t size, const void *more, int64_t more_count)
+{
+    char *p = realloc(block, (size_t)(count + more_count) * size);
+    assert_non_null(p);
+    memcpy(p + (size_t)count * size, more, (size_t)more_count * size);
+    return p;
+}
+
+/* The cells of both; more is freed. */
+static void join(test_mesh *mesh, test_mesh *more)
+{
+    for (int64_t i = 0; i < more->connectivity_count; i++) more->connectivity[i] += mesh->vertex_count;
+    for (int64_t i = 0; i <= more->cell_count; i++) more->offsets[i] += mesh->connectivity_count;
+    mesh->coordinates = grown(mesh->coordinates, 3 * mesh->vertex_count, 8, more->coordinates, 3 * more->vertex_count);
+    mesh->values = grown(mesh->values, mesh->vertex_count, 8, more->values, more->vertex_count);
+    mesh->connectivity =
+        grown(mesh->connectivity, mesh->connectivity_count, 8, more->connectivity, more->connectivity_count);
+    mesh->offsets = grown(mesh->offsets, mesh->cell_count, 8, more->offsets, more->cell_count + 1);
+    mesh->types = grown(mesh->types, mesh->cell_count, 1, more->types, more->cell_count);
+    mesh->ghosts = grown(mesh->ghosts, mesh->cell_count, 1, more->ghosts, more->cell_count);
+    mesh->vertex_count += more->vertex_count;
+    mesh->cell_count += more->cell_count;
+    mesh->connectivity_count += more->connectivity_count;
+    test_mesh_free(more);
+}
+
+/* A lattice, and in it a smaller one of the next kind with another field. */
+static void interpenetrating(test_mesh_kind kind, test_mesh *out)
+{
+    test_mesh inner;
+    test_mesh_lattice(kind, SIDE, 0.2, test_wave, out);
+    test_mesh_lattice((kind + 1) % TEST_KIND_COUNT, 3, 0.2, test_linear, &inner);
+    test_mesh_transform(&inner, 0.6, (const double[]){0.3, 0.25, -0.2});
+    join(out, &inner);
+}
+
+/* A lattice of which every third vertex is somewhere else: cells turned inside out, in their neighbours and theirs. */
+static void tangled(test_mesh_kind kind, test_mesh *out)
+{
+    test_mesh_lattice(kind, SIDE, 0.2, test_wave, out);
+    for (int64_t v = 0; v < out->vertex_count; v += 3)
+        for (int a = 0; a < 3; a++) {
+            double *x = &out->coordinates[3 * v + a];
+            *x = fmin(fmax(*x + test_uniform((uint64_t)(3 * v + a), 5) - 0.5, -1), 1);
+        }
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------ */
+
+typedef struct drawing {
+    scene_kind scene;
+    fixture_camera camera;
+    int frame;
+    int64_t fragment_limit;
+} drawing;
+
+static const double surface_values[2] = {-0.2, 0.3};
+static const double ramp_values[2] = {-0.5, 1};
+static const float ramp_opacities[2] = {0, 0.6f};
+
+typedef struct staged {
+    render_fixture f;
+    render_transfer second;
+    render_volume_layer volumes[2];
+} staged;
+
+static void stage(staged *s, const test_mesh *mesh, const drawing *d)
+{
+    fixture_create(&s->f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
+                   (const double[]){0, 0, 0});
+    fixture_look(&s->f, d->camera, WIDTH, HEIGHT);
+    if (d->scene == OPAQUE_VOLUME || d->scene == TRANSPARENT_VOLUME)
+        fixture_add_surface(&s->f, surface_values, 2, d->scene == OPAQUE_VOLUME ? 1 : 0.4f);
+    fixture_set_volume(&s->f, 0.3);
+    s->f.job.frame = d->frame;
+    if (d->scene != TWO_VOLUMES) return;
+    s->second = s->f.transfer;
+    s->second.opacity_count = 2;
+    s->second.opacity_values = ramp_values;
+    s->second.opacities = ramp_opacities;
+    s->volumes[0] = s->volumes[1] = s->f.volume;
+    s->volumes[1].transfer = &s->second;
+    s->f.job.volumes = s->volumes;
+    s->f.job.volume_count = 2;
+}
+
+static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool is_alone, image *out)
+{
+    staged s;
+    session_frame frame;
+    base_error error = {0};
+    *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float))};
+    stage(&s, mesh, d);
+    s.f.job.is_alone = is_alone;
+    if (session_draw_frame(comm, comm, &s.f.job, fixture_background, d->fragment_limit, out, &frame, &error))
+        fail_msg("session_draw_frame: %s", error.message);
+    fixture_free(&s.f);
+    return frame.overlaps;
+}
+
+static void free_image(image *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+/* As the session would: the share of this rank, drawn by all. */
+static int64_t draw_shares(const test_mesh *mesh, test_partition_kind partition, const drawing *d, image *out)
+{
+    test_mesh share;
+    int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
+    test_partition(mesh, partition, SIDE, rank_count, owners);
+    test_mesh_part(mesh, owners, my_rank, &share);
+    const int64_t overlaps = draw(&share, d, MPI_COMM_WORLD, rank_count == 1, out);
+    test_mesh_free(&share);
+    free(owners);
+    return overlaps;
+}
+
+static void assert_everywhere(bool is_well)
+{
+    int mine = is_well, all = 0;
+    MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    assert_true(all);
+}
+
+/* ---- comparisons --------------------------------------------------------------------------------------------- */
+
+/* Samples of one place mix alike whoever made them; elsewhere "over" rounds in other groups, to 1e-6. */
+static bool same_images(const image *whole, const image *other, const drawing *d, const char *what)
+{
+    int depths = 0;
+    double colour = 0;
+    for (int p = 0; p < PIXELS; p++) {
+        depths += memcmp(whole->depth + p, other->depth + p, sizeof(float)) != 0;
+        for (int c = 0; c < 4; c++) {
+            const double off = fabs((double)whole->rgba[4 * p + c] - (double)other->rgba[4 * p + c]);
+            if (!(off <= colour)) colour = off;
+        }
+    }
+    if (depths || !(colour <= 1e-6))
+        fprintf(stderr, "%s, %d ranks, scene %d: %d depths differ, colour by %g\n", what, rank_count, (int)d->scene,
+                depths, colour);
+    return !depths && colour <= 1e-6;
+}
+
+/* May rounding turn one of the ray's decisions, or has its root finder more than one answer? */
+static bool is_doubtful(const reference_ray *ray)
+{
+    const double margin = fixture_usual_bounds.margin;
+    if (ray->ambiguous || ray->map_failed || ray->edge_margin < margin || ray->value_margin < margin ||
+        ray->sample_margin < margin || ray->eye_margin < margin)
+        return true;
+    for (int i = 0; i < ray->hit_count; i++)
+        if (ray->hits[i].falsi_error > 1e-6) return true;
+    return false;
+}
+
+/* Cells that overlap have many surfaces and faces in a pixel: a tenth of the rays may be in doubt, of which map_failed
+ * and ambiguous ones are the most. */
+static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
+{
+    staged s;
+    stage(&s, mesh, d);
+    reference_scene *scene = reference_create(&s.f.job);
+    int doubtful = 0, wrong = 0;
+    double worst = 0;
+    for (int p = 0; p < PIXELS; p++) {
+        reference_ray ray;
+        double off = 0;
+        reference_trace(scene, p % WIDTH, p / WIDTH, fixture_background, &ray);
+        for (int c = 0; c < 4; c++) off = fmax(off, fabs((double)drawn->rgba[4 * p + c] - ray.rgba[c]));
+        if (is_doubtful(&ray)) {
+            doubtful++;
+            continue;
+        }
+        wrong += !(off <= fixture_usual_bounds.colour);
+        worst = fmax(worst, off);
+    }
+    reference_free(scene);
+    fixture_free(&s.f);
+    if (getenv("INSITU_TEST_VERBOSE") || wrong || doubtful > PIXELS / 10)
+        fprintf(stderr, "%s, %d ranks, scene %d: %d pixels are not as counted, worst %g; %d in doubt\n", what,
+                rank_count, (int)d->scene, wrong, worst, doubtful);
+    return !wrong && doubtful <= PIXELS / 10;
+}
+
+/* Where opaque surfaces hide most of a mesh some 50 pixels overlap, elsewhere hundreds and more. */
+enum { FEWEST = 30 };
+
+static void compare(const test_mesh *mesh, const drawing *d, bool with_reference, const char *what)
+{
+    image ours, whole;
+    bool good = true;
+    const int64_t overlaps = draw_shares(mesh, TEST_RANDOM, d, &ours);
+    if (my_rank == 0) {
+        const int64_t alone = draw(mesh, d, MPI_COMM_SELF, true, &whole);
+        if (overlaps < FEWEST || alone < FEWEST)
+            fprintf(stderr, "%s, scene %d: %d pixels overlap, %d alone\n", what, (int)d->scene, (int)overlaps,
+                    (int)alone);
+        good = overlaps >= FEWEST && alone >= FEWEST && same_images(&whole, &ours, d, what);
+        if (with_reference) good = is_as_counted(mesh, d, &ours, what) && good;
+        free_image(&whole);
+    }
+    free_image(&ours);
+    assert_everywhere(good);
+}
+
+static void lattices_in_one_another_are_as_counted(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        interpenetrating(kind, &mesh);
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
+            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY};
+            compare(&mesh, &d, true, test_mesh_kind_name(kind));
+        }
+        test_mesh_free(&mesh);
+    }
+}
+
+/* Hexes turned inside out have no inverse map that both sides would find: tets alone are counted. */
+static void tangled_lattices_are_the_same_everywhere(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        tangled(kind, &mesh);
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
+            const drawing d = {scene, scene == VOLUME ? CAMERA_INSIDE : CAMERA_OUTSIDE, 3, MANY};
+            compare(&mesh, &d, kind == TEST_TETS, test_mesh_kind_name(kind));
+        }
+        test_mesh_free(&mesh);
+    }
+}
+
+/* Turns differ in nothing but when a pixel is drawn. */
+static void turns_make_the_same_bits(void **state)
+{
+    (void)state;
+    test_mesh mesh;
+    interpenetrating(TEST_MIXED, &mesh);
+    image at_once, in_turns;
+    drawing d = {TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY};
+    draw_shares(&mesh, TEST_RANDOM, &d, &at_once);
+    d.fragment_limit = 3000; /* of a step of 0.15 in an extent of 2: 100 pixels and more */
+    const int64_t overlaps = draw_shares(&mesh, TEST_RANDOM, &d, &in_turns);
+    const bool is_same = my_rank != 0 || (!memcmp(at_once.rgba, in_turns.rgba, 4 * PIXELS * sizeof(float)) &&
+                                          !memcmp(at_once.depth, in_turns.depth, PIXELS * sizeof(float)));
+    free_image(&at_once);
+    free_image(&in_turns);
+    test_mesh_free(&mesh);
+    assert_everywhere(overlaps > 500 && is_same);
+}
+
+/* ---- meshes without overlaps --------------------------------------------------------------------------------- */
+
+static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partition, const char *what)
+{
+    for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+            image drawn;
+            const drawing d = {scene, camera, (int)camera, MANY};
+            const int64_t overlaps = draw_shares(mesh, partition, &d, &drawn);
+            free_image(&drawn);
+            if (overlaps)
+                fprintf(stderr, "%s, scene %d, %s: %d pixels overlap\n", what, (int)scene, fixture_camera_name(camera),
+                        (int)overlaps);
+            assert_everywhere(overlaps == 0);
+        }
+}
+
+static void conforming_meshes_have_no_overlap(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (test_partition_kind partition = TEST_RANDOM; partition < TEST_PARTITION_COUNT; partition++) {
+            test_mesh mesh;
+            test_mesh_lattice(kind, SIDE, partition == TEST_RANDOM ? 0 : 0.2, test_wave, &mesh);
+            nothing_overlaps(&mesh, partition, test_mesh_kind_name(kind));
+            test_mesh_free(&mesh);
+        }
+}
+
+/* A cell that a ray goes through twice is not twice at any place. */
+static void a_cell_does_not_overlap_itself(void **state)
+{
+    (void)state;
+    for (test_cell_shape shape = 0; shape < TEST_SHAPE_COUNT; shape++) {
+        test_mesh mesh;
+        test_mesh_single(shape, test_linear, &mesh);
+        nothing_overlaps(&mesh, TEST_RANDOM, test_cell_shape_name(shape));
+        test_mesh_free(&mesh);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lattices_in_one_another_are_as_counted),
+        cmocka_unit_test(tangled_lattices_are_the_same_everywhere),
+        cmocka_unit_test(turns_make_the_same_bits),
+        cmocka_unit_test(conforming_meshes_have_no_overlap),
+        cmocka_unit_test(a_cell_does_not_overlap_itself),
+    };
+    MPI_Init(&argc, &argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &my_rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &rank_count);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    MPI_Finalize();
+    return failed;
+}
