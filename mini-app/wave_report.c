@@ -109,7 +109,7 @@ void wave_report_end(const wave_report *report, const wave_options *options, con
     if (images < 0) {
         printf("no pictures: see the message above\n");
     } else {
-        printf("%d pictures drawn by %s:\n", images, options->scene);
+        printf("%d pictures drawn, with these names in %s:\n", images, options->scene);
         show_paths(options->scene);
     }
     fflush(stdout);

@@ -91,7 +91,7 @@ typedef struct scene_image {
     int light_count; /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
     double step;       /* sample distance in scene units; 0: by step_cells */
-    double step_cells; /* in mean cell sizes: cube root of bounds' volume over cells; 0.5 by default */
+    double step_cells; /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
     int sample_group;  /* 1 .. 64; 16 by default */
     bool jitter;       /* true by default */
     int frames;        /* accumulated; 1 by default, 1 .. 4096 */

@@ -145,7 +145,8 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
       .help = "Distance between samples, in scene units. Not with `step_cells`.", .by_default = "by `step_cells`",     \
       .low = 0, .is_low_excluded = true, .high = 1e30)                                                                 \
     X(CYAML_FIELD_FLOAT_PTR("step_cells", OPTIONAL, scene_file_sampling, step_cells),                                  \
-      .help = "Distance between samples in mean cell sizes: the cube root of the bounds' volume over the cells.",      \
+      .help = "Distance between samples in mean cell sizes (a cell's size is the cube root of its volume). Smaller "   \
+              "is finer and slower.",                                                                                  \
       .by_default = "`0.5`", .low = 0, .is_low_excluded = true, .high = 1000)                                          \
     X(CYAML_FIELD_INT_PTR("group", OPTIONAL, scene_file_sampling, group),                                              \
       .help = "Samples of a ray that are looked up together. Changes the speed, not the image.", .by_default = "`16`", \

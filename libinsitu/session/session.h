@@ -66,6 +66,7 @@ typedef struct session_mesh {
     bool is_geometry_stale;    /* the tree is of other coordinates */
     double lower[3], upper[3]; /* of the drawn cells; lower > upper: there are none */
     int64_t drawn_count, ghost_count, inverted_count;
+    double size_sum; /* of drawn cells: cube roots of volumes */
 
     bool is_needed; /* by an image of this step */
     bool has_tree;
@@ -103,6 +104,7 @@ typedef struct session_extent {
     double lower[3], upper[3]; /* both 0 where there are no cells */
     double half_diagonal;
     int64_t cell_count; /* drawn ones */
+    double cell_size;   /* their mean: of the cube roots of their volumes; 0 where they have none */
     int rank_count;     /* ranks that have some */
 } session_extent;
 

@@ -95,7 +95,8 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
                          mesh->name, at, place.type);
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
-        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": cell %lld (%s): vertex index %lld is outside 0..%lld",
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (%s): vertex index %lld is outside 0..%lld (indices count from 0)",
                          mesh->name, at, type, vertex, (long long)mesh->given.vertex_count - 1);
     case BAD_COORDINATE:
         return base_fail(error, INSITU_ERROR_MESH,
@@ -117,7 +118,8 @@ static double corner_volume(double points[][3], const signed char *corner)
            edge[0][2] * (edge[1][0] * edge[2][1] - edge[1][1] * edge[2][0]);
 }
 
-static bool is_inverted(int type, double points[][3])
+/* Signed volume, from the corners' tets: exact for cells with parallel edges, else their mean. */
+static double signed_volume(int type, double points[][3])
 {
     static const signed char tet[][4] = {{0, 1, 2, 3}};
     static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
@@ -132,15 +134,17 @@ static bool is_inverted(int type, double points[][3])
     const int count = type == GRID_TET ? 1 : type == GRID_HEX ? 8 : type == GRID_WEDGE ? 6 : 4;
     double sum = 0;
     for (int i = 0; i < count; i++) sum += corner_volume(points, corners[i]);
-    return sum < 0;
+    const double shares = type == GRID_TET ? 6 : type == GRID_HEX ? 8 : 12; /* what a cell of volume 1 sums to */
+    return sum / shares;
 }
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
     int64_t drawn, ghosts, inverted;
+    double sizes; /* sum of cube roots of volumes */
 } mesh_tally;
 
-static const mesh_tally empty_tally = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, 0, 0};
+static const mesh_tally empty_tally = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, 0, 0, 0};
 
 static void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
 {
@@ -159,7 +163,9 @@ static void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
         }
     }
     tally->drawn++;
-    tally->inverted += is_inverted(grid_cell_type(g, cell), points);
+    const double volume = signed_volume(grid_cell_type(g, cell), points);
+    tally->inverted += volume < 0;
+    tally->sizes += cbrt(fabs(volume));
 }
 
 static void merge_tally(mesh_tally *sum, const mesh_tally *part)
@@ -171,6 +177,7 @@ static void merge_tally(mesh_tally *sum, const mesh_tally *part)
     sum->drawn += part->drawn;
     sum->ghosts += part->ghosts;
     sum->inverted += part->inverted;
+    sum->sizes += part->sizes;
 }
 
 /* The lowest bad cell, or cell_count. */
@@ -220,6 +227,7 @@ insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *er
     mesh->drawn_count = tally.drawn;
     mesh->ghost_count = tally.ghosts;
     mesh->inverted_count = tally.inverted;
+    mesh->size_sum = tally.sizes;
     mesh->is_check_stale = false;
     return INSITU_OK;
 }

@@ -44,9 +44,9 @@ static insitu_status check_on_mesh(const insitu_session *session, const scene_fi
                          found->lacking_rank, mesh->name, field->name, session->scene_path, field->line);
     if (field->component >= found->component_count)
         return base_fail(error, INSITU_ERROR_FIELD,
-                         "%s:%d: component %d of field \"%s\" is asked for; on mesh \"%s\" it has %d, counted from 0",
+                         "%s:%d: component %d of field \"%s\" is asked for; on mesh \"%s\" it has components 0 to %d",
                          session->scene_path, field->line, field->component, field->name, mesh->name,
-                         found->component_count);
+                         found->component_count - 1);
     return INSITU_OK;
 }
 

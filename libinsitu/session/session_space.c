@@ -47,6 +47,7 @@ static insitu_status reduce_extent(insitu_session *session, session_extent *out,
 {
     double mine[6], all[6];
     int64_t counts[2] = {0, 0}, totals[2] = {0, 0};
+    double sizes = 0, all_sizes = 0;
     for (int i = 0; i < 6; i++) mine[i] = INFINITY;
     for (int i = 0; i < session->mesh_count; i++) {
         const session_mesh *mesh = session->meshes[i];
@@ -56,6 +57,7 @@ static insitu_status reduce_extent(insitu_session *session, session_extent *out,
             mine[3 + axis] = fmin(mine[3 + axis], -mesh->upper[axis]);
         }
         counts[0] += mesh->drawn_count;
+        sizes += mesh->size_sum;
     }
     counts[1] = counts[0] > 0;
     insitu_status status =
@@ -63,8 +65,13 @@ static insitu_status reduce_extent(insitu_session *session, session_extent *out,
     if (!status)
         status =
             session_mpi(error, MPI_Allreduce(counts, totals, 2, MPI_INT64_T, MPI_SUM, session->comm), "MPI_Allreduce");
+    if (!status)
+        status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, session->comm),
+                             "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .rank_count = (int)totals[1]};
+    /* To float, so that the sum's rounding, which depends on the partition, does not reach the samples. */
+    if (totals[0] > 0) out->cell_size = (double)(float)(all_sizes / (double)totals[0]);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
         out->lower[axis] = all[axis];
         out->upper[axis] = -all[3 + axis];

@@ -76,10 +76,7 @@ static void make_lights(const scene_image *image, const render_camera *camera, r
 static double sample_distance(const session_extent *extent, const scene_image *image)
 {
     if (image->step > 0) return image->step;
-    double side = 1;
-    for (int axis = 0; axis < 3; axis++) side *= cbrt(extent->upper[axis] - extent->lower[axis]);
-    double cell = extent->cell_count > 0 ? side / cbrt((double)extent->cell_count) : 0;
-    if (!(cell > 0)) cell = extent->half_diagonal / 50;
+    const double cell = extent->cell_size > 0 ? extent->cell_size : extent->half_diagonal / 50;
     return cell > 0 ? image->step_cells * cell : 1;
 }
 

@@ -148,8 +148,8 @@ INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, in
  *
  * What can be seen at once (counts, types, strides) is checked here; the arrays' contents when a step first needs
  * them: every cell's vertex indices and type, and the coordinates that cells without a ghost flag use. Either way the
- * next insitu_step() returns the error on every rank, and each step after it until the mesh is set right or taken
- * away. */
+ * next insitu_step() that draws returns the error on every rank, and so does each one after it until the mesh is set
+ * right or taken away; a set call that failed is told by the very next insitu_step(). */
 INSITU_API insitu_status insitu_set_mesh(insitu_session *session, const char *name, const insitu_mesh *mesh);
 
 /* Hand over this rank's part of a field on the mesh called mesh, which must be set. Local. A field that is not set
