@@ -418,7 +418,7 @@ static void component_that_is_not_there_is_named(void **context)
         open_session(MPI_COMM_WORLD, write_scene("images:\n" IMAGE("c", "1", "volume: {field: f, component: 2}", "")));
     everywhere(hand_over(session, &input) == INSITU_OK);
     const insitu_status status = insitu_step(session, 0, 0);
-    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"", "it has 1");
+    told_everywhere(session, status, INSITU_ERROR_FIELD, ".yaml:7: component 2 of field \"f\"", "it has components 0 to 0");
     insitu_destroy(&session);
 }
 
