@@ -1,0 +1,412 @@
+/* Volumes by segments: the integral of emission and absorption instead of a sum over samples.
+ *
+ * A cell's interval on a ray is one segment where the field is linear on it (tets, cells of one value), and is cut into
+ * equal parts with a linear field each elsewhere. What a cell adds is integrated at once (kernel_integral.h), and kept
+ * with its t_in and t_out until all that lies in front of it is known: cells come in the order of the tree, not of the
+ * ray.
+ *
+ * Each ray has room for so many segments, sorted by t_in. When it is full, its window ends at the t_in of the farthest,
+ * which is put back; the traversal, whose upper limit is that end, meets only what is nearer. The window's segments
+ * are blended front to back, and the next window begins where the last one ended:
+ *
+ *     window 1: t_end ________________ | window 2: from here on
+ *     |--cell--|--cell--|----cell----|-|--cell--|
+ *              ^ t_in in window 1      ^ t_in == t_end: window 2
+ *
+ * A segment belongs to the window that holds its t_in and is never cut by the window, so what a ray sees does not
+ * depend on where windows end, nor on the other rays of its packet. Surfaces do cut segments. Fragments join segments
+ * whose t_out and t_in are the same bits, as neighbours' are; a gap ends them, for it may belong to another rank. */
+#ifndef RENDER_KERNEL_SEGMENTS_H
+#define RENDER_KERNEL_SEGMENTS_H
+
+#include "kernel_integral.h"
+#include "kernel_volume.h"
+
+enum { KERNEL_WINDOW = 48, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
+
+typedef struct kernel_segment_rows {
+    float t_in[KERNEL_WINDOW][SIMD_WIDTH], t_out[KERNEL_WINDOW][SIMD_WIDTH];
+    float colour[3][KERNEL_WINDOW][SIMD_WIDTH], transmittance[KERNEL_WINDOW][SIMD_WIDTH];
+} kernel_segment_rows;
+
+/* Crossings of transparent surfaces: the first of each ray in rows, sorted, +inf where there are no more. */
+typedef struct kernel_cuts {
+    int row_count;
+    bool is_whole;       /* else the rest is looked for in the fragments */
+    int64_t first, last; /* the packet's fragments of surfaces */
+    float row[KERNEL_LANE_CUTS][SIMD_WIDTH];
+} kernel_cuts;
+
+typedef struct kernel_segments {
+    int count[SIMD_WIDTH];
+    kernel_segment_rows rows;
+    vf t_begin, t_end; /* the window */
+    vf per_t;          /* unit distances per t */
+    kernel_cuts cuts;
+} kernel_segments;
+
+SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
+{
+    int lane = 0;
+    while (lane < SIMD_WIDTH - 1 && p->pixel[lane] != pixel) lane++;
+    return lane;
+}
+
+SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_cuts *cuts)
+{
+    int count[SIMD_WIDTH] = {0};
+    cuts->row_count = 0;
+    cuts->is_whole = true;
+    cuts->first = first;
+    cuts->last = p->thread->out->count;
+    for (int64_t i = first; p->frame->has_transparent && i < cuts->last; i++) {
+        const fragment *hit = &p->thread->out->items[i];
+        const int lane = kernel_lane_of(p, hit->pixel);
+        int at = count[lane];
+        if (at == KERNEL_LANE_CUTS) {
+            cuts->is_whole = false;
+            continue;
+        }
+        if (at == cuts->row_count) {
+            vf_store(cuts->row[at], vf_set(INFINITY));
+            cuts->row_count++;
+        }
+        for (; at > 0 && cuts->row[at - 1][lane] > hit->t_in; at--) cuts->row[at][lane] = cuts->row[at - 1][lane];
+        cuts->row[at][lane] = hit->t_in;
+        count[lane]++;
+    }
+}
+
+/* A ray of more cuts than there are rows: its fragments are looked through. */
+static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
+{
+    float start[SIMD_WIDTH], next[SIMD_WIDTH];
+    vf_store(start, from);
+    vf_store(next, vf_set(INFINITY));
+    for (int64_t i = cuts->first; i < cuts->last; i++) {
+        const fragment *hit = &p->thread->out->items[i];
+        const int lane = kernel_lane_of(p, hit->pixel);
+        if ((beyond ? hit->t_in > start[lane] : hit->t_in >= start[lane]) && hit->t_in < next[lane])
+            next[lane] = hit->t_in;
+    }
+    return vf_load(next);
+}
+
+/* The first cut at or, if asked, beyond t. */
+SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, vf t, bool beyond)
+{
+    vf next = vf_set(INFINITY);
+    if (!cuts->is_whole) return kernel_next_cut_slowly(p, cuts, t, beyond);
+    for (int i = cuts->row_count; i-- > 0;) {
+        const vf cut = vf_load(cuts->row[i]);
+        next = vf_select(beyond ? vf_lt(t, cut) : vf_le(t, cut), cut, next);
+    }
+    return next;
+}
+
+/* ---- a ray's segments ---- */
+
+typedef struct kernel_segment {
+    float t_in, t_out, colour[3], transmittance;
+} kernel_segment;
+
+static inline void kernel_rows_set(kernel_segment_rows *r, int lane, int at, const kernel_segment *s)
+{
+    r->t_in[at][lane] = s->t_in;
+    r->t_out[at][lane] = s->t_out;
+    for (int a = 0; a < 3; a++) r->colour[a][at][lane] = s->colour[a];
+    r->transmittance[at][lane] = s->transmittance;
+}
+
+static inline void kernel_rows_move(kernel_segment_rows *r, int lane, int from, int to)
+{
+    r->t_in[to][lane] = r->t_in[from][lane];
+    r->t_out[to][lane] = r->t_out[from][lane];
+    for (int a = 0; a < 3; a++) r->colour[a][to][lane] = r->colour[a][from][lane];
+    r->transmittance[to][lane] = r->transmittance[from][lane];
+}
+
+/* Meshes that overlap to no end: more segments than there is room for begin at one place, where no order is meant. The
+ * last of them takes the new one up, and nothing is lost. */
+static void kernel_rows_heap_up(kernel_segment_rows *r, int lane, const kernel_segment *s)
+{
+    const int last = KERNEL_WINDOW - 1;
+    for (int a = 0; a < 3; a++) r->colour[a][last][lane] += r->transmittance[last][lane] * s->colour[a];
+    r->transmittance[last][lane] *= s->transmittance;
+    r->t_out[last][lane] = fmaxf(r->t_out[last][lane], s->t_out);
+}
+
+/* Make room in a full ray: the window ends at its farthest segment, which goes, with all that begin there. Returns
+ * false where that would be all. */
+static bool kernel_rows_shorten(kernel_segments *list, int lane)
+{
+    kernel_segment_rows *r = &list->rows;
+    int count = KERNEL_WINDOW - 1;
+    const float end = r->t_in[count][lane];
+    while (count > 0 && r->t_in[count - 1][lane] == end) count--;
+    if (count == 0) return false;
+    list->count[lane] = count;
+    list->t_end[lane] = end;
+    return true;
+}
+
+static void kernel_rows_insert(kernel_segments *list, int lane, const kernel_segment *s)
+{
+    kernel_segment_rows *r = &list->rows;
+    if (list->count[lane] == KERNEL_WINDOW && !kernel_rows_shorten(list, lane)) {
+        if (s->t_in > r->t_in[0][lane]) {
+            list->t_end[lane] = fminf(list->t_end[lane], s->t_in);
+            return;
+        }
+        if (s->t_in == r->t_in[0][lane]) {
+            kernel_rows_heap_up(r, lane, s);
+            return;
+        }
+        /* Nearer than all: those wait for the next window. */
+        list->t_end[lane] = r->t_in[0][lane];
+        list->count[lane] = 0;
+    }
+    if (!(s->t_in < list->t_end[lane])) return;
+    int at = list->count[lane]++;
+    for (; at > 0 && r->t_in[at - 1][lane] > s->t_in; at--) kernel_rows_move(r, lane, at - 1, at);
+    kernel_rows_set(r, lane, at, s);
+}
+
+SIMD_INLINE void kernel_segments_add(kernel_segments *list, vm rays, vf t_in, vf t_out, const kernel_light *light)
+{
+    float a[6][SIMD_WIDTH];
+    unsigned bits = vm_bits(rays);
+    vf_store(a[0], t_in);
+    vf_store(a[1], t_out);
+    for (int i = 0; i < 3; i++) vf_store(a[2 + i], light->colour[i]);
+    vf_store(a[5], light->transmittance);
+    while (bits) {
+        const int lane = __builtin_ctz(bits);
+        bits &= bits - 1;
+        const kernel_segment s = {a[0][lane], a[1][lane], {a[2][lane], a[3][lane], a[4][lane]}, a[5][lane]};
+        kernel_rows_insert(list, lane, &s);
+    }
+}
+
+/* ---- a cell's segments ---- */
+
+typedef struct kernel_segment_state {
+    kernel_segments *list;
+    const kernel_pieces *pieces;
+    float allowance; /* the error a unit distance, and a unit of optical depth, may make; 0: parts by step */
+    float reach;     /* no ray is longer in the cells, unit distances */
+} kernel_segment_state;
+
+/* A cell under way: how its field is known, and how finely it must be. */
+typedef struct kernel_course {
+    const kernel_map *map; /* NULL: linear */
+    const kernel_interval *interval;
+    float deviation; /* the field may be off by; < 0: parts by step */
+} kernel_course;
+
+static const kernel_light kernel_no_light;
+
+/* How far the field may be off its line: with extinction s and colour c, an error d changes the light by at most
+ * T (contrast |s'| + s |c'|) d a unit distance, which may be allowance (1 / reach + s) of it (docs/decisions.md). */
+SIMD_INLINE float kernel_deviation(const kernel_segment_state *state, const kernel_cell *c)
+{
+    const kernel_pieces *t = state->pieces;
+    float low = c->f[0], high = low;
+    if (!(state->allowance > 0)) return -1;
+    for (int i = 1; i < c->count; i++) {
+        low = fminf(low, c->f[i]);
+        high = fmaxf(high, c->f[i]);
+    }
+    const float last = KERNEL_BOUND_BINS - 1;
+    const int from = (int)fminf(fmaxf((low - t->bin_low) * t->bound_inverse, 0), last);
+    const int to = (int)fminf(fmaxf((high - t->bin_low) * t->bound_inverse, 0), last);
+    kernel_bound b = t->bounds[from];
+    for (int i = from + 1; i <= to; i++) {
+        b.extinction_low = fminf(b.extinction_low, t->bounds[i].extinction_low);
+        b.extinction_high = fmaxf(b.extinction_high, t->bounds[i].extinction_high);
+        b.extinction_slope = fmaxf(b.extinction_slope, t->bounds[i].extinction_slope);
+        b.colour_slope = fmaxf(b.colour_slope, t->bounds[i].colour_slope);
+    }
+    const float cost = t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope;
+    return state->allowance * (1 / state->reach + b.extinction_low) / fmaxf(cost, 1e-30f);
+}
+
+SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
+{
+    const kernel_interval *i = course->interval;
+    if (course->map) return kernel_value_at(p, course->map, i, rays, t);
+    const vf length = i->t_out - i->t_in;
+    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
+    return i->v_in + along * (i->v_out - i->v_in);
+}
+
+/* Into how many parts to cut the stretch from t0 to t1, with values v0 and v1 there. By error: the deviation from the
+ * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
+ * square of a part. */
+SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_course *course, vm rays, vf t0, vf t1, vf v0, vf v1)
+{
+    const vf most = vf_set(KERNEL_MAX_PARTS), length = t1 - t0;
+    if (!course->map) return vf_set(1);
+    if (course->deviation < 0) return vf_clamp(-vf_floor(-(length / p->sample_step)), vf_set(1), most);
+    vf off = vf_set(0);
+    for (int quarter = 1; quarter < 4; quarter++) {
+        const float share = 0.25f * (float)quarter;
+        const vf v = kernel_value_at(p, course->map, course->interval, rays, t0 + length * share);
+        off = vf_max(off, vf_abs((v0 + (v1 - v0) * share) - v));
+    }
+    const vf ratio = vf_min(off * (1.5f / fmaxf(course->deviation, 1e-12f)), vf_set(1e6f));
+    return vf_clamp(-vf_floor(-vf_sqrt(ratio)), vf_set(1), most);
+}
+
+/* One segment from t0 to t1. */
+SIMD_INLINE void kernel_course_segment(kernel_packet *p, kernel_segment_state *state, const kernel_course *course,
+                                       vm rays, vf t0, vf t1)
+{
+    kernel_light light = kernel_no_light;
+    light.transmittance = vf_set(1);
+    vf from = t0, before = kernel_course_value(p, course, rays, t0);
+    const vf last = kernel_course_value(p, course, rays, t1);
+    const vf parts = kernel_course_parts(p, course, rays, t0, t1, before, last);
+    const vf span = (t1 - t0) / parts;
+    vm open = rays;
+    for (int n = 1; vm_any(open); n++) {
+        const vm is_last = vf_le(parts, vf_set((float)n));
+        const vf to = vf_select(is_last, t1, t0 + span * (float)n);
+        vf after = last;
+        if (vm_any(vm_andnot(open, is_last)))
+            after = vf_select(is_last, last, kernel_course_value(p, course, vm_andnot(open, is_last), to));
+        kernel_integrate(state->pieces, open, (to - from) * state->list->per_t, before, after, &light);
+        from = to;
+        before = after;
+        open = vm_andnot(open, is_last);
+    }
+    kernel_segments_add(state->list, rays, t0, t1, &light);
+}
+
+/* The interval's stretches between surfaces that begin in the window. */
+SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state, const kernel_course *course)
+{
+    const kernel_interval *i = course->interval;
+    const kernel_segments *list = state->list;
+    vf from = vf_max(i->t_in, p->t_near);
+    const vf end = vf_min(i->t_out, p->t_far);
+    vm open = vm_and(i->mask, vm_and(p->active, vf_lt(from, end)));
+    while (vm_any(open)) {
+        vf to = end;
+        if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
+        const vm mine = vm_and(open, vm_and(vf_le(list->t_begin, from), vf_lt(from, list->t_end)));
+        if (vm_any(mine)) kernel_course_segment(p, state, course, mine, from, to);
+        from = to;
+        open = vm_and(open, vf_lt(from, end));
+    }
+}
+
+static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
+                                vm rays)
+{
+    kernel_segment_state *state = opaque_state;
+    const kernel_transfer *transfer = &p->frame->volumes[0];
+    const grid_field *field = &p->frame->job->volumes[0].field.fields[part];
+    const grid *g = p->frame->job->parts[part].cells;
+    for (int n = 0; n < count; n++) {
+        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count, part, field, cells[n]);
+        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
+        if (!c->is_placed) {
+            kernel_cell_place(c, p, g);
+            kernel_cell_domain(c, transfer);
+        }
+        kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+        kernel_course course = {.deviation = -1};
+        kernel_map map;
+        int intervals = 1;
+        if (c->type == GRID_TET) {
+            kernel_tet_interval(p, c, rays, false, &list[0]);
+        } else {
+            intervals = kernel_poly_intervals(p, c, rays, false, list);
+            if (intervals && !c->is_constant) {
+                kernel_map_setup(&map, c);
+                course.map = &map;
+                course.deviation = kernel_deviation(state, c);
+            }
+        }
+        for (int k = 0; k < intervals; k++) {
+            course.interval = &list[k];
+            kernel_course_run(p, state, &course);
+        }
+    }
+}
+
+/* ---- the ray ---- */
+
+/* Rays whose fragment must end before the segment at t_in: a surface is in between, or there is a gap. */
+SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_cuts *cuts, vf t_in)
+{
+    vm broken = p->frame->job->is_alone ? vm_none() : vm_not(vf_eq(t_in, b->t_last));
+    if (cuts->row_count) broken = vm_or(broken, vf_le(kernel_next_cut(p, cuts, b->t_last, false), t_in));
+    return broken;
+}
+
+SIMD_INLINE void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kernel_segments *list)
+{
+    const kernel_segment_rows *r = &list->rows;
+    float counts[SIMD_WIDTH];
+    int most = 0;
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+        counts[lane] = (float)list->count[lane];
+        most = list->count[lane] > most ? list->count[lane] : most;
+    }
+    const vf count = vf_load(counts);
+    for (int n = 0; n < most; n++) {
+        const vm has = vm_and(vf_lt(vf_set((float)n), count), vf_lt(vf_set(KERNEL_DARK), b->light));
+        if (!vm_any(has)) break;
+        const vf t_in = vf_load(r->t_in[n]), clear = vf_load(r->transmittance[n]);
+        kernel_blend_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
+        const vm fresh = vm_andnot(has, b->open);
+        b->t_first = vf_select(fresh, t_in, b->t_first);
+        b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
+        for (int a = 0; a < 3; a++) {
+            b->colour[a] = vf_select(fresh, vf_set(0), b->colour[a]);
+            const vf sum = b->colour[a] + b->transmittance * vf_load(r->colour[a][n]);
+            b->colour[a] = vf_select(has, sum, b->colour[a]);
+        }
+        b->transmittance = vf_select(has, b->transmittance * clear, b->transmittance);
+        b->light = vf_select(has, b->light * clear, b->light);
+        b->t_last = vf_select(has, vf_load(r->t_out[n]), b->t_last);
+        b->open = vm_or(b->open, has);
+    }
+}
+
+/* One window from list->t_begin on; t_end is lowered to where it ended. */
+SIMD_INLINE void kernel_trace_window(kernel_packet *p, kernel_segment_state *state)
+{
+    kernel_segments *list = state->list;
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) list->count[lane] = 0;
+    list->t_end = p->t_far;
+    kernel_trace_parts(p, &p->frame->job->volumes[0].field, &p->frame->volumes[0].interest, list->t_begin, &list->t_end,
+                       kernel_segment_leaf, state);
+}
+
+/* first_fragment: where the packet's own fragments, of surfaces so far, begin in the thread's list. */
+SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
+{
+    const kernel_frame *f = p->frame;
+    kernel_segments list;
+    kernel_segment_state state = {&list, &f->pieces, f->allowance, f->reach};
+    kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
+    b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] = vf_set(0);
+    list.per_t = f->volumes[0].exponent / p->sample_step;
+    list.t_begin = p->t_near;
+    kernel_cuts_find(p, first_fragment, &list.cuts);
+    const vm active = p->active;
+    while (vm_any(p->active)) {
+        kernel_trace_window(p, &state);
+        kernel_blend_segments(p, &b, &list);
+        const vm unfinished = vm_and(vf_lt(list.t_end, p->t_far), vf_lt(vf_set(KERNEL_DARK), b.light));
+        p->active = vm_and(p->active, unfinished);
+        list.t_begin = list.t_end;
+    }
+    p->active = active;
+    kernel_blend_close(p, &b, p->active);
+}
+
+#endif
