@@ -62,24 +62,46 @@ typedef struct kernel_light {
     vf colour[3], transmittance;
 } kernel_light;
 
-SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, vi at, int entry)
+SIMD_INLINE kernel_light kernel_clear(void)
 {
-    return vf_gather(t->pieces[0].entry + entry, at * KERNEL_PIECE_ENTRIES);
+    return (kernel_light){{vf_set(0), vf_set(0), vf_set(0)}, vf_set(1)};
+}
+
+/* Pieces that rays are in: most often one for all, which saves the gathers. */
+typedef struct kernel_place {
+    vi at;
+    const kernel_piece *common;
+} kernel_place;
+
+SIMD_INLINE kernel_place kernel_place_of(const kernel_pieces *t, vm rays, vf piece)
+{
+    const int lane = __builtin_ctz(vm_bits(rays));
+    const int first = (int)piece[lane];
+    const bool is_common = !vm_any(vm_andnot(rays, vf_eq(piece, vf_set((kernel_real)first))));
+    return (kernel_place){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
+}
+
+SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_place *place, int entry)
+{
+    if (place->common) return vf_set(place->common->entry[entry]);
+    return vf_gather(t->pieces[0].entry + entry, place->at * KERNEL_PIECE_ENTRIES);
 }
 
 /* The piece that holds value x; at a knot the one above, or (where falling) below. */
 SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vm falling)
 {
-    const vf place = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
-    vf piece = vf_gather(t->bin_first, vi_from_vf(place));
-    for (;;) {
-        const vi at = vi_from_vf(piece);
-        const vf low = kernel_piece_entry(t, at, KERNEL_PIECE_LOW), high = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH);
-        const vm up = vm_and(rays, vm_or(vf_lt(high, x), vm_andnot(vf_eq(high, x), falling)));
-        const vm down = vm_and(rays, vm_or(vf_lt(x, low), vm_and(vf_eq(low, x), falling)));
-        if (!vm_any(vm_or(up, down))) return piece;
+    const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
+    vf piece = vf_gather(t->bin_first, vi_from_vf(spot));
+    for (vm open = rays; vm_any(open);) {
+        const kernel_place at = kernel_place_of(t, open, piece);
+        const vf low = kernel_piece_entry(t, &at, KERNEL_PIECE_LOW),
+                 high = kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH);
+        const vm up = vm_and(open, vm_or(vf_lt(high, x), vm_andnot(vf_eq(high, x), falling)));
+        const vm down = vm_and(open, vm_or(vf_lt(x, low), vm_and(vf_eq(low, x), falling)));
         piece = vf_select(up, piece + 1.0f, vf_select(down, piece - 1.0f, piece));
+        open = vm_or(up, down);
     }
+    return piece;
 }
 
 /* The stretch of one piece under way: from s to end of the segment's [0, 1]. */
@@ -135,22 +157,23 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, vf length, vf
     vf piece = kernel_piece_find(t, rays, v_in, falling), s = zero;
     vm open = rays;
     while (vm_any(open)) {
-        const vi at = vi_from_vf(vf_select(open, piece, zero));
-        const vf low = kernel_piece_entry(t, at, KERNEL_PIECE_LOW), high = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH);
+        const kernel_place at = kernel_place_of(t, open, piece);
+        const vf low = kernel_piece_entry(t, &at, KERNEL_PIECE_LOW),
+                 high = kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH);
         const vf to_edge = (vf_select(falling, low, high) - v_in) / vf_select(level, one, rise);
         const vf end = vf_select(level, one, vf_clamp(to_edge, s, one));
-        const vf slope = kernel_piece_entry(t, at, KERNEL_PIECE_SLOPE);
+        const vf slope = kernel_piece_entry(t, &at, KERNEL_PIECE_SLOPE);
         const vf value = vf_clamp(v_in + s * rise, low, high), span = end - s;
         kernel_stretch st;
-        st.opacity = vf_clamp(kernel_piece_entry(t, at, KERNEL_PIECE_OPACITY) + (value - low) * slope, zero, one);
+        st.opacity = vf_clamp(kernel_piece_entry(t, &at, KERNEL_PIECE_OPACITY) + (value - low) * slope, zero, one);
         st.rise = vf_clamp(st.opacity + span * rise * slope, zero, one) - st.opacity;
         kernel_stretch_limit(&st, span * length);
         vf e0, e1;
         const vf depth = kernel_stretch_sum(&st, &e0, &e1);
         const vf whole = light->transmittance * e0, moment = light->transmittance * e1 * (span * st.share * rise);
         for (int a = 0; a < 3; a++) {
-            const vf colour_slope = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR_SLOPE + a);
-            const vf colour = kernel_piece_entry(t, at, KERNEL_PIECE_COLOUR + a) + (value - low) * colour_slope;
+            const vf colour_slope = kernel_piece_entry(t, &at, KERNEL_PIECE_COLOUR_SLOPE + a);
+            const vf colour = kernel_piece_entry(t, &at, KERNEL_PIECE_COLOUR + a) + (value - low) * colour_slope;
             light->colour[a] =
                 vf_select(open, light->colour[a] + (whole * colour + moment * colour_slope), light->colour[a]);
         }

@@ -1,13 +1,13 @@
 /* Volumes by segments: the integral of emission and absorption instead of a sum over samples.
  *
  * A cell's interval on a ray is one segment where the field is linear on it (tets, cells of one value), and is cut into
- * equal parts with a linear field each elsewhere. What a cell adds is integrated at once (kernel_integral.h), and kept
- * with its t_in and t_out until all that lies in front of it is known: cells come in the order of the tree, not of the
- * ray.
+ * equal segments with a linear field each elsewhere. They are kept until all that lies in front of them is known, for
+ * cells come in the order of the tree, not of the ray; then the n-th segments of all rays are integrated together
+ * (kernel_integral.h), which fills the lanes far better than a cell does, that few of a packet's rays meet.
  *
  * Each ray has room for so many segments, sorted by t_in. When it is full, its window ends at the t_in of the farthest,
  * which is put back; the traversal, whose upper limit is that end, meets only what is nearer. The window's segments
- * are blended front to back, and the next window begins where the last one ended:
+ * are integrated front to back, and the next window begins where the last one ended:
  *
  *     window 1: t_end ________________ | window 2: from here on
  *     |--cell--|--cell--|----cell----|-|--cell--|
@@ -22,11 +22,15 @@
 #include "kernel_integral.h"
 #include "kernel_volume.h"
 
-enum { KERNEL_WINDOW = 48, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
+enum { KERNEL_WINDOW = 64, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
+
+typedef struct kernel_segment {
+    float t_in, t_out, v_in, v_out;
+} kernel_segment;
 
 typedef struct kernel_segment_rows {
     float t_in[KERNEL_WINDOW][SIMD_WIDTH], t_out[KERNEL_WINDOW][SIMD_WIDTH];
-    float colour[3][KERNEL_WINDOW][SIMD_WIDTH], transmittance[KERNEL_WINDOW][SIMD_WIDTH];
+    float v_in[KERNEL_WINDOW][SIMD_WIDTH], v_out[KERNEL_WINDOW][SIMD_WIDTH];
 } kernel_segment_rows;
 
 /* Crossings of transparent surfaces: the first of each ray in rows, sorted, +inf where there are no more. */
@@ -40,6 +44,9 @@ typedef struct kernel_cuts {
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
     kernel_segment_rows rows;
+    /* Meshes that overlap to no end: of segments that begin at one place, where no order is meant, those for which
+     * there is no room are integrated at once, and blended behind the window's. */
+    kernel_light heap;
     vf t_begin, t_end; /* the window */
     vf per_t;          /* unit distances per t */
     kernel_cuts cuts;
@@ -106,41 +113,27 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, 
 
 /* ---- a ray's segments ---- */
 
-typedef struct kernel_segment {
-    float t_in, t_out, colour[3], transmittance;
-} kernel_segment;
-
 static inline void kernel_rows_set(kernel_segment_rows *r, int lane, int at, const kernel_segment *s)
 {
     r->t_in[at][lane] = s->t_in;
     r->t_out[at][lane] = s->t_out;
-    for (int a = 0; a < 3; a++) r->colour[a][at][lane] = s->colour[a];
-    r->transmittance[at][lane] = s->transmittance;
+    r->v_in[at][lane] = s->v_in;
+    r->v_out[at][lane] = s->v_out;
 }
 
 static inline void kernel_rows_move(kernel_segment_rows *r, int lane, int from, int to)
 {
     r->t_in[to][lane] = r->t_in[from][lane];
     r->t_out[to][lane] = r->t_out[from][lane];
-    for (int a = 0; a < 3; a++) r->colour[a][to][lane] = r->colour[a][from][lane];
-    r->transmittance[to][lane] = r->transmittance[from][lane];
-}
-
-/* Meshes that overlap to no end: more segments than there is room for begin at one place, where no order is meant. The
- * last of them takes the new one up, and nothing is lost. */
-static void kernel_rows_heap_up(kernel_segment_rows *r, int lane, const kernel_segment *s)
-{
-    const int last = KERNEL_WINDOW - 1;
-    for (int a = 0; a < 3; a++) r->colour[a][last][lane] += r->transmittance[last][lane] * s->colour[a];
-    r->transmittance[last][lane] *= s->transmittance;
-    r->t_out[last][lane] = fmaxf(r->t_out[last][lane], s->t_out);
+    r->v_in[to][lane] = r->v_in[from][lane];
+    r->v_out[to][lane] = r->v_out[from][lane];
 }
 
 /* Make room in a full ray: the window ends at its farthest segment, which goes, with all that begin there. Returns
  * false where that would be all. */
 static bool kernel_rows_shorten(kernel_segments *list, int lane)
 {
-    kernel_segment_rows *r = &list->rows;
+    const kernel_segment_rows *r = &list->rows;
     int count = KERNEL_WINDOW - 1;
     const float end = r->t_in[count][lane];
     while (count > 0 && r->t_in[count - 1][lane] == end) count--;
@@ -150,42 +143,39 @@ static bool kernel_rows_shorten(kernel_segments *list, int lane)
     return true;
 }
 
-static void kernel_rows_insert(kernel_segments *list, int lane, const kernel_segment *s)
+/* False where there is no room: more segments begin at one place than a window holds. */
+static inline bool kernel_rows_insert(kernel_segments *list, int lane, const kernel_segment *s)
 {
     kernel_segment_rows *r = &list->rows;
     if (list->count[lane] == KERNEL_WINDOW && !kernel_rows_shorten(list, lane)) {
-        if (s->t_in > r->t_in[0][lane]) {
-            list->t_end[lane] = fminf(list->t_end[lane], s->t_in);
-            return;
-        }
-        if (s->t_in == r->t_in[0][lane]) {
-            kernel_rows_heap_up(r, lane, s);
-            return;
-        }
-        /* Nearer than all: those wait for the next window. */
-        list->t_end[lane] = r->t_in[0][lane];
-        list->count[lane] = 0;
+        const float all = r->t_in[0][lane];
+        if (s->t_in == all) return false;
+        list->t_end[lane] = fminf(list->t_end[lane], fmaxf(s->t_in, all));
+        if (s->t_in < all) list->count[lane] = 0;
     }
-    if (!(s->t_in < list->t_end[lane])) return;
+    if (!(s->t_in < list->t_end[lane])) return true;
     int at = list->count[lane]++;
     for (; at > 0 && r->t_in[at - 1][lane] > s->t_in; at--) kernel_rows_move(r, lane, at - 1, at);
     kernel_rows_set(r, lane, at, s);
+    return true;
 }
 
-SIMD_INLINE void kernel_segments_add(kernel_segments *list, vm rays, vf t_in, vf t_out, const kernel_light *light)
+SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays, vf t_in, vf t_out,
+                                     vf v_in, vf v_out)
 {
-    float a[6][SIMD_WIDTH];
-    unsigned bits = vm_bits(rays);
+    float a[4][SIMD_WIDTH];
+    unsigned bits = vm_bits(rays), left = 0;
     vf_store(a[0], t_in);
     vf_store(a[1], t_out);
-    for (int i = 0; i < 3; i++) vf_store(a[2 + i], light->colour[i]);
-    vf_store(a[5], light->transmittance);
-    while (bits) {
+    vf_store(a[2], v_in);
+    vf_store(a[3], v_out);
+    for (; bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        bits &= bits - 1;
-        const kernel_segment s = {a[0][lane], a[1][lane], {a[2][lane], a[3][lane], a[4][lane]}, a[5][lane]};
-        kernel_rows_insert(list, lane, &s);
+        const kernel_segment s = {a[0][lane], a[1][lane], a[2][lane], a[3][lane]};
+        if (!kernel_rows_insert(list, lane, &s)) left |= bits & -bits;
     }
+    if (__builtin_expect(left != 0, 0))
+        kernel_integrate(pieces, vm_from_bits(left), (t_out - t_in) * list->per_t, v_in, v_out, &list->heap);
 }
 
 /* ---- a cell's segments ---- */
@@ -203,8 +193,6 @@ typedef struct kernel_course {
     const kernel_interval *interval;
     float deviation; /* the field may be off by; < 0: parts by step */
 } kernel_course;
-
-static const kernel_light kernel_no_light;
 
 /* How far the field may be off its line: with extinction s and colour c, an error d changes the light by at most
  * T (contrast |s'| + s |c'|) d a unit distance, which may be allowance (1 / reach + s) of it (docs/decisions.md). */
@@ -258,29 +246,27 @@ SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_course *course
     return vf_clamp(-vf_floor(-vf_sqrt(ratio)), vf_set(1), most);
 }
 
-/* One segment from t0 to t1. */
-SIMD_INLINE void kernel_course_segment(kernel_packet *p, kernel_segment_state *state, const kernel_course *course,
-                                       vm rays, vf t0, vf t1)
+/* The stretch from t0 to t1 as segments; those that begin in the window are kept. */
+SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *state, const kernel_course *course,
+                                        vm rays, vf t0, vf t1)
 {
-    kernel_light light = kernel_no_light;
-    light.transmittance = vf_set(1);
+    kernel_segments *list = state->list;
     vf from = t0, before = kernel_course_value(p, course, rays, t0);
     const vf last = kernel_course_value(p, course, rays, t1);
     const vf parts = kernel_course_parts(p, course, rays, t0, t1, before, last);
     const vf span = (t1 - t0) / parts;
     vm open = rays;
     for (int n = 1; vm_any(open); n++) {
-        const vm is_last = vf_le(parts, vf_set((float)n));
-        const vf to = vf_select(is_last, t1, t0 + span * (float)n);
+        const vm inner = vm_and(open, vf_lt(vf_set((float)n), parts));
+        const vf to = vf_select(inner, t0 + span * (float)n, t1);
         vf after = last;
-        if (vm_any(vm_andnot(open, is_last)))
-            after = vf_select(is_last, last, kernel_course_value(p, course, vm_andnot(open, is_last), to));
-        kernel_integrate(state->pieces, open, (to - from) * state->list->per_t, before, after, &light);
+        if (vm_any(inner)) after = vf_select(inner, kernel_course_value(p, course, inner, to), last);
+        const vm mine = vm_and(vf_le(list->t_begin, from), vf_lt(from, list->t_end));
+        kernel_segments_add(state->pieces, list, vm_and(open, mine), from, to, before, after);
         from = to;
         before = after;
-        open = vm_andnot(open, is_last);
+        open = inner;
     }
-    kernel_segments_add(state->list, rays, t0, t1, &light);
 }
 
 /* The interval's stretches between surfaces that begin in the window. */
@@ -294,8 +280,8 @@ SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state
     while (vm_any(open)) {
         vf to = end;
         if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
-        const vm mine = vm_and(open, vm_and(vf_le(list->t_begin, from), vf_lt(from, list->t_end)));
-        if (vm_any(mine)) kernel_course_segment(p, state, course, mine, from, to);
+        const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
+        if (vm_any(mine)) kernel_course_segments(p, state, course, mine, from, to);
         from = to;
         open = vm_and(open, vf_lt(from, end));
     }
@@ -346,7 +332,24 @@ SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend 
     return broken;
 }
 
-SIMD_INLINE void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kernel_segments *list)
+/* Light of the rays in has, from t_in to t_out. */
+SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, const kernel_light *light)
+{
+    const vm fresh = vm_andnot(has, b->open);
+    b->t_first = vf_select(fresh, t_in, b->t_first);
+    b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
+    for (int a = 0; a < 3; a++) {
+        b->colour[a] = vf_select(fresh, vf_set(0), b->colour[a]);
+        b->colour[a] = vf_select(has, b->colour[a] + b->transmittance * light->colour[a], b->colour[a]);
+    }
+    b->transmittance = vf_select(has, b->transmittance * light->transmittance, b->transmittance);
+    b->light = vf_select(has, b->light * light->transmittance, b->light);
+    b->t_last = vf_select(has, t_out, b->t_last);
+    b->open = vm_or(b->open, has);
+}
+
+static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kernel_pieces *pieces,
+                                  const kernel_segments *list)
 {
     const kernel_segment_rows *r = &list->rows;
     float counts[SIMD_WIDTH];
@@ -359,21 +362,14 @@ SIMD_INLINE void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const 
     for (int n = 0; n < most; n++) {
         const vm has = vm_and(vf_lt(vf_set((float)n), count), vf_lt(vf_set(KERNEL_DARK), b->light));
         if (!vm_any(has)) break;
-        const vf t_in = vf_load(r->t_in[n]), clear = vf_load(r->transmittance[n]);
+        const vf t_in = vf_load(r->t_in[n]), t_out = vf_load(r->t_out[n]);
+        kernel_light light = kernel_clear();
+        kernel_integrate(pieces, has, (t_out - t_in) * list->per_t, vf_load(r->v_in[n]), vf_load(r->v_out[n]), &light);
         kernel_blend_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
-        const vm fresh = vm_andnot(has, b->open);
-        b->t_first = vf_select(fresh, t_in, b->t_first);
-        b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
-        for (int a = 0; a < 3; a++) {
-            b->colour[a] = vf_select(fresh, vf_set(0), b->colour[a]);
-            const vf sum = b->colour[a] + b->transmittance * vf_load(r->colour[a][n]);
-            b->colour[a] = vf_select(has, sum, b->colour[a]);
-        }
-        b->transmittance = vf_select(has, b->transmittance * clear, b->transmittance);
-        b->light = vf_select(has, b->light * clear, b->light);
-        b->t_last = vf_select(has, vf_load(r->t_out[n]), b->t_last);
-        b->open = vm_or(b->open, has);
+        kernel_blend_light(b, has, t_in, t_out, &light);
     }
+    const vm heaped = vf_lt(list->heap.transmittance, vf_set(1));
+    if (vm_any(heaped)) kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
 }
 
 /* One window from list->t_begin on; t_end is lowered to where it ended. */
@@ -381,6 +377,7 @@ SIMD_INLINE void kernel_trace_window(kernel_packet *p, kernel_segment_state *sta
 {
     kernel_segments *list = state->list;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) list->count[lane] = 0;
+    list->heap = kernel_clear();
     list->t_end = p->t_far;
     kernel_trace_parts(p, &p->frame->job->volumes[0].field, &p->frame->volumes[0].interest, list->t_begin, &list->t_end,
                        kernel_segment_leaf, state);
@@ -400,7 +397,7 @@ SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
     const vm active = p->active;
     while (vm_any(p->active)) {
         kernel_trace_window(p, &state);
-        kernel_blend_segments(p, &b, &list);
+        kernel_blend_segments(p, &b, state.pieces, &list);
         const vm unfinished = vm_and(vf_lt(list.t_end, p->t_far), vf_lt(vf_set(KERNEL_DARK), b.light));
         p->active = vm_and(p->active, unfinished);
         list.t_begin = list.t_end;
