@@ -4,14 +4,14 @@
 
 #include <stdbool.h>
 
+/* KERNEL_BLACK: what is behind so little light is left out of a segment. */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
+#define KERNEL_BLACK 1e-16
 #else
 typedef float kernel_real;
+#define KERNEL_BLACK 1e-8f
 #endif
-
-/* What is behind so little light is left out: of the light that a segment lets through. */
-#define KERNEL_BLACK ((kernel_real)1e-8)
 
 enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64 };
 
@@ -21,6 +21,8 @@ enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
     KERNEL_PIECE_OPACITY,
+    KERNEL_PIECE_OPACITY_HIGH, /* at the upper end */
+    KERNEL_PIECE_INVERSE,      /* 1 / (high - low) */
     KERNEL_PIECE_SLOPE,
     KERNEL_PIECE_COLOUR,
     KERNEL_PIECE_COLOUR_SLOPE = KERNEL_PIECE_COLOUR + 3,

@@ -191,12 +191,12 @@ typedef struct kernel_segment_state {
 typedef struct kernel_course {
     const kernel_map *map; /* NULL: linear */
     const kernel_interval *interval;
-    float deviation; /* the field may be off by; < 0: parts by step */
+    float cost; /* what light changes by a unit distance for a field off by one; < 0: parts by step */
 } kernel_course;
 
-/* How far the field may be off its line: with extinction s and colour c, an error d changes the light by at most
- * T (contrast |s'| + s |c'|) d a unit distance, which may be allowance (1 / reach + s) of it (docs/decisions.md). */
-SIMD_INLINE float kernel_deviation(const kernel_segment_state *state, const kernel_cell *c)
+/* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
+ * unit distance (docs/decisions.md): the most of that over the cell's values. */
+SIMD_INLINE float kernel_course_cost(const kernel_segment_state *state, const kernel_cell *c)
 {
     const kernel_pieces *t = state->pieces;
     float low = c->f[0], high = low;
@@ -210,13 +210,11 @@ SIMD_INLINE float kernel_deviation(const kernel_segment_state *state, const kern
     const int to = (int)fminf(fmaxf((high - t->bin_low) * t->bound_inverse, 0), last);
     kernel_bound b = t->bounds[from];
     for (int i = from + 1; i <= to; i++) {
-        b.extinction_low = fminf(b.extinction_low, t->bounds[i].extinction_low);
         b.extinction_high = fmaxf(b.extinction_high, t->bounds[i].extinction_high);
         b.extinction_slope = fmaxf(b.extinction_slope, t->bounds[i].extinction_slope);
         b.colour_slope = fmaxf(b.colour_slope, t->bounds[i].colour_slope);
     }
-    const float cost = t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope;
-    return state->allowance * (1 / state->reach + b.extinction_low) / fmaxf(cost, 1e-30f);
+    return fminf(t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope, 1e30f);
 }
 
 SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
@@ -230,19 +228,26 @@ SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course
 
 /* Into how many parts to cut the stretch from t0 to t1, with values v0 and v1 there. By error: the deviation from the
  * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
- * square of a part. */
-SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_course *course, vm rays, vf t0, vf t1, vf v0, vf v1)
+ * square of a part, and its mean is two thirds of it. Allowed is the stretch's share of the ray's length and of its
+ * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. */
+SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
+                                   vm rays, vf t0, vf t1, vf v0, vf v1)
 {
     const vf most = vf_set(KERNEL_MAX_PARTS), length = t1 - t0;
     if (!course->map) return vf_set(1);
-    if (course->deviation < 0) return vf_clamp(-vf_floor(-(length / p->sample_step)), vf_set(1), most);
-    vf off = vf_set(0);
+    if (course->cost < 0) return vf_clamp(-vf_floor(-(length / p->sample_step)), vf_set(1), most);
+    const kernel_transfer *transfer = &p->frame->volumes[0];
+    vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
     for (int quarter = 1; quarter < 4; quarter++) {
         const float share = 0.25f * (float)quarter;
         const vf v = kernel_value_at(p, course->map, course->interval, rays, t0 + length * share);
         off = vf_max(off, vf_abs((v0 + (v1 - v0) * share) - v));
+        opacity += kernel_opacity(transfer, v);
     }
-    const vf ratio = vf_min(off * (1.5f / fmaxf(course->deviation, 1e-12f)), vf_set(1e6f));
+    const vf distance = length * state->list->per_t, depth = distance * opacity * 0.25f;
+    const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
+    const vf made = off * course->cost * distance; /* 3/2 of 2/3 */
+    const vf ratio = vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f));
     return vf_clamp(-vf_floor(-vf_sqrt(ratio)), vf_set(1), most);
 }
 
@@ -253,7 +258,7 @@ SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *
     kernel_segments *list = state->list;
     vf from = t0, before = kernel_course_value(p, course, rays, t0);
     const vf last = kernel_course_value(p, course, rays, t1);
-    const vf parts = kernel_course_parts(p, course, rays, t0, t1, before, last);
+    const vf parts = kernel_course_parts(p, state, course, rays, t0, t1, before, last);
     const vf span = (t1 - t0) / parts;
     vm open = rays;
     for (int n = 1; vm_any(open); n++) {
@@ -302,7 +307,7 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
             kernel_cell_domain(c, transfer);
         }
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-        kernel_course course = {.deviation = -1};
+        kernel_course course = {.cost = -1};
         kernel_map map;
         int intervals = 1;
         if (c->type == GRID_TET) {
@@ -312,7 +317,7 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
             if (intervals && !c->is_constant) {
                 kernel_map_setup(&map, c);
                 course.map = &map;
-                course.deviation = kernel_deviation(state, c);
+                course.cost = kernel_course_cost(state, c);
             }
         }
         for (int k = 0; k < intervals; k++) {

@@ -114,6 +114,8 @@ static void set_piece(const render_transfer *t, const int *entries, kernel_real 
     piece->entry[KERNEL_PIECE_HIGH] = high;
     piece->entry[KERNEL_PIECE_OPACITY] = (kernel_real)opacity_on(t, middle, (double)low, &slope);
     piece->entry[KERNEL_PIECE_SLOPE] = (kernel_real)slope;
+    piece->entry[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)opacity_on(t, middle, (double)high, &slope);
+    piece->entry[KERNEL_PIECE_INVERSE] = 1 / (high - low);
     set_colours(t, entries, middle, (double)low, piece);
 }
 

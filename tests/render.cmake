@@ -44,3 +44,11 @@ foreach(isa plain avx512)
   set_tests_properties(segments_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 180)
 endforeach()
 
+
+
+add_executable(test_integral test_integral.c integral_doubles.c integral_floats.c)
+target_link_libraries(test_integral PRIVATE test_render_support insitu_flags)
+target_compile_options(test_integral PRIVATE $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
+add_test(NAME integral COMMAND test_integral)
+set_tests_properties(integral PROPERTIES TIMEOUT 120)
+

@@ -118,9 +118,9 @@ static double order_of(render_fixture *f, const double *truth, render_integratio
     f->job.integration = how;
     for (int i = 0; i <= halvings; i++) {
         double mean;
-        f->job.step = f->cell_size * ldexp(1, -i - 1);
+        f->job.step = f->cell_size * ldexp(1, -i - 2);
         const double worst = error_of(f, truth, &mean);
-        fprintf(stderr, "%s, step of 1/%d cell: mean %.3g, worst %.3g\n", how ? "segments" : "samples", 2 << i, mean,
+        fprintf(stderr, "%s, step of 1/%d cell: mean %.3g, worst %.3g\n", how ? "segments" : "samples", 4 << i, mean,
                 worst);
         if (i == 0) first = mean;
         last = mean;
@@ -166,12 +166,125 @@ static void max_error_is_kept_on_every_kind(void **state)
         }
 }
 
+/* The cells dealt to ranks, each drawn alone, all fragments merged: only the rounding of "over" differs. */
+static void parts_make_the_whole(void **state)
+{
+    static const double values[2] = {-0.2, 0.3};
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (test_partition_kind deal = 0; deal < TEST_PARTITION_COUNT; deal++)
+            for (int surfaces = 0; surfaces < 2; surfaces++) {
+                enum { N = 4, RANKS = 3 };
+                test_mesh mesh;
+                render_fixture whole, parts[RANKS];
+                drawn_frame at_once, apart;
+                test_mesh_lattice(kind, N, 0.2, test_wave, &mesh);
+                int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
+                test_partition(&mesh, deal, N, RANKS, owners);
+                for (int i = 0; i <= RANKS; i++) {
+                    render_fixture *f = i ? &parts[i - 1] : &whole;
+                    test_mesh part = mesh;
+                    if (i) test_mesh_part(&mesh, owners, i - 1, &part);
+                    fixture_create(f, &part, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / N,
+                                   1, (const double[]){0, 0, 0});
+                    if (i) test_mesh_free(&part);
+                    fixture_look(f, CAMERA_OUTSIDE, 37, 31);
+                    set_segments(f, 0.3, 0);
+                    if (surfaces) fixture_add_surface(f, values, 2, 0.4f);
+                    f->job.is_alone = i == 0;
+                }
+                fixture_draw(&whole, &at_once);
+                fixture_draw_apart(parts, RANKS, &apart);
+                const double off = drawn_difference(&at_once, &apart);
+                if (!(off <= 1e-6))
+                    fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(deal), off);
+                drawn_free(&at_once);
+                drawn_free(&apart);
+                for (int i = 0; i < RANKS; i++) fixture_free(&parts[i]);
+                fixture_free(&whole);
+                free(owners);
+                test_mesh_free(&mesh);
+            }
+}
+
+/* More meshes in one place than a window has room for: none is dropped. All have the same opacity throughout. */
+static void overlapping_meshes_are_all_seen(void **state)
+{
+    static const float constant[1] = {0.001f};
+    enum { COPIES = 100 };
+    (void)state;
+    test_mesh mesh;
+    render_fixture f;
+    drawn_frame drawn;
+    test_mesh_single(TEST_UNIT_TET, test_linear, &mesh);
+    test_mesh many = {.vertex_count = 4, .cell_count = COPIES, .connectivity_count = 4 * COPIES};
+    many.coordinates = mesh.coordinates;
+    many.values = mesh.values;
+    many.offsets = malloc((COPIES + 1) * sizeof *many.offsets);
+    many.connectivity = malloc(4 * COPIES * sizeof *many.connectivity);
+    many.types = malloc(COPIES);
+    many.ghosts = calloc(COPIES, 1);
+    for (int i = 0; i < 4 * COPIES; i++) many.connectivity[i] = mesh.connectivity[i % 4];
+    for (int i = 0; i <= COPIES; i++) many.offsets[i] = 4 * i;
+    for (int i = 0; i < COPIES; i++) many.types[i] = mesh.types[0];
+    double clear[2][23 * 21];
+    for (int all = 0; all < 2; all++) {
+        fixture_create(&f, all ? &many : &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                       (const double[]){0, 0, 0});
+        fixture_look(&f, CAMERA_OUTSIDE, 23, 21);
+        set_segments(&f, 1, 0);
+        f.transfer.opacity_count = 1;
+        f.transfer.opacities = constant;
+        fixture_draw(&f, &drawn);
+        for (int p = 0; p < 23 * 21; p++) clear[all][p] = 2 * (1 - (double)drawn.picture.rgba[4 * p + 3]);
+        drawn_free(&drawn);
+        fixture_free(&f);
+    }
+    /* 100 times the logarithm of a number that is rounded to 6e-8. */
+    for (int p = 0; p < 23 * 21; p++) assert_true(fabs(COPIES * log(clear[0][p]) - log(clear[1][p])) < 3e-5);
+    free(many.offsets);
+    free(many.connectivity);
+    free(many.types);
+    free(many.ghosts);
+    test_mesh_free(&mesh);
+}
+
+/* The same bits whatever else is in the packet: a picture's pixels do not change with the cut of its border, nor with
+ * the order of the cells, which turns the tree's leaves about. */
+static void pictures_do_not_depend_on_the_order_of_cells(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        drawn_frame drawn[2];
+        for (int i = 0; i < 2; i++) {
+            test_mesh mesh;
+            render_fixture f;
+            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+            if (i) test_mesh_shuffle(&mesh, 3);
+            fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
+                           (const double[]){0, 0, 0});
+            fixture_look(&f, CAMERA_OUTSIDE, 39, 33);
+            set_segments(&f, 0.1, 0);
+            fixture_draw(&f, &drawn[i]);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+        drawn_assert_same(&drawn[0], &drawn[1]);
+        for (int i = 0; i < 2; i++) drawn_free(&drawn[i]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tets_are_exact_for_every_camera), cmocka_unit_test(linear_fields_are_exact_on_every_kind),
-        cmocka_unit_test(surfaces_cut_segments),           cmocka_unit_test(orders_on_jittered_hexes),
+        cmocka_unit_test(tets_are_exact_for_every_camera),
+        cmocka_unit_test(linear_fields_are_exact_on_every_kind),
+        cmocka_unit_test(surfaces_cut_segments),
+        cmocka_unit_test(orders_on_jittered_hexes),
         cmocka_unit_test(max_error_is_kept_on_every_kind),
+        cmocka_unit_test(parts_make_the_whole),
+        cmocka_unit_test(overlapping_meshes_are_all_seen),
+        cmocka_unit_test(pictures_do_not_depend_on_the_order_of_cells),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
