@@ -60,12 +60,13 @@ SIMD_INLINE vf kernel_exp(vf x)
 
 /* What a segment adds: colour (premultiplied) and what it lets through. */
 typedef struct kernel_light {
-    vf colour[3], transmittance;
+    vf colour[3], depth; /* depth: -ln(transmittance), whose sums round less than products near 1 */
+    vf transmittance;
 } kernel_light;
 
 SIMD_INLINE kernel_light kernel_clear(void)
 {
-    return (kernel_light){{vf_set(0), vf_set(0), vf_set(0)}, vf_set(1)};
+    return (kernel_light){{vf_set(0), vf_set(0), vf_set(0)}, vf_set(0), vf_set(1)};
 }
 
 /* Pieces that rays are in: most often one for all, which saves the gathers. */
@@ -188,7 +189,8 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, vf length, vf
             const vf sum = light->colour[a] + (whole * colour + moment * colour_slope);
             light->colour[a] = vf_select(open, sum, light->colour[a]);
         }
-        light->transmittance = vf_select(open, light->transmittance * kernel_exp(-depth), light->transmittance);
+        light->depth = vf_select(open, light->depth + depth, light->depth);
+        light->transmittance = kernel_exp(-light->depth);
         const vm through = vf_le(one, st.share);
         piece = vf_select(through, piece + turn, piece);
         value = vf_select(through, edge, value + step);

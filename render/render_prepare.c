@@ -131,8 +131,9 @@ static insitu_status check_job(const render_job *job, base_error *error)
                          values, job->volume_count, job->light_count, RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES,
                          RENDER_MAX_LIGHTS);
     if (!job->volume_count) return INSITU_OK;
-    if (!(job->max_error >= 0))
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "max_error of %g, expected 0 or more", job->max_error);
+    if (!(job->max_error >= 0) || !(job->extent >= 0))
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "max_error of %g over %g, expected 0 or more", job->max_error,
+                         job->extent);
     if (job->sample_group < 1 || job->sample_group > KERNEL_MAX_GROUP)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "sample group of %d, expected 1 to %d", job->sample_group,
                          KERNEL_MAX_GROUP);
@@ -168,8 +169,8 @@ static double scene_reach(const render_job *job)
     return sqrt(square);
 }
 
-/* Of max_error an eighth goes to the colours' table, and four fifths to the field (docs/decisions.md): half of them over
- * the length of the ray, half over what is absorbed. */
+/* Of max_error an eighth goes to the colours' table, and four fifths to the field (docs/decisions.md): half of them
+ * over the length of the ray, half over what is absorbed. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;
@@ -177,7 +178,8 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     if (!f->has_segments) return INSITU_OK;
     const double unit = job->volumes[0].transfer->unit_distance * job->space.scale;
     f->allowance = (float)(0.4 * job->max_error);
-    f->reach = (float)fmax(scene_reach(job) / unit, 1e-30);
+    const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
+    f->reach = (float)fmax(reach / unit, 1e-30);
     return render_pieces_build(&f->pieces, job->volumes[0].transfer, job->max_error / 8, error);
 }
 
