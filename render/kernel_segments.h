@@ -329,12 +329,23 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
 
 /* ---- the ray ---- */
 
-/* Rays whose fragment must end before the segment at t_in: a surface is in between, or there is a gap. */
+/* Rays whose fragment must end before the segment at t_in: a surface is in between, or there is a gap, or cells
+ * overlap, which the overlapping fragments tell compositing (render.h). */
 SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_cuts *cuts, vf t_in)
 {
-    vm broken = p->frame->job->is_alone ? vm_none() : vm_not(vf_eq(t_in, b->t_last));
+    vm broken = p->frame->job->is_alone ? vf_lt(t_in, b->t_last) : vm_not(vf_eq(t_in, b->t_last));
     if (cuts->row_count) broken = vm_or(broken, vf_le(kernel_next_cut(p, cuts, b->t_last, false), t_in));
     return broken;
+}
+
+/* End the fragments of the rays in mask, just before their end: what begins at the end does not overlap
+ * them (comp.h). */
+SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mask)
+{
+    const vf end = b->t_last, size = vf_max(vf_abs(end), vf_set(1e-30f));
+    b->t_last = vf_max(b->t_first, end - size * 1e-7f);
+    kernel_blend_close(p, b, mask);
+    b->t_last = end;
 }
 
 /* Light of the rays in has, from t_in to t_out. */
@@ -374,7 +385,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         const vf t_in = vf_load(r->t_in[n]), t_out = vf_load(r->t_out[n]);
         kernel_light light = kernel_clear();
         kernel_integrate(pieces, has, (t_out - t_in) * list->per_t, vf_load(r->v_in[n]), vf_load(r->v_out[n]), &light);
-        kernel_blend_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
+        kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
         kernel_blend_light(b, has, t_in, t_out, &light);
     }
     const vm heaped = vf_lt(list->heap.transmittance, vf_set(1));
@@ -413,7 +424,7 @@ SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
         list.t_begin = list.t_end;
     }
     p->active = active;
-    kernel_blend_close(p, &b, p->active);
+    kernel_segments_close(p, &b, p->active);
 }
 
 #endif

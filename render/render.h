@@ -102,7 +102,7 @@ typedef struct render_part {
 
 /* How a volume is integrated: by samples (thesis, 4.4), whose error goes with the step, or by segments, exact where the
  * field is linear along the ray (tets) and of second order in the parts of cells elsewhere. Several volumes are
- * sampled.
+ * sampled, and so are rays on which cells overlap.
  */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
 

@@ -174,7 +174,7 @@ static double scene_reach(const render_job *job)
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;
-    f->has_segments = job->integration == RENDER_SEGMENTS && job->volume_count == 1;
+    f->has_segments = job->integration == RENDER_SEGMENTS && job->volume_count == 1 && !job->separate_samples;
     if (!f->has_segments) return INSITU_OK;
     const double unit = job->volumes[0].transfer->unit_distance * job->space.scale;
     f->allowance = (float)(0.4 * job->max_error);

@@ -1,5 +1,6 @@
 /* Volumes by segments against the adaptive integral: tets exactly, other cells to second order, max_error kept; with
  * surfaces; on parts of the mesh; on every instruction set. */
+#include "comp.h"
 #include "reference_integral.h"
 #include "test_render_fixture.h"
 
@@ -197,6 +198,9 @@ static void parts_make_the_whole(void **state)
                 fixture_draw(&whole, &at_once);
                 fixture_draw_apart(parts, RANKS, &apart);
                 const double off = drawn_difference(&at_once, &apart);
+                for (int p = 0; p < 37 * 31; p++)
+                    assert_true(
+                        !comp_pixel_overlaps(apart.list.items + apart.first[p], apart.first[p + 1] - apart.first[p]));
                 if (!(off <= 1e-6))
                     fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(deal), off);
                 drawn_free(&at_once);
