@@ -5,6 +5,7 @@
 
 #include <stddef.h>
 
+#include "kernel_pieces.h"
 #include "render.h"
 
 enum { KERNEL_TILE = 16, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
@@ -49,6 +50,9 @@ typedef struct kernel_frame {
     double scaled_step;                          /* step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
     bool has_transparent;
+    bool has_segments; /* the volume is integrated by segments, else sampled */
+    kernel_pieces pieces;
+    float allowance, reach; /* kernel_segments.h */
     bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there
                          */
 } kernel_frame;

@@ -26,6 +26,7 @@ typedef struct kernel_blend {
     vm open;
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
+    vf depth, lost[3]; /* of segments: -ln(transmittance), and what colour has lost to rounding */
     vf light; /* what reaches this rank's next sample through all its samples so far */
 } kernel_blend;
 

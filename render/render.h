@@ -100,6 +100,12 @@ typedef struct render_part {
     const mmbvh *tree; /* over cells; its origin and scale are the space's */
 } render_part;
 
+/* How a volume is integrated: by samples (thesis, 4.4), whose error goes with the step, or by segments, exact where the
+ * field is linear along the ray (tets) and of second order in the parts of cells elsewhere. Several volumes are
+ * sampled, and so are rays on which cells overlap.
+ */
+typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
+
 typedef struct render_job {
     render_camera camera;
     render_space space;
@@ -112,7 +118,12 @@ typedef struct render_job {
     int volume_count;
     const render_light *lights;
     int light_count;
-    double step;      /* distance between samples, scene units, > 0; volumes only */
+    double step; /* distance between samples, scene units, > 0; volumes only */
+    render_integration integration;
+    double max_error; /* of segments: > 0: cells other than tets are cut into parts such that no channel of a pixel is
+                         off by more, in linear light; 0: into parts no longer than step */
+    double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
+                         ranks, so that all cut alike. 0: of this rank's */
     int sample_group; /* N of the sample position packets (thesis, 4.4.1), 1 .. 64 */
     bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
     int frame;        /* 0 .. : which of the accumulated frames this is */

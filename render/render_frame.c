@@ -103,6 +103,6 @@ insitu_status render_frame(const render_job *job, fragment_list *out, render_sta
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for %d threads", threads);
     for (int i = 0; lists && i < threads; i++) base_free(lists[i].items);
     base_free(lists);
-    base_free(frame.surfaces);
+    render_unprepare(&frame);
     return status;
 }

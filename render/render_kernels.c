@@ -2,7 +2,7 @@
  * pixels is cut into packets; each packet finds its surfaces first, so that volumes know where opaque ones end them. */
 #include <math.h>
 
-#include "kernel_volume.h"
+#include "kernel_segments.h"
 
 /* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
 typedef struct kernel_parent_state {
@@ -46,6 +46,7 @@ static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_
 {
     kernel_packet p;
     kernel_hits hits;
+    const int64_t first_fragment = thread->out->count;
     kernel_packet_setup(&p, f, tile, thread, x0, y0);
     hits.found = vm_none();
     hits.cut_count = 0;
@@ -59,7 +60,10 @@ static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_
     }
     if (f->volume_count) {
         const double start = thread->now();
-        kernel_trace_volumes(&p, &hits);
+        if (f->has_segments)
+            kernel_trace_segments(&p, first_fragment);
+        else
+            kernel_trace_volumes(&p, &hits);
         thread->volume_seconds += thread->now() - start;
     }
 }

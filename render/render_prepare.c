@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "render_pieces.h"
 
 static float below(double v)
 {
@@ -130,6 +131,9 @@ static insitu_status check_job(const render_job *job, base_error *error)
                          values, job->volume_count, job->light_count, RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES,
                          RENDER_MAX_LIGHTS);
     if (!job->volume_count) return INSITU_OK;
+    if (!(job->max_error >= 0) || !(job->extent >= 0))
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "max_error of %g over %g, expected 0 or more", job->max_error,
+                         job->extent);
     if (job->sample_group < 1 || job->sample_group > KERNEL_MAX_GROUP)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "sample group of %d, expected 1 to %d", job->sample_group,
                          KERNEL_MAX_GROUP);
@@ -150,6 +154,41 @@ static insitu_status check_job(const render_job *job, base_error *error)
     return INSITU_OK;
 }
 
+/* The longest way through the cells, in scaled units: the diagonal of all trees' boxes. */
+static double scene_reach(const render_job *job)
+{
+    double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, square = 0;
+    for (int i = 0; i < job->part_count; i++) {
+        const mmbvh *tree = job->parts[i].tree;
+        for (int a = 0; a < 3 && tree->node_count; a++) {
+            low[a] = fmin(low[a], (double)tree->nodes[0].lower[a]);
+            high[a] = fmax(high[a], (double)tree->nodes[0].upper[a]);
+        }
+    }
+    for (int a = 0; a < 3; a++) square += low[a] < high[a] ? (high[a] - low[a]) * (high[a] - low[a]) : 0;
+    return sqrt(square);
+}
+
+/* Of max_error an eighth goes to the colours' table, and four fifths to the field (docs/decisions.md): half of them
+ * over the length of the ray, half over what is absorbed. */
+static insitu_status prepare_segments(kernel_frame *f, base_error *error)
+{
+    const render_job *job = f->job;
+    f->has_segments = job->integration == RENDER_SEGMENTS && job->volume_count == 1 && !job->separate_samples;
+    if (!f->has_segments) return INSITU_OK;
+    const double unit = job->volumes[0].transfer->unit_distance * job->space.scale;
+    f->allowance = (float)(0.4 * job->max_error);
+    const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
+    f->reach = (float)fmax(reach / unit, 1e-30);
+    return render_pieces_build(&f->pieces, job->volumes[0].transfer, job->max_error / 8, error);
+}
+
+void render_unprepare(kernel_frame *frame)
+{
+    base_free(frame->surfaces);
+    render_pieces_free(&frame->pieces);
+}
+
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error)
 {
     const insitu_status status = check_job(job, error);
@@ -164,5 +203,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     for (int i = 0; i < job->volume_count; i++)
         prepare_transfer(&frame->volumes[i], job->volumes[i].transfer, job->step);
     frame->needs_contact = job->volume_count && job->surface_count && !job->is_alone;
-    return INSITU_OK;
+    const insitu_status segments = prepare_segments(frame, error);
+    if (segments != INSITU_OK) render_unprepare(frame);
+    return segments;
 }

@@ -4,7 +4,8 @@
 
 #include "kernel_types.h"
 
-/* Check the job and fill frame; frame->surfaces is memory of base_alloc(), the caller's to free. */
+/* Check the job and fill frame, which is to be freed with render_unprepare() where that succeeded. */
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error);
+void render_unprepare(kernel_frame *frame);
 
 #endif

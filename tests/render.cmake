@@ -3,7 +3,7 @@ add_library(test_meshes STATIC test_meshes.c)
 target_include_directories(test_meshes PUBLIC . ${PROJECT_SOURCE_DIR}/libinsitu/base)
 target_link_libraries(test_meshes PUBLIC m PRIVATE insitu_flags)
 
-add_library(test_render_support STATIC reference_cell.c reference_render.c test_render_fixture.c)
+add_library(test_render_support STATIC reference_cell.c reference_integral.c reference_render.c test_render_fixture.c)
 target_link_libraries(test_render_support
   PUBLIC test_meshes insitu_internal PkgConfig::CMOCKA PRIVATE insitu_flags)
 
@@ -34,5 +34,21 @@ set_tests_properties(render_isa PROPERTIES TIMEOUT 120)
 insitu_render_program(test_partition_mpi)
 insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7)
 
+
 insitu_render_program(test_overlap_mpi)
 insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 4 7)
+
+insitu_render_program(test_segments)
+foreach(isa plain avx512)
+  add_test(NAME segments_${isa} COMMAND test_segments)
+  set_tests_properties(segments_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 180)
+endforeach()
+
+
+
+add_executable(test_integral test_integral.c integral_doubles.c integral_floats.c)
+target_link_libraries(test_integral PRIVATE test_render_support insitu_flags)
+target_compile_options(test_integral PRIVATE $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
+add_test(NAME integral COMMAND test_integral)
+set_tests_properties(integral PROPERTIES TIMEOUT 120)
+

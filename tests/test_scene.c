@@ -73,7 +73,8 @@ static const char every_key[] = "threads: 3\n"
                                 "          unit_distance: 0.1\n"
                                 "      - isosurface: {field: q, values: [7], colour_by: {field: speed, component: 2, "
                                 "map: inferno, range: [0, 1]}}\n"
-                                "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4}\n"
+                                "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4,\n"
+                                "               method: segments}\n"
                                 "    outputs:\n"
                                 "      - path: \"out/{name}_{cycle:06}.png\"\n"
                                 "        bits: 16\n"
@@ -82,7 +83,11 @@ static const char every_key[] = "threads: 3\n"
                                 "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5}}\n"
                                 "    layers: [{volume: {field: p}}]\n"
                                 "    sampling: {step: 0.125}\n"
-                                "    outputs: [{path: b.png, bits: 8}]\n";
+                                "    outputs: [{path: b.png, bits: 8}]\n"
+                                "  - name: third\n"
+                                "    layers: [{volume: {field: p}}]\n"
+                                "    sampling: {max_error: 1e-3}\n"
+                                "    outputs: [{path: c.png}]\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -112,7 +117,7 @@ static void scene_image_keys_are_read(void **state)
     scene s;
     parse_good(every_key, &s);
     assert_int_equal(s.threads, 3);
-    assert_int_equal(s.image_count, 2);
+    assert_int_equal(s.image_count, 3);
     const scene_image *image = &s.images[0];
     assert_string_equal(image->name, "wave");
     assert_int_equal(image->line, 3);
@@ -125,6 +130,8 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(image->sample_group, 8);
     assert_false(image->jitter);
     assert_int_equal(image->frames, 4);
+    assert_true(image->method == SCENE_SEGMENTS && image->max_error == 0);
+    assert_true(s.images[2].method == SCENE_SEGMENTS && s.images[2].max_error == 1e-3);
     assert_int_equal(image->output_count, 2);
     assert_string_equal(image->outputs[0].path, "out/{name}_{cycle:06}.png");
     assert_int_equal(image->outputs[0].format, SCENE_PNG16);
@@ -221,6 +228,7 @@ static void scene_image_defaults_hold(void **state)
     assert_true(image->background[3] == 1);
     assert_true(image->step == 0 && image->step_cells == 0.5 && image->sample_group == 16);
     assert_true(image->jitter && image->frames == 1);
+    assert_true(image->method == SCENE_SAMPLES && image->max_error == 0);
     assert_true(image->camera.is_automatic && image->camera.angle == 40 && image->camera.zoom == 1);
     check_vector(image->camera.direction, 1 / length, 0.8 / length, 1.2 / length);
     check_vector(image->camera.up, 0, 1, 0);
@@ -426,6 +434,10 @@ static const struct bad_file {
     {11, "      - volume: {field: f, opacity: 0.5}", 11, {"opacity: \"0.5\"", "lists of 2 numbers"}},
     {11, "      - volume: {field: f, unit_distance: 0}", 11, {"unit_distance: \"0\"", "above 0"}},
     {12, "    sampling: {step: 1, step_cells: 1}", 12, {"sampling.step: given beside step_cells"}},
+    {12, "    sampling: {max_error: 1e-3, step: 1}", 12, {"sampling.max_error: given beside a step"}},
+    {12, "    sampling: {max_error: 1e-3, method: samples}", 12, {"sampling.max_error: given with method: samples"}},
+    {12, "    sampling: {max_error: 0}", 12, {"sampling.max_error: \"0\"", "from 1e-05 to 1"}},
+    {12, "    sampling: {method: rays}", 12, {"sampling.method: \"rays\"", "samples, segments"}},
     {12, "    sampling: {step: 0}", 12, {"sampling.step: \"0\"", "above 0"}},
     {12, "    sampling: {group: 65}", 12, {"sampling.group: \"65\"", "from 1 to 64"}},
     {12, "    sampling: {jitter: maybe}", 12, {"sampling.jitter: \"maybe\"", "true or false"}},

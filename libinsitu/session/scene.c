@@ -94,13 +94,22 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
 {
     static const scene_file_sampling none;
     if (!in) in = &none;
+    out->max_error = in->max_error ? *in->max_error : 0;
+    out->method = in->method ? (scene_sampling_method)*in->method : in->max_error ? SCENE_SEGMENTS : SCENE_SAMPLES;
     out->step = in->step ? *in->step : 0;
     out->step_cells = in->step_cells ? *in->step_cells : 0.5;
     out->sample_group = in->group ? *in->group : 16;
     out->jitter = in->jitter ? *in->jitter : true;
     out->frames = in->frames ? *in->frames : 1;
-    if (!in->step || !in->step_cells) return INSITU_OK;
-    return scene_bad(d, path, "sampling.step", "given beside step_cells, expected one of the two");
+    if (in->step && in->step_cells)
+        return scene_bad(d, path, "sampling.step", "given beside step_cells, expected one of the two");
+    if (in->max_error && (in->step || in->step_cells))
+        return scene_bad(d, path, "sampling.max_error", "given beside a step, expected one of the two");
+    if (in->max_error && out->method == SCENE_SAMPLES)
+        return scene_bad(d, path, "sampling.max_error", "given with method: samples, expected segments");
+    if (out->method == SCENE_SEGMENTS && out->volume_count > 1)
+        return scene_bad(d, path, "sampling", "segments of %d volumes, expected one volume", out->volume_count);
+    return INSITU_OK;
 }
 
 static insitu_status convert_image(const scene_document *d, const char *path, const scene_file_image *in,

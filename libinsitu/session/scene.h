@@ -8,6 +8,7 @@
 
 #include "error.h"
 
+typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
 typedef enum scene_colour_map { SCENE_VIRIDIS, SCENE_INFERNO, SCENE_COOL_TO_WARM, SCENE_GREY } scene_colour_map;
 
 /* Which scalar of a field: the magnitude, or component n. Default: component 0 of a field of one, else magnitude. */
@@ -90,12 +91,14 @@ typedef struct scene_image {
     scene_volume *volumes;
     int light_count; /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
-    double step;       /* sample distance in scene units; 0: by step_cells */
-    double step_cells; /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
-    int sample_group;  /* 1 .. 64; 16 by default */
-    bool jitter;       /* true by default */
-    int frames;        /* accumulated; 1 by default, 1 .. 4096 */
-    int output_count;  /* >= 1 */
+    scene_sampling_method method; /* of volumes; segments only where there is one volume */
+    double max_error;             /* of segments: of a channel, linear; 0: by step */
+    double step;                  /* sample distance in scene units; 0: by step_cells */
+    double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
+    int sample_group;             /* 1 .. 64; 16 by default */
+    bool jitter;                  /* true by default */
+    int frames;                   /* accumulated; 1 by default, 1 .. 4096 */
+    int output_count;             /* >= 1 */
     scene_output *outputs;
     int every; /* drawn at cycles that are multiples of it; 1 by default */
 } scene_image;

@@ -30,6 +30,7 @@ static const cyaml_schema_value_t opacity_point = {CYAML_VALUE_SEQUENCE_FIXED(CY
 
 static const cyaml_strval_t map_words[] = {
     {"viridis", SCENE_VIRIDIS}, {"inferno", SCENE_INFERNO}, {"cool_to_warm", SCENE_COOL_TO_WARM}, {"grey", SCENE_GREY}};
+static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
 
 #define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
@@ -141,6 +142,14 @@ DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
 DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
 
 #define SAMPLING_KEYS(X)                                                                                               \
+    X(CHOICE("method", scene_file_sampling, method, method_words),                                                     \
+      .help = "How a volume is integrated: by samples, or by segments, exact on tetrahedra and of second order in "    \
+              "the step elsewhere. `segments` takes one volume an image.",                                             \
+      .by_default = "`samples`, with `max_error` `segments`")                                                          \
+    X(CYAML_FIELD_FLOAT_PTR("max_error", OPTIONAL, scene_file_sampling, max_error),                                    \
+      .help = "No channel of a pixel is off by more, in linear light: cells are cut as finely as that takes. Not "     \
+              "with `step`, `step_cells`, nor `method: samples`.",                                                     \
+      .by_default = "by the step", .low = 1e-5, .high = 1)                                                             \
     X(CYAML_FIELD_FLOAT_PTR("step", OPTIONAL, scene_file_sampling, step),                                              \
       .help = "Distance between samples, in scene units. Not with `step_cells`.", .by_default = "by `step_cells`",     \
       .low = 0, .is_low_excluded = true, .high = 1e30)                                                                 \

@@ -65,6 +65,8 @@ typedef struct scene_file_layer {
 } scene_file_layer;
 
 typedef struct scene_file_sampling {
+    int *method; /* scene_sampling_method */
+    double *max_error;
     double *step, *step_cells;
     int *group;
     bool *jitter;

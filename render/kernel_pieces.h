@@ -1,0 +1,53 @@
+/* A transfer function as pieces on which opacity and colour are linear (render_pieces.c), and bounds of its slopes. */
+#ifndef RENDER_KERNEL_PIECES_H
+#define RENDER_KERNEL_PIECES_H
+
+#include <stdbool.h>
+
+/* KERNEL_BLACK: what is behind so little light is left out of a segment. */
+#if defined(KERNEL_REAL_IS_DOUBLE)
+typedef double kernel_real;
+#define KERNEL_BLACK 1e-16
+#else
+typedef float kernel_real;
+#define KERNEL_BLACK 1e-8f
+#endif
+
+enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64 };
+
+/* Opacity and colour at a value x of the piece: entry[..] + (x - low) * slope. Where a function is constant to either
+ * side, the pieces' ends are at -+1e30. */
+enum {
+    KERNEL_PIECE_LOW,
+    KERNEL_PIECE_HIGH,
+    KERNEL_PIECE_OPACITY,
+    KERNEL_PIECE_OPACITY_HIGH, /* at the upper end */
+    KERNEL_PIECE_INVERSE,      /* 1 / (high - low) */
+    KERNEL_PIECE_SLOPE,
+    KERNEL_PIECE_COLOUR,
+    KERNEL_PIECE_COLOUR_SLOPE = KERNEL_PIECE_COLOUR + 3,
+    KERNEL_PIECE_ENTRIES = KERNEL_PIECE_COLOUR_SLOPE + 3
+};
+
+typedef struct kernel_piece {
+    kernel_real entry[KERNEL_PIECE_ENTRIES];
+} kernel_piece;
+
+/* Over a stretch of values: how the function may change in it. Extinctions are per unit distance, slopes per domain. */
+typedef struct kernel_bound {
+    float extinction_low, extinction_high, extinction_slope, colour_slope;
+} kernel_bound;
+
+typedef struct kernel_pieces {
+    int count;
+    kernel_piece *pieces; /* by value; the first and the last are endless */
+    /* Bins of equal width from bin_low, to find a value's piece by: the piece at the bin's begin, as a number. */
+    kernel_real bin_low, bin_inverse;
+    kernel_real bin_first[KERNEL_PIECE_BINS];
+    /* Of the bounds' bins: also from bin_low; below and above the bins the function is constant. */
+    float bound_inverse;
+    kernel_bound bounds[KERNEL_BOUND_BINS];
+    float contrast; /* no two colours differ by more, in any channel; black and white counted */
+} kernel_pieces;
+
+#endif

@@ -1,0 +1,430 @@
+/* Volumes by segments: the integral of emission and absorption instead of a sum over samples.
+ *
+ * A cell's interval on a ray is one segment where the field is linear on it (tets, cells of one value), and is cut into
+ * equal segments with a linear field each elsewhere. They are kept until all that lies in front of them is known, for
+ * cells come in the order of the tree, not of the ray; then the n-th segments of all rays are integrated together
+ * (kernel_integral.h), which fills the lanes far better than a cell does, that few of a packet's rays meet.
+ *
+ * Each ray has room for so many segments, sorted by t_in. When it is full, its window ends at the t_in of the farthest,
+ * which is put back; the traversal, whose upper limit is that end, meets only what is nearer. The window's segments
+ * are integrated front to back, and the next window begins where the last one ended:
+ *
+ *     window 1: t_end ________________ | window 2: from here on
+ *     |--cell--|--cell--|----cell----|-|--cell--|
+ *              ^ t_in in window 1      ^ t_in == t_end: window 2
+ *
+ * A segment belongs to the window that holds its t_in and is never cut by the window, so what a ray sees does not
+ * depend on where windows end, nor on the other rays of its packet. Surfaces do cut segments. Fragments join segments
+ * whose t_out and t_in are the same bits, as neighbours' are; a gap ends them, for it may belong to another rank. */
+#ifndef RENDER_KERNEL_SEGMENTS_H
+#define RENDER_KERNEL_SEGMENTS_H
+
+#include "kernel_integral.h"
+#include "kernel_volume.h"
+
+enum { KERNEL_WINDOW = 64, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
+
+typedef struct kernel_segment {
+    float t_in, t_out, v_in, v_out;
+} kernel_segment;
+
+typedef struct kernel_segment_rows {
+    float t_in[KERNEL_WINDOW][SIMD_WIDTH], t_out[KERNEL_WINDOW][SIMD_WIDTH];
+    float v_in[KERNEL_WINDOW][SIMD_WIDTH], v_out[KERNEL_WINDOW][SIMD_WIDTH];
+} kernel_segment_rows;
+
+/* Crossings of transparent surfaces: the first of each ray in rows, sorted, +inf where there are no more. */
+typedef struct kernel_cuts {
+    int row_count;
+    bool is_whole;       /* else the rest is looked for in the fragments */
+    int64_t first, last; /* the packet's fragments of surfaces */
+    float row[KERNEL_LANE_CUTS][SIMD_WIDTH];
+} kernel_cuts;
+
+typedef struct kernel_segments {
+    int count[SIMD_WIDTH];
+    kernel_segment_rows rows;
+    /* Meshes that overlap to no end: of segments that begin at one place, where no order is meant, those for which
+     * there is no room are integrated at once, and blended behind the window's. */
+    kernel_light heap;
+    vf t_begin, t_end; /* the window */
+    vf per_t;          /* unit distances per t */
+    kernel_cuts cuts;
+} kernel_segments;
+
+SIMD_INLINE int kernel_lane_of(const kernel_packet *p, uint32_t pixel)
+{
+    int lane = 0;
+    while (lane < SIMD_WIDTH - 1 && p->pixel[lane] != pixel) lane++;
+    return lane;
+}
+
+SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_cuts *cuts)
+{
+    int count[SIMD_WIDTH] = {0};
+    cuts->row_count = 0;
+    cuts->is_whole = true;
+    cuts->first = first;
+    cuts->last = p->thread->out->count;
+    for (int64_t i = first; p->frame->has_transparent && i < cuts->last; i++) {
+        const fragment *hit = &p->thread->out->items[i];
+        const int lane = kernel_lane_of(p, hit->pixel);
+        int at = count[lane];
+        if (at == KERNEL_LANE_CUTS) {
+            cuts->is_whole = false;
+            continue;
+        }
+        if (at == cuts->row_count) {
+            vf_store(cuts->row[at], vf_set(INFINITY));
+            cuts->row_count++;
+        }
+        for (; at > 0 && cuts->row[at - 1][lane] > hit->t_in; at--) cuts->row[at][lane] = cuts->row[at - 1][lane];
+        cuts->row[at][lane] = hit->t_in;
+        count[lane]++;
+    }
+}
+
+/* A ray of more cuts than there are rows: its fragments are looked through. */
+static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts, vf from, bool beyond)
+{
+    float start[SIMD_WIDTH], next[SIMD_WIDTH];
+    vf_store(start, from);
+    vf_store(next, vf_set(INFINITY));
+    for (int64_t i = cuts->first; i < cuts->last; i++) {
+        const fragment *hit = &p->thread->out->items[i];
+        const int lane = kernel_lane_of(p, hit->pixel);
+        if ((beyond ? hit->t_in > start[lane] : hit->t_in >= start[lane]) && hit->t_in < next[lane])
+            next[lane] = hit->t_in;
+    }
+    return vf_load(next);
+}
+
+/* The first cut at or, if asked, beyond t. */
+SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, vf t, bool beyond)
+{
+    vf next = vf_set(INFINITY);
+    if (!cuts->is_whole) return kernel_next_cut_slowly(p, cuts, t, beyond);
+    for (int i = cuts->row_count; i-- > 0;) {
+        const vf cut = vf_load(cuts->row[i]);
+        next = vf_select(beyond ? vf_lt(t, cut) : vf_le(t, cut), cut, next);
+    }
+    return next;
+}
+
+/* ---- a ray's segments ---- */
+
+static inline void kernel_rows_set(kernel_segment_rows *r, int lane, int at, const kernel_segment *s)
+{
+    r->t_in[at][lane] = s->t_in;
+    r->t_out[at][lane] = s->t_out;
+    r->v_in[at][lane] = s->v_in;
+    r->v_out[at][lane] = s->v_out;
+}
+
+static inline void kernel_rows_move(kernel_segment_rows *r, int lane, int from, int to)
+{
+    r->t_in[to][lane] = r->t_in[from][lane];
+    r->t_out[to][lane] = r->t_out[from][lane];
+    r->v_in[to][lane] = r->v_in[from][lane];
+    r->v_out[to][lane] = r->v_out[from][lane];
+}
+
+/* Make room in a full ray: the window ends at its farthest segment, which goes, with all that begin there. Returns
+ * false where that would be all. */
+static bool kernel_rows_shorten(kernel_segments *list, int lane)
+{
+    const kernel_segment_rows *r = &list->rows;
+    int count = KERNEL_WINDOW - 1;
+    const float end = r->t_in[count][lane];
+    while (count > 0 && r->t_in[count - 1][lane] == end) count--;
+    if (count == 0) return false;
+    list->count[lane] = count;
+    list->t_end[lane] = end;
+    return true;
+}
+
+/* False where there is no room: more segments begin at one place than a window holds. */
+static inline bool kernel_rows_insert(kernel_segments *list, int lane, const kernel_segment *s)
+{
+    kernel_segment_rows *r = &list->rows;
+    if (list->count[lane] == KERNEL_WINDOW && !kernel_rows_shorten(list, lane)) {
+        const float all = r->t_in[0][lane];
+        if (s->t_in == all) return false;
+        list->t_end[lane] = fminf(list->t_end[lane], fmaxf(s->t_in, all));
+        if (s->t_in < all) list->count[lane] = 0;
+    }
+    if (!(s->t_in < list->t_end[lane])) return true;
+    int at = list->count[lane]++;
+    for (; at > 0 && r->t_in[at - 1][lane] > s->t_in; at--) kernel_rows_move(r, lane, at - 1, at);
+    kernel_rows_set(r, lane, at, s);
+    return true;
+}
+
+SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays, vf t_in, vf t_out,
+                                     vf v_in, vf v_out)
+{
+    float a[4][SIMD_WIDTH];
+    unsigned bits = vm_bits(rays), left = 0;
+    vf_store(a[0], t_in);
+    vf_store(a[1], t_out);
+    vf_store(a[2], v_in);
+    vf_store(a[3], v_out);
+    for (; bits; bits &= bits - 1) {
+        const int lane = __builtin_ctz(bits);
+        const kernel_segment s = {a[0][lane], a[1][lane], a[2][lane], a[3][lane]};
+        if (!kernel_rows_insert(list, lane, &s)) left |= bits & -bits;
+    }
+    if (__builtin_expect(left != 0, 0))
+        kernel_integrate(pieces, vm_from_bits(left), (t_out - t_in) * list->per_t, v_in, v_out, &list->heap);
+}
+
+/* ---- a cell's segments ---- */
+
+typedef struct kernel_segment_state {
+    kernel_segments *list;
+    const kernel_pieces *pieces;
+    float allowance; /* the error a unit distance, and a unit of optical depth, may make; 0: parts by step */
+    float reach;     /* no ray is longer in the cells, unit distances */
+} kernel_segment_state;
+
+/* A cell under way: how its field is known, and how finely it must be. */
+typedef struct kernel_course {
+    const kernel_map *map; /* NULL: linear */
+    const kernel_interval *interval;
+    float cost; /* what light changes by a unit distance for a field off by one; < 0: parts by step */
+} kernel_course;
+
+/* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
+ * unit distance (docs/decisions.md): the most of that over the cell's values. */
+SIMD_INLINE float kernel_course_cost(const kernel_segment_state *state, const kernel_cell *c)
+{
+    const kernel_pieces *t = state->pieces;
+    float low = c->f[0], high = low;
+    if (!(state->allowance > 0)) return -1;
+    for (int i = 1; i < c->count; i++) {
+        low = fminf(low, c->f[i]);
+        high = fmaxf(high, c->f[i]);
+    }
+    const float last = KERNEL_BOUND_BINS - 1;
+    const int from = (int)fminf(fmaxf((low - t->bin_low) * t->bound_inverse, 0), last);
+    const int to = (int)fminf(fmaxf((high - t->bin_low) * t->bound_inverse, 0), last);
+    kernel_bound b = t->bounds[from];
+    for (int i = from + 1; i <= to; i++) {
+        b.extinction_high = fmaxf(b.extinction_high, t->bounds[i].extinction_high);
+        b.extinction_slope = fmaxf(b.extinction_slope, t->bounds[i].extinction_slope);
+        b.colour_slope = fmaxf(b.colour_slope, t->bounds[i].colour_slope);
+    }
+    return fminf(t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope, 1e30f);
+}
+
+SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
+{
+    const kernel_interval *i = course->interval;
+    if (course->map) return kernel_value_at(p, course->map, i, rays, t);
+    const vf length = i->t_out - i->t_in;
+    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
+    return i->v_in + along * (i->v_out - i->v_in);
+}
+
+/* Into how many parts to cut the stretch from t0 to t1, with values v0 and v1 there. By error: the deviation from the
+ * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
+ * square of a part, and its mean is two thirds of it. Allowed is the stretch's share of the ray's length and of its
+ * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. */
+SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
+                                   vm rays, vf t0, vf t1, vf v0, vf v1)
+{
+    const vf most = vf_set(KERNEL_MAX_PARTS), length = t1 - t0;
+    if (!course->map) return vf_set(1);
+    if (course->cost < 0) return vf_clamp(-vf_floor(-(length / p->sample_step)), vf_set(1), most);
+    const kernel_transfer *transfer = &p->frame->volumes[0];
+    vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
+    for (int quarter = 1; quarter < 4; quarter++) {
+        const float share = 0.25f * (float)quarter;
+        const vf v = kernel_value_at(p, course->map, course->interval, rays, t0 + length * share);
+        off = vf_max(off, vf_abs((v0 + (v1 - v0) * share) - v));
+        opacity += kernel_opacity(transfer, v);
+    }
+    const vf distance = length * state->list->per_t, depth = distance * opacity * 0.25f;
+    const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
+    const vf made = off * course->cost * distance; /* 3/2 of 2/3 */
+    const vf ratio = vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f));
+    return vf_clamp(-vf_floor(-vf_sqrt(ratio)), vf_set(1), most);
+}
+
+/* The stretch from t0 to t1 as segments; those that begin in the window are kept. */
+SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *state, const kernel_course *course,
+                                        vm rays, vf t0, vf t1)
+{
+    kernel_segments *list = state->list;
+    vf from = t0, before = kernel_course_value(p, course, rays, t0);
+    const vf last = kernel_course_value(p, course, rays, t1);
+    const vf parts = kernel_course_parts(p, state, course, rays, t0, t1, before, last);
+    const vf span = (t1 - t0) / parts;
+    vm open = rays;
+    for (int n = 1; vm_any(open); n++) {
+        const vm inner = vm_and(open, vf_lt(vf_set((float)n), parts));
+        const vf to = vf_select(inner, t0 + span * (float)n, t1);
+        vf after = last;
+        if (vm_any(inner)) after = vf_select(inner, kernel_course_value(p, course, inner, to), last);
+        const vm mine = vm_and(vf_le(list->t_begin, from), vf_lt(from, list->t_end));
+        kernel_segments_add(state->pieces, list, vm_and(open, mine), from, to, before, after);
+        from = to;
+        before = after;
+        open = inner;
+    }
+}
+
+/* The interval's stretches between surfaces that begin in the window. */
+SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state, const kernel_course *course)
+{
+    const kernel_interval *i = course->interval;
+    const kernel_segments *list = state->list;
+    vf from = vf_max(i->t_in, p->t_near);
+    const vf end = vf_min(i->t_out, p->t_far);
+    vm open = vm_and(i->mask, vm_and(p->active, vf_lt(from, end)));
+    while (vm_any(open)) {
+        vf to = end;
+        if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
+        const vm mine = vm_and(open, vm_and(vf_lt(list->t_begin, to), vf_lt(from, list->t_end)));
+        if (vm_any(mine)) kernel_course_segments(p, state, course, mine, from, to);
+        from = to;
+        open = vm_and(open, vf_lt(from, end));
+    }
+}
+
+static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
+                                vm rays)
+{
+    kernel_segment_state *state = opaque_state;
+    const kernel_transfer *transfer = &p->frame->volumes[0];
+    const grid_field *field = &p->frame->job->volumes[0].field.fields[part];
+    const grid *g = p->frame->job->parts[part].cells;
+    for (int n = 0; n < count; n++) {
+        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count, part, field, cells[n]);
+        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
+        if (!c->is_placed) {
+            kernel_cell_place(c, p, g);
+            kernel_cell_domain(c, transfer);
+        }
+        kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+        kernel_course course = {.cost = -1};
+        kernel_map map;
+        int intervals = 1;
+        if (c->type == GRID_TET) {
+            kernel_tet_interval(p, c, rays, false, &list[0]);
+        } else {
+            intervals = kernel_poly_intervals(p, c, rays, false, list);
+            if (intervals && !c->is_constant) {
+                kernel_map_setup(&map, c);
+                course.map = &map;
+                course.cost = kernel_course_cost(state, c);
+            }
+        }
+        for (int k = 0; k < intervals; k++) {
+            course.interval = &list[k];
+            kernel_course_run(p, state, &course);
+        }
+    }
+}
+
+/* ---- the ray ---- */
+
+/* Rays whose fragment must end before the segment at t_in: a surface is in between, or there is a gap, or cells
+ * overlap, which the overlapping fragments tell compositing (render.h). */
+SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_cuts *cuts, vf t_in)
+{
+    vm broken = p->frame->job->is_alone ? vf_lt(t_in, b->t_last) : vm_not(vf_eq(t_in, b->t_last));
+    if (cuts->row_count) broken = vm_or(broken, vf_le(kernel_next_cut(p, cuts, b->t_last, false), t_in));
+    return broken;
+}
+
+/* End the fragments of the rays in mask, just before their end: what begins at the end does not overlap
+ * them (comp.h). */
+SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mask)
+{
+    const vf end = b->t_last, size = vf_max(vf_abs(end), vf_set(1e-30f));
+    b->t_last = vf_max(b->t_first, end - size * 1e-7f);
+    kernel_blend_close(p, b, mask);
+    b->t_last = end;
+}
+
+/* Light of the rays in has, from t_in to t_out. */
+SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, const kernel_light *light)
+{
+    const vm fresh = vm_andnot(has, b->open);
+    b->t_first = vf_select(fresh, t_in, b->t_first);
+    b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
+    for (int a = 0; a < 3; a++) {
+        /* Compensated: of hundreds of segments the roundings would add up to 1e-6. */
+        const vf before = vf_select(fresh, vf_set(0), b->colour[a]), lost = vf_select(fresh, vf_set(0), b->lost[a]);
+        const vf more = b->transmittance * light->colour[a] - lost, sum = before + more;
+        b->lost[a] = vf_select(has, (sum - before) - more, b->lost[a]);
+        b->colour[a] = vf_select(has, sum, b->colour[a]);
+    }
+    b->depth = vf_select(fresh, light->depth, vf_select(has, b->depth + light->depth, b->depth));
+    b->transmittance = vf_select(has, kernel_exp(-b->depth), b->transmittance);
+    b->light = vf_select(has, b->light * light->transmittance, b->light);
+    b->t_last = vf_select(has, t_out, b->t_last);
+    b->open = vm_or(b->open, has);
+}
+
+static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kernel_pieces *pieces,
+                                  const kernel_segments *list)
+{
+    const kernel_segment_rows *r = &list->rows;
+    float counts[SIMD_WIDTH];
+    int most = 0;
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+        counts[lane] = (float)list->count[lane];
+        most = list->count[lane] > most ? list->count[lane] : most;
+    }
+    const vf count = vf_load(counts);
+    for (int n = 0; n < most; n++) {
+        const vm has = vm_and(vf_lt(vf_set((float)n), count), vf_lt(vf_set(KERNEL_DARK), b->light));
+        if (!vm_any(has)) break;
+        const vf t_in = vf_load(r->t_in[n]), t_out = vf_load(r->t_out[n]);
+        kernel_light light = kernel_clear();
+        kernel_integrate(pieces, has, (t_out - t_in) * list->per_t, vf_load(r->v_in[n]), vf_load(r->v_out[n]), &light);
+        kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
+        kernel_blend_light(b, has, t_in, t_out, &light);
+    }
+    const vm heaped = vf_lt(list->heap.transmittance, vf_set(1));
+    if (vm_any(heaped)) kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
+}
+
+/* One window from list->t_begin on; t_end is lowered to where it ended. */
+SIMD_INLINE void kernel_trace_window(kernel_packet *p, kernel_segment_state *state)
+{
+    kernel_segments *list = state->list;
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) list->count[lane] = 0;
+    list->heap = kernel_clear();
+    list->t_end = p->t_far;
+    kernel_trace_parts(p, &p->frame->job->volumes[0].field, &p->frame->volumes[0].interest, list->t_begin, &list->t_end,
+                       kernel_segment_leaf, state);
+}
+
+/* first_fragment: where the packet's own fragments, of surfaces so far, begin in the thread's list. */
+SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
+{
+    const kernel_frame *f = p->frame;
+    kernel_segments list;
+    kernel_segment_state state = {&list, &f->pieces, f->allowance, f->reach};
+    kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
+    b.lost[0] = b.lost[1] = b.lost[2] = b.depth = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] =
+        vf_set(0);
+    list.per_t = f->volumes[0].exponent / p->sample_step;
+    list.t_begin = p->t_near;
+    kernel_cuts_find(p, first_fragment, &list.cuts);
+    const vm active = p->active;
+    while (vm_any(p->active)) {
+        kernel_trace_window(p, &state);
+        kernel_blend_segments(p, &b, state.pieces, &list);
+        const vm unfinished = vm_and(vf_lt(list.t_end, p->t_far), vf_lt(vf_set(KERNEL_DARK), b.light));
+        p->active = vm_and(p->active, unfinished);
+        list.t_begin = list.t_end;
+    }
+    p->active = active;
+    kernel_segments_close(p, &b, p->active);
+}
+
+#endif

@@ -1,0 +1,237 @@
+/* Cutting a transfer function: at every point of the opacity and every entry of the colour table, after entries that
+ * lie on a line with others have been left out. Opacity and colour are then linear between cuts, exactly as documented.
+ */
+#include "render_pieces.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+
+/* Far outside of every domain, and finite so that 0 times it is 0. */
+static const kernel_real endless = (kernel_real)1e30;
+/* No extinction, nor its slope, is more. */
+static const double steepest = 1e6;
+static const double rounding = 1e-7;
+
+static int compare_cuts(const void *left, const void *right)
+{
+    const kernel_real a = *(const kernel_real *)left, b = *(const kernel_real *)right;
+    return (a > b) - (a < b);
+}
+
+static double colour_at(const render_transfer *t, double place, int channel)
+{
+    const int last = t->colour_count - 1;
+    const int i = place >= last ? last - 1 : place > 0 ? (int)place : 0;
+    const double low = (double)t->colours[3 * i + channel], high = (double)t->colours[3 * i + 3 + channel];
+    return low + (place - i) * (high - low);
+}
+
+static bool is_straight(const render_transfer *t, int from, int to, double tolerance)
+{
+    for (int c = 0; c < 3; c++) {
+        const double start = (double)t->colours[3 * from + c];
+        const double slope = ((double)t->colours[3 * to + c] - start) / (to - from);
+        for (int i = from + 1; i < to; i++)
+            if (fabs(start + slope * (i - from) - (double)t->colours[3 * i + c]) > tolerance) return false;
+    }
+    return true;
+}
+
+/* The entry that follows i, as far on as the line allows. Long tables are tried piecewise: this is quadratic. */
+static int next_entry(const render_transfer *t, int i, double tolerance)
+{
+    enum { FARTHEST = 256 };
+    int next = i + 1;
+    while (next + 1 < t->colour_count && next - i < FARTHEST && is_straight(t, i, next + 1, tolerance)) next++;
+    return next;
+}
+
+static double domain_of(const render_transfer *t, double value)
+{
+    const double width = t->high - t->low, x = (value - t->low) * (width > 0 ? 1 / width : 1);
+    return x < -1e18 ? -1e18 : x > 1e18 ? 1e18 : x;
+}
+
+/* Places in the domain, sorted, no two the same; entries gets the colours of the table that are kept. */
+static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, int *entries)
+{
+    int count = 0, kept = 0;
+    for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance)) entries[kept++] = i;
+    entries[kept++] = t->colour_count - 1;
+    for (int i = 0; i < kept; i++) cuts[count++] = (kernel_real)((double)entries[i] / (t->colour_count - 1));
+    for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)domain_of(t, t->opacity_values[i]);
+    qsort(cuts, (size_t)count, sizeof *cuts, compare_cuts);
+    int unique = 1;
+    for (int i = 1; i < count; i++)
+        if (cuts[i] > cuts[unique - 1]) cuts[unique++] = cuts[i];
+    return unique;
+}
+
+static double opacity_slope(const render_transfer *t, int i)
+{
+    return ((double)t->opacities[i + 1] - (double)t->opacities[i]) /
+           (domain_of(t, t->opacity_values[i + 1]) - domain_of(t, t->opacity_values[i]));
+}
+
+/* Opacity at x and its slope, on the stretch that holds middle. */
+static double opacity_on(const render_transfer *t, double middle, double x, double *slope)
+{
+    int i = 0;
+    *slope = 0;
+    while (i < t->opacity_count && domain_of(t, t->opacity_values[i]) <= middle) i++;
+    if (i == 0) return (double)t->opacities[0];
+    if (i == t->opacity_count) return (double)t->opacities[i - 1];
+    *slope = opacity_slope(t, i - 1);
+    const double a = (double)t->opacities[i - 1] + (x - domain_of(t, t->opacity_values[i - 1])) * *slope;
+    return a < 0 ? 0 : a > 1 ? 1 : a;
+}
+
+static void set_colours(const render_transfer *t, const int *entries, double middle, double x, kernel_piece *piece)
+{
+    const int last = t->colour_count - 1;
+    int k = 0;
+    while (entries[k + 1] < last && (double)entries[k + 1] / last <= middle) k++;
+    const double begin = (double)entries[k] / last, end = (double)entries[k + 1] / last;
+    const bool is_outside = middle < 0 || middle > 1;
+    for (int c = 0; c < 3; c++) {
+        const double low = colour_at(t, entries[k], c), high = colour_at(t, entries[k + 1], c);
+        const double slope = is_outside ? 0 : (high - low) / (end - begin);
+        const double colour = middle < 0 ? low : middle > 1 ? high : low + (x - begin) * slope;
+        piece->entry[KERNEL_PIECE_COLOUR + c] = (kernel_real)colour;
+        piece->entry[KERNEL_PIECE_COLOUR_SLOPE + c] = (kernel_real)slope;
+    }
+}
+
+static void set_piece(const render_transfer *t, const int *entries, kernel_real low, kernel_real high,
+                      kernel_piece *piece)
+{
+    const double middle = 0.5 * ((double)low + (double)high);
+    double slope;
+    piece->entry[KERNEL_PIECE_LOW] = low;
+    piece->entry[KERNEL_PIECE_HIGH] = high;
+    piece->entry[KERNEL_PIECE_OPACITY] = (kernel_real)opacity_on(t, middle, (double)low, &slope);
+    piece->entry[KERNEL_PIECE_SLOPE] = (kernel_real)slope;
+    piece->entry[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)opacity_on(t, middle, (double)high, &slope);
+    piece->entry[KERNEL_PIECE_INVERSE] = 1 / (high - low);
+    set_colours(t, entries, middle, (double)low, piece);
+}
+
+/* ---- bins and bounds ---- */
+
+static void fill_bins(kernel_pieces *out)
+{
+    int piece = 0;
+    for (int i = 0; i < KERNEL_PIECE_BINS; i++) {
+        const kernel_real x = out->bin_low + (kernel_real)i / out->bin_inverse;
+        while (piece + 1 < out->count && out->pieces[piece].entry[KERNEL_PIECE_HIGH] <= x) piece++;
+        out->bin_first[i] = (kernel_real)piece;
+    }
+}
+
+static double extinction_of(double opacity)
+{
+    return opacity < 1 ? fmin(-log1p(-opacity), steepest) : steepest;
+}
+
+static int bound_bin(const kernel_pieces *t, double x)
+{
+    const double place = (x - (double)t->bin_low) * (double)t->bound_inverse;
+    return place < 0 ? 0 : place >= KERNEL_BOUND_BINS ? KERNEL_BOUND_BINS - 1 : (int)place;
+}
+
+static float largest(double a, float b)
+{
+    return (float)a > b ? (float)a : b;
+}
+
+static double piece_opacity(const kernel_piece *p, double x)
+{
+    const kernel_real *e = p->entry;
+    return fmin(
+        fmax((double)e[KERNEL_PIECE_OPACITY] + (x - (double)e[KERNEL_PIECE_LOW]) * (double)e[KERNEL_PIECE_SLOPE], 0),
+        1);
+}
+
+/* What the piece is between two of its values, into a bin. */
+static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
+{
+    const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to), most = fmax(a0, a1);
+    const double slope = fabs((double)p->entry[KERNEL_PIECE_SLOPE]);
+    b->extinction_low = fminf(b->extinction_low, (float)extinction_of(fmin(a0, a1)));
+    b->extinction_high = largest(extinction_of(most), b->extinction_high);
+    if (slope > 0) b->extinction_slope = largest(most < 1 ? fmin(slope / (1 - most), 1e30) : 1e30, b->extinction_slope);
+    for (int c = 0; c < 3; c++)
+        b->colour_slope = largest(fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]), b->colour_slope);
+}
+
+static void bound_piece(kernel_pieces *out, const kernel_piece *p)
+{
+    const double low = (double)p->entry[KERNEL_PIECE_LOW], high = (double)p->entry[KERNEL_PIECE_HIGH];
+    const int first = bound_bin(out, low), last = bound_bin(out, high);
+    for (int bin = first; bin <= last; bin++) {
+        const double begin = (double)out->bin_low + bin / (double)out->bound_inverse;
+        const double end = (double)out->bin_low + (bin + 1) / (double)out->bound_inverse;
+        widen(&out->bounds[bin], p, bin == first ? low : fmax(low, begin), bin == last ? high : fmin(high, end));
+    }
+}
+
+/* A step between two pieces has no slope that bounds it. */
+static void bound_step(kernel_pieces *out, const kernel_piece *p)
+{
+    const double x = (double)p[0].entry[KERNEL_PIECE_HIGH];
+    if (fabs(piece_opacity(&p[0], x) - piece_opacity(&p[1], x)) <= 1e-5) return;
+    const double width = 1e-6 / (double)out->bound_inverse;
+    for (int side = -1; side <= 1; side += 2) out->bounds[bound_bin(out, x + side * width)].extinction_slope = 1e30f;
+}
+
+static void fill_bounds(kernel_pieces *out, const render_transfer *t)
+{
+    float low = 0, high = 1;
+    for (int i = 0; i < KERNEL_BOUND_BINS; i++) out->bounds[i] = (kernel_bound){.extinction_low = 1e30f};
+    for (int i = 0; i < out->count; i++) bound_piece(out, &out->pieces[i]);
+    for (int i = 0; i + 1 < out->count; i++) bound_step(out, &out->pieces[i]);
+    for (int i = 0; i < 3 * t->colour_count; i++) {
+        low = fminf(low, t->colours[i]);
+        high = fmaxf(high, t->colours[i]);
+    }
+    out->contrast = high - low;
+}
+
+static void fill(kernel_pieces *out, const render_transfer *t, double tolerance, kernel_real *cuts, int *entries)
+{
+    const int count = collect_cuts(t, tolerance > rounding ? tolerance : rounding, cuts, entries);
+    out->count = count + 1;
+    set_piece(t, entries, -endless, cuts[0], &out->pieces[0]);
+    for (int i = 0; i + 1 < count; i++) set_piece(t, entries, cuts[i], cuts[i + 1], &out->pieces[i + 1]);
+    set_piece(t, entries, cuts[count - 1], endless, &out->pieces[count]);
+    out->bin_low = cuts[0];
+    out->bin_inverse = KERNEL_PIECE_BINS / (cuts[count - 1] - cuts[0]);
+    out->bound_inverse = (float)(KERNEL_BOUND_BINS / (double)(cuts[count - 1] - cuts[0]));
+    fill_bins(out);
+    fill_bounds(out, t);
+}
+
+insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error)
+{
+    const size_t most = (size_t)t->colour_count + (size_t)t->opacity_count;
+    memset(out, 0, sizeof *out);
+    kernel_real *cuts = base_calloc(most, sizeof *cuts);
+    int *entries = base_calloc((size_t)t->colour_count, sizeof *entries);
+    out->pieces = base_calloc(most + 1, sizeof *out->pieces);
+    const bool has_room = cuts && entries && out->pieces;
+    if (has_room) fill(out, t, tolerance, cuts, entries);
+    base_free(cuts);
+    base_free(entries);
+    if (has_room) return INSITU_OK;
+    render_pieces_free(out);
+    return base_fail(error, INSITU_ERROR_MEMORY, "no memory for a transfer function of %d colours", t->colour_count);
+}
+
+void render_pieces_free(kernel_pieces *pieces)
+{
+    base_free(pieces->pieces);
+    pieces->pieces = NULL;
+}

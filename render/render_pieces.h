@@ -1,0 +1,13 @@
+/* Transfer functions cut into the pieces that segments are integrated by. */
+#ifndef RENDER_RENDER_PIECES_H
+#define RENDER_RENDER_PIECES_H
+
+#include "kernel_pieces.h"
+#include "render.h"
+
+/* Colours may be off the table's by tolerance where that saves pieces; 0: by rounding. Freed by render_pieces_free().
+ */
+insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error);
+void render_pieces_free(kernel_pieces *pieces);
+
+#endif

@@ -1,0 +1,11 @@
+/* The kernels' integral of a segment, compiled on floats and on doubles. */
+#ifndef INTEGRAL_DOUBLE_H
+#define INTEGRAL_DOUBLE_H
+
+#include "render.h"
+
+/* rgb and transmittance of a segment of the given length in unit distances, values in the transfer's domain. */
+void integral_on_doubles(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
+void integral_on_floats(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
+
+#endif

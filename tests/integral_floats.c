@@ -1,0 +1,18 @@
+/* The integral as the plain kernels have it. */
+#include <stdlib.h>
+
+#include "integral_double.h"
+#include "kernel_integral.h"
+#include "render_pieces.h"
+
+void integral_on_floats(const render_transfer *t, double length, double v_in, double v_out, double out[4])
+{
+    kernel_pieces pieces;
+    base_error error = {0};
+    if (render_pieces_build(&pieces, t, 0, &error) != INSITU_OK) abort();
+    kernel_light light = kernel_clear();
+    kernel_integrate(&pieces, vm_all_lanes(), vf_set((float)length), vf_set((float)v_in), vf_set((float)v_out), &light);
+    for (int c = 0; c < 3; c++) out[c] = (double)light.colour[c][0];
+    out[3] = (double)light.transmittance[0];
+    render_pieces_free(&pieces);
+}

@@ -1,0 +1,276 @@
+/* Adaptive integration. An interval is integrated by Simpson's rule whole and in halves; where the two differ by more
+ * than the tolerance each half is taken in turn. Kinks and steps of the transfer function are not known here: they
+ * are found by halving. */
+#include "reference_integral.h"
+
+#include "reference_cell.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+typedef struct placed_cell {
+    reference_cell cell;
+    double values[8];
+} placed_cell;
+
+struct reference_integral {
+    const render_job *job;
+    double tolerance;
+    int64_t count;
+    placed_cell *cells;
+};
+
+/* Where the ray is in a cell. */
+typedef struct stretch {
+    const placed_cell *cell;
+    double z_in, z_out;
+} stretch;
+
+/* What a stretch does to light: C and T. */
+typedef struct light {
+    double colour[3], transmittance;
+} light;
+
+/* The integrand at a place. */
+typedef struct sample {
+    double extinction, colour[3]; /* per z */
+} sample;
+
+typedef struct course {
+    const reference_integral *scene;
+    const placed_cell *cell;
+    reference_line line;
+    double units; /* unit distances per z */
+} course;
+
+static void *reserve(void *block, size_t bytes)
+{
+    void *p = realloc(block, bytes ? bytes : 1);
+    if (!p) {
+        fprintf(stderr, "reference: out of memory\n");
+        exit(1);
+    }
+    return p;
+}
+
+static double dot(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+double reference_opacity(const render_transfer *t, double value)
+{
+    const int last = t->opacity_count - 1;
+    if (value < t->opacity_values[0]) return (double)t->opacities[0];
+    for (int i = 0; i < last; i++) {
+        const double low = t->opacity_values[i], high = t->opacity_values[i + 1];
+        if (value < high)
+            return (double)t->opacities[i] +
+                   (value - low) / (high - low) * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
+    }
+    return (double)t->opacities[last];
+}
+
+void reference_colour(const render_transfer *t, double value, double colour[3])
+{
+    const double range = t->high - t->low, x = range > 0 ? (value - t->low) / range : 0;
+    const double place = fmin(fmax(x, 0), 1) * (t->colour_count - 1);
+    const int i = place >= t->colour_count - 1 ? t->colour_count - 2 : (int)place;
+    for (int c = 0; c < 3; c++) {
+        const double low = (double)t->colours[3 * i + c], high = (double)t->colours[3 * i + 3 + c];
+        colour[c] = low + (place - i) * (high - low);
+    }
+}
+
+static void add_cell(reference_integral *scene, int part, int64_t index)
+{
+    const render_job *job = scene->job;
+    const grid *g = job->parts[part].cells;
+    const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    placed_cell *c = &scene->cells[scene->count];
+    if (grid_is_ghost(g, index) || !job->volumes[0].field.ranges[part].low) return;
+    c->cell.type = grid_cell_type(g, index);
+    c->cell.count = grid_cell_vertices(g, index, vertices);
+    if (!grid_cell_values(&job->volumes[0].field.fields[part], index, vertices, c->cell.count, c->values)) return;
+    for (int i = 0; i < c->cell.count; i++) {
+        double from_eye[3];
+        grid_vertex(g, vertices[i], c->cell.world[i]);
+        for (int axis = 0; axis < 3; axis++) from_eye[axis] = c->cell.world[i][axis] - job->camera.eye[axis];
+        for (int axis = 0; axis < 3; axis++) c->cell.position[i][axis] = dot(axes[axis], from_eye);
+    }
+    scene->count++;
+}
+
+reference_integral *reference_integral_create(const render_job *job, double tolerance)
+{
+    reference_integral *scene = reserve(NULL, sizeof *scene);
+    int64_t most = 0;
+    for (int part = 0; part < job->part_count; part++) most += job->parts[part].cells->cell_count;
+    *scene = (reference_integral){job, tolerance, 0, reserve(NULL, (size_t)most * sizeof(placed_cell))};
+    for (int part = 0; part < job->part_count; part++)
+        for (int64_t cell = 0; cell < job->parts[part].cells->cell_count; cell++) add_cell(scene, part, cell);
+    return scene;
+}
+
+void reference_integral_free(reference_integral *scene)
+{
+    if (scene) free(scene->cells);
+    free(scene);
+}
+
+static sample sample_at(const course *c, double z)
+{
+    const render_transfer *t = c->scene->job->volumes[0].transfer;
+    const double point[3] = {c->line.base[0] + c->line.slope[0] * z, c->line.base[1] + c->line.slope[1] * z, z};
+    double value;
+    sample s;
+    reference_interpolate(&c->cell->cell, point, c->cell->values, &value, NULL);
+    s.extinction = -log1p(-fmin(reference_opacity(t, value), 1 - 1e-15)) * c->units;
+    reference_colour(t, value, s.colour);
+    return s;
+}
+
+/* Simpson's rule on five samples for the transmittance, and on three for the colour: up to the middle the optical depth
+ * is that of the first three, by Simpson on them. */
+static light simpson(const sample s[5], double width)
+{
+    const double half = width / 12 * (s[0].extinction + 4 * s[1].extinction + s[2].extinction);
+    const double whole = half + width / 12 * (s[2].extinction + 4 * s[3].extinction + s[4].extinction);
+    light out = {{0, 0, 0}, exp(-whole)};
+    for (int c = 0; c < 3; c++)
+        out.colour[c] = width / 6 *
+                        (s[0].extinction * s[0].colour[c] + 4 * s[2].extinction * s[2].colour[c] * exp(-half) +
+                         s[4].extinction * s[4].colour[c] * exp(-whole));
+    return out;
+}
+
+static light over(const light *front, const light *back)
+{
+    light out = {{0, 0, 0}, front->transmittance * back->transmittance};
+    for (int c = 0; c < 3; c++) out.colour[c] = front->colour[c] + front->transmittance * back->colour[c];
+    return out;
+}
+
+static double difference(const light *a, const light *b)
+{
+    double most = fabs(a->transmittance - b->transmittance);
+    for (int c = 0; c < 3; c++) most = fmax(most, fabs(a->colour[c] - b->colour[c]));
+    return most;
+}
+
+/* s: at the ends, the quarters and the middle. */
+static light adapt(const course *c, double from, double to, const sample s[5], double tolerance, int depth)
+{
+    const double middle = 0.5 * (from + to), width = to - from;
+    sample left[5] = {s[0], sample_at(c, from + width / 8), s[1], sample_at(c, from + 3 * width / 8), s[2]};
+    sample right[5] = {s[2], sample_at(c, from + 5 * width / 8), s[3], sample_at(c, from + 7 * width / 8), s[4]};
+    light a = simpson(left, 0.5 * width), b = simpson(right, 0.5 * width);
+    const light whole = simpson(s, width), halves = over(&a, &b);
+    if ((difference(&whole, &halves) <= tolerance && depth >= 2) || depth > 40) return halves;
+    a = adapt(c, from, middle, left, 0.5 * tolerance, depth + 1);
+    b = adapt(c, middle, to, right, 0.5 * tolerance, depth + 1);
+    return over(&a, &b);
+}
+
+static light integrate(const course *c, double from, double to)
+{
+    sample s[5];
+    for (int i = 0; i < 5; i++) s[i] = sample_at(c, from + (to - from) * i / 4);
+    return adapt(c, from, to, s, c->scene->tolerance, 0);
+}
+
+static bool is_near(const reference_cell *cell, const reference_line *line)
+{
+    for (int axis = 0; axis < 2; axis++) {
+        bool below = false, above = false;
+        for (int i = 0; i < cell->count; i++) {
+            const double *p = cell->position[i];
+            const double u = p[axis] - line->base[axis] - line->slope[axis] * p[2];
+            below = below || u <= 1e-9;
+            above = above || u >= -1e-9;
+        }
+        if (!below || !above) return false;
+    }
+    return true;
+}
+
+static int compare_stretches(const void *left, const void *right)
+{
+    const stretch *a = left, *b = right;
+    return a->z_in != b->z_in ? (a->z_in < b->z_in ? -1 : 1) : (a->z_out > b->z_out) - (a->z_out < b->z_out);
+}
+
+/* The cells on the ray in front of the eye, sorted. */
+static stretch *collect(const reference_integral *scene, const reference_line *line, int64_t *count)
+{
+    stretch *list = NULL;
+    int64_t capacity = 0;
+    *count = 0;
+    for (int64_t i = 0; i < scene->count; i++) {
+        reference_crossing crossings[REFERENCE_MAX_CROSSINGS];
+        const reference_cell *cell = &scene->cells[i].cell;
+        const int found = is_near(cell, line) ? reference_crossings(cell, line, crossings) : 0;
+        for (int k = 0; k + 1 < found; k += 2) {
+            if (!(crossings[k + 1].z > fmax(crossings[k].z, 0))) continue;
+            if (*count == capacity) list = reserve(list, (size_t)(capacity = 2 * capacity + 64) * sizeof *list);
+            list[(*count)++] = (stretch){&scene->cells[i], fmax(crossings[k].z, 0), crossings[k + 1].z};
+        }
+    }
+    if (*count) qsort(list, (size_t)*count, sizeof *list, compare_stretches);
+    return list;
+}
+
+static course begin_ray(const reference_integral *scene, int x, int y)
+{
+    const render_camera *camera = &scene->job->camera;
+    const double *axes[2] = {camera->right, camera->up};
+    course c = {.scene = scene};
+    double base[3], direction[3], from_eye[3];
+    render_camera_ray(camera, x, y, base, direction);
+    for (int axis = 0; axis < 3; axis++) from_eye[axis] = base[axis] - camera->eye[axis];
+    for (int axis = 0; axis < 2; axis++) {
+        c.line.base[axis] = dot(axes[axis], from_eye);
+        c.line.slope[axis] = dot(axes[axis], direction);
+    }
+    c.units = (camera->is_orthographic ? 1 : sqrt(dot(direction, direction))) /
+              scene->job->volumes[0].transfer->unit_distance;
+    return c;
+}
+
+static void blend_hit(light *sum, const reference_hit *hit)
+{
+    light surface = {{0, 0, 0}, 1 - hit->opacity};
+    for (int c = 0; c < 3; c++) surface.colour[c] = hit->opacity * hit->colour[c];
+    *sum = over(sum, &surface);
+}
+
+void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
+                              const reference_hit *hits, int hit_count, double rgba[4])
+{
+    course c = begin_ray(scene, x, y);
+    light sum = {{0, 0, 0}, 1};
+    int64_t count;
+    int next = 0;
+    stretch *list = collect(scene, &c.line, &count);
+    for (int64_t i = 0; i < count; i++) {
+        double from = list[i].z_in;
+        c.cell = list[i].cell;
+        for (; next < hit_count && hits[next].depth < list[i].z_out; next++) {
+            if (hits[next].depth > from && sum.transmittance > 0) {
+                const light part = integrate(&c, from, hits[next].depth);
+                sum = over(&sum, &part);
+                from = hits[next].depth;
+            }
+            blend_hit(&sum, &hits[next]);
+        }
+        if (!(sum.transmittance > 0)) break;
+        const light part = integrate(&c, from, list[i].z_out);
+        sum = over(&sum, &part);
+    }
+    for (; next < hit_count; next++) blend_hit(&sum, &hits[next]);
+    for (int k = 0; k < 3; k++) rgba[k] = sum.colour[k] + sum.transmittance * (double)background[k];
+    rgba[3] = 1 - sum.transmittance * (1 - (double)background[3]);
+    free(list);
+}

@@ -1,0 +1,22 @@
+/* The truth of a volume: emission and absorption integrated along a ray through every cell, adaptively, in double, no
+ * tree. One volume layer, with the surfaces' hits that reference_trace() found. */
+#ifndef REFERENCE_INTEGRAL_H
+#define REFERENCE_INTEGRAL_H
+
+#include "reference_render.h"
+
+typedef struct reference_integral reference_integral;
+
+/* job is borrowed. tolerance is what a cell's interval may be off by, in colour and optical depth. */
+reference_integral *reference_integral_create(const render_job *job, double tolerance);
+void reference_integral_free(reference_integral *scene);
+
+/* The pixel over the background, hits (by depth, the last one may be opaque) included. */
+void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
+                              const reference_hit *hits, int hit_count, double rgba[4]);
+
+/* Colour and opacity of a value, as render.h says. */
+double reference_opacity(const render_transfer *t, double value);
+void reference_colour(const render_transfer *t, double value, double colour[3]);
+
+#endif

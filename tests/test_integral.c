@@ -1,0 +1,258 @@
+/* The integral of a segment against high precision: random transfer functions, values and lengths. The oracle splits at
+ * every point of the function in long double, has the optical depth in closed form (the integral of -ln u is
+ * u - u ln u) and the colour by adaptive Simpson. */
+#include "integral_double.h"
+#include "test_meshes.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+enum { MAX_POINTS = 9, MAX_COLOURS = 40, MAX_CUTS = MAX_POINTS + MAX_COLOURS + 2 };
+
+typedef struct random_transfer {
+    render_transfer transfer;
+    double values[MAX_POINTS];
+    float opacities[MAX_POINTS], colours[3 * MAX_COLOURS];
+} random_transfer;
+
+/* One stretch between points of the function: opacity and colour linear in s of [0, 1]. */
+typedef struct piece {
+    long double a0, a1, c0[3], c1[3], length;
+} piece;
+
+/* Numbers of 1/1024ths are the same in float, so that both builds are given the same function. */
+static double coarse(uint64_t index, uint64_t seed)
+{
+    return floor(1024 * test_uniform(index, seed)) / 1024;
+}
+
+static void make_transfer(random_transfer *r, uint64_t seed, double most)
+{
+    render_transfer *t = &r->transfer;
+    *t = (render_transfer){.low = 0, .high = 1, .unit_distance = 1};
+    t->colour_count = 2 + (int)(test_uniform(0, seed) * (MAX_COLOURS - 2));
+    /* Entries at places that floats have: 2^n + 1 of them. */
+    t->colour_count = t->colour_count > 33 ? 33 : t->colour_count > 17 ? 17 : t->colour_count > 5 ? 5 : 2;
+    for (int i = 0; i < 3 * t->colour_count; i++) r->colours[i] = (float)coarse(10 + (uint64_t)i, seed);
+    t->opacity_count = 1 + (int)(test_uniform(1, seed) * (MAX_POINTS - 1));
+    double at = -0.25;
+    for (int i = 0; i < t->opacity_count; i++) {
+        const double gap =
+            test_uniform(200 + (uint64_t)i, seed) < 0.2 ? 0 : 0.0625 + 0.25 * coarse(300 + (uint64_t)i, seed);
+        r->values[i] = at += gap;
+        const bool is_clear = test_uniform(400 + (uint64_t)i, seed) < 0.2;
+        r->opacities[i] = is_clear ? 0 : (float)(most * coarse(500 + (uint64_t)i, seed));
+    }
+    t->colours = r->colours;
+    t->opacity_values = r->values;
+    t->opacities = r->opacities;
+}
+
+/* ---- the oracle ---- */
+
+static long double opacity_near(const render_transfer *t, long double middle, long double x)
+{
+    int i = 0;
+    while (i < t->opacity_count && (long double)t->opacity_values[i] <= middle) i++;
+    if (i == 0) return (long double)t->opacities[0];
+    if (i == t->opacity_count) return (long double)t->opacities[i - 1];
+    const long double low = (long double)t->opacity_values[i - 1], high = (long double)t->opacity_values[i];
+    const long double a = (long double)t->opacities[i - 1], b = (long double)t->opacities[i];
+    return a + (x - low) / (high - low) * (b - a);
+}
+
+static long double colour_at(const render_transfer *t, long double x, int c)
+{
+    const int last = t->colour_count - 1;
+    const long double place = fminl(fmaxl(x, 0), 1) * last;
+    const int i = place >= last ? last - 1 : (int)place;
+    const long double low = (long double)t->colours[3 * i + c], high = (long double)t->colours[3 * i + 3 + c];
+    return low + (place - i) * (high - low);
+}
+
+/* Optical depth from 0 to s. */
+static long double depth_to(const piece *p, long double s)
+{
+    const long double u0 = 1 - p->a0, u1 = u0 - s * (p->a1 - p->a0), change = u0 - u1;
+    if (fabsl(change) < 1e-4L * u0) {
+        /* Three nodes: the remainder is of the sixth power. */
+        const long double r = sqrtl(0.15L), m = 0.5L;
+        return -p->length * s *
+               (5 * logl(u0 - (m - r) * change) + 8 * logl(u0 - m * change) + 5 * logl(u0 - (m + r) * change)) / 18;
+    }
+    const long double g0 = u0 > 0 ? u0 - u0 * logl(u0) : 0, g1 = u1 > 0 ? u1 - u1 * logl(u1) : 0;
+    return p->length * s * (g0 - g1) / change;
+}
+
+static long double emission(const piece *p, int c, long double s)
+{
+    const long double a = p->a0 + s * (p->a1 - p->a0);
+    if (a >= 1) return 0;
+    return (p->c0[c] + s * (p->c1[c] - p->c0[c])) * -log1pl(-a) * p->length * expl(-depth_to(p, s));
+}
+
+static long double simpson(const piece *p, int c, long double from, long double to, const long double f[3],
+                           long double tolerance, int depth)
+{
+    const long double width = to - from, middle = 0.5L * (from + to);
+    const long double q1 = emission(p, c, from + 0.25L * width), q3 = emission(p, c, from + 0.75L * width);
+    const long double whole = width / 6 * (f[0] + 4 * f[1] + f[2]);
+    const long double halves = width / 12 * (f[0] + 4 * q1 + 2 * f[1] + 4 * q3 + f[2]);
+    if ((depth > 5 && fabsl(whole - halves) < 15 * tolerance) || depth > 40) return halves + (halves - whole) / 15;
+    const long double left[3] = {f[0], q1, f[1]}, right[3] = {f[1], q3, f[2]};
+    return simpson(p, c, from, middle, left, tolerance / 2, depth + 1) +
+           simpson(p, c, middle, to, right, tolerance / 2, depth + 1);
+}
+
+static int collect_cuts(const render_transfer *t, long double v0, long double v1, long double cuts[MAX_CUTS])
+{
+    int count = 0;
+    cuts[count++] = 0;
+    cuts[count++] = 1;
+    for (int i = 0; i < t->opacity_count + t->colour_count; i++) {
+        const long double x = i < t->opacity_count ? (long double)t->opacity_values[i]
+                                                   : (long double)(i - t->opacity_count) / (t->colour_count - 1);
+        const long double s = v1 != v0 ? (x - v0) / (v1 - v0) : -1;
+        if (!(s > 0 && s < 1)) continue;
+        int at = count++;
+        for (; cuts[at - 1] > s; at--) cuts[at] = cuts[at - 1];
+        cuts[at] = s;
+    }
+    return count;
+}
+
+/* out: rgb, transmittance, and the optical depth. */
+static void oracle(const render_transfer *t, double length, double v_in, double v_out, long double out[5])
+{
+    const long double v0 = (long double)v_in, v1 = (long double)v_out;
+    long double cuts[MAX_CUTS];
+    const int count = collect_cuts(t, v0, v1, cuts);
+    for (int i = 0; i < 5; i++) out[i] = 0;
+    for (int i = 0; i + 1 < count; i++) {
+        const long double x0 = v0 + cuts[i] * (v1 - v0), x1 = v0 + cuts[i + 1] * (v1 - v0), m = 0.5L * (x0 + x1);
+        piece p = {.a0 = opacity_near(t, m, x0), .a1 = opacity_near(t, m, x1)};
+        p.length = (long double)length * (cuts[i + 1] - cuts[i]);
+        for (int c = 0; c < 3; c++) {
+            p.c0[c] = colour_at(t, x0, c);
+            p.c1[c] = colour_at(t, x1, c);
+            const long double f[3] = {emission(&p, c, 0), emission(&p, c, 0.5L), emission(&p, c, 1)};
+            const long double depth = depth_to(&p, 1);
+            if (depth > 0) out[c] += expl(-out[4]) * simpson(&p, c, 0, 1, f, 1e-15L * fminl(depth, 1), 0);
+        }
+        out[4] += depth_to(&p, 1);
+    }
+    out[3] = expl(-out[4]);
+}
+
+/* ---- tests ---- */
+
+typedef void integral(const render_transfer *t, double length, double v_in, double v_out, double out[4]);
+
+/* The largest error, relative to the optical depth where that is below 1, over the decades of depth asked for. */
+static double worst_of(integral *of, int count, double most, double *deepest, double *shallowest)
+{
+    double worst = 0;
+    *deepest = 0;
+    *shallowest = 1;
+    for (int n = 0; n < count; n++) {
+        random_transfer r;
+        const uint64_t seed = 1000 + (uint64_t)n;
+        make_transfer(&r, seed, most);
+        const double v_in = 1.5 * coarse(1, seed + 7) - 0.25;
+        const bool is_level = n % 11 == 0;
+        const double span = n % 3 == 0 ? 1 / 64.0 : 1.5,
+                     v_out = is_level ? v_in : v_in + span * (coarse(2, seed + 7) - 0.5);
+        const double length = ldexp(1, (int)(38 * test_uniform(3, seed)) - 28);
+        long double truth[5];
+        double found[4];
+        oracle(&r.transfer, length, v_in, v_out, truth);
+        of(&r.transfer, length, v_in, v_out, found);
+        const double depth = (double)truth[4], scale = fmin(1, depth);
+        for (int c = 0; c < 4; c++) {
+            const double off = fabs(found[c] - (double)truth[c]);
+            assert_true(found[c] == found[c]);
+            if (depth == 0) {
+                assert_true(off == 0);
+                continue;
+            }
+            /* A transmittance near 1 cannot be closer than its own rounding. */
+            const double excess = c < 3 ? off / scale : off;
+            if (excess > worst) worst = excess;
+        }
+        if (depth > 0) *deepest = fmax(*deepest, depth), *shallowest = fmin(*shallowest, depth);
+    }
+    return worst;
+}
+
+static void integral_is_exact_in_double(void **state)
+{
+    (void)state;
+    double deep, shallow;
+    const double worst = worst_of(integral_on_doubles, 300, 0.999, &deep, &shallow);
+    fprintf(stderr, "double: %.2g, depths %.2g to %.2g\n", worst, shallow, deep);
+    assert_true(shallow < 1e-8 && deep > 1e3);
+    assert_true(worst < 1e-12);
+}
+
+/* In float, of opacities up to 0.9: above that the rounding of 1 - opacity, 6e-8 of its place, shows. */
+static void integral_is_near_in_float(void **state)
+{
+    (void)state;
+    double deep, shallow;
+    const double worst = worst_of(integral_on_floats, 500, 0.9, &deep, &shallow);
+    fprintf(stderr, "float: %.2g, depths %.2g to %.2g\n", worst, shallow, deep);
+    assert_true(shallow < 1e-8 && deep > 500);
+    assert_true(worst < 1e-6);
+}
+
+/* Opacity 1 at points of the function, where the extinction is infinite, and its integral not. */
+static void opaque_points_are_integrated(void **state)
+{
+    (void)state;
+    double worst = 0;
+    for (int n = 0; n < 200; n++) {
+        random_transfer r;
+        make_transfer(&r, 5000 + (uint64_t)n, 0.9);
+        r.transfer.opacity_count = 3;
+        r.values[0] = 0.125, r.values[1] = 0.5, r.values[2] = 0.75;
+        r.opacities[0] = 0.25f, r.opacities[1] = 1, r.opacities[2] = 0;
+        const double v_in = coarse(1, (uint64_t)n + 9), v_out = coarse(2, (uint64_t)n + 9);
+        const double length = ldexp(1, n % 20 - 16);
+        long double truth[5];
+        double found[4];
+        oracle(&r.transfer, length, v_in, v_out, truth);
+        integral_on_floats(&r.transfer, length, v_in, v_out, found);
+        for (int c = 0; c < 4; c++) worst = fmax(worst, fabs(found[c] - (double)truth[c]));
+    }
+    fprintf(stderr, "opaque points: %.2g\n", worst);
+    assert_true(worst < 2e-6);
+}
+
+static void opacity_of_one_lets_nothing_through(void **state)
+{
+    (void)state;
+    random_transfer r;
+    double found[4];
+    make_transfer(&r, 1, 1);
+    r.transfer.opacity_count = 1;
+    r.opacities[0] = 1;
+    integral_on_floats(&r.transfer, 0.01, 0, 0, found);
+    for (int c = 0; c < 3; c++) assert_true(fabs(found[c] - (double)r.colours[c]) < 1e-6);
+    assert_true(found[3] < 1e-7);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(integral_is_exact_in_double),
+        cmocka_unit_test(integral_is_near_in_float),
+        cmocka_unit_test(opaque_points_are_integrated),
+        cmocka_unit_test(opacity_of_one_lets_nothing_through),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

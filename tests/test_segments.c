@@ -1,0 +1,295 @@
+/* Volumes by segments against the adaptive integral: tets exactly, other cells to second order, max_error kept; with
+ * surfaces; on parts of the mesh; on every instruction set. */
+#include "comp.h"
+#include "reference_integral.h"
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+/* The truth of a fixture's picture: width * height * 4. */
+static double *truth_of(const render_fixture *f)
+{
+    const int width = f->job.camera.width, height = f->job.camera.height;
+    double *rgba = malloc((size_t)width * (size_t)height * 4 * sizeof *rgba);
+    reference_integral *scene = reference_integral_create(&f->job, 1e-10);
+    reference_scene *surfaces = f->job.surface_count ? reference_create(&f->job) : NULL;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+            reference_ray ray = {.hit_count = 0};
+            if (surfaces) reference_trace(surfaces, x, y, fixture_background, &ray);
+            double *at = rgba + 4 * (y * width + x);
+            reference_integral_trace(scene, x, y, fixture_background, ray.hits, ray.hit_count, at);
+            for (int c = 0; c < 4 && ray.ambiguous; c++) at[c] = (double)NAN;
+        }
+    reference_free(surfaces);
+    reference_integral_free(scene);
+    return rgba;
+}
+
+/* The largest difference of a channel, and the mean of all; pixels whose truth is NaN do not count. */
+static double error_of(const render_fixture *f, const double *truth, double *mean)
+{
+    drawn_frame drawn;
+    const int pixels = f->job.camera.width * f->job.camera.height;
+    double worst = 0, total = 0;
+    fixture_draw(f, &drawn);
+    for (int i = 0; i < 4 * pixels; i++) {
+        const double off = fabs((double)drawn.picture.rgba[i] - truth[i]);
+        if (isnan(truth[i])) continue;
+        if (!(off <= worst)) worst = off;
+        total += off;
+    }
+    drawn_free(&drawn);
+    if (mean) *mean = total / (4 * pixels);
+    return worst;
+}
+
+static void set_segments(render_fixture *f, double step, double max_error)
+{
+    fixture_set_volume(f, step);
+    f->job.integration = RENDER_SEGMENTS;
+    f->job.max_error = max_error;
+}
+
+/* Float32 places err by 6e-8 of the mesh's size, which is some 2e-7 of the transfer's domain a cell face and twice 0.3
+ * unit distances; errors of one face's t cancel between its cells. The sums of 20 cells stay below 3e-6. */
+static void tets_are_exact_for_every_camera(void **state)
+{
+    (void)state;
+    for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+        render_fixture f;
+        fixture_create_lattice(&f, TEST_TETS, 4, camera == CAMERA_ALONG_X ? 0 : 0.2, test_wave);
+        fixture_look(&f, camera, 29, 23);
+        set_segments(&f, 1, 0);
+        double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
+        fprintf(stderr, "tets, %s: %.2g\n", fixture_camera_name(camera), worst);
+        assert_true(worst < 3e-6);
+        free(truth);
+        fixture_free(&f);
+    }
+}
+
+static void linear_fields_are_exact_on_every_kind(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        render_fixture f;
+        fixture_create_lattice(&f, kind, 4, 0.2, test_linear);
+        fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+        set_segments(&f, 100, 0);
+        double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
+        fprintf(stderr, "linear, %s: %.2g\n", test_mesh_kind_name(kind), worst);
+        assert_true(worst < 3e-6);
+        free(truth);
+        fixture_free(&f);
+    }
+}
+
+static void surfaces_cut_segments(void **state)
+{
+    static const double values[4] = {-0.4, -0.1, 0.2, 0.5};
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int alone = 0; alone < 2; alone++) {
+            render_fixture f;
+            fixture_create_lattice(&f, kind, 3, 0.2, test_wave);
+            fixture_look(&f, CAMERA_OUTSIDE, 25, 21);
+            set_segments(&f, 1, 1e-4);
+            fixture_add_surface(&f, values, 3, 0.4f);
+            fixture_add_surface(&f, values + 3, 1, 1);
+            f.job.is_alone = alone;
+            double *truth = truth_of(&f), worst = error_of(&f, truth, NULL);
+            fprintf(stderr, "surfaces, %s: %.2g\n", test_mesh_kind_name(kind), worst);
+            assert_true(worst < 1.1e-4);
+            free(truth);
+            fixture_free(&f);
+        }
+}
+
+/* Errors of steps 1, 1/2, 1/4 ... of a cell, and the order seen between the first and the last. */
+static double order_of(render_fixture *f, const double *truth, render_integration how, int halvings)
+{
+    double first = 0, last = 0;
+    f->job.integration = how;
+    for (int i = 0; i <= halvings; i++) {
+        double mean;
+        f->job.step = f->cell_size * ldexp(1, -i - 2);
+        const double worst = error_of(f, truth, &mean);
+        fprintf(stderr, "%s, step of 1/%d cell: mean %.3g, worst %.3g\n", how ? "segments" : "samples", 4 << i, mean,
+                worst);
+        if (i == 0) first = mean;
+        last = mean;
+    }
+    return log2(first / last) / halvings;
+}
+
+static void orders_on_jittered_hexes(void **state)
+{
+    (void)state;
+    render_fixture f;
+    fixture_create_lattice(&f, TEST_HEXES, 5, 0.2, test_wave);
+    fixture_look(&f, CAMERA_OUTSIDE, 29, 23);
+    set_segments(&f, 1, 0);
+    double *truth = truth_of(&f);
+    const double segments = order_of(&f, truth, RENDER_SEGMENTS, 4), samples = order_of(&f, truth, RENDER_SAMPLES, 5);
+    fprintf(stderr, "observed orders: segments %.2f, samples %.2f\n", segments, samples);
+    assert_true(segments >= 1.9);
+    assert_true(samples >= 0.95);
+    free(truth);
+    fixture_free(&f);
+}
+
+static void max_error_is_kept_on_every_kind(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
+            render_fixture f;
+            fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+            fixture_look(&f, camera, 21, 17);
+            set_segments(&f, 1, 0);
+            double *truth = truth_of(&f);
+            for (int i = 2; i <= 4; i++) {
+                f.job.max_error = pow(10, -i);
+                const double worst = error_of(&f, truth, NULL);
+                fprintf(stderr, "max_error 1e-%d, %s, %s: %.2g\n", i, test_mesh_kind_name(kind),
+                        fixture_camera_name(camera), worst);
+                assert_true(worst <= f.job.max_error);
+            }
+            free(truth);
+            fixture_free(&f);
+        }
+}
+
+/* The cells dealt to ranks, each drawn alone, all fragments merged: only the rounding of "over" differs. */
+static void parts_make_the_whole(void **state)
+{
+    static const double values[2] = {-0.2, 0.3};
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (test_partition_kind deal = 0; deal < TEST_PARTITION_COUNT; deal++)
+            for (int surfaces = 0; surfaces < 2; surfaces++) {
+                enum { N = 4, RANKS = 3 };
+                test_mesh mesh;
+                render_fixture whole, parts[RANKS];
+                drawn_frame at_once, apart;
+                test_mesh_lattice(kind, N, 0.2, test_wave, &mesh);
+                int *owners = malloc((size_t)mesh.cell_count * sizeof *owners);
+                test_partition(&mesh, deal, N, RANKS, owners);
+                for (int i = 0; i <= RANKS; i++) {
+                    render_fixture *f = i ? &parts[i - 1] : &whole;
+                    test_mesh part = mesh;
+                    if (i) test_mesh_part(&mesh, owners, i - 1, &part);
+                    fixture_create(f, &part, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / N,
+                                   1, (const double[]){0, 0, 0});
+                    if (i) test_mesh_free(&part);
+                    fixture_look(f, CAMERA_OUTSIDE, 37, 31);
+                    set_segments(f, 0.3, deal == TEST_RANDOM ? 1e-3 : 0);
+                    f->job.extent = 3.5;
+                    if (surfaces) fixture_add_surface(f, values, 2, 0.4f);
+                    f->job.is_alone = i == 0;
+                }
+                fixture_draw(&whole, &at_once);
+                fixture_draw_apart(parts, RANKS, &apart);
+                const double off = drawn_difference(&at_once, &apart);
+                for (int p = 0; p < 37 * 31; p++)
+                    assert_true(
+                        !comp_pixel_overlaps(apart.list.items + apart.first[p], apart.first[p + 1] - apart.first[p]));
+                if (!(off <= 1e-6))
+                    fail_msg("%s, %s: %g", test_mesh_kind_name(kind), test_partition_kind_name(deal), off);
+                drawn_free(&at_once);
+                drawn_free(&apart);
+                for (int i = 0; i < RANKS; i++) fixture_free(&parts[i]);
+                fixture_free(&whole);
+                free(owners);
+                test_mesh_free(&mesh);
+            }
+}
+
+/* More meshes in one place than a window has room for: none is dropped. All have the same opacity throughout. */
+static void overlapping_meshes_are_all_seen(void **state)
+{
+    static const float constant[1] = {0.001f};
+    enum { COPIES = 100 };
+    (void)state;
+    test_mesh mesh;
+    render_fixture f;
+    drawn_frame drawn;
+    test_mesh_single(TEST_UNIT_TET, test_linear, &mesh);
+    test_mesh many = {.vertex_count = 4, .cell_count = COPIES, .connectivity_count = 4 * COPIES};
+    many.coordinates = mesh.coordinates;
+    many.values = mesh.values;
+    many.offsets = malloc((COPIES + 1) * sizeof *many.offsets);
+    many.connectivity = malloc(4 * COPIES * sizeof *many.connectivity);
+    many.types = malloc(COPIES);
+    many.ghosts = calloc(COPIES, 1);
+    for (int i = 0; i < 4 * COPIES; i++) many.connectivity[i] = mesh.connectivity[i % 4];
+    for (int i = 0; i <= COPIES; i++) many.offsets[i] = 4 * i;
+    for (int i = 0; i < COPIES; i++) many.types[i] = mesh.types[0];
+    double clear[2][23 * 21];
+    for (int all = 0; all < 2; all++) {
+        fixture_create(&f, all ? &many : &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                       (const double[]){0, 0, 0});
+        fixture_look(&f, CAMERA_OUTSIDE, 23, 21);
+        set_segments(&f, 1, 0);
+        f.transfer.opacity_count = 1;
+        f.transfer.opacities = constant;
+        fixture_draw(&f, &drawn);
+        for (int p = 0; p < 23 * 21; p++) clear[all][p] = 2 * (1 - (double)drawn.picture.rgba[4 * p + 3]);
+        drawn_free(&drawn);
+        fixture_free(&f);
+    }
+    /* 100 times the logarithm of a number that is rounded to 6e-8. */
+    for (int p = 0; p < 23 * 21; p++) assert_true(fabs(COPIES * log(clear[0][p]) - log(clear[1][p])) < 3e-5);
+    free(many.offsets);
+    free(many.connectivity);
+    free(many.types);
+    free(many.ghosts);
+    test_mesh_free(&mesh);
+}
+
+/* The same bits whatever else is in the packet: a picture's pixels do not change with the cut of its border, nor with
+ * the order of the cells, which turns the tree's leaves about. */
+static void pictures_do_not_depend_on_the_order_of_cells(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        drawn_frame drawn[2];
+        for (int i = 0; i < 2; i++) {
+            test_mesh mesh;
+            render_fixture f;
+            test_mesh_lattice(kind, 4, 0.2, test_wave, &mesh);
+            if (i) test_mesh_shuffle(&mesh, 3);
+            fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
+                           (const double[]){0, 0, 0});
+            fixture_look(&f, CAMERA_OUTSIDE, 39, 33);
+            set_segments(&f, 0.1, 0);
+            fixture_draw(&f, &drawn[i]);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+        drawn_assert_same(&drawn[0], &drawn[1]);
+        for (int i = 0; i < 2; i++) drawn_free(&drawn[i]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(tets_are_exact_for_every_camera),
+        cmocka_unit_test(linear_fields_are_exact_on_every_kind),
+        cmocka_unit_test(surfaces_cut_segments),
+        cmocka_unit_test(orders_on_jittered_hexes),
+        cmocka_unit_test(max_error_is_kept_on_every_kind),
+        cmocka_unit_test(parts_make_the_whole),
+        cmocka_unit_test(overlapping_meshes_are_all_seen),
+        cmocka_unit_test(pictures_do_not_depend_on_the_order_of_cells),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
