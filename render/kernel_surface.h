@@ -2,14 +2,15 @@
  * sections 4.3.1 to 4.3.5).
  *
  * Within a cell, values are taken relative to the isovalue in double before they are rounded, so that their signs are
- * exact, and scaled by a power of two. Whether the surface crosses an interval is decided by the signs at its two
- * faces alone (not negative counts as inside); both are the faces' own, so of two cells that share a face exactly one
- * has a crossing next to it. */
+ * exact, and scaled by a power of two. Whether the surface crosses an interval an odd number of times is decided by the
+ * signs at its two faces alone (not negative counts as inside); both are the faces' own, so of two cells that share a
+ * face exactly one has a crossing next to it. Neubauer's method takes one crossing where there is an odd number and
+ * none where there is an even one; the robust finder (kernel_roots.h) finds all. */
 #ifndef RENDER_KERNEL_SURFACE_H
 #define RENDER_KERNEL_SURFACE_H
 
 #include "kernel_colour.h"
-#include "kernel_map.h"
+#include "kernel_roots.h"
 #include "kernel_traverse.h"
 
 /* Nearest opaque hits so far; and the crossings of transparent surfaces, by which volume fragments are cut. */
@@ -129,18 +130,16 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, in
     hits->cut_count++;
 }
 
-/* Rays on which the sign changes between the interval's faces, in front of the eye and of what is known. */
-SIMD_INLINE vm kernel_changes_sign(const kernel_packet *p, const kernel_interval *i)
+/* Rays on which the sign changes between the interval's faces. */
+SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
 {
-    const vf zero = vf_set(0);
-    const vm change = vm_xor(vf_lt(i->v_in, zero), vf_lt(i->v_out, zero));
-    return vm_and(vm_and(i->mask, change), vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
+    return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
 }
 
-/* Where the line through the ends is zero. */
-SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
+/* Rays whose interval is in front of the eye and of what is known. */
+SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
 {
-    return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
+    return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
 SIMD_INLINE vm kernel_visible(const kernel_packet *p, vm hit, vf t)
@@ -176,7 +175,7 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
     const bool has_colour = state->surface->layer->colour_map != NULL;
     kernel_interval i;
     kernel_tet_interval(p, c, rays, has_colour, &i);
-    const vm change = kernel_changes_sign(p, &i);
+    const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
     if (!vm_any(change)) return;
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
     const vm hit = kernel_visible(p, change, t);
@@ -191,42 +190,61 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
     kernel_accept(p, state, value, hit, t, normal, w);
 }
 
-/* A guess for the coordinates at t: on the line between those at the faces. */
-SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
+/* What kernel_poly_surface() sets up once for all rays and intervals. */
+typedef struct kernel_poly {
+    const kernel_cell *cell;
+    int value;
+    kernel_map map;
+    kernel_bounds bounds; /* robust roots alone */
+} kernel_poly;
+
+SIMD_INLINE void kernel_poly_setup(kernel_poly *poly, const render_surface_layer *layer, const kernel_cell *c,
+                                   int value)
 {
-    const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
+    poly->cell = c;
+    poly->value = value;
+    kernel_map_setup(&poly->map, c);
+    if (layer->colour_map) kernel_map_colour(&poly->map, c);
+    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type);
 }
 
-/* Field at t, by the inverse map; on rays where that fails, the line between the faces' values, counted. */
-SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)
+/* The crossings at the places that are visible; returns these. */
+SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state, const kernel_poly *poly, vm found,
+                                  const kernel_place *at)
 {
-    vf r[3];
-    kernel_guess(i, t, r);
-    const vm failed = kernel_map_invert(p, map, rays, t, r);
-    const vf value = kernel_map_value(map, &map->field, r);
-    if (!vm_any(failed)) return value;
-    p->thread->map_failures += __builtin_popcount(vm_bits(failed));
-    const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    return vf_select(failed, i->v_in + along * (i->v_out - i->v_in), value);
+    const vm hit = kernel_visible(p, found, at->t);
+    if (!vm_any(hit)) return hit;
+    vf normal[3], w = vf_set(0);
+    kernel_map_normal(&poly->map, at->r, normal);
+    kernel_unshear(p, normal);
+    if (state->surface->layer->colour_map) w = kernel_map_value(&poly->map, &poly->map.colour, at->r);
+    kernel_accept(p, state, poly->value, hit, at->t, normal, w);
+    return hit;
 }
 
-/* Neubauer's method (thesis, algorithm 4.2): steps of regula falsi on the field along the ray. */
-SIMD_INLINE vf kernel_neubauer(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, int steps)
+/* Every crossing of the interval in turn; an opaque surface's first visible one is a ray's last. */
+SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *state, const kernel_poly *poly,
+                                    const kernel_interval *i, vm rays)
 {
-    vf t0 = i->t_in, t1 = i->t_out, v0 = i->v_in, v1 = i->v_out;
-    for (int n = 0; n < steps; n++) {
-        const vf t = kernel_secant(t0, v0, t1, v1);
-        const vf v = kernel_value_at(p, map, i, rays, t);
-        const vm same = vm_not(vm_xor(vf_lt(v, vf_set(0)), vf_lt(v0, vf_set(0))));
-        t0 = vf_select(same, t, t0);
-        v0 = vf_select(same, v, v0);
-        t1 = vf_select(same, t1, t);
-        v1 = vf_select(same, v1, v);
+    kernel_search s = {.map = &poly->map, .bounds = &poly->bounds, .interval = i};
+    kernel_search_begin(p, &s, rays);
+    for (;;) {
+        if (vm_any(s.found)) {
+            kernel_place at;
+            kernel_polish(p, &s, &at);
+            const vm hit = kernel_poly_accept(p, state, poly, s.found, &at);
+            if (state->is_opaque) {
+                s.open = vm_andnot(s.open, hit);
+                s.ended = vm_andnot(s.ended, hit);
+            }
+        }
+        if (vm_any(s.open))
+            kernel_search_next(p, &s);
+        else if (vm_any(s.ended))
+            kernel_search_end(&s);
+        else
+            return;
     }
-    return kernel_secant(t0, v0, t1, v1);
 }
 
 SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value,
@@ -235,27 +253,22 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_poly_intervals(p, c, rays, false, list);
-    kernel_map map;
+    kernel_poly poly;
     bool is_set_up = false;
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
-        const vm change = kernel_changes_sign(p, i);
-        if (!vm_any(change)) continue;
-        if (!is_set_up) {
-            kernel_map_setup(&map, c);
-            if (layer->colour_map) kernel_map_colour(&map, c);
-            is_set_up = true;
+        const vm near = kernel_is_near(p, i);
+        const vm wanted = layer->root == RENDER_ROBUST ? near : vm_and(near, kernel_changes_sign(i));
+        if (!vm_any(wanted)) continue;
+        if (!is_set_up) kernel_poly_setup(&poly, layer, c, value);
+        is_set_up = true;
+        if (layer->root == RENDER_ROBUST) {
+            kernel_poly_robust(p, state, &poly, i, wanted);
+            continue;
         }
-        const vf t = kernel_neubauer(p, &map, i, change, layer->root_steps);
-        const vm hit = kernel_visible(p, change, t);
-        if (!vm_any(hit)) continue;
-        vf r[3], normal[3], w = vf_set(0);
-        kernel_guess(i, t, r);
-        kernel_map_invert(p, &map, hit, t, r);
-        kernel_map_normal(&map, r, normal);
-        kernel_unshear(p, normal);
-        if (layer->colour_map) w = kernel_map_value(&map, &map.colour, r);
-        kernel_accept(p, state, value, hit, t, normal, w);
+        kernel_place at;
+        kernel_neubauer(p, &poly.map, i, wanted, layer->root_steps, &at);
+        kernel_poly_accept(p, state, &poly, wanted, &at);
     }
 }
 
