@@ -36,3 +36,11 @@ insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7)
 
 insitu_render_program(test_overlap_mpi)
 insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 4 7)
+
+# The root finder's headers compiled into the test, on the compiler's own vectors.
+add_executable(test_roots test_roots.c)
+target_compile_definitions(test_roots PRIVATE SIMD_PLAIN)
+target_compile_options(test_roots PRIVATE -fno-math-errno -fno-trapping-math $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
+target_link_libraries(test_roots PRIVATE test_meshes insitu_internal PkgConfig::CMOCKA insitu_flags)
+add_test(NAME roots COMMAND test_roots)
+set_tests_properties(roots PROPERTIES TIMEOUT 120)
