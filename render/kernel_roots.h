@@ -150,8 +150,8 @@ static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, 
                 move += d * d;
             }
         }
-        theta = fmax(theta, move);
-        gradient = fmax(gradient, steep);
+        theta = move > theta ? move : theta;
+        gradient = steep > gradient ? steep : gradient;
     }
     theta = sqrt(theta);
     if (!(theta < 0.9)) b->coarsest = 0.125f;

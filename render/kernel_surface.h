@@ -190,22 +190,34 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
     kernel_accept(p, state, value, hit, t, normal, w);
 }
 
-/* What kernel_poly_surface() sets up once for all rays and intervals. */
+/* What is set up once for a cell and isovalue, for all packets of a tile: beside each place of the cache. */
 typedef struct kernel_poly {
-    const kernel_cell *cell;
+    bool is_set_up;
     int value;
     kernel_map map;
     kernel_bounds bounds; /* robust roots alone */
 } kernel_poly;
 
+typedef struct kernel_surface_cache {
+    kernel_cache cells;
+    kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
+} kernel_surface_cache;
+
 SIMD_INLINE void kernel_poly_setup(kernel_poly *poly, const render_surface_layer *layer, const kernel_cell *c,
                                    int value)
 {
-    poly->cell = c;
+    if (poly->is_set_up) return;
+    poly->is_set_up = true;
     poly->value = value;
     kernel_map_setup(&poly->map, c);
     if (layer->colour_map) kernel_map_colour(&poly->map, c);
     if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type);
+}
+
+SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_cell *c)
+{
+    kernel_surface_cache *cache = p->thread->cache;
+    return &cache->polys[c - cache->cells.cells];
 }
 
 /* The crossings at the places that are visible; returns these. */
@@ -247,28 +259,25 @@ SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *stat
     }
 }
 
-SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value,
-                                     vm rays)
+SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                     kernel_poly *poly, int value, vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_poly_intervals(p, c, rays, false, list);
-    kernel_poly poly;
-    bool is_set_up = false;
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm near = kernel_is_near(p, i);
         const vm wanted = layer->root == RENDER_ROBUST ? near : vm_and(near, kernel_changes_sign(i));
         if (!vm_any(wanted)) continue;
-        if (!is_set_up) kernel_poly_setup(&poly, layer, c, value);
-        is_set_up = true;
+        kernel_poly_setup(poly, layer, c, value);
         if (layer->root == RENDER_ROBUST) {
-            kernel_poly_robust(p, state, &poly, i, wanted);
+            kernel_poly_robust(p, state, poly, i, wanted);
             continue;
         }
         kernel_place at;
-        kernel_neubauer(p, &poly.map, i, wanted, layer->root_steps, &at);
-        kernel_poly_accept(p, state, &poly, wanted, &at);
+        kernel_neubauer(p, &poly->map, i, wanted, layer->root_steps, &at);
+        kernel_poly_accept(p, state, poly, wanted, &at);
     }
 }
 
@@ -280,6 +289,7 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
     const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
+        kernel_poly *poly = kernel_poly_find(p, c);
         if (!c->is_finite) continue;
         for (int value = 0; value < layer->value_count; value++) {
             if (!kernel_cell_straddles(c, layer->values[value])) continue;
@@ -288,11 +298,14 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
                 kernel_cell_place(c, p, g);
                 if (layer->colour_map) kernel_cell_colours(c, state->surface, part);
             }
-            if (is_fresh || layer->value_count > 1) kernel_cell_relative(c, layer->values[value]);
+            if (is_fresh || layer->value_count > 1) {
+                kernel_cell_relative(c, layer->values[value]);
+                poly->is_set_up = false;
+            }
             if (c->type == GRID_TET)
                 kernel_tet_surface(p, state, c, value, rays);
             else
-                kernel_poly_surface(p, state, c, value, rays);
+                kernel_poly_surface(p, state, c, poly, value, rays);
         }
     }
 }

@@ -86,4 +86,4 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
             if (is_wanted(f->job, x, y)) trace_packet(f, &tile, thread, x, y);
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_cache), trace_tile};
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_surface_cache), trace_tile};
