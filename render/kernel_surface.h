@@ -10,6 +10,7 @@
 #define RENDER_KERNEL_SURFACE_H
 
 #include "kernel_colour.h"
+#include "kernel_normals.h"
 #include "kernel_roots.h"
 #include "kernel_traverse.h"
 
@@ -20,6 +21,7 @@ typedef struct kernel_hits {
     vm found;
     vf normal[3]; /* along the gradient, camera axes, any length */
     vf colour[3]; /* unlit */
+    vf reach;     /* of differences; only where asked for */
     vf kind;
     int cut_count; /* more than KERNEL_MAX_CUTS: the list is not whole */
     vm cut_mask[KERNEL_MAX_CUTS];
@@ -98,12 +100,14 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
 }
 
 /* Hits at depth t: kept where the nearest, or written at once where the surface is transparent. */
-SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, int value, vm hit, vf t,
-                               const vf normal[3], vf w)
+SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
+                               vf t, vf normal[3], vf w)
 {
     const kernel_surface *s = state->surface;
     kernel_hits *hits = state->hits;
     vf colour[3];
+    const bool by_differences = s->layer->normal == RENDER_DIFFERENCES;
+    const vf reach = vf_set(by_differences ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, w, colour);
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
@@ -117,9 +121,11 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, in
             hits->normal[a] = vf_select(hit, normal[a], hits->normal[a]);
             hits->colour[a] = vf_select(hit, colour[a], hits->colour[a]);
         }
+        if (by_differences) hits->reach = vf_select(hit, reach, hits->reach);
         hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
         return;
     }
+    if (by_differences) kernel_differences(p, s, state->layer, value, hit, t, reach, normal);
     kernel_shade(p, &s->layer->material, normal, colour);
     for (int a = 0; a < 3; a++) colour[a] *= s->layer->opacity;
     kernel_emit(p, hit, s->first_kind + (uint32_t)value, vf_set(0), t, t, colour, vf_set(1 - s->layer->opacity));
@@ -187,7 +193,7 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
         const vf along = vf_select(vf_lt(vf_set(0), length), (t - i.t_in) / length, vf_set(0));
         w = i.w_in + along * (i.w_out - i.w_in);
     }
-    kernel_accept(p, state, value, hit, t, normal, w);
+    kernel_accept(p, state, c, value, hit, t, normal, w);
 }
 
 /* What is set up once for a cell and isovalue, for all packets of a tile: beside each place of the cache. */
@@ -221,8 +227,8 @@ SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_c
 }
 
 /* The crossings at the places that are visible; returns these. */
-SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state, const kernel_poly *poly, vm found,
-                                  const kernel_place *at)
+SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                  const kernel_poly *poly, vm found, const kernel_place *at)
 {
     const vm hit = kernel_visible(p, found, at->t);
     if (!vm_any(hit)) return hit;
@@ -230,13 +236,13 @@ SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state,
     kernel_map_normal(&poly->map, at->r, normal);
     kernel_unshear(p, normal);
     if (state->surface->layer->colour_map) w = kernel_map_value(&poly->map, &poly->map.colour, at->r);
-    kernel_accept(p, state, poly->value, hit, at->t, normal, w);
+    kernel_accept(p, state, c, poly->value, hit, at->t, normal, w);
     return hit;
 }
 
 /* Every crossing of the interval in turn; an opaque surface's first visible one is a ray's last. */
-SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *state, const kernel_poly *poly,
-                                    const kernel_interval *i, vm rays)
+SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                    const kernel_poly *poly, const kernel_interval *i, vm rays)
 {
     kernel_search s = {.map = &poly->map, .bounds = &poly->bounds, .interval = i};
     kernel_search_begin(p, &s, rays);
@@ -244,7 +250,7 @@ SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *stat
         if (vm_any(s.found)) {
             kernel_place at;
             kernel_polish(p, &s, &at);
-            const vm hit = kernel_poly_accept(p, state, poly, s.found, &at);
+            const vm hit = kernel_poly_accept(p, state, c, poly, s.found, &at);
             if (state->is_opaque) {
                 s.open = vm_andnot(s.open, hit);
                 s.ended = vm_andnot(s.ended, hit);
@@ -272,12 +278,12 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
         if (!vm_any(wanted)) continue;
         kernel_poly_setup(poly, layer, c, value);
         if (layer->root == RENDER_ROBUST) {
-            kernel_poly_robust(p, state, poly, i, wanted);
+            kernel_poly_robust(p, state, c, poly, i, wanted);
             continue;
         }
         kernel_place at;
         kernel_neubauer(p, &poly->map, i, wanted, layer->root_steps, &at);
-        kernel_poly_accept(p, state, poly, wanted, &at);
+        kernel_poly_accept(p, state, c, poly, wanted, &at);
     }
 }
 
@@ -291,6 +297,15 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
         kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
         kernel_poly *poly = kernel_poly_find(p, c);
         if (!c->is_finite) continue;
+        kernel_cell own_cell;
+        kernel_poly own_poly;
+        if (layer->normal == RENDER_DIFFERENCES && !state->is_opaque) {
+            /* Looking for samples fills the cache with other cells while this one is in use. */
+            own_cell = *c;
+            own_poly = *poly;
+            c = &own_cell;
+            poly = &own_poly;
+        }
         for (int value = 0; value < layer->value_count; value++) {
             if (!kernel_cell_straddles(c, layer->values[value])) continue;
             const bool is_fresh = !c->is_placed;
@@ -311,9 +326,6 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
 }
 
 /* All surface layers: opaque hits go to p->t_far and hits, transparent ones into fragments. */
-SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                    vf t_low, const vf *t_high, kernel_leaf *leaf, void *state);
-
 SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
@@ -322,6 +334,16 @@ SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
             .surface = &f->surfaces[n], .layer = n, .hits = hits, .is_opaque = n < f->opaque_count};
         kernel_trace_parts(p, &f->surfaces[n].layer->field, &f->surfaces[n].interest, p->t_near, &p->t_far,
                            kernel_surface_leaf, &state);
+    }
+}
+
+/* Normals by differences of the nearest opaque hits of a surface. */
+SIMD_INLINE void kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, int layer, vm rays,
+                                           kernel_hits *hits)
+{
+    for (int value = 0; value < s->layer->value_count; value++) {
+        const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
+        if (vm_any(mine)) kernel_differences(p, s, layer, value, mine, p->t_far, hits->reach, hits->normal);
     }
 }
 
@@ -334,6 +356,7 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         const vm mine = vm_and(vf_le(first, hits->kind), vf_lt(hits->kind, first + (float)s->layer->value_count));
         const vm write = vm_and(hits->found, mine);
         if (!vm_any(write)) continue;
+        if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, n, write, hits);
         vf colour[3] = {hits->colour[0], hits->colour[1], hits->colour[2]};
         kernel_shade(p, &s->layer->material, hits->normal, colour);
         kernel_emit(p, write, 0, hits->kind, p->t_far, p->t_far, colour, vf_set(0));

@@ -49,7 +49,7 @@ static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_
     kernel_packet_setup(&p, f, tile, thread, x0, y0);
     hits.found = vm_none();
     hits.cut_count = 0;
-    hits.kind = vf_set(0);
+    hits.kind = hits.reach = vf_set(0);
     for (int a = 0; a < 3; a++) hits.normal[a] = hits.colour[a] = vf_set(0);
     if (f->surface_count) {
         const double start = thread->now();
