@@ -44,3 +44,7 @@ target_compile_options(test_roots PRIVATE -fno-math-errno -fno-trapping-math $<$
 target_link_libraries(test_roots PRIVATE test_meshes insitu_internal PkgConfig::CMOCKA insitu_flags)
 add_test(NAME roots COMMAND test_roots)
 set_tests_properties(roots PROPERTIES TIMEOUT 120)
+
+insitu_render_program(test_hits)
+add_test(NAME hits COMMAND test_hits)
+set_tests_properties(hits PROPERTIES TIMEOUT 180)
