@@ -630,6 +630,7 @@ double reference_residual(const reference_scene *scene, int x, int y, const refe
     line_at(&t, depth, point);
     reference_interpolate(&c.cell, point, values, &value, g);
     *slope = (g[0] * t.line.slope[0] + g[1] * t.line.slope[1] + g[2]) / (high - low);
+    for (int axis = 0; axis < 3; axis++) g[axis] /= high - low;
     if (gradient) to_world(&scene->job->camera, g, gradient);
     return (value - iso) / (high - low);
 }

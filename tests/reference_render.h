@@ -44,8 +44,8 @@ typedef struct reference_scene reference_scene;
 reference_scene *reference_create(const render_job *job);
 void reference_free(reference_scene *scene);
 
-/* On the ray of pixel (x, y), in a hit's cell: (field at depth - isovalue) / the range of the cell's values, and the
- * same of its derivative by depth. gradient (world) may be NULL. */
+/* On the ray of pixel (x, y), in a hit's cell: field at depth - isovalue, its derivative by depth and its gradient
+ * (world; may be NULL), all over the range of the cell's values. */
 double reference_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
                           double *slope, double gradient[3]);
 

@@ -180,11 +180,188 @@ static void robust_hits_in_ugly_cells_are_the_reference(void **state)
     }
 }
 
+/* ---- normals ---- */
+
+/* White diffuse surfaces under a red, a green and a blue light from three sides about the eye: a hit's colour is its
+ * normal, in the axes of the lights, without the negative components. */
+static void light_by_axes(render_fixture *f, render_light lights[3])
+{
+    static const float white[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1};
+    const double inner = sqrt(1.0 / 3), outer = sqrt(2.0 / 3);
+    for (int i = 0; i < 3; i++) {
+        const double angle = i * 2 * 3.14159265358979323846 / 3;
+        lights[i] = (render_light){.colour = {i == 0, i == 1, i == 2}};
+        for (int a = 0; a < 3; a++) {
+            const double side = cos(angle) * f->job.camera.right[a] + sin(angle) * f->job.camera.up[a];
+            lights[i].direction[a] = outer * side - inner * f->job.camera.forward[a];
+        }
+    }
+    f->job.lights = lights;
+    f->job.light_count = 3;
+    f->surfaces[0].colours = white;
+    f->surfaces[0].material = (render_material){.ambient = 0, .diffuse = 1, .specular = 0, .shininess = 1};
+}
+
+/* How far the fragment's colour is from that of the gradient, towards the eye. */
+static double normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
+{
+    const int width = f->job.camera.width;
+    double base[3], direction[3], length = 0, facing = 0, off = 0;
+    render_camera_ray(&f->job.camera, (int)hit->pixel % width, (int)hit->pixel / width, base, direction);
+    for (int a = 0; a < 3; a++) {
+        length += gradient[a] * gradient[a];
+        facing += gradient[a] * direction[a];
+    }
+    length = facing > 0 ? -sqrt(length) : sqrt(length);
+    for (int i = 0; i < 3; i++) {
+        double shade = 0;
+        for (int a = 0; a < 3; a++) shade += f->job.lights[i].direction[a] * gradient[a] / length;
+        off = fmax(off, fabs((double)hit->colour[i] - (double)f->surfaces[0].opacity * fmax(shade, 0)));
+    }
+    return off;
+}
+
+/* The gradient is made of differences of float32 values and positions, each off by half a unit, 6e-8, of the cell's
+ * range and size; eight of them and the cell's distortion make 2e-6 of range / size, against the gradient's length.
+ * The place is off by 1e-6 cells, against second derivatives of a range or two: as much again. Seen edge-on, either
+ * side may be the eye's. */
+static void judge_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
+                         const fragment *hit, int64_t *checked)
+{
+    const int x = (int)hit->pixel % f->job.camera.width, y = (int)hit->pixel / f->job.camera.width;
+    double slope, gradient[3];
+    reference_residual(scene, x, y, truth, fixture_depth(f, hit->t_in), &slope, gradient);
+    const double length = sqrt(gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]);
+    if (fabs(slope) < 1e-4 * length) return;
+    const double off = normal_error(f, hit, gradient), allowed = 4e-6 / (length * f->cell_size) + 1e-6;
+    if (!(off <= allowed)) fail_msg("pixel %d, %d: normal off by %g, allowed %g", x, y, off, allowed);
+    ++*checked;
+}
+
+static void cell_gradients_are_the_reference(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        render_fixture f;
+        drawn_frame drawn;
+        render_light lights[3];
+        int64_t checked = 0;
+        fixture_create_lattice(&f, kinds[k], 3, 0.2, test_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, 43, 37);
+        add_robust(&f, 0.5f);
+        light_by_axes(&f, lights);
+        fixture_draw(&f, &drawn);
+        reference_scene *scene = reference_create(&f.job);
+        for (int p = 0; p < 43 * 37; p++) {
+            const fragment *hits[REFERENCE_MAX_HITS];
+            reference_ray ray;
+            reference_trace(scene, p % 43, p / 43, fixture_background, &ray);
+            const int count = hits_of(&drawn, p, hits);
+            if (ray.ambiguous || ray.edge_margin < 1e-6 || ray.value_margin < 1e-6 || count != ray.hit_count) continue;
+            for (int i = 0; i < count; i++) judge_normal(&f, scene, &ray.hits[i], hits[i], &checked);
+        }
+        assert_true(checked > 300);
+        reference_free(scene);
+        drawn_free(&drawn);
+        fixture_free(&f);
+    }
+}
+
+static void add_differences(render_fixture *f, const double *values, int count, float opacity, double difference,
+                            render_light lights[3])
+{
+    fixture_add_surface(f, values, count, opacity);
+    f->surfaces[0].root = RENDER_ROBUST;
+    f->surfaces[0].normal = RENDER_DIFFERENCES;
+    f->surfaces[0].difference = difference;
+    light_by_axes(f, lights);
+}
+
+/* Isoparametric cells hold a linear field as it is, and so all differences, one-sided ones at the rim too, are its
+ * gradient. A sample errs by some 5e-7 of the field's range of 3, a difference over half of cells of 2/3, at a slope of
+ * 0.9, by some 1e-5 of it. Half a cell from warped faces the polyhedron's field is continued outside the cell's domain,
+ * where it is linear as well. */
+static void differences_of_a_linear_field_are_exact(void **state)
+{
+    (void)state;
+    static const double values[3] = {-0.6, 0.1, 0.5}, gradient[3] = {0.3, -0.7, 0.5};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++)
+            for (int opaque = 0; opaque < 2; opaque++) {
+                render_fixture f;
+                drawn_frame drawn;
+                render_light lights[3];
+                double worst = 0;
+                fixture_create_lattice(&f, kind, 3, 0.2, test_linear);
+                fixture_look(&f, camera, 35, 31);
+                add_differences(&f, values, 3, opaque ? 1 : 0.5f, 0.5, lights);
+                fixture_draw(&f, &drawn);
+                for (int64_t i = 0; i < drawn.list.count; i++)
+                    worst = fmax(worst, normal_error(&f, &drawn.list.items[i], gradient));
+                assert_true(drawn.list.count > 100);
+                if (!(worst <= 2e-5)) fail_msg("%s: normal off by %g", test_mesh_kind_name(kind), worst);
+                drawn_free(&drawn);
+                fixture_free(&f);
+            }
+}
+
+static double quadratic(const double p[3])
+{
+    return p[0] * p[0] + 0.5 * p[1] * p[1] + 0.7 * p[2] * p[2] + 0.3 * p[0] * p[1];
+}
+
+/* Mean error of normals against the field's own gradient at the hit. */
+static double quadratic_error(int n, render_normal normal, double difference)
+{
+    static const double value[1] = {0.3};
+    render_fixture f;
+    drawn_frame drawn;
+    render_light lights[3];
+    double sum = 0;
+    fixture_create_lattice(&f, TEST_HEXES, n, 0, quadratic);
+    fixture_look(&f, CAMERA_OUTSIDE, 64, 64);
+    add_differences(&f, value, 1, 1, difference, lights);
+    f.surfaces[0].normal = normal;
+    fixture_draw(&f, &drawn);
+    for (int64_t i = 0; i < drawn.list.count; i++) {
+        const fragment *hit = &drawn.list.items[i];
+        double base[3], d[3], p[3];
+        render_camera_ray(&f.job.camera, (int)hit->pixel % 64, (int)hit->pixel / 64, base, d);
+        for (int a = 0; a < 3; a++) p[a] = base[a] + fixture_depth(&f, hit->t_in) * d[a];
+        sum += normal_error(&f, hit, (const double[]){2 * p[0] + 0.3 * p[1], p[1] + 0.3 * p[0], 1.4 * p[2]});
+    }
+    assert_true(drawn.list.count > 300);
+    sum /= (double)drawn.list.count;
+    drawn_free(&drawn);
+    fixture_free(&f);
+    return sum;
+}
+
+/* The trilinear interpolant of a quadratic errs by the same in every cell of a lattice, so that differences over a
+ * whole cell are those of the quadratic itself, which are exact: what is left is rounding. Over other lengths they err
+ * by the cell's size, as the cell's gradient does, but by less. On a field with a third derivative the whole cell's
+ * differences are of second order. */
+static void differences_of_a_quadratic_field_are_of_second_order(void **state)
+{
+    (void)state;
+    const double coarse = quadratic_error(8, RENDER_DIFFERENCES, 1), fine = quadratic_error(16, RENDER_DIFFERENCES, 1);
+    const double gradient = quadratic_error(16, RENDER_GRADIENT, 1),
+                 half = quadratic_error(16, RENDER_DIFFERENCES, 0.5);
+    printf("normals of a quadratic field: differences %.2g, on cells of half the size %.2g, over half of these %.2g; "
+           "gradient %.2g\n",
+           coarse, fine, half, gradient);
+    assert_true(fine <= 0.3 * coarse || coarse < 1e-5);
+    assert_true(half < gradient && fine < 0.1 * half);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(robust_hits_are_on_the_surface),
         cmocka_unit_test(robust_hits_in_ugly_cells_are_the_reference),
+        cmocka_unit_test(cell_gradients_are_the_reference),
+        cmocka_unit_test(differences_of_a_linear_field_are_exact),
+        cmocka_unit_test(differences_of_a_quadratic_field_are_of_second_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
