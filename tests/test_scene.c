@@ -183,7 +183,7 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(first->material.specular == 0.3F && first->material.shininess == 40);
     assert_int_equal(first->root_steps, 5);
     assert_true(first->roots == SCENE_NEUBAUER && first->normals == SCENE_DIFFERENCES && first->difference == 0.25);
-    assert_true(second->roots == SCENE_ROBUST && second->normals == SCENE_GRADIENT && second->difference == 0.5);
+    assert_true(second->roots == SCENE_ROBUST && second->normals == SCENE_GRADIENT && second->difference == 1);
     assert_false(first->has_colour_by);
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");

@@ -50,7 +50,7 @@ typedef struct scene_isosurface {
     scene_root roots; /* robust by default */
     int root_steps;   /* of Neubauer's method, 0 .. 64; 2 by default */
     scene_normal normals;
-    double difference; /* in cell sizes, > 0; 0.5 by default */
+    double difference; /* in cell sizes, > 0; 1 by default */
 } scene_isosurface;
 
 typedef struct scene_volume {

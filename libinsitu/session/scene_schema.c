@@ -129,7 +129,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .by_default = "`gradient`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
       .help = "Distance between the two samples of a difference, in sizes of the cell that is hit.",                   \
-      .by_default = "`0.5`", .low = 0, .is_low_excluded = true, .high = 100)
+      .by_default = "`1`", .low = 0, .is_low_excluded = true, .high = 100)
 DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
 
 #define VOLUME_KEYS(X)                                                                                                 \
