@@ -112,6 +112,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
         if (__builtin_expect(vm_any(tied), 0)) {
+            if (by_differences) kernel_differences(p, s, state->layer, value, tied, t, reach, normal);
             kernel_emit_tied(p, s, value, tied, t, normal, colour);
             hit = vm_andnot(hit, tied);
         }
@@ -299,7 +300,7 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
         if (!c->is_finite) continue;
         kernel_cell own_cell;
         kernel_poly own_poly;
-        if (layer->normal == RENDER_DIFFERENCES && !state->is_opaque) {
+        if (layer->normal == RENDER_DIFFERENCES) {
             /* Looking for samples fills the cache with other cells while this one is in use. */
             own_cell = *c;
             own_poly = *poly;
