@@ -154,9 +154,9 @@ SIMD_INLINE void kernel_map_jacobian(const kernel_map *map, const kernel_product
 }
 
 /* From the guess in r to the coordinates of the point at depth t on each ray of wanted, by Newton's method. Returns the
- * rays that did not converge: theirs are not to be used. A ray that has converged is left alone, so that its result
+ * rays that did not converge. A ray that has converged is left alone, so that its result
  * does not depend on the others of the packet. */
-SIMD_INLINE vm kernel_map_invert(const kernel_packet *p, const kernel_map *map, vm wanted, vf t, vf r[3])
+SIMD_INLINE vm kernel_map_newton(const kernel_packet *p, const kernel_map *map, vm wanted, vf t, vf r[3])
 {
     const vf target[3] = {(p->origin_x + p->slope_x * t) - map->origin[0],
                           (p->origin_y + p->slope_y * t) - map->origin[1], t - map->origin[2]};
@@ -178,6 +178,30 @@ SIMD_INLINE vm kernel_map_invert(const kernel_packet *p, const kernel_map *map, 
         open = vm_andnot(open, vm_and(solid, vf_le(largest, vf_set(map->tolerance))));
     }
     return open;
+}
+
+/* How far r is out of the cell's domain. */
+SIMD_INLINE vf kernel_map_beyond(const vf r[3])
+{
+    vf most = vf_set(0);
+    for (int a = 0; a < 3; a++) most = vf_max(most, vf_max(-r[a], r[a] - 1.0f));
+    return most;
+}
+
+/* The coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method may diverge or come
+ * to another solution far outside: then once more from the middle of the cell. Returns the rays that found none: theirs
+ * are not to be used. */
+SIMD_INLINE vm kernel_map_invert(const kernel_packet *p, const kernel_map *map, vm wanted, vf t, vf r[3])
+{
+    vm failed = kernel_map_newton(p, map, wanted, t, r);
+    const vm again = vm_or(failed, vm_and(wanted, vf_lt(vf_set(0.25f), kernel_map_beyond(r))));
+    if (__builtin_expect(!vm_any(again), 1)) return failed;
+    vf middle[3] = {vf_set(0.4f), vf_set(0.4f), vf_set(0.5f)};
+    const vm worse = kernel_map_newton(p, map, again, t, middle);
+    const vm nearer = vm_or(failed, vf_lt(kernel_map_beyond(middle), kernel_map_beyond(r)));
+    const vm better = vm_and(vm_andnot(again, worse), nearer);
+    for (int a = 0; a < 3; a++) r[a] = vf_select(better, middle[a], r[a]);
+    return vm_andnot(failed, better);
 }
 
 SIMD_INLINE vf kernel_map_value(const kernel_map *map, const kernel_polynomial *field, const vf r[3])

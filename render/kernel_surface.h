@@ -2,14 +2,16 @@
  * sections 4.3.1 to 4.3.5).
  *
  * Within a cell, values are taken relative to the isovalue in double before they are rounded, so that their signs are
- * exact, and scaled by a power of two. Whether the surface crosses an interval is decided by the signs at its two
- * faces alone (not negative counts as inside); both are the faces' own, so of two cells that share a face exactly one
- * has a crossing next to it. */
+ * exact, and scaled by a power of two. Whether the surface crosses an interval an odd number of times is decided by the
+ * signs at its two faces alone (not negative counts as inside); both are the faces' own, so of two cells that share a
+ * face exactly one has a crossing next to it. Neubauer's method takes one crossing where there is an odd number and
+ * none where there is an even one; the robust finder (kernel_roots.h) finds all. */
 #ifndef RENDER_KERNEL_SURFACE_H
 #define RENDER_KERNEL_SURFACE_H
 
 #include "kernel_colour.h"
-#include "kernel_map.h"
+#include "kernel_normals.h"
+#include "kernel_roots.h"
 #include "kernel_traverse.h"
 
 /* Nearest opaque hits so far; and the crossings of transparent surfaces, by which volume fragments are cut. */
@@ -19,6 +21,7 @@ typedef struct kernel_hits {
     vm found;
     vf normal[3]; /* along the gradient, camera axes, any length */
     vf colour[3]; /* unlit */
+    vf reach;     /* of differences; only where asked for */
     vf kind;
     int cut_count; /* more than KERNEL_MAX_CUTS: the list is not whole */
     vm cut_mask[KERNEL_MAX_CUTS];
@@ -97,16 +100,19 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
 }
 
 /* Hits at depth t: kept where the nearest, or written at once where the surface is transparent. */
-SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, int value, vm hit, vf t,
-                               const vf normal[3], vf w)
+SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
+                               vf t, vf normal[3], vf w)
 {
     const kernel_surface *s = state->surface;
     kernel_hits *hits = state->hits;
     vf colour[3];
+    const bool by_differences = s->layer->normal == RENDER_DIFFERENCES;
+    const vf reach = vf_set(by_differences ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, w, colour);
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
         if (__builtin_expect(vm_any(tied), 0)) {
+            if (by_differences) kernel_differences(p, s, state->layer, value, tied, t, reach, normal);
             kernel_emit_tied(p, s, value, tied, t, normal, colour);
             hit = vm_andnot(hit, tied);
         }
@@ -116,9 +122,11 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, in
             hits->normal[a] = vf_select(hit, normal[a], hits->normal[a]);
             hits->colour[a] = vf_select(hit, colour[a], hits->colour[a]);
         }
+        if (by_differences) hits->reach = vf_select(hit, reach, hits->reach);
         hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
         return;
     }
+    if (by_differences) kernel_differences(p, s, state->layer, value, hit, t, reach, normal);
     kernel_shade(p, &s->layer->material, normal, colour);
     for (int a = 0; a < 3; a++) colour[a] *= s->layer->opacity;
     kernel_emit(p, hit, s->first_kind + (uint32_t)value, vf_set(0), t, t, colour, vf_set(1 - s->layer->opacity));
@@ -129,18 +137,16 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, in
     hits->cut_count++;
 }
 
-/* Rays on which the sign changes between the interval's faces, in front of the eye and of what is known. */
-SIMD_INLINE vm kernel_changes_sign(const kernel_packet *p, const kernel_interval *i)
+/* Rays on which the sign changes between the interval's faces. */
+SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
 {
-    const vf zero = vf_set(0);
-    const vm change = vm_xor(vf_lt(i->v_in, zero), vf_lt(i->v_out, zero));
-    return vm_and(vm_and(i->mask, change), vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
+    return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
 }
 
-/* Where the line through the ends is zero. */
-SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
+/* Rays whose interval is in front of the eye and of what is known. */
+SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
 {
-    return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
+    return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
 SIMD_INLINE vm kernel_visible(const kernel_packet *p, vm hit, vf t)
@@ -176,7 +182,7 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
     const bool has_colour = state->surface->layer->colour_map != NULL;
     kernel_interval i;
     kernel_tet_interval(p, c, rays, has_colour, &i);
-    const vm change = kernel_changes_sign(p, &i);
+    const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
     if (!vm_any(change)) return;
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
     const vm hit = kernel_visible(p, change, t);
@@ -188,74 +194,97 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
         const vf along = vf_select(vf_lt(vf_set(0), length), (t - i.t_in) / length, vf_set(0));
         w = i.w_in + along * (i.w_out - i.w_in);
     }
-    kernel_accept(p, state, value, hit, t, normal, w);
+    kernel_accept(p, state, c, value, hit, t, normal, w);
 }
 
-/* A guess for the coordinates at t: on the line between those at the faces. */
-SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
+/* What is set up once for a cell and isovalue, for all packets of a tile: beside each place of the cache. */
+typedef struct kernel_poly {
+    bool is_set_up;
+    int value;
+    kernel_map map;
+    kernel_bounds bounds; /* robust roots alone */
+} kernel_poly;
+
+typedef struct kernel_surface_cache {
+    kernel_cache cells;
+    kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
+} kernel_surface_cache;
+
+SIMD_INLINE void kernel_poly_setup(kernel_poly *poly, const render_surface_layer *layer, const kernel_cell *c,
+                                   int value)
 {
-    const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
+    if (poly->is_set_up) return;
+    poly->is_set_up = true;
+    poly->value = value;
+    kernel_map_setup(&poly->map, c);
+    if (layer->colour_map) kernel_map_colour(&poly->map, c);
+    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type);
 }
 
-/* Field at t, by the inverse map; on rays where that fails, the line between the faces' values, counted. */
-SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)
+SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_cell *c)
 {
-    vf r[3];
-    kernel_guess(i, t, r);
-    const vm failed = kernel_map_invert(p, map, rays, t, r);
-    const vf value = kernel_map_value(map, &map->field, r);
-    if (!vm_any(failed)) return value;
-    p->thread->map_failures += __builtin_popcount(vm_bits(failed));
-    const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    return vf_select(failed, i->v_in + along * (i->v_out - i->v_in), value);
+    kernel_surface_cache *cache = p->thread->cache;
+    return &cache->polys[c - cache->cells.cells];
 }
 
-/* Neubauer's method (thesis, algorithm 4.2): steps of regula falsi on the field along the ray. */
-SIMD_INLINE vf kernel_neubauer(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, int steps)
+/* The crossings at the places that are visible; returns these. */
+SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                  const kernel_poly *poly, vm found, const kernel_point *at)
 {
-    vf t0 = i->t_in, t1 = i->t_out, v0 = i->v_in, v1 = i->v_out;
-    for (int n = 0; n < steps; n++) {
-        const vf t = kernel_secant(t0, v0, t1, v1);
-        const vf v = kernel_value_at(p, map, i, rays, t);
-        const vm same = vm_not(vm_xor(vf_lt(v, vf_set(0)), vf_lt(v0, vf_set(0))));
-        t0 = vf_select(same, t, t0);
-        v0 = vf_select(same, v, v0);
-        t1 = vf_select(same, t1, t);
-        v1 = vf_select(same, v1, v);
+    const vm hit = kernel_visible(p, found, at->t);
+    if (!vm_any(hit)) return hit;
+    vf normal[3], w = vf_set(0);
+    kernel_map_normal(&poly->map, at->r, normal);
+    kernel_unshear(p, normal);
+    if (state->surface->layer->colour_map) w = kernel_map_value(&poly->map, &poly->map.colour, at->r);
+    kernel_accept(p, state, c, poly->value, hit, at->t, normal, w);
+    return hit;
+}
+
+/* Every crossing of the interval in turn; an opaque surface's first visible one is a ray's last. */
+SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                    const kernel_poly *poly, const kernel_interval *i, vm rays)
+{
+    kernel_search s = {.map = &poly->map, .bounds = &poly->bounds, .interval = i};
+    kernel_search_begin(p, &s, rays);
+    for (;;) {
+        if (vm_any(s.found)) {
+            kernel_point at;
+            kernel_polish(p, &s, &at);
+            const vm hit = kernel_poly_accept(p, state, c, poly, s.found, &at);
+            if (state->is_opaque) {
+                s.open = vm_andnot(s.open, hit);
+                s.ended = vm_andnot(s.ended, hit);
+            }
+        }
+        if (vm_any(s.open))
+            kernel_search_next(p, &s);
+        else if (vm_any(s.ended))
+            kernel_search_end(&s);
+        else
+            return;
     }
-    return kernel_secant(t0, v0, t1, v1);
 }
 
-SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value,
-                                     vm rays)
+SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                     kernel_poly *poly, int value, vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_poly_intervals(p, c, rays, false, list);
-    kernel_map map;
-    bool is_set_up = false;
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
-        const vm change = kernel_changes_sign(p, i);
-        if (!vm_any(change)) continue;
-        if (!is_set_up) {
-            kernel_map_setup(&map, c);
-            if (layer->colour_map) kernel_map_colour(&map, c);
-            is_set_up = true;
+        const vm near = kernel_is_near(p, i);
+        const vm wanted = layer->root == RENDER_ROBUST ? near : vm_and(near, kernel_changes_sign(i));
+        if (!vm_any(wanted)) continue;
+        kernel_poly_setup(poly, layer, c, value);
+        if (layer->root == RENDER_ROBUST) {
+            kernel_poly_robust(p, state, c, poly, i, wanted);
+            continue;
         }
-        const vf t = kernel_neubauer(p, &map, i, change, layer->root_steps);
-        const vm hit = kernel_visible(p, change, t);
-        if (!vm_any(hit)) continue;
-        vf r[3], normal[3], w = vf_set(0);
-        kernel_guess(i, t, r);
-        kernel_map_invert(p, &map, hit, t, r);
-        kernel_map_normal(&map, r, normal);
-        kernel_unshear(p, normal);
-        if (layer->colour_map) w = kernel_map_value(&map, &map.colour, r);
-        kernel_accept(p, state, value, hit, t, normal, w);
+        kernel_point at;
+        kernel_neubauer(p, &poly->map, i, wanted, layer->root_steps, &at);
+        kernel_poly_accept(p, state, c, poly, wanted, &at);
     }
 }
 
@@ -267,7 +296,17 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
     const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
+        kernel_poly *poly = kernel_poly_find(p, c);
         if (!c->is_finite) continue;
+        kernel_cell own_cell;
+        kernel_poly own_poly;
+        if (layer->normal == RENDER_DIFFERENCES) {
+            /* Looking for samples fills the cache with other cells while this one is in use. */
+            own_cell = *c;
+            own_poly = *poly;
+            c = &own_cell;
+            poly = &own_poly;
+        }
         for (int value = 0; value < layer->value_count; value++) {
             if (!kernel_cell_straddles(c, layer->values[value])) continue;
             const bool is_fresh = !c->is_placed;
@@ -275,19 +314,19 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
                 kernel_cell_place(c, p, g);
                 if (layer->colour_map) kernel_cell_colours(c, state->surface, part);
             }
-            if (is_fresh || layer->value_count > 1) kernel_cell_relative(c, layer->values[value]);
+            if (is_fresh || layer->value_count > 1) {
+                kernel_cell_relative(c, layer->values[value]);
+                poly->is_set_up = false;
+            }
             if (c->type == GRID_TET)
                 kernel_tet_surface(p, state, c, value, rays);
             else
-                kernel_poly_surface(p, state, c, value, rays);
+                kernel_poly_surface(p, state, c, poly, value, rays);
         }
     }
 }
 
 /* All surface layers: opaque hits go to p->t_far and hits, transparent ones into fragments. */
-SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                    vf t_low, const vf *t_high, kernel_leaf *leaf, void *state);
-
 SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
@@ -296,6 +335,16 @@ SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
             .surface = &f->surfaces[n], .layer = n, .hits = hits, .is_opaque = n < f->opaque_count};
         kernel_trace_parts(p, &f->surfaces[n].layer->field, &f->surfaces[n].interest, p->t_near, &p->t_far,
                            kernel_surface_leaf, &state);
+    }
+}
+
+/* Normals by differences of the nearest opaque hits of a surface. */
+SIMD_INLINE void kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, int layer, vm rays,
+                                           kernel_hits *hits)
+{
+    for (int value = 0; value < s->layer->value_count; value++) {
+        const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
+        if (vm_any(mine)) kernel_differences(p, s, layer, value, mine, p->t_far, hits->reach, hits->normal);
     }
 }
 
@@ -308,6 +357,7 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         const vm mine = vm_and(vf_le(first, hits->kind), vf_lt(hits->kind, first + (float)s->layer->value_count));
         const vm write = vm_and(hits->found, mine);
         if (!vm_any(write)) continue;
+        if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, n, write, hits);
         vf colour[3] = {hits->colour[0], hits->colour[1], hits->colour[2]};
         kernel_shade(p, &s->layer->material, hits->normal, colour);
         kernel_emit(p, write, 0, hits->kind, p->t_far, p->t_far, colour, vf_set(0));

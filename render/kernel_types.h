@@ -35,6 +35,7 @@ typedef struct kernel_surface {
     kernel_interest interest; /* the isovalues */
     kernel_transfer colour;   /* where layer->colour_map */
     uint32_t first_kind;      /* fragment kind of the layer's first isovalue */
+    double value_scale;       /* a power of two that brings the field's range near 1: for differences */
 } kernel_surface;
 
 typedef struct kernel_frame {

@@ -77,6 +77,18 @@ typedef struct render_field {
     const mmbvh_ranges *ranges;
 } render_field;
 
+/* How crossings are found in a cell along a ray. Tets have at most one, which both find exactly. */
+typedef enum render_root {
+    RENDER_NEUBAUER, /* root_steps of regula falsi; two crossings of one interval are missed, of three one is found */
+    RENDER_ROBUST    /* every crossing, isolated and then polished: render/kernel_roots.h */
+} render_root;
+
+typedef enum render_normal {
+    RENDER_GRADIENT,   /* of the cell that holds the hit */
+    RENDER_DIFFERENCES /* central ones (thesis, 4.3.4), over this rank's cells: one-sided where a sample is in none of
+                          them, the cell's gradient where an axis has neither. May differ by the partition. */
+} render_normal;
+
 typedef struct render_surface_layer {
     render_field field; /* vertex-centred */
     int value_count;
@@ -86,7 +98,10 @@ typedef struct render_surface_layer {
     const render_transfer *colour_map;
     float opacity; /* 0 .. 1; 1 ends the ray */
     render_material material;
+    render_root root;
     int root_steps; /* N of Neubauer's method (thesis, 4.3.3), 0 .. 64 */
+    render_normal normal;
+    double difference; /* h of central differences, > 0, in sizes of the hit's cell (cube root of its box's volume) */
 } render_surface_layer;
 
 typedef struct render_volume_layer {

@@ -50,7 +50,7 @@ static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_
     kernel_packet_setup(&p, f, tile, thread, x0, y0);
     hits.found = vm_none();
     hits.cut_count = 0;
-    hits.kind = vf_set(0);
+    hits.kind = hits.reach = vf_set(0);
     for (int a = 0; a < 3; a++) hits.normal[a] = hits.colour[a] = vf_set(0);
     if (f->surface_count) {
         const double start = thread->now();
@@ -90,4 +90,4 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
             if (is_wanted(f->job, x, y)) trace_packet(f, &tile, thread, x, y);
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_cache), trace_tile};
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_surface_cache), trace_tile};

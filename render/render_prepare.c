@@ -91,6 +91,23 @@ static void prepare_camera(kernel_frame *f)
         }
 }
 
+/* 1 over the width of the field's range on all parts, to a power of two. */
+static double value_scale(const render_job *job, const render_surface_layer *layer)
+{
+    float low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < job->part_count; i++) {
+        const mmbvh_ranges *r = &layer->field.ranges[i];
+        if (!r->low || !job->parts[i].tree->node_count) continue;
+        float ends[2];
+        memcpy(&ends[0], r->low, sizeof ends[0]);
+        memcpy(&ends[1], r->high, sizeof ends[1]);
+        low = fminf(low, ends[0]);
+        high = fmaxf(high, ends[1]);
+    }
+    const double width = (double)high - (double)low;
+    return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
+}
+
 /* Opaque layers first; kinds number the isovalues in the job's order. */
 static void prepare_surfaces(kernel_frame *f)
 {
@@ -105,6 +122,7 @@ static void prepare_surfaces(kernel_frame *f)
                 s->layer = layer;
                 s->first_kind = kind;
                 prepare_isovalues(&s->interest, layer);
+                if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, layer);
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 f->opaque_count += is_opaque;
                 f->has_transparent = f->has_transparent || !is_opaque;
@@ -122,6 +140,10 @@ static insitu_status check_job(const render_job *job, base_error *error)
         if (job->surfaces[i].root_steps < 0 || job->surfaces[i].root_steps > 64)
             return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: %d root steps, expected 0 to 64", i,
                              job->surfaces[i].root_steps);
+        if (job->surfaces[i].normal == RENDER_DIFFERENCES && !(job->surfaces[i].difference > 0))
+            return base_fail(error, INSITU_ERROR_ARGUMENT,
+                             "isosurface %d: differences over %g cell sizes, expected more than 0", i,
+                             job->surfaces[i].difference);
     }
     if (job->camera.width < 1 || job->camera.height < 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "image of %d x %d pixels, expected at least 1 x 1",

@@ -233,6 +233,74 @@ static bool is_ambiguous(trace *t, const placed_cell *c, const double *values, d
     return changes != 1;
 }
 
+/* ---- every crossing ---- */
+
+typedef struct along {
+    trace *t;
+    const placed_cell *c;
+    const double *values;
+    double iso, range;
+} along;
+
+static double relative_along(const along *a, double z)
+{
+    return value_along(a->t, a->c, a->values, z) - a->iso;
+}
+
+/* Where side times the field is least in [low, high], by golden section. */
+static double dip(const along *a, double low, double high, double side)
+{
+    const double golden = 0.6180339887498949;
+    double x = high - golden * (high - low), y = low + golden * (high - low);
+    double at_x = side * relative_along(a, x), at_y = side * relative_along(a, y);
+    for (int i = 0; i < 40; i++) {
+        if (at_x < at_y) {
+            high = y;
+            y = x;
+            at_y = at_x;
+            x = high - golden * (high - low);
+            at_x = side * relative_along(a, x);
+        } else {
+            low = x;
+            x = y;
+            at_x = at_y;
+            y = low + golden * (high - low);
+            at_y = side * relative_along(a, y);
+        }
+    }
+    return 0.5 * (low + high);
+}
+
+enum { CROSSING_PIECES = 24, CROSSING_MAX = 3 * CROSSING_PIECES };
+
+/* Points between which the field passes the isovalue at most once: even ones, and the bottom of every dip towards it
+ * between two of one side. */
+static int crossing_fence(const along *a, double z_in, double z_out, double *z, double *v)
+{
+    double at[CROSSING_PIECES + 1], f[CROSSING_PIECES + 1];
+    int n = 0;
+    for (int i = 0; i <= CROSSING_PIECES; i++) {
+        at[i] = z_in + (z_out - z_in) * i / CROSSING_PIECES;
+        f[i] = relative_along(a, at[i]);
+    }
+    for (int i = 0; i <= CROSSING_PIECES; i++) {
+        z[n] = at[i];
+        v[n++] = f[i];
+        const int before = i > 0 ? i - 1 : 0, behind = i + 2 <= CROSSING_PIECES ? i + 2 : CROSSING_PIECES;
+        if (i == CROSSING_PIECES || (f[i] < 0) != (f[i + 1] < 0)) continue;
+        /* A dip is where the slopes about the piece do not agree. */
+        const double side = f[i] < 0 ? -1 : 1;
+        const bool falls = before == i || side * (f[i] - f[before]) <= 0;
+        const bool rises = behind == i + 1 || side * (f[behind] - f[i + 1]) >= 0;
+        if (!falls || !rises) continue;
+        z[n] = dip(a, at[i], at[i + 1], side);
+        v[n] = relative_along(a, z[n]);
+        lessen(&a->t->out->value_margin, fabs(v[n]) / a->range);
+        n++;
+    }
+    return n;
+}
+
 static void range_of(const double *values, int count, double *low, double *high)
 {
     *low = *high = values[0];
@@ -266,6 +334,8 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     event *e = add_event(t);
     e->depth = e->hit.depth = depth;
     e->order = e->hit.surface = surface;
+    e->hit.part = c->part_index;
+    e->hit.cell = c->index;
     e->hit.opacity = (double)layer->opacity;
     e->transmittance = 1 - e->hit.opacity;
     line_at(t, depth, point);
@@ -279,6 +349,30 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     surface_colour(t, c, layer, value_index, point, colour);
     shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
     return &e->hit;
+}
+
+/* All crossings, where the layer asks for robust roots. Where the interpolant at a face has another side than the
+ * face's value, the crossing is at the face. */
+static void cross_every(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, int surface,
+                        const double *values, const reference_crossing ends[2], const double face[2])
+{
+    double z[CROSSING_MAX], v[CROSSING_MAX], low, high;
+    along a = {t, c, values, layer->values[value_index], 0};
+    range_of(values, c->cell.count, &low, &high);
+    if (a.iso > high || a.iso < low || ends[1].z < 0) return;
+    a.range = high - low;
+    const int count = crossing_fence(&a, ends[0].z, ends[1].z, z, v);
+    bool side = face[0] >= a.iso;
+    for (int i = 0; i <= count; i++) {
+        const bool is_end = i == count, now = is_end ? face[1] >= a.iso : v[i] >= 0;
+        if (now == side) continue;
+        if (is_end || i == 0) t->out->ambiguous = true;
+        double depth = is_end ? ends[1].z : ends[0].z;
+        if (!is_end && i > 0) depth = bisect(t, c, values, a.iso, z[i - 1], z[i], side);
+        side = now;
+        lessen(&t->out->eye_margin, fabs(depth) / c->size);
+        if (depth >= 0) add_hit(t, c, layer, value_index, surface, values, depth);
+    }
 }
 
 static void cross_surface(trace *t, const placed_cell *c, const render_surface_layer *layer, int first_surface,
@@ -295,6 +389,10 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
         const double iso = layer->values[i];
         for (int end = 0; end < 2 && high > low; end++)
             lessen(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
+        if (layer->root == RENDER_ROBUST && c->cell.type != GRID_TET) {
+            cross_every(t, c, layer, i, first_surface + i, values, ends, face);
+            continue;
+        }
         const bool side = face[0] >= iso;
         if (side == (face[1] >= iso) || ends[1].z < 0) continue;
         const double z = bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
@@ -512,4 +610,27 @@ void reference_trace(const reference_scene *scene, int x, int y, const float bac
         for (int64_t cell = 0; cell < scene->job->parts[part].cells->cell_count; cell++) cross_cell(&t, part, cell);
     blend_events(&t, background);
     free(t.events);
+}
+
+double reference_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
+                          double *slope, double gradient[3])
+{
+    reference_ray unused = {.hit_count = 0};
+    trace t = {.scene = scene, .out = &unused};
+    placed_cell c;
+    double values[8], point[3], value, low, high, g[3], iso = 0;
+    int surface = hit->surface;
+    const render_surface_layer *layer = scene->job->surfaces;
+    for (; surface >= layer->value_count; layer++) surface -= layer->value_count;
+    iso = layer->values[surface];
+    begin_ray(&t, scene, x, y);
+    place_cell(scene, hit->part, hit->cell, &c);
+    grid_cell_values(&layer->field.fields[hit->part], c.index, c.vertices, c.cell.count, values);
+    range_of(values, c.cell.count, &low, &high);
+    line_at(&t, depth, point);
+    reference_interpolate(&c.cell, point, values, &value, g);
+    *slope = (g[0] * t.line.slope[0] + g[1] * t.line.slope[1] + g[2]) / (high - low);
+    for (int axis = 0; axis < 3; axis++) g[axis] /= high - low;
+    if (gradient) to_world(&scene->job->camera, g, gradient);
+    return (value - iso) / (high - low);
 }

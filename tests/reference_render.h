@@ -11,7 +11,9 @@ typedef struct reference_hit {
     double normal[3]; /* world, towards the eye */
     double colour[3]; /* shaded, not premultiplied */
     double opacity;
-    double falsi_error;  /* how far Neubauer's method in double with the layer's root_steps is from depth */
+    double falsi_error; /* how far Neubauer's method in double with the layer's root_steps is from depth */
+    int part;
+    int64_t cell;
     double conditioning; /* |gradient| / |its component along the ray|: how an error of position becomes one of depth */
 } reference_hit;
 
@@ -41,6 +43,11 @@ typedef struct reference_scene reference_scene;
 /* job is borrowed. */
 reference_scene *reference_create(const render_job *job);
 void reference_free(reference_scene *scene);
+
+/* On the ray of pixel (x, y), in a hit's cell: field at depth - isovalue, its derivative by depth and its gradient
+ * (world; may be NULL), all over the range of the cell's values. */
+double reference_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
+                          double *slope, double gradient[3]);
 
 void reference_trace(const reference_scene *scene, int x, int y, const float background[4], reference_ray *out);
 

@@ -52,3 +52,15 @@ target_compile_options(test_integral PRIVATE $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
 add_test(NAME integral COMMAND test_integral)
 set_tests_properties(integral PROPERTIES TIMEOUT 120)
 
+
+# The root finder's headers compiled into the test, on the compiler's own vectors.
+add_executable(test_roots test_roots.c)
+target_compile_definitions(test_roots PRIVATE SIMD_PLAIN)
+target_compile_options(test_roots PRIVATE -fno-math-errno -fno-trapping-math $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
+target_link_libraries(test_roots PRIVATE test_meshes insitu_internal PkgConfig::CMOCKA insitu_flags)
+add_test(NAME roots COMMAND test_roots)
+set_tests_properties(roots PROPERTIES TIMEOUT 120)
+
+insitu_render_program(test_hits)
+add_test(NAME hits COMMAND test_hits)
+set_tests_properties(hits PROPERTIES TIMEOUT 180)

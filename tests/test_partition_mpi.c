@@ -33,6 +33,7 @@ static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera,
     fixture_look(&f, camera, WIDTH, HEIGHT);
     if (scene != VOLUME) fixture_add_surface(&f, values, 2, scene == OPAQUE || scene == OPAQUE_VOLUME ? 1 : 0.4f);
     if (scene != VOLUME) f.surfaces[0].root_steps = 2;
+    f.surfaces[0].root = scene % 2 ? RENDER_NEUBAUER : RENDER_ROBUST;
     if (scene >= VOLUME) fixture_set_volume(&f, 0.3);
     f.job.is_alone = is_alone;
     assert_int_equal(render_frame(&f.job, &list, NULL, &error), INSITU_OK);

@@ -22,6 +22,7 @@ static void add_layers(render_fixture *f, scene_kind scene)
     if (scene != VOLUME) fixture_add_surface(f, values, 2, scene == OPAQUE || scene == OPAQUE_VOLUME ? 1 : 0.4f);
     if (scene >= VOLUME) fixture_set_volume(f, 0.3);
     if (scene != VOLUME) f->surfaces[0].root_steps = 3;
+    f->surfaces[0].root = scene % 2 ? RENDER_NEUBAUER : RENDER_ROBUST;
 }
 
 static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, int n, scene_kind scene,

@@ -33,6 +33,7 @@ static void draw_scene(int frame, float *numbers)
     fixture_create_lattice(&f, (test_mesh_kind)(frame / (SCENES * CAMERA_PLANE)), 4, 0.2, test_wave);
     fixture_look(&f, (fixture_camera)(frame / SCENES % CAMERA_PLANE), WIDTH, HEIGHT);
     if (scene != 1) fixture_add_surface(&f, values, 2, scene == 0 ? 1 : 0.4f);
+    f.surfaces[0].root = scene % 2 ? RENDER_NEUBAUER : RENDER_ROBUST;
     if (scene != 0) fixture_set_volume(&f, 0.3);
     fixture_draw(&f, &drawn);
     memcpy(numbers, drawn.picture.rgba, 4 * WIDTH * HEIGHT * sizeof *numbers);

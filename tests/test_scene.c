@@ -64,6 +64,9 @@ static const char every_key[] = "threads: 3\n"
                                 "          opacity: 0.5\n"
                                 "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
                                 "          root_steps: 5\n"
+                                "          roots: neubauer\n"
+                                "          normals: differences\n"
+                                "          difference: 0.25\n"
                                 "      - volume:\n"
                                 "          field: temperature\n"
                                 "          component: y\n"
@@ -186,11 +189,13 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(first->material.ambient == 0.1F && first->material.diffuse == 0.2F);
     assert_true(first->material.specular == 0.3F && first->material.shininess == 40);
     assert_int_equal(first->root_steps, 5);
+    assert_true(first->roots == SCENE_NEUBAUER && first->normals == SCENE_DIFFERENCES && first->difference == 0.25);
+    assert_true(second->roots == SCENE_ROBUST && second->normals == SCENE_GRADIENT && second->difference == 1);
     assert_false(first->has_colour_by);
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");
     assert_int_equal(second->colour_by.component, 2);
-    assert_int_equal(second->colour_by.line, 27);
+    assert_int_equal(second->colour_by.line, 30);
     assert_int_equal(second->colour_map, SCENE_INFERNO);
     assert_true(second->colour_range.is_fixed && second->colour_range.low == 0 && second->colour_range.high == 1);
     scene_free(&s);
@@ -420,6 +425,8 @@ static const struct bad_file {
     {10, "      - isosurface: {field: f, values: [1], component: -1}", 10, {"component: \"-1\"", "magnitude"}},
     {10, "      - isosurface: {field: f, values: [1], opacity: 1.5}", 10, {"opacity: \"1.5\"", "from 0 to 1"}},
     {10, "      - isosurface: {field: f, values: [1], root_steps: 65}", 10, {"root_steps: \"65\"", "from 0 to 64"}},
+    {10, "      - isosurface: {field: f, values: [1], roots: newton}", 10, {"roots: \"newton\"", "neubauer, robust"}},
+    {10, "      - isosurface: {field: f, values: [1], difference: 0}", 10, {"difference: \"0\"", "above 0"}},
     {10, "      - isosurface: {field: f, values: [1], material: {shine: 1}}", 10, {"material: the key \"shine\""}},
     {10, "      - isosurface: {field: f, values: [1], material: {shininess: 0}}", 10, {"material.shininess: \"0\""}},
     {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface and volume"}},

@@ -34,6 +34,9 @@ typedef struct scene_material {
     float ambient, diffuse, specular, shininess;
 } scene_material;
 
+typedef enum scene_root { SCENE_NEUBAUER, SCENE_ROBUST } scene_root;
+typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES } scene_normal;
+
 typedef struct scene_isosurface {
     scene_field field;
     int value_count; /* 1 .. 16 */
@@ -45,7 +48,10 @@ typedef struct scene_isosurface {
     scene_range colour_range;
     float opacity;
     scene_material material;
-    int root_steps; /* 0 .. 64; 2 by default */
+    scene_root roots; /* robust by default */
+    int root_steps;   /* of Neubauer's method, 0 .. 64; 2 by default */
+    scene_normal normals;
+    double difference; /* in cell sizes, > 0; 1 by default */
 } scene_isosurface;
 
 typedef struct scene_volume {

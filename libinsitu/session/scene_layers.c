@@ -131,7 +131,10 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
 {
     out->opacity = given_or(in->opacity, 1);
     out->material = convert_material(in->material);
+    out->roots = in->roots ? (scene_root)*in->roots : SCENE_ROBUST;
     out->root_steps = in->root_steps ? *in->root_steps : 2;
+    out->normals = in->normals ? (scene_normal)*in->normals : SCENE_GRADIENT;
+    out->difference = in->difference ? *in->difference : 1;
     insitu_status status = convert_field(d, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_values(d, path, in, out);
     if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);

@@ -31,6 +31,8 @@ static const cyaml_schema_value_t opacity_point = {CYAML_VALUE_SEQUENCE_FIXED(CY
 static const cyaml_strval_t map_words[] = {
     {"viridis", SCENE_VIRIDIS}, {"inferno", SCENE_INFERNO}, {"cool_to_warm", SCENE_COOL_TO_WARM}, {"grey", SCENE_GREY}};
 static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
+static const cyaml_strval_t root_words[] = {{"neubauer", SCENE_NEUBAUER}, {"robust", SCENE_ROBUST}};
+static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
 
 #define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
@@ -114,9 +116,21 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_isosurface, material, material_fields),                 \
       .help = "How the surfaces take light.", .by_default = "a slight gloss", .child = &material_mapping)              \
+    X(CHOICE("roots", scene_file_isosurface, roots, root_words),                                                       \
+      .help = "How the surface is found in a cell along a ray: `robust` misses none of its crossings; `neubauer` is "  \
+              "the faster method of `root_steps` steps, which sees no surface that a ray enters and leaves in one "    \
+              "cell.",                                                                                                 \
+      .by_default = "`robust`")                                                                                        \
     X(CYAML_FIELD_INT_PTR("root_steps", OPTIONAL, scene_file_isosurface, root_steps),                                  \
-      .help = "Steps of the root search in a cell (Neubauer's method) after it has been bracketed.",                   \
-      .by_default = "`2`", .low = 0, .high = 64)
+      .help = "Steps of the root search in a cell by `neubauer` after it has been bracketed.", .by_default = "`2`",    \
+      .low = 0, .high = 64)                                                                                            \
+    X(CHOICE("normals", scene_file_isosurface, normals, normal_words),                                                 \
+      .help = "What light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, or "      \
+              "central `differences` about the hit, smoother and slower, over the cells of one rank.",                 \
+      .by_default = "`gradient`")                                                                                      \
+    X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
+      .help = "Distance between the two samples of a difference, in sizes of the cell that is hit.",                   \
+      .by_default = "`1`", .low = 0, .is_low_excluded = true, .high = 100)
 DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
 
 #define VOLUME_KEYS(X)                                                                                                 \

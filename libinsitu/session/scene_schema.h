@@ -47,7 +47,10 @@ typedef struct scene_file_isosurface {
     scene_file_colour_by *colour_by;
     double *opacity;
     scene_file_material *material;
+    int *roots; /* scene_root */
     int *root_steps;
+    int *normals; /* scene_normal */
+    double *difference;
 } scene_file_isosurface;
 
 typedef struct scene_file_volume {

@@ -107,7 +107,10 @@ static insitu_status fill_surface(insitu_session *session, const scene_isosurfac
                                   .colours = layer->colours,
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
-                                  .root_steps = layer->root_steps};
+                                  .root = layer->roots == SCENE_ROBUST ? RENDER_ROBUST : RENDER_NEUBAUER,
+                                  .root_steps = layer->root_steps,
+                                  .normal = layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES : RENDER_GRADIENT,
+                                  .difference = layer->difference};
     if (!layer->has_colour_by) return INSITU_OK;
     out->colour_field = place_field(session, layers, 2 * index + 1, &layer->colour_by, false, false);
     out->colour_map = &layers->transfers[index].transfer;

@@ -1,0 +1,91 @@
+/* The field along a ray through a cell, and Neubauer's method on it (thesis, algorithm 4.2). */
+#ifndef RENDER_KERNEL_NEUBAUER_H
+#define RENDER_KERNEL_NEUBAUER_H
+
+#include "kernel_map.h"
+
+/* Where the line through the ends is zero. */
+SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
+{
+    return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
+}
+
+/* A guess for the coordinates at t: on the line between those at the faces. */
+SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
+{
+    const vf length = i->t_out - i->t_in;
+    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
+    for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
+}
+
+/* Field and the cell's own coordinates at t, from the guess in r; on rays where the inverse map fails, the lines
+ * between the faces' values and coordinates, counted. */
+SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t, vf r[3])
+{
+    const vm failed = kernel_map_invert(p, map, rays, t, r);
+    if (!vm_any(failed)) return kernel_map_value(map, &map->field, r);
+    vf line[3];
+    kernel_guess(i, t, line);
+    for (int a = 0; a < 3; a++) r[a] = vf_select(failed, line[a], r[a]);
+    p->thread->map_failures += __builtin_popcount(vm_bits(failed));
+    const vf length = i->t_out - i->t_in;
+    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
+    return vf_select(failed, i->v_in + along * (i->v_out - i->v_in), kernel_map_value(map, &map->field, r));
+}
+
+SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)
+{
+    vf r[3];
+    kernel_guess(i, t, r);
+    return kernel_solve(p, map, i, rays, t, r);
+}
+
+/* A point of a ray in a cell. */
+typedef struct kernel_point {
+    vf t, value, r[3];
+} kernel_point;
+
+SIMD_INLINE void kernel_point_ends(const kernel_interval *i, kernel_point *in, kernel_point *out)
+{
+    in->t = i->t_in;
+    in->value = i->v_in;
+    out->t = i->t_out;
+    out->value = i->v_out;
+    memcpy(in->r, i->r_in, sizeof in->r);
+    memcpy(out->r, i->r_out, sizeof out->r);
+}
+
+SIMD_INLINE void kernel_place_move(vm mask, const kernel_point *from, kernel_point *to)
+{
+    to->t = vf_select(mask, from->t, to->t);
+    to->value = vf_select(mask, from->value, to->value);
+    for (int a = 0; a < 3; a++) to->r[a] = vf_select(mask, from->r[a], to->r[a]);
+}
+
+/* On the line between the places, at t. */
+SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
+{
+    const vf length = high->t - low->t;
+    const vf along = vf_select(vf_lt(vf_set(0), length), (t - low->t) / length, vf_set(0));
+    for (int a = 0; a < 3; a++) r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
+}
+
+/* Neubauer's method: steps of regula falsi on the field along the ray. The guess for an inverse map is on the line
+ * between the places found so far, and so better in every step. */
+SIMD_INLINE void kernel_neubauer(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, int steps,
+                                 kernel_point *out)
+{
+    kernel_point low, high;
+    kernel_point_ends(i, &low, &high);
+    *out = low;
+    for (int n = 0; n <= steps; n++) {
+        out->t = kernel_secant(low.t, low.value, high.t, high.value);
+        kernel_place_between(&low, &high, out->t, out->r);
+        out->value = kernel_solve(p, map, i, rays, out->t, out->r);
+        const vm same = vm_not(vm_xor(vf_lt(out->value, vf_set(0)), vf_lt(low.value, vf_set(0))));
+        kernel_place_move(same, out, &low);
+        kernel_place_move(vm_not(same), out, &high);
+    }
+}
+
+#endif

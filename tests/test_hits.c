@@ -1,0 +1,377 @@
+/* Where robust roots lie and what their normals are, through whole frames: on warped lattices of hexes, wedges and
+ * pyramids, on ugly single cells, and by closed forms. */
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static const double three_values[3] = {-0.6, 0.3, 0.95};
+static const test_mesh_kind kinds[3] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS};
+
+/* What a ray's hits were, over a test. */
+typedef struct tally {
+    int64_t rays, hits, excluded, folded, different, beyond;
+    double residual, depth, normal; /* the worst */
+} tally;
+
+static int hits_of(const drawn_frame *drawn, int64_t pixel, const fragment *hits[REFERENCE_MAX_HITS])
+{
+    int count = 0;
+    for (int64_t i = drawn->first[pixel]; i < drawn->first[pixel + 1] && count < REFERENCE_MAX_HITS; i++)
+        if (drawn->list.items[i].kind >= FRAGMENT_SURFACE) hits[count++] = &drawn->list.items[i];
+    return count;
+}
+
+/* The hit's float32 t is off by half a unit of 1 in scaled units, and so is each vertex's depth; the slope turns that
+ * into values. */
+static double residual_allowed(const render_fixture *f, double slope)
+{
+    return 1e-6 + (3e-8 + 3e-8) / f->job.space.scale * fabs(slope);
+}
+
+static void judge_hit(const render_fixture *f, const reference_scene *scene, int x, int y, const reference_hit *truth,
+                      const fragment *hit, tally *t)
+{
+    double slope;
+    const double depth = fixture_depth(f, hit->t_in);
+    const double residual = fabs(reference_residual(scene, x, y, truth, depth, &slope, NULL));
+    t->hits++;
+    t->beyond += residual > 1e-6;
+    t->residual = fmax(t->residual, residual - residual_allowed(f, slope) + 1e-6);
+    /* An error of the field of 1e-6 ranges is one of depth by the slope. */
+    const double grazing = 1e-6 / fabs(slope) / f->cell_size;
+    t->depth = fmax(t->depth, fabs(depth - truth->depth) / f->cell_size - grazing);
+}
+
+static void judge_ray(const render_fixture *f, const drawn_frame *drawn, const reference_scene *scene, int x, int y,
+                      double margin, tally *t)
+{
+    const fragment *hits[REFERENCE_MAX_HITS];
+    reference_ray ray;
+    reference_trace(scene, x, y, fixture_background, &ray);
+    t->rays++;
+    if (ray.edge_margin < margin || ray.value_margin < margin || ray.eye_margin < margin) {
+        t->excluded++;
+        return;
+    }
+    if (ray.ambiguous || ray.map_failed) {
+        t->folded++;
+        return;
+    }
+    const int count = hits_of(drawn, (int64_t)y * f->job.camera.width + x, hits);
+    bool same = count == ray.hit_count;
+    for (int i = 0; same && i < count; i++) same = hits[i]->kind - FRAGMENT_SURFACE == (uint32_t)ray.hits[i].surface;
+    if (!same) {
+        t->different++;
+        fprintf(stderr, "pixel %d, %d: %d hits, reference %d\n", x, y, count, ray.hit_count);
+        return;
+    }
+    for (int i = 0; i < count; i++) judge_hit(f, scene, x, y, &ray.hits[i], hits[i], t);
+}
+
+static void judge_frame(const render_fixture *f, double margin, tally *t)
+{
+    drawn_frame drawn;
+    reference_scene *scene = reference_create(&f->job);
+    fixture_draw(f, &drawn);
+    for (int y = 0; y < f->job.camera.height; y++)
+        for (int x = 0; x < f->job.camera.width; x++) judge_ray(f, &drawn, scene, x, y, margin, t);
+    reference_free(scene);
+    drawn_free(&drawn);
+}
+
+static void tell(const char *what, const tally *t)
+{
+    printf("%s: %d rays, %d hits, %d excluded, %d folded, %d different; residual %.2g (%d beyond 1e-6), depth %.2g\n",
+           what, (int)t->rays, (int)t->hits, (int)t->excluded, (int)t->folded, (int)t->different, t->residual,
+           (int)t->beyond, t->depth);
+}
+
+/* Many surfaces have many rims, where rays meet them twice at nearly one place. */
+static void add_many_robust(render_fixture *f)
+{
+    static const float black[48];
+    static double values[16];
+    for (int i = 0; i < 16; i++) values[i] = -1.17 + 0.171 * i;
+    fixture_add_surface(f, values, 16, 0.4f);
+    f->surfaces[0].root = RENDER_ROBUST;
+    f->surfaces[0].colours = black;
+}
+
+static void add_robust(render_fixture *f, float opacity)
+{
+    fixture_add_surface(f, three_values, 3, opacity);
+    f->surfaces[0].root = RENDER_ROBUST;
+}
+
+static void robust_hits_are_on_the_surface(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 3; k++)
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
+            render_fixture f;
+            tally t = {.rays = 0};
+            fixture_create_lattice(&f, kinds[k], kinds[k] == TEST_PYRAMIDS ? 3 : 4, 0.2, test_wave);
+            fixture_look(&f, camera, 53, 45);
+            add_robust(&f, 0.4f); /* all crossings, not the first alone */
+            judge_frame(&f, 1e-6, &t);
+            tell(test_mesh_kind_name(kinds[k]), &t);
+            assert_true(t.hits > 600);
+            assert_int_equal(t.different, 0);
+            assert_true(t.residual <= 1e-6);
+            assert_true(t.depth <= 1e-5);
+            assert_true(t.excluded * 200 < t.rays);
+            fixture_free(&f);
+        }
+}
+
+/* ---- ugly cells ---- */
+
+typedef enum ugly { UGLY_WARPED, UGLY_CONCAVE, UGLY_WEDGE, UGLY_APEX, UGLY_COUNT } ugly;
+
+static double uniform(uint64_t n, uint64_t seed, double low, double high)
+{
+    return low + (high - low) * test_uniform(n, seed);
+}
+
+static void make_ugly(ugly kind, uint64_t seed, test_mesh *out)
+{
+    static const test_cell_shape shapes[UGLY_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
+                                                       TEST_UNIT_PYRAMID};
+    test_mesh_single(shapes[kind], test_linear, out);
+    for (uint64_t i = 0; i < (uint64_t)out->vertex_count; i++) {
+        double *p = out->coordinates + 3 * i;
+        const double amount = kind == UGLY_WARPED || kind == UGLY_APEX ? 0.2 : 0.1;
+        for (uint64_t a = 0; a < 3; a++) p[a] += uniform(3 * i + a, seed, -amount, amount);
+        out->values[i] = uniform(i, seed + 1000, -1, 1.5);
+        /* A corner pulled in almost to the plane of its neighbours: dents on both sides of its edges. Beyond that plane
+         * the hex's map folds, and a point has several values. */
+        if (kind == UGLY_CONCAVE && i == 6)
+            for (uint64_t a = 0; a < 3; a++) p[a] = uniform(a, seed + 2000, 0.24, 0.3);
+        if (kind == UGLY_WEDGE && i >= 3) {
+            const double angle = uniform(0, seed + 3000, -0.8, 0.8), x = p[0], y = p[1];
+            p[0] = cos(angle) * x - sin(angle) * y;
+            p[1] = sin(angle) * x + cos(angle) * y;
+        }
+    }
+}
+
+static void robust_hits_in_ugly_cells_are_the_reference(void **state)
+{
+    (void)state;
+    static const char *const names[UGLY_COUNT] = {"warped hexes", "concave hexes", "twisted wedges", "pyramid apexes"};
+    for (ugly kind = 0; kind < UGLY_COUNT; kind++) {
+        tally t = {.rays = 0};
+        for (uint64_t seed = 0; seed < 24; seed++) {
+            test_mesh mesh;
+            render_fixture f;
+            make_ugly(kind, seed, &mesh);
+            fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                           (const double[]){0, 0, 0});
+            fixture_look(&f, seed % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 31, 29);
+            /* Close to the apex: the middle of the picture is its neighbourhood. */
+            if (kind == UGLY_APEX)
+                assert_true(render_camera_look_at(&f.job.camera, (const double[]){2.4, 1.6, 3.0},
+                                                  mesh.coordinates + 3 * 4, (const double[]){0, 1, 0}, 2, 31, 29));
+            add_many_robust(&f);
+            judge_frame(&f, 1e-6, &t);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+        tell(names[kind], &t);
+        assert_true(t.hits > 800);
+        assert_int_equal(t.different, 0);
+        assert_true(t.residual <= 1e-6);
+        assert_true(t.depth <= 1e-5);
+    }
+}
+
+/* ---- normals ---- */
+
+/* White diffuse surfaces under a red, a green and a blue light from three sides about the eye: a hit's colour is its
+ * normal, in the axes of the lights, without the negative components. */
+static void light_by_axes(render_fixture *f, render_light lights[3])
+{
+    static const float white[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1};
+    const double inner = sqrt(1.0 / 3), outer = sqrt(2.0 / 3);
+    for (int i = 0; i < 3; i++) {
+        const double angle = i * 2 * 3.14159265358979323846 / 3;
+        lights[i] = (render_light){.colour = {i == 0, i == 1, i == 2}};
+        for (int a = 0; a < 3; a++) {
+            const double side = cos(angle) * f->job.camera.right[a] + sin(angle) * f->job.camera.up[a];
+            lights[i].direction[a] = outer * side - inner * f->job.camera.forward[a];
+        }
+    }
+    f->job.lights = lights;
+    f->job.light_count = 3;
+    f->surfaces[0].colours = white;
+    f->surfaces[0].material = (render_material){.ambient = 0, .diffuse = 1, .specular = 0, .shininess = 1};
+}
+
+/* How far the fragment's colour is from that of the gradient, towards the eye. */
+static double normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
+{
+    const int width = f->job.camera.width;
+    double base[3], direction[3], length = 0, facing = 0, off = 0;
+    render_camera_ray(&f->job.camera, (int)hit->pixel % width, (int)hit->pixel / width, base, direction);
+    for (int a = 0; a < 3; a++) {
+        length += gradient[a] * gradient[a];
+        facing += gradient[a] * direction[a];
+    }
+    length = facing > 0 ? -sqrt(length) : sqrt(length);
+    for (int i = 0; i < 3; i++) {
+        double shade = 0;
+        for (int a = 0; a < 3; a++) shade += f->job.lights[i].direction[a] * gradient[a] / length;
+        off = fmax(off, fabs((double)hit->colour[i] - (double)f->surfaces[0].opacity * fmax(shade, 0)));
+    }
+    return off;
+}
+
+/* The gradient is made of differences of float32 values and positions, each off by half a unit, 6e-8, of the cell's
+ * range and size; eight of them and the cell's distortion make 2e-6 of range / size, against the gradient's length.
+ * The place is off by 1e-6 cells, against second derivatives of a range or two: as much again. Seen edge-on, either
+ * side may be the eye's. */
+static void judge_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
+                         const fragment *hit, int64_t *checked)
+{
+    const int x = (int)hit->pixel % f->job.camera.width, y = (int)hit->pixel / f->job.camera.width;
+    double slope, gradient[3];
+    reference_residual(scene, x, y, truth, fixture_depth(f, hit->t_in), &slope, gradient);
+    const double length = sqrt(gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]);
+    if (fabs(slope) < 1e-4 * length) return;
+    const double off = normal_error(f, hit, gradient), allowed = 4e-6 / (length * f->cell_size) + 1e-6;
+    if (!(off <= allowed)) fail_msg("pixel %d, %d: normal off by %g, allowed %g", x, y, off, allowed);
+    ++*checked;
+}
+
+static void cell_gradients_are_the_reference(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        render_fixture f;
+        drawn_frame drawn;
+        render_light lights[3];
+        int64_t checked = 0;
+        fixture_create_lattice(&f, kinds[k], 3, 0.2, test_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, 43, 37);
+        add_robust(&f, 0.5f);
+        light_by_axes(&f, lights);
+        fixture_draw(&f, &drawn);
+        reference_scene *scene = reference_create(&f.job);
+        for (int p = 0; p < 43 * 37; p++) {
+            const fragment *hits[REFERENCE_MAX_HITS];
+            reference_ray ray;
+            reference_trace(scene, p % 43, p / 43, fixture_background, &ray);
+            const int count = hits_of(&drawn, p, hits);
+            if (ray.ambiguous || ray.edge_margin < 1e-6 || ray.value_margin < 1e-6 || count != ray.hit_count) continue;
+            for (int i = 0; i < count; i++) judge_normal(&f, scene, &ray.hits[i], hits[i], &checked);
+        }
+        assert_true(checked > 300);
+        reference_free(scene);
+        drawn_free(&drawn);
+        fixture_free(&f);
+    }
+}
+
+static void add_differences(render_fixture *f, const double *values, int count, float opacity, double difference,
+                            render_light lights[3])
+{
+    fixture_add_surface(f, values, count, opacity);
+    f->surfaces[0].root = RENDER_ROBUST;
+    f->surfaces[0].normal = RENDER_DIFFERENCES;
+    f->surfaces[0].difference = difference;
+    light_by_axes(f, lights);
+}
+
+/* Isoparametric cells hold a linear field as it is, and so all differences, one-sided ones at the rim too, are its
+ * gradient. A sample errs by some 5e-7 of the field's range of 3, a difference over half of cells of 2/3, at a slope of
+ * 0.9, by some 1e-5 of it. Half a cell from warped faces the polyhedron's field is continued outside the cell's domain,
+ * where it is linear as well. */
+static void differences_of_a_linear_field_are_exact(void **state)
+{
+    (void)state;
+    static const double values[3] = {-0.6, 0.1, 0.5}, gradient[3] = {0.3, -0.7, 0.5};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++)
+            for (int opaque = 0; opaque < 2; opaque++) {
+                render_fixture f;
+                drawn_frame drawn;
+                render_light lights[3];
+                double worst = 0;
+                fixture_create_lattice(&f, kind, 3, 0.2, test_linear);
+                fixture_look(&f, camera, 35, 31);
+                add_differences(&f, values, 3, opaque ? 1 : 0.5f, 0.5, lights);
+                fixture_draw(&f, &drawn);
+                for (int64_t i = 0; i < drawn.list.count; i++)
+                    worst = fmax(worst, normal_error(&f, &drawn.list.items[i], gradient));
+                assert_true(drawn.list.count > 100);
+                if (!(worst <= 2e-5)) fail_msg("%s: normal off by %g", test_mesh_kind_name(kind), worst);
+                drawn_free(&drawn);
+                fixture_free(&f);
+            }
+}
+
+static double quadratic(const double p[3])
+{
+    return p[0] * p[0] + 0.5 * p[1] * p[1] + 0.7 * p[2] * p[2] + 0.3 * p[0] * p[1];
+}
+
+/* Mean error of normals against the field's own gradient at the hit. */
+static double quadratic_error(int n, render_normal normal, double difference)
+{
+    static const double value[1] = {0.3};
+    render_fixture f;
+    drawn_frame drawn;
+    render_light lights[3];
+    double sum = 0;
+    fixture_create_lattice(&f, TEST_HEXES, n, 0, quadratic);
+    fixture_look(&f, CAMERA_OUTSIDE, 64, 64);
+    add_differences(&f, value, 1, 1, difference, lights);
+    f.surfaces[0].normal = normal;
+    fixture_draw(&f, &drawn);
+    for (int64_t i = 0; i < drawn.list.count; i++) {
+        const fragment *hit = &drawn.list.items[i];
+        double base[3], d[3], p[3];
+        render_camera_ray(&f.job.camera, (int)hit->pixel % 64, (int)hit->pixel / 64, base, d);
+        for (int a = 0; a < 3; a++) p[a] = base[a] + fixture_depth(&f, hit->t_in) * d[a];
+        sum += normal_error(&f, hit, (const double[]){2 * p[0] + 0.3 * p[1], p[1] + 0.3 * p[0], 1.4 * p[2]});
+    }
+    assert_true(drawn.list.count > 300);
+    sum /= (double)drawn.list.count;
+    drawn_free(&drawn);
+    fixture_free(&f);
+    return sum;
+}
+
+/* The trilinear interpolant of a quadratic errs by the same in every cell of a lattice, so that differences over a
+ * whole cell are those of the quadratic itself, which are exact: what is left is rounding, well within second order.
+ * Over half a cell they err by the cell's size, as the cell's gradient does, but by less. */
+static void differences_of_a_quadratic_field_are_of_second_order(void **state)
+{
+    (void)state;
+    const double coarse = quadratic_error(8, RENDER_DIFFERENCES, 1), fine = quadratic_error(16, RENDER_DIFFERENCES, 1);
+    const double gradient = quadratic_error(16, RENDER_GRADIENT, 1),
+                 half = quadratic_error(16, RENDER_DIFFERENCES, 0.5);
+    printf("normals of a quadratic field: differences %.2g, on cells of half the size %.2g, over half of these %.2g; "
+           "gradient %.2g\n",
+           coarse, fine, half, gradient);
+    assert_true(fine <= 0.3 * coarse || coarse < 1e-5);
+    assert_true(half < gradient && fine < 0.1 * half);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(robust_hits_are_on_the_surface),
+        cmocka_unit_test(robust_hits_in_ugly_cells_are_the_reference),
+        cmocka_unit_test(cell_gradients_are_the_reference),
+        cmocka_unit_test(differences_of_a_linear_field_are_exact),
+        cmocka_unit_test(differences_of_a_quadratic_field_are_of_second_order),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,363 @@
+/* The robust root finder on random cubics: rays through a unit hex with random values, and with double and triple roots
+ * made on purpose, against the exact cubic in long double. The kernels' headers are compiled here, plain.
+ *
+ * What rounding may decide: the field's eight coefficients are sums of up to 8 values of at most 1, rounded to float32
+ * (half a unit of 1, 3 of 2, 3 of 4 and 1 of 8: 27 · 6e-8 = 1.6e-6), its evaluation rounds some ten times at the size
+ * of its terms (6e-7 · 2), and coordinates are off by 2e-7 against slopes of at most some 4. So the sign of a |F| below
+ * band = 4e-6 is not told by float32. A crossing is certain where the cubic passes from beyond band on one side to
+ * beyond band on the other: the first hit must not come after that, and every hit must lie within band of 0. */
+#include <math.h>
+
+#include "kernel_roots.h"
+#include "test_meshes.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+static const long double band = 4e-6L;
+static int64_t cubics = 100000;
+static uint64_t drawn_numbers;
+
+typedef struct cubic {
+    long double c[4];
+} cubic;
+
+/* A hex and the rays of a packet. */
+typedef struct bundle {
+    double values[8];
+    kernel_frame frame;
+    kernel_tile tile;
+    kernel_thread thread;
+    kernel_packet packet;
+    kernel_cell cell;
+} bundle;
+
+static double uniform(double low, double high)
+{
+    return low + (high - low) * test_uniform(drawn_numbers++, 77);
+}
+
+static void hex_corner(int i, int corner[3])
+{
+    corner[0] = (i & 3) == 1 || (i & 3) == 2;
+    corner[1] = (i & 3) >= 2;
+    corner[2] = i >= 4;
+}
+
+/* The field on ray lane as a polynomial of t. */
+static cubic exact_cubic(const bundle *b, int lane)
+{
+    const long double base[3] = {(long double)b->packet.origin_x[lane], (long double)b->packet.origin_y[lane], 0};
+    const long double slope[3] = {(long double)b->packet.slope_x[lane], (long double)b->packet.slope_y[lane], 1};
+    cubic sum = {{0, 0, 0, 0}};
+    for (int i = 0; i < 8; i++) {
+        int corner[3];
+        cubic weight = {{(long double)b->values[i], 0, 0, 0}};
+        hex_corner(i, corner);
+        for (int a = 0; a < 3; a++) {
+            const long double c0 = corner[a] ? base[a] : 1 - base[a], c1 = corner[a] ? slope[a] : -slope[a];
+            for (int k = 3; k >= 0; k--) weight.c[k] = weight.c[k] * c0 + (k ? weight.c[k - 1] * c1 : 0);
+        }
+        for (int k = 0; k < 4; k++) sum.c[k] += weight.c[k];
+    }
+    return sum;
+}
+
+static long double at(const cubic *g, long double t)
+{
+    return ((g->c[3] * t + g->c[2]) * t + g->c[1]) * t + g->c[0];
+}
+
+/* Between low and high, where g is monotone and passes v. */
+static long double pass(const cubic *g, long double low, long double high, long double v)
+{
+    const bool rises = at(g, high) > at(g, low);
+    for (int i = 0; i < 80; i++) {
+        const long double middle = (low + high) / 2;
+        if ((at(g, middle) < v) == rises)
+            low = middle;
+        else
+            high = middle;
+    }
+    return high;
+}
+
+/* The ends of the pieces on which g is monotone; returns how many ends, 2 to 4. */
+static int monotone_ends(const cubic *g, long double low, long double high, long double ends[4])
+{
+    const long double a = 3 * g->c[3], b = g->c[2], c = g->c[1], root = sqrtl(fmaxl(b * b - a * c, 0));
+    const long double h = -(b + (b < 0 ? -root : root));
+    long double turns[2] = {a != 0 ? h / a : high, h != 0 ? c / h : high};
+    int n = 0;
+    if (turns[0] > turns[1]) {
+        const long double swap = turns[0];
+        turns[0] = turns[1];
+        turns[1] = swap;
+    }
+    ends[n++] = low;
+    for (int i = 0; i < 2; i++)
+        if (turns[i] > low && turns[i] < high) ends[n++] = turns[i];
+    ends[n++] = high;
+    return n;
+}
+
+typedef struct truth {
+    bool certain;
+    long double certain_t; /* a hit must have come until here */
+    int count;
+    long double roots[3];
+} truth;
+
+static truth find_truth(const cubic *g, long double low, long double high)
+{
+    truth out = {.certain = false};
+    long double ends[4];
+    const int n = monotone_ends(g, low, high, ends);
+    int side = 0;
+    for (int i = 0; i < n; i++) {
+        const long double v = at(g, ends[i]);
+        if (i && (v < 0) != (at(g, ends[i - 1]) < 0)) out.roots[out.count++] = pass(g, ends[i - 1], ends[i], 0);
+        if (fabsl(v) <= band || out.certain) continue;
+        const int now = v < 0 ? -1 : 1;
+        if (side && now != side) {
+            out.certain = true;
+            out.certain_t = pass(g, ends[i - 1], ends[i], now * band);
+        }
+        side = now;
+    }
+    return out;
+}
+
+static void aim(bundle *b, int lane, const double from[3], const double to[3])
+{
+    const double rise = to[2] - from[2];
+    for (int a = 0; a < 2; a++) {
+        const double slope = (to[a] - from[a]) / rise, origin = from[a] - slope * from[2];
+        (a ? &b->packet.slope_y : &b->packet.slope_x)[0][lane] = (float)slope;
+        (a ? &b->packet.origin_y : &b->packet.origin_x)[0][lane] = (float)origin;
+    }
+}
+
+/* Two points in the cube, not level. */
+static void random_points(double from[3], double to[3])
+{
+    do {
+        for (int a = 0; a < 3; a++) {
+            from[a] = uniform(0.02, 0.98);
+            to[a] = uniform(0.02, 0.98);
+        }
+    } while (fabs(to[2] - from[2]) < 0.2);
+}
+
+/* Rays near the first one, from 1e-7 to 1e-1 off, or anywhere. */
+static void aim_all(bundle *b, bool is_near)
+{
+    double from[3], to[3];
+    random_points(from, to);
+    aim(b, 0, from, to);
+    for (int lane = 1; lane < SIMD_WIDTH; lane++) {
+        double p[3], q[3];
+        random_points(p, q);
+        const double off = pow(10, uniform(-7, -1));
+        for (int a = 0; a < 3 && is_near; a++) {
+            p[a] = from[a] + off * (p[a] - 0.5);
+            q[a] = to[a] + off * (q[a] - 0.5);
+        }
+        aim(b, lane, p, q);
+    }
+}
+
+/* Largest value 1, as kernel_cell_relative() has it, in float32. */
+static void normalize(double values[8])
+{
+    double largest = 0;
+    for (int i = 0; i < 8; i++) largest = fmax(largest, fabs(values[i]));
+    for (int i = 0; i < 8; i++) values[i] = (double)(float)(values[i] / largest);
+}
+
+/* Shift the values so that the cubic of ray 0 turns at a depth of miss beyond 0. */
+static void make_double_root(bundle *b, double miss)
+{
+    const cubic g = exact_cubic(b, 0);
+    long double ends[4];
+    const int n = monotone_ends(&g, 0, 1, ends);
+    const double v = (double)at(&g, ends[n > 2 ? 1 : 0]);
+    for (int i = 0; i < 8; i++) b->values[i] -= v + miss;
+}
+
+/* Add to the values a constant, a multiple of x and one of x y so that the cubic of ray 0 has a triple root, or, with
+ * spread, three close ones. */
+static void make_triple_root(bundle *b, double place, double spread)
+{
+    const cubic g = exact_cubic(b, 0);
+    const double x0 = (double)b->packet.origin_x[0], x1 = (double)b->packet.slope_x[0];
+    const double y0 = (double)b->packet.origin_y[0], y1 = (double)b->packet.slope_y[0];
+    const double lead = (double)g.c[3], bent = (-3 * lead * place - (double)g.c[2]) / (x1 * y1);
+    const double want1 = lead * (3 * place * place - spread * spread);
+    const double slope = (want1 - (double)g.c[1] - bent * (x0 * y1 + x1 * y0)) / x1;
+    const double level =
+        lead * place * (spread * spread - place * place) - (double)g.c[0] - bent * x0 * y0 - slope * x0;
+    for (int i = 0; i < 8; i++) {
+        int c[3];
+        hex_corner(i, c);
+        b->values[i] += level + slope * c[0] + bent * c[0] * c[1];
+    }
+}
+
+static void make_bundle(bundle *b, int64_t n)
+{
+    const int kind = (int)(n % 8);
+    const double small = (uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, uniform(-9, -1));
+    memset(b, 0, sizeof *b);
+    aim_all(b, kind >= 4);
+    for (int i = 0; i < 8; i++) b->values[i] = uniform(-1, 1) + (kind == 1 ? 0.6 : 0);
+    if (kind == 4 || kind == 5) make_double_root(b, kind == 4 ? small : 0);
+    if (kind == 6 || kind == 7) make_triple_root(b, uniform(0.2, 0.8), kind == 6 ? fabs(small) : 0);
+    normalize(b->values);
+    b->packet.frame = &b->frame;
+    b->packet.tile = &b->tile;
+    b->packet.thread = &b->thread;
+    b->packet.active = vm_all_lanes();
+    b->packet.t_near = vf_set(-100);
+    b->packet.t_far = vf_set(INFINITY);
+    b->cell.type = GRID_HEX;
+    b->cell.count = 8;
+    for (int i = 0; i < 8; i++) {
+        int c[3];
+        hex_corner(i, c);
+        for (int a = 0; a < 3; a++) b->cell.world[i][a] = c[a];
+        b->cell.x[i] = (float)c[0];
+        b->cell.y[i] = (float)c[1];
+        b->cell.z[i] = (float)c[2];
+        b->cell.values[i] = b->values[i];
+        b->cell.f[i] = (float)b->values[i];
+    }
+    kernel_cell_order(&b->cell);
+}
+
+typedef struct count {
+    int64_t rays, certain, missed, off, spurious;
+    double worst; /* residual */
+} count;
+
+static void judge_robust(count *c, const cubic *g, const truth *t, bool hit, long double at_t)
+{
+    c->rays++;
+    c->certain += t->certain;
+    /* t itself is rounded: half a unit of 2. */
+    if (t->certain && (!hit || at_t > t->certain_t + 1.2e-7L)) c->missed++;
+    if (!hit) return;
+    const double residual = (double)fabsl(at(g, at_t));
+    c->worst = fmax(c->worst, residual);
+    if (residual > (double)band) c->off++;
+}
+
+static void judge_neubauer(count *c, const truth *t, bool hit, long double at_t)
+{
+    c->rays++;
+    c->certain += t->certain;
+    if (!t->certain || !t->count) return;
+    int nearest = 0;
+    for (int i = 1; i < t->count; i++)
+        if (fabsl(at_t - t->roots[i]) < fabsl(at_t - t->roots[nearest])) nearest = i;
+    if (!hit)
+        c->missed++;
+    else
+        c->off += nearest > 0;
+}
+
+typedef struct rates {
+    count robust, neubauer[5];
+    int64_t later; /* further crossings that the robust search did not find, or found too many of */
+} rates;
+
+/* First hits on all rays, and how many hits there are. */
+static vm robust_hits(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i, vf *t,
+                      vf *hits)
+{
+    kernel_search s = {.map = map, .bounds = bounds, .interval = i};
+    vm hit = vm_none();
+    *t = *hits = vf_set(0);
+    kernel_search_begin(&b->packet, &s, i->mask);
+    for (;;) {
+        if (vm_any(s.found)) {
+            kernel_point place;
+            kernel_polish(&b->packet, &s, &place);
+            *t = vf_select(vm_andnot(s.found, hit), place.t, *t);
+            *hits += vf_select(s.found, vf_set(1), vf_set(0));
+            hit = vm_or(hit, s.found);
+        }
+        if (vm_any(s.open))
+            kernel_search_next(&b->packet, &s);
+        else if (vm_any(s.ended))
+            kernel_search_end(&s);
+        else
+            return hit;
+    }
+}
+
+static void judge_bundle(bundle *b, rates *r)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    kernel_map map;
+    kernel_bounds bounds;
+    const int intervals = kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
+    kernel_map_setup(&map, &b->cell);
+    kernel_bounds_setup(&bounds, &map, GRID_HEX);
+    for (int n = 0; n < intervals; n++) {
+        vf t[6], hits;
+        unsigned hit[6];
+        const vm change = vm_xor(vf_lt(list[n].v_in, vf_set(0)), vf_lt(list[n].v_out, vf_set(0)));
+        hit[5] = vm_bits(robust_hits(b, &map, &bounds, &list[n], &t[5], &hits));
+        for (int steps = 0; steps < 5; steps++) {
+            kernel_point place;
+            kernel_neubauer(&b->packet, &map, &list[n], list[n].mask, steps, &place);
+            t[steps] = place.t;
+            hit[steps] = vm_bits(vm_and(change, list[n].mask));
+        }
+        for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+            if (!(vm_bits(list[n].mask) >> lane & 1)) continue;
+            const cubic g = exact_cubic(b, lane);
+            const truth truth = find_truth(&g, (long double)list[n].t_in[lane], (long double)list[n].t_out[lane]);
+            judge_robust(&r->robust, &g, &truth, hit[5] >> lane & 1, (long double)t[5][lane]);
+            for (int steps = 0; steps < 5; steps++)
+                judge_neubauer(&r->neubauer[steps], &truth, hit[steps] >> lane & 1, (long double)t[steps][lane]);
+            /* Crossings alternate, so their number is odd where the faces differ. */
+            if (((int)hits[lane] & 1) != (int)(vm_bits(change) >> lane & 1)) r->later++;
+        }
+    }
+}
+
+static void robust_misses_no_first_root(void **state)
+{
+    (void)state;
+    rates r = {.later = 0};
+    bundle b;
+    for (int64_t n = 0; r.robust.rays < cubics; n++) {
+        make_bundle(&b, n);
+        judge_bundle(&b, &r);
+    }
+    printf("robust: %lld cubics, %lld with a certain crossing, %lld missed, worst residual %.2g\n",
+           (long long)r.robust.rays, (long long)r.robust.certain, (long long)r.robust.missed, r.robust.worst);
+    for (int steps = 0; steps < 5; steps++)
+        printf("Neubauer, N = %d: no hit on %.3g %%, a later root on %.3g %% of those with a certain crossing\n", steps,
+               100.0 * (double)r.neubauer[steps].missed / (double)r.neubauer[steps].certain,
+               100.0 * (double)r.neubauer[steps].off / (double)r.neubauer[steps].certain);
+    assert_true(r.robust.certain > cubics / 3);
+    assert_int_equal(r.robust.missed, 0);
+    assert_int_equal(r.robust.off, 0);
+    assert_int_equal(r.later, 0);
+    assert_int_equal(b.thread.map_failures, 0);
+}
+
+/* The argument is the number of cubics. */
+int main(int argc, char **argv)
+{
+    if (argc > 1) cubics = atoll(argv[1]);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(robust_misses_no_first_root)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
