@@ -42,15 +42,9 @@ SIMD_INLINE bool kernel_cell_straddles(const kernel_cell *c, double value)
     return below && above;
 }
 
-/* f: values minus the isovalue, times a power of two that brings the largest near 1. The power is read off the bits
- * of the largest: its exponent, mirrored. */
-SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
+/* The power of two that brings largest near 1, read off its bits: its exponent, mirrored. */
+SIMD_INLINE double kernel_mirrored_power(double largest)
 {
-    double largest = 0;
-    for (int i = 0; i < c->count; i++) {
-        const double size = fabs(c->values[i] - value);
-        largest = size > largest ? size : largest;
-    }
     uint64_t bits;
     memcpy(&bits, &largest, sizeof bits);
     const uint64_t exponent = bits >> 52;
@@ -58,6 +52,18 @@ SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
     bits = mirrored << 52;
     double scale;
     memcpy(&scale, &bits, sizeof scale);
+    return scale;
+}
+
+/* f: values minus the isovalue, times a power of two that brings the largest near 1. */
+SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
+{
+    double largest = 0;
+    for (int i = 0; i < c->count; i++) {
+        const double size = fabs(c->values[i] - value);
+        largest = size > largest ? size : largest;
+    }
+    const double scale = kernel_mirrored_power(largest);
     for (int i = 0; i < c->count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
 }
 
@@ -259,6 +265,10 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
     }
 }
 
+/* kernel_polyhedron_surface.h */
+static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *state, int part, uint32_t index,
+                                       vm rays);
+
 static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
                                 vm rays)
 {
@@ -267,6 +277,10 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
     const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_polyhedron_surfaces(p, state, part, cells[n], rays);
+            continue;
+        }
         if (!c->is_finite) continue;
         for (int value = 0; value < layer->value_count; value++) {
             if (!kernel_cell_straddles(c, layer->values[value])) continue;

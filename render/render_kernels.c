@@ -2,7 +2,8 @@
  * pixels is cut into packets; each packet finds its surfaces first, so that volumes know where opaque ones end them. */
 #include <math.h>
 
-#include "kernel_volume.h"
+#include "kernel_polyhedron_surface.h"
+#include "kernel_polyhedron_volume.h"
 
 /* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
 typedef struct kernel_parent_state {

@@ -1,0 +1,75 @@
+/* Volumes in polyhedra: samples on the profile. */
+#ifndef RENDER_KERNEL_POLYHEDRON_VOLUME_H
+#define RENDER_KERNEL_POLYHEDRON_VOLUME_H
+
+#include "kernel_polyhedron.h"
+#include "kernel_volume.h"
+
+SIMD_INLINE bool kernel_polyhedron_shows(const polyhedron *c, const kernel_transfer *t)
+{
+    double low = c->values[0], high = low;
+    for (int i = 1; i < c->vertex_count; i++) {
+        low = c->values[i] < low ? c->values[i] : low;
+        high = c->values[i] > high ? c->values[i] : high;
+    }
+    return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
+}
+
+SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
+{
+    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+}
+
+/* The samples of the window, from begin on to end, that the stay owns and that are in the piece. */
+static void kernel_polyhedron_fill(const kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
+                                   const kernel_piece *piece, int begin, int end)
+{
+    kernel_samples *s = state->samples;
+    const vf length = piece->t1 - piece->t0;
+    const vf slope = vf_select(vf_lt(vf_set(0), length), (piece->v1 - piece->v0) / length, vf_set(0));
+    for (int n = begin; n < end; n++) {
+        const vf t = kernel_sample_t(p, s->first + n);
+        const vm own = vm_and(stay->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
+        if (!vm_any(own)) continue;
+        s->value[state->volume][n] = vf_select(own, piece->v0 + slope * (t - piece->t0), s->value[state->volume][n]);
+        if (p->frame->needs_contact) {
+            s->t_in[n] = vf_select(own, stay->interval.t_in, s->t_in[n]);
+            s->t_out[n] = vf_select(own, stay->interval.t_out, s->t_out[n]);
+        }
+    }
+}
+
+static void kernel_polyhedron_stay(const kernel_packet *p, kernel_volume_state *state, const polyhedron *c, vm rays,
+                                   kernel_passage *r, kernel_stay *stay)
+{
+    const kernel_interval *i = &stay->interval;
+    int begin, end;
+    kernel_sample_span(p, state->samples, i, &begin, &end);
+    if (begin >= end) return;
+    if (!c->is_constant) kernel_passage_profile(c, rays, false, r, stay);
+    kernel_piece piece = kernel_profile_begin(stay, stay->u_in);
+    while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
+        kernel_profile_next(r, c, stay, stay->u_out, &piece);
+        kernel_polyhedron_fill(p, state, stay, &piece, begin, end);
+    }
+}
+
+static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *state, int part, uint32_t index, vm rays)
+{
+    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    const grid_field *field = &p->frame->job->volumes[state->volume].field.fields[part];
+    polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part,
+                                               p->frame->surface_count + state->volume, index);
+    kernel_passage r;
+    kernel_stay stay;
+    if (!c) p->thread->out_of_memory = true;
+    if (!c || !c->is_finite || !kernel_polyhedron_shows(c, transfer)) return;
+    if (!c->is_placed) {
+        kernel_polyhedron_place(c, p);
+        kernel_polyhedron_domain(c, transfer);
+    }
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, false, &r)) return;
+    while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, c, rays, &r, &stay);
+}
+
+#endif
