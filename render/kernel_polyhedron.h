@@ -29,10 +29,12 @@
 
 #include "kernel_map.h"
 
-/* Rays that cross a triangle: v its value there, linear; face the face's, which quads make bilinear; w the colour's. */
+/* Rays that cross a triangle at t: v its value there, linear, and w the colour's. Of a facet also where its face is
+ * met and the face's values, which are others for quads. Of a sheet v_face and w_face are the field's values there. */
 typedef struct kernel_meeting {
     vm mask;
-    vf t, v, face, w;
+    vf t, v, w;
+    vf t_face, v_face, w_face;
 } kernel_meeting;
 
 /* Rays within a tet of the surface triangle facet: v along t is v0 + (t - t0) slope. */
@@ -60,9 +62,10 @@ typedef struct kernel_passage {
     bool has_sheets;
 } kernel_passage;
 
-/* Between two crossings: v_in, v_out are the faces' values, u_in, u_out those of the field inside. */
+/* Between two crossings: the interval has the faces' values; u_in, u_out are the profile's at its ends. */
 typedef struct kernel_stay {
     kernel_interval interval;
+    kernel_meeting in, out;
     vf u_in, u_out;
 } kernel_stay;
 
@@ -114,27 +117,33 @@ SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
 
 /* ---- the surface ---- */
 
-/* The bilinear value of a quad where the ray crosses its half w, as a hex next to it has it. */
-static vf kernel_polyhedron_quad(const polyhedron *c, const int around[4], const kernel_weights *w, vf linear)
+/* Where and with what values the ray meets the patch of a quad whose half w it crosses: as a hex next to it has it. */
+static void kernel_polyhedron_quad(const polyhedron *c, const kernel_passage *r, const int around[4],
+                                   const kernel_weights *w, bool has_colour, kernel_meeting *out)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
-    kernel_cell q;
-    kernel_quad quad;
+    kernel_cell quad;
+    kernel_projected q;
     kernel_weights local = *w;
-    kernel_crossing out;
+    kernel_crossing crossing = {.mask = out->mask, .t = out->t};
+    int corner[4];
     for (int i = 0; i < 4; i++) {
-        memcpy(q.world[i], c->world[around[i]], sizeof q.world[i]);
-        q.f[i] = c->f[around[i]];
-        q.rank[i] = around[i]; /* numbers are in the order */
+        memcpy(quad.world[i], c->world[around[i]], sizeof quad.world[i]);
+        quad.z[i] = c->z[around[i]];
+        quad.f[i] = c->f[around[i]];
+        quad.g[i] = has_colour ? c->g[around[i]] : 0;
+        quad.rank[i] = around[i]; /* numbers are in the order */
+        q.x[i] = r->x[around[i]], q.y[i] = r->y[around[i]];
         if (w->i == around[i]) local.i = i;
         if (w->j == around[i]) local.j = i;
         if (w->k == around[i]) local.k = i;
     }
-    kernel_quad_corners(&q, loop, quad.corner);
-    if (kernel_quad_collapses(&q, quad.corner)) return linear;
-    kernel_quad_plane(&q, &quad);
-    kernel_quad_values(&q, &kernel_shapes[0], &quad, &local, false, &out);
-    return out.v;
+    kernel_quad_corners(&quad, loop, corner);
+    if (kernel_quad_collapses(&quad, corner)) return;
+    kernel_quad_values(&quad, &kernel_shapes[0], &q, corner, &local, has_colour, &crossing);
+    out->t_face = crossing.t;
+    out->v_face = crossing.v;
+    out->w_face = crossing.w;
 }
 
 SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool has_colour, kernel_meeting *out)
@@ -142,6 +151,9 @@ SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool 
     out->t = kernel_weigh(w, c->z[w->i], c->z[w->j], c->z[w->k]);
     out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
     out->w = has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
+    out->t_face = out->t;
+    out->v_face = out->v;
+    out->w_face = out->w;
 }
 
 SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf e_ij, vf e_jk, vf e_ik)
@@ -158,8 +170,8 @@ SIMD_INLINE void kernel_passage_edge(kernel_passage *r, int number, int a, int b
     r->edge[number] = kernel_edge(&q, 0, 1, &r->positive[number]);
 }
 
-/* All crossings of the surface, with the faces' values where has_faces; false where no ray has any. */
-static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm rays, bool has_faces, bool has_colour,
+/* All crossings of the surface; false where no ray has any. */
+static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
                                  kernel_passage *r)
 {
     for (int i = 0; i <= c->vertex_count; i++) {
@@ -176,32 +188,28 @@ static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm
         kernel_meeting *m = &r->facets[i];
         kernel_meet(c, &w, has_colour, m);
         m->mask = r->left[i] = hit;
-        m->face = !has_faces || t->quad < 0 ? m->v : kernel_polyhedron_quad(c, c->quads[t->quad], &w, m->v);
+        if (t->quad >= 0) kernel_polyhedron_quad(c, r, c->quads[t->quad], &w, has_colour, m);
         r->met[r->met_count++] = i;
     }
     return r->met_count > 0;
 }
 
-typedef struct kernel_end {
-    vm mask;
-    vf t, v, face, w;
-} kernel_end;
-
-/* Take the nearest crossing of each ray: false where no ray has one left. */
-SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_end *out)
+/* Take the crossing of each ray whose face is nearest: false where no ray has one left. */
+SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_meeting *out)
 {
+    const vf zero = vf_set(0);
     vf taken = vf_set(-1);
-    out->mask = vm_none();
-    out->t = vf_set(INFINITY);
-    out->v = out->face = out->w = vf_set(0);
+    *out = (kernel_meeting){vm_none(), zero, zero, zero, vf_set(INFINITY), zero, zero};
     for (int n = 0; n < r->met_count; n++) {
         const kernel_meeting *m = &r->facets[r->met[n]];
-        const vm nearer = vm_and(r->left[r->met[n]], vf_lt(m->t, out->t));
+        const vm nearer = vm_and(r->left[r->met[n]], vf_lt(m->t_face, out->t_face));
         out->mask = vm_or(out->mask, nearer);
         out->t = vf_select(nearer, m->t, out->t);
         out->v = vf_select(nearer, m->v, out->v);
-        out->face = vf_select(nearer, m->face, out->face);
         out->w = vf_select(nearer, m->w, out->w);
+        out->t_face = vf_select(nearer, m->t_face, out->t_face);
+        out->v_face = vf_select(nearer, m->v_face, out->v_face);
+        out->w_face = vf_select(nearer, m->w_face, out->w_face);
         taken = vf_select(nearer, vf_set((float)n), taken);
     }
     for (int n = 0; n < r->met_count; n++)
@@ -212,18 +220,15 @@ SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_end *out)
 /* The rays' next stay in the cell; false after the last. */
 static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
 {
-    kernel_end in, next;
-    if (!kernel_passage_take(r, &in) || !kernel_passage_take(r, &next)) return false;
+    if (!kernel_passage_take(r, &out->in) || !kernel_passage_take(r, &out->out)) return false;
     kernel_interval *i = &out->interval;
-    i->mask = vm_and(in.mask, next.mask);
-    i->t_in = in.t;
-    i->t_out = next.t;
-    i->v_in = in.face;
-    i->v_out = next.face;
-    i->w_in = in.w;
-    i->w_out = next.w;
-    out->u_in = in.v;
-    out->u_out = next.v;
+    i->mask = vm_and(out->in.mask, out->out.mask);
+    i->t_in = out->in.t_face;
+    i->t_out = out->out.t_face;
+    i->v_in = out->u_in = out->in.v_face;
+    i->v_out = out->u_out = out->out.v_face;
+    i->w_in = out->in.w_face;
+    i->w_out = out->out.w_face;
     return true;
 }
 
@@ -325,6 +330,16 @@ SIMD_INLINE vm kernel_stay_holds(const kernel_stay *stay, const kernel_meeting *
     return vm_and(vm_and(i->mask, sheet->mask), vm_and(vf_lt(i->t_in, sheet->t), vf_lt(sheet->t, i->t_out)));
 }
 
+/* What other tets have at an end, beside the one whose triangle it is: added to the face's value. */
+SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const kernel_meeting *end, bool before, vf *u,
+                                     vf *w)
+{
+    vf v_sum = end->v, w_sum = end->w;
+    kernel_passage_sum(r, rays, end->t, before, &v_sum, &w_sum);
+    *u = end->v_face + (v_sum - end->v);
+    *w = end->w_face + (w_sum - end->w);
+}
+
 /* Make the sheets ready to be the profile of the stay: their values, and those at its ends, the field's. */
 static void kernel_passage_profile(const polyhedron *c, vm rays, bool has_colour, kernel_passage *r, kernel_stay *stay)
 {
@@ -332,16 +347,16 @@ static void kernel_passage_profile(const polyhedron *c, vm rays, bool has_colour
     kernel_passage_sheets(c, rays, has_colour, r);
     if (c->is_star) return;
     kernel_passage_segments(c, rays, r);
-    kernel_passage_sum(r, i->mask, i->t_in, false, &stay->u_in, &i->w_in);
-    kernel_passage_sum(r, i->mask, i->t_out, true, &stay->u_out, &i->w_out);
+    kernel_passage_lift(r, i->mask, &stay->in, false, &stay->u_in, &i->w_in);
+    kernel_passage_lift(r, i->mask, &stay->out, true, &stay->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {
         kernel_meeting *sheet = &r->sheets[r->met_sheets[n]];
         const vm held = kernel_stay_holds(stay, sheet);
         vf v = sheet->v, w = sheet->w;
         if (!vm_any(held)) continue;
         kernel_passage_sum(r, held, sheet->t, false, &v, &w);
-        sheet->face = vf_select(held, v, sheet->face);
-        sheet->w = vf_select(held, w, sheet->w);
+        sheet->v_face = vf_select(held, v, sheet->v_face);
+        sheet->w_face = vf_select(held, w, sheet->w_face);
     }
 }
 
@@ -353,8 +368,7 @@ SIMD_INLINE kernel_piece kernel_profile_begin(const kernel_stay *stay, vf v_in)
 }
 
 /* The piece behind this one, each ray's own; v_out: the value at the profile's end. */
-SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const polyhedron *c, const kernel_stay *stay, vf v_out,
-                                     kernel_piece *piece)
+SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay *stay, vf v_out, kernel_piece *piece)
 {
     vf t = stay->interval.t_out, v = v_out, w = stay->interval.w_out;
     for (int n = 0; n < r->sheet_count; n++) {
@@ -362,8 +376,8 @@ SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const polyhedron *
         const vm nearer =
             vm_and(kernel_stay_holds(stay, sheet), vm_and(vf_lt(piece->t1, sheet->t), vf_lt(sheet->t, t)));
         t = vf_select(nearer, sheet->t, t);
-        v = vf_select(nearer, c->is_star ? sheet->v : sheet->face, v);
-        w = vf_select(nearer, sheet->w, w);
+        v = vf_select(nearer, sheet->v_face, v);
+        w = vf_select(nearer, sheet->w_face, w);
     }
     *piece = (kernel_piece){piece->t1, t, piece->v1, v, piece->w1, w};
 }

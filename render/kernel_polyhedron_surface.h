@@ -107,8 +107,7 @@ SIMD_INLINE vf kernel_polyhedron_end(vf inside, vf face)
 }
 
 /* The root on each ray of change, and the colour field there. */
-static vf kernel_polyhedron_root(const kernel_passage *r, const polyhedron *c, const kernel_stay *stay, vm change,
-                                 vf *w)
+static vf kernel_polyhedron_root(const kernel_passage *r, const kernel_stay *stay, vm change, vf *w)
 {
     const kernel_interval *i = &stay->interval;
     const vf v_in = kernel_polyhedron_end(stay->u_in, i->v_in), v_out = kernel_polyhedron_end(stay->u_out, i->v_out);
@@ -118,7 +117,7 @@ static vf kernel_polyhedron_root(const kernel_passage *r, const polyhedron *c, c
     vm open = change;
     while (vm_any(open)) {
         const vm last = vm_not(kernel_profile_open(stay, &piece, open));
-        kernel_profile_next(r, c, stay, v_out, &piece);
+        kernel_profile_next(r, stay, v_out, &piece);
         const vm cross = vm_and(open, vm_xor(vf_lt(piece.v1, vf_set(0)), below));
         const vf t = kernel_secant(piece.t0, piece.v0, piece.t1, piece.v1), length = piece.t1 - piece.t0;
         const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece.t0) / length, vf_set(0));
@@ -135,13 +134,13 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
     const bool has_colour = state->surface->layer->colour_map != NULL;
     kernel_passage r;
     kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, true, has_colour, &r)) return;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, has_colour, &r)) return;
     while (kernel_passage_next(&r, &stay)) {
         const vm change = kernel_changes_sign(p, &stay.interval);
         if (!vm_any(change)) continue;
         vf normal[3], w = vf_set(0);
         kernel_passage_profile(c, rays, has_colour, &r, &stay);
-        const vf t = kernel_polyhedron_root(&r, c, &stay, change, &w);
+        const vf t = kernel_polyhedron_root(&r, &stay, change, &w);
         const vm hit = kernel_visible(p, change, t);
         if (!vm_any(hit)) continue;
         kernel_passage_segments(c, rays, &r);

@@ -49,7 +49,7 @@ static void kernel_polyhedron_stay(const kernel_packet *p, kernel_volume_state *
     if (!c->is_constant) kernel_passage_profile(c, rays, false, r, stay);
     kernel_piece piece = kernel_profile_begin(stay, stay->u_in);
     while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
-        kernel_profile_next(r, c, stay, stay->u_out, &piece);
+        kernel_profile_next(r, stay, stay->u_out, &piece);
         kernel_polyhedron_fill(p, state, stay, &piece, begin, end);
     }
 }
@@ -68,7 +68,7 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *stat
         kernel_polyhedron_place(c, p);
         kernel_polyhedron_domain(c, transfer);
     }
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, false, &r)) return;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
     while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, c, rays, &r, &stay);
 }
 
