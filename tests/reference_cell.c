@@ -326,17 +326,24 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     int next = 1;
     while (next < count - 1 && breaks[next] <= z) next++;
     const double before = breaks[next - 1], behind = breaks[next];
-    const bool is_first = next == 1, is_last = next == count - 1;
-    if (!is_first && !is_last) return sum_on_line(cell, line, z, values, value);
+    /* From triangles on the profile is the sum itself. */
+    const bool is_first = next == 1 && ends[0].z != ends[0].z_triangle;
+    const bool is_last = next == count - 1 && ends[1].z != ends[1].z_triangle;
+    if (!is_first && !is_last) {
+        const double inner = 1e-9 * length;
+        return sum_on_line(cell, line, fmin(fmax(z, ends[0].z + inner), ends[1].z - inner), values, value);
+    }
+    /* Sums a little inside the piece: a sheet may lie in the face at the other end. */
+    const double aside = 1e-9 * (behind - before);
     bool is_good = true;
-    if (is_first)
+    if (next == 1)
         v0 = profile_end(cell, line, &ends[0], values, length);
     else
-        is_good = sum_on_line(cell, line, before, values, &v0);
-    if (is_last)
+        is_good = sum_on_line(cell, line, before + aside, values, &v0);
+    if (next == count - 1)
         v1 = profile_end(cell, line, &ends[1], values, -length);
     else
-        is_good = sum_on_line(cell, line, behind, values, &v1) && is_good;
+        is_good = sum_on_line(cell, line, behind - aside, values, &v1) && is_good;
     *value = behind > before ? v0 + (z - before) / (behind - before) * (v1 - v0) : v0;
     return is_good;
 }
