@@ -80,7 +80,7 @@ static insitu_status check_cell_range(walk *w, int64_t index, int64_t cell)
         return INSITU_OK;
     }
     if (!(node->range_low <= low && high <= node->range_high)) {
-        return BROKEN(w, "leaf %" PRId64 ": values %g to %g of cell %" PRId64 " lie outside its range", index, low,
+        return BROKEN(w, "leaf %" PRId64 ": value %g or %g of cell %" PRId64 " lies outside its range", index, low,
                       high, cell);
     }
     return INSITU_OK;
