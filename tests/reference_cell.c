@@ -327,8 +327,8 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     while (next < count - 1 && breaks[next] <= z) next++;
     const double before = breaks[next - 1], behind = breaks[next];
     /* From triangles on the profile is the sum itself. */
-    const bool is_first = next == 1 && ends[0].z != ends[0].z_triangle;
-    const bool is_last = next == count - 1 && ends[1].z != ends[1].z_triangle;
+    const bool is_first = next == 1 && cell->poly.face_size[ends[0].face] == 4;
+    const bool is_last = next == count - 1 && cell->poly.face_size[ends[1].face] == 4;
     if (!is_first && !is_last) {
         const double inner = 1e-9 * length;
         return sum_on_line(cell, line, fmin(fmax(z, ends[0].z + inner), ends[1].z - inner), values, value);

@@ -37,3 +37,7 @@ insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7)
 
 insitu_render_program(test_overlap_mpi)
 insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 4 7)
+
+insitu_render_program(test_render_polyhedra)
+add_test(NAME render_polyhedra COMMAND test_render_polyhedra)
+set_tests_properties(render_polyhedra PROPERTIES TIMEOUT 120)
