@@ -324,10 +324,13 @@ static void kernel_passage_sum(const kernel_passage *r, vm rays, vf t, bool befo
     }
 }
 
+/* Sheets between the crossed triangles and faces: those behind the triangles, of tets that stand out of the cell, are
+ * none of its field. */
 SIMD_INLINE vm kernel_stay_holds(const kernel_stay *stay, const kernel_meeting *sheet)
 {
-    const kernel_interval *i = &stay->interval;
-    return vm_and(vm_and(i->mask, sheet->mask), vm_and(vf_lt(i->t_in, sheet->t), vf_lt(sheet->t, i->t_out)));
+    const vm inside = vm_and(vf_lt(stay->interval.t_in, sheet->t), vf_lt(sheet->t, stay->interval.t_out));
+    const vm within = vm_and(vf_lt(stay->in.t, sheet->t), vf_lt(sheet->t, stay->out.t));
+    return vm_and(vm_and(stay->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
 /* What other tets have at an end, beside the one whose triangle it is: added to the face's value. */

@@ -311,7 +311,8 @@ int reference_profile_breaks(const reference_cell *cell, const reference_line *l
         for (int k = 0; k < 3; k++) {
             const int *t = cell->poly.triangles[i], sheet[3] = {t[k], t[(k + 1) % 3], cell->count};
             reference_crossing met;
-            if (triangle_crossed(cell, line, sheet, &met) && met.z > ends[0].z && met.z < ends[1].z)
+            const double low = fmax(ends[0].z, ends[0].z_triangle), high = fmin(ends[1].z, ends[1].z_triangle);
+            if (triangle_crossed(cell, line, sheet, &met) && met.z > low && met.z < high)
                 count = insert_depth(z, count, met.z);
         }
     return count;

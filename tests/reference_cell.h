@@ -63,7 +63,8 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
 
 enum { REFERENCE_MAX_BREAKS = 3 * REFERENCE_MAX_TRIANGLES + 2 };
 
-/* Where a polyhedron's profile bends: depths from the first crossing to the second, rising. Returns how many. */
+/* Where a polyhedron's profile bends: depths from the first crossing to the second, rising; sheets count where they are
+ * between both the faces and the triangles. Returns how many. */
 int reference_profile_breaks(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
                              double z[REFERENCE_MAX_BREAKS]);
 

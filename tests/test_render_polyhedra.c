@@ -26,14 +26,15 @@ static const char *case_name(const char *what, fixture_camera camera)
     return name;
 }
 
-/* Prisms on bases that are not convex, spikes, a cavity. A coplanar fan folds over itself in the bases: there rays
- * meet triangles that lie in one another, which the margin of edges does not know. */
+/* Prisms on bases that are not convex, spikes, a cavity. The fan of the U's base folds over itself in its plane: rays
+ * cross triangles that lie on each other, in an order that rounding decides. For a linear field that is nothing, for
+ * others the triangles' values differ, and there is no telling. */
 static void shapes_are_the_reference(void **state)
 {
     (void)state;
     for (test_polyhedron_shape shape = 0; shape < TEST_POLYHEDRON_COUNT; shape++)
         for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++)
-            for (int field = 0; field < 2; field++) {
+            for (int field = 0; field < (shape == TEST_U_PRISM ? 1 : 2); field++) {
                 test_mesh mesh;
                 render_fixture f;
                 test_mesh_polyhedron(shape, field ? test_wave : test_linear, &mesh);
