@@ -20,8 +20,9 @@ SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *
     for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
 }
 
-/* The samples of the window, from begin on to end, that the stay owns and that are in the piece. */
-static void kernel_polyhedron_fill(const kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
+/* The samples of the window, from begin on to end, that the stay owns and that are in the piece. One that another cell
+ * owns too stays the other's, as in kernel_fill(). */
+static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
                                    const kernel_piece *piece, int begin, int end)
 {
     kernel_samples *s = state->samples;
@@ -29,9 +30,15 @@ static void kernel_polyhedron_fill(const kernel_packet *p, kernel_volume_state *
     const vf slope = vf_select(vf_lt(vf_set(0), length), (piece->v1 - piece->v0) / length, vf_set(0));
     for (int n = begin; n < end; n++) {
         const vf t = kernel_sample_t(p, s->first + n);
-        const vm own = vm_and(stay->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
+        vm own = vm_and(stay->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
         if (!vm_any(own)) continue;
-        s->value[state->volume][n] = vf_select(own, piece->v0 + slope * (t - piece->t0), s->value[state->volume][n]);
+        const vf value = piece->v0 + slope * (t - piece->t0), kept = s->value[state->volume][n];
+        const vm apart = vm_and(own, vf_eq(kept, kept));
+        if (__builtin_expect(vm_any(apart), 0)) {
+            kernel_emit_sample(p, state, apart, t, value);
+            own = vm_andnot(own, apart);
+        }
+        s->value[state->volume][n] = vf_select(own, value, kept);
         if (p->frame->needs_contact) {
             s->t_in[n] = vf_select(own, stay->interval.t_in, s->t_in[n]);
             s->t_out[n] = vf_select(own, stay->interval.t_out, s->t_out[n]);
@@ -39,7 +46,7 @@ static void kernel_polyhedron_fill(const kernel_packet *p, kernel_volume_state *
     }
 }
 
-static void kernel_polyhedron_stay(const kernel_packet *p, kernel_volume_state *state, const polyhedron *c, vm rays,
+static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state, const polyhedron *c, vm rays,
                                    kernel_passage *r, kernel_stay *stay)
 {
     const kernel_interval *i = &stay->interval;
