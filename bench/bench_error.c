@@ -70,11 +70,11 @@ static bool holds_chosen(const bench_pixels *all, const double low[2], const dou
 static bool is_wanted(const bench_pixels *all, const grid *cells, int64_t cell)
 {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
-    const int count = grid_cell_vertices(cells, cell, vertices);
-    for (int i = 0; i < count; i++) {
+    grid_walk walk = grid_walk_cell(cells, cell);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
         double world[3], pixel[2];
-        grid_vertex(cells, vertices[i], world);
+        grid_vertex(cells, vertex, world);
         to_pixel(&all->camera, world, pixel);
         for (int axis = 0; axis < 2; axis++) {
             low[axis] = fmin(low[axis], pixel[axis] - 1);
@@ -84,20 +84,35 @@ static bool is_wanted(const bench_pixels *all, const grid *cells, int64_t cell)
     return holds_chosen(all, low, high);
 }
 
+/* The cell's entries of connectivity: vertices, or a polyhedron's faces. */
+static void cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_t *end)
+{
+    const grid_walk walk = grid_walk_cell(cells, cell);
+    *first = walk.next;
+    *end = walk.end;
+}
+
 /* kept: the wanted cells in the mesh's order. */
 static void keep_cells(bench_pixels *all, const grid *cells, const unsigned char *wanted)
 {
-    int64_t count = 0, at = 0;
-    for (int64_t cell = 0; cell < cells->cell_count; cell++) count += wanted[cell];
-    all->connectivity = must(malloc(GRID_MAX_CELL_VERTICES * sizeof(int64_t) * (size_t)(count + 1)));
+    int64_t count = 0, entries = 0, at = 0, first, end;
+    for (int64_t cell = 0; cell < cells->cell_count; cell++) {
+        if (!wanted[cell]) continue;
+        cell_entries(cells, cell, &first, &end);
+        entries += end - first;
+        count++;
+    }
+    all->connectivity = must(malloc(sizeof(int64_t) * (size_t)(entries + 1)));
     all->offsets = must(malloc(sizeof(int64_t) * (size_t)(count + 1)));
     all->types = must(malloc((size_t)(count + 1)));
     all->offsets[0] = 0;
     for (int64_t cell = 0; cell < cells->cell_count; cell++) {
         if (!wanted[cell]) continue;
-        const int vertices = grid_cell_vertices(cells, cell, all->connectivity + all->offsets[at]);
+        cell_entries(cells, cell, &first, &end);
         all->types[at] = (unsigned char)grid_cell_type(cells, cell);
-        all->offsets[at + 1] = all->offsets[at] + vertices;
+        all->offsets[at + 1] = all->offsets[at] + end - first;
+        for (int64_t i = first; i < end; i++)
+            all->connectivity[all->offsets[at] + i - first] = grid_array_index(&cells->connectivity, i);
         at++;
     }
     all->kept = *cells;

@@ -54,7 +54,7 @@ bounds_fill bounds_choose_fill(const grid *g)
 {
     static const bounds_fill table[FETCH_SHAPES][2][2] = FETCH_TABLE(fill);
     if (!g) return fill_given;
-    if (!fetch_coordinates_alike(g)) return fill_any;
+    if (!fetch_is_plain(g)) return fill_any;
     return table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
 }
 
@@ -70,7 +70,7 @@ static void unite_children(mmbvh_node *node, const mmbvh_node *pair)
     }
 }
 
-MMBVH_INLINE int64_t run_bounds(const sweep *s, int64_t first, int64_t end, const bool alike, const fetch_shape shape,
+MMBVH_INLINE int64_t run_bounds(const sweep *s, int64_t first, int64_t end, const bool plain, const fetch_shape shape,
                                 const bool wide_index, const bool wide_number)
 {
     for (int64_t i = end - 1; i >= first; i--) {
@@ -83,7 +83,7 @@ MMBVH_INLINE int64_t run_bounds(const sweep *s, int64_t first, int64_t end, cons
         fetch_box_empty(&box);
         for (uint64_t k = 0; k < node->count; k++) {
             const int64_t cell = s->tree->cells[node->ref + k];
-            if (alike) {
+            if (plain) {
                 fetch_box_cell(&box, s->g, cell, shape, wide_index, wide_number);
             } else {
                 fetch_box_any_cell(&box, s->g, cell);
@@ -111,7 +111,7 @@ insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options
     static const sweep_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_bounds);
     if (!tree || !g) return INSITU_ERROR_ARGUMENT;
     sweep s = {.tree = tree, .g = g, .nodes = tree->nodes, .run = run_any_bounds};
-    if (fetch_coordinates_alike(g)) {
+    if (fetch_is_plain(g)) {
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
     }
     sweep_tree(&s, sweep_threads(options));

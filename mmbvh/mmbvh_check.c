@@ -36,36 +36,52 @@ static insitu_status check_box(const walk *w, int64_t index)
     return INSITU_OK;
 }
 
-static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cell, const int64_t *vertices, int count)
+static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cell)
 {
     const mmbvh_node *node = w->tree->nodes + index;
-    for (int i = 0; i < count; i++) {
+    grid_walk vertices = grid_walk_cell(w->g, cell);
+    int64_t vertex;
+    while (grid_walk_next(&vertices, &vertex)) {
         double p[3];
-        grid_vertex(w->g, vertices[i], p);
+        grid_vertex(w->g, vertex, p);
         for (int axis = 0; axis < 3; axis++) {
             const double x = (p[axis] - w->tree->origin[axis]) * w->tree->scale;
             if (!(node->lower[axis] <= x && x <= node->upper[axis])) {
                 return BROKEN(w, "leaf %" PRId64 ": vertex %" PRId64 " of cell %" PRId64 " lies outside its bounds",
-                              index, vertices[i], cell);
+                              index, vertex, cell);
             }
         }
     }
     return INSITU_OK;
 }
 
-static insitu_status check_cell_range(walk *w, int64_t index, int64_t cell, const int64_t *vertices, int count)
+/* False where one of the cell's values is not finite; else their range. */
+static bool cell_range(const walk *w, int64_t cell, double *low, double *high)
+{
+    grid_walk vertices = grid_walk_cell(w->g, cell);
+    int64_t vertex;
+    *low = INFINITY;
+    *high = -INFINITY;
+    while (grid_walk_next(&vertices, &vertex)) {
+        const double v = grid_field_value(w->field, w->field->is_cell_centred ? cell : vertex);
+        if (!isfinite(v)) return false;
+        *low = fmin(*low, v);
+        *high = fmax(*high, v);
+    }
+    return true;
+}
+
+static insitu_status check_cell_range(walk *w, int64_t index, int64_t cell)
 {
     const mmbvh_node *node = w->tree->nodes + index;
-    double values[GRID_MAX_CELL_VERTICES];
-    if (!grid_cell_values(w->field, cell, vertices, count, values)) {
+    double low, high;
+    if (!cell_range(w, cell, &low, &high)) {
         w->unusable++;
         return INSITU_OK;
     }
-    for (int i = 0; i < count; i++) {
-        if (!(node->range_low <= values[i] && values[i] <= node->range_high)) {
-            return BROKEN(w, "leaf %" PRId64 ": value %g of cell %" PRId64 " lies outside its range", index, values[i],
-                          cell);
-        }
+    if (!(node->range_low <= low && high <= node->range_high)) {
+        return BROKEN(w, "leaf %" PRId64 ": value %g or %g of cell %" PRId64 " lies outside its range", index, low,
+                      high, cell);
     }
     return INSITU_OK;
 }
@@ -79,11 +95,9 @@ static insitu_status check_cell(walk *w, int64_t index, int64_t cell)
     *byte = (unsigned char)(*byte | bit);
     if (!w->g) return INSITU_OK;
     if (grid_is_ghost(w->g, cell)) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is a ghost", index, cell);
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
-    const int count = grid_cell_vertices(w->g, cell, vertices);
-    const insitu_status status = check_cell_bounds(w, index, cell, vertices, count);
+    const insitu_status status = check_cell_bounds(w, index, cell);
     if (status || !w->field) return status;
-    return check_cell_range(w, index, cell, vertices, count);
+    return check_cell_range(w, index, cell);
 }
 
 static insitu_status check_leaf(walk *w, int64_t index)

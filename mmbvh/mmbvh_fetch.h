@@ -101,9 +101,10 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
     }
 }
 
-/* Where the coordinates are not all floats or all doubles, fetch_box_cell() will not do. */
-static inline bool fetch_coordinates_alike(const grid *g)
+/* Where the coordinates are not all floats or all doubles, or cells may be polyhedra, fetch_box_cell() will not do. */
+static inline bool fetch_is_plain(const grid *g)
 {
+    if (grid_has_faces(g)) return false;
     const grid_array *c = g->coordinates;
     const bool integer = c[0].is_integer || c[1].is_integer || c[2].is_integer;
     return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide;
@@ -111,11 +112,11 @@ static inline bool fetch_coordinates_alike(const grid *g)
 
 static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cell)
 {
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
-    const int count = grid_cell_vertices(g, cell, vertices);
-    for (int i = 0; i < count; i++) {
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
         double p[3];
-        grid_vertex(g, vertices[i], p);
+        grid_vertex(g, vertex, p);
         for (int axis = 0; axis < 3; axis++) {
             box->lower[axis] = p[axis] < box->lower[axis] ? p[axis] : box->lower[axis];
             box->upper[axis] = p[axis] > box->upper[axis] ? p[axis] : box->upper[axis];

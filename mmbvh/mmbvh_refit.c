@@ -171,14 +171,15 @@ MMBVH_INLINE int64_t run_leaves(const sweep *s, int64_t first, int64_t end,
 
 static void add_any_cell(span *to, const sweep *s, int64_t cell)
 {
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
-    double values[GRID_MAX_CELL_VERTICES];
-    const int count = grid_cell_vertices(s->g, cell, vertices);
-    const bool finite = grid_cell_values(s->field, cell, vertices, count, values);
+    grid_walk walk = grid_walk_cell(s->g, cell);
     double low = INFINITY, high = -INFINITY;
-    for (int i = 0; i < count; i++) {
-        low = values[i] < low ? values[i] : low;
-        high = values[i] > high ? values[i] : high;
+    bool finite = true;
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
+        const double v = grid_field_value(s->field, vertex);
+        finite = finite && isfinite(v);
+        low = v < low ? v : low;
+        high = v > high ? v : high;
     }
     span_add(to, low, high, finite);
 }
@@ -222,7 +223,7 @@ static sweep_run choose_run(const grid *g, const grid_field *field)
 {
     if (!field) return run_infinite;
     if (field->is_cell_centred) return run_by_cell;
-    if (field->component < 0 || field->values.is_integer) return run_any;
+    if (field->component < 0 || field->values.is_integer || grid_has_faces(g)) return run_any;
     return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
 }
 

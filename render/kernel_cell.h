@@ -67,7 +67,25 @@ typedef struct kernel_cache {
     kernel_cell cells[KERNEL_CACHE_CELLS];
 } kernel_cache;
 
-/* The cell with its values; a new one is not placed yet. layer tells apart the fields that cells are asked for. */
+/* Is the polyhedron a tet, on which its field is linear as a tet's is? Then it is drawn as one, to the same bits. */
+static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
+{
+    int64_t first, end, vertex;
+    grid_cell_faces(g, cell, &first, &end);
+    if (end - first != 4) return false;
+    int count = 0, entries = 0;
+    grid_walk walk = grid_walk_cell(g, cell);
+    while (grid_walk_next(&walk, &vertex)) {
+        int at = 0;
+        while (at < count && vertices[at] != vertex) at++;
+        if (++entries > 12 || at == 4) return false;
+        if (at == count) vertices[count++] = vertex;
+    }
+    return count == 4;
+}
+
+/* The cell with its values; a new one is not placed yet. Of a polyhedron only the type: see kernel_polyhedron.h. layer
+ * tells apart the fields that cells are asked for. */
 SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
                                           uint32_t index)
 {
@@ -81,7 +99,10 @@ SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int
     c->layer = layer;
     c->is_placed = false;
     c->type = grid_cell_type(g, index);
-    c->count = grid_cell_vertices(g, index, c->vertices);
+    if (c->type == GRID_POLYHEDRON && kernel_is_tet(g, index, c->vertices))
+        c->type = GRID_TET, c->count = 4;
+    else
+        c->count = grid_cell_vertices(g, index, c->vertices);
     c->is_finite = grid_cell_values(field, index, c->vertices, c->count, c->values);
     return c;
 }
@@ -120,25 +141,26 @@ SIMD_INLINE void kernel_cell_order(kernel_cell *c)
         }
 }
 
-/* Vertices into tile space (kernel_packet.h), in order. */
-SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
+/* A position into tile space (kernel_packet.h). */
+SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
 {
     const kernel_frame *f = p->frame;
     const double *eye = f->job->camera.eye;
-    const bool flat = f->job->camera.is_orthographic;
+    const double d0 = world[0] - eye[0], d1 = world[1] - eye[1], d2 = world[2] - eye[2];
+    const double x = f->scaled_axes[0][0] * d0 + f->scaled_axes[0][1] * d1 + f->scaled_axes[0][2] * d2;
+    const double y = f->scaled_axes[1][0] * d0 + f->scaled_axes[1][1] * d1 + f->scaled_axes[1][2] * d2;
+    const double z = f->scaled_axes[2][0] * d0 + f->scaled_axes[2][1] * d1 + f->scaled_axes[2][2] * d2;
+    const double depth = f->job->camera.is_orthographic ? f->job->space.scale : z;
+    *out_x = (float)(x - p->tile->centre_x * depth);
+    *out_y = (float)(y - p->tile->centre_y * depth);
+    *out_z = (float)(z - f->depth_shift);
+}
+
+SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
+{
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
     kernel_cell_order(c);
-    const double cx = p->tile->centre_x, cy = p->tile->centre_y;
-    for (int i = 0; i < c->count; i++) {
-        const double d0 = c->world[i][0] - eye[0], d1 = c->world[i][1] - eye[1], d2 = c->world[i][2] - eye[2];
-        const double x = f->scaled_axes[0][0] * d0 + f->scaled_axes[0][1] * d1 + f->scaled_axes[0][2] * d2;
-        const double y = f->scaled_axes[1][0] * d0 + f->scaled_axes[1][1] * d1 + f->scaled_axes[1][2] * d2;
-        const double z = f->scaled_axes[2][0] * d0 + f->scaled_axes[2][1] * d1 + f->scaled_axes[2][2] * d2;
-        const double depth = flat ? f->job->space.scale : z;
-        c->x[i] = (float)(x - cx * depth);
-        c->y[i] = (float)(y - cy * depth);
-        c->z[i] = (float)(z - f->depth_shift);
-    }
+    for (int i = 0; i < c->count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_placed = true;
 }
 
@@ -371,15 +393,16 @@ SIMD_INLINE vf kernel_bilinear(const float *f, const int corner[4], vf s, vf r)
     return low + r * (high - low);
 }
 
-/* Barycentric weights of a crossed triangle: of i, j, k in the order. */
+/* Weights of a crossed triangle's i, j, k in the order, and one over their sum. Tets weigh in the same way
+ * (kernel_tet_face): a face's value has the same bits from both its cells. */
 typedef struct kernel_weights {
     int i, j, k;
-    vf a, b, c;
+    vf a, b, c, inverse;
 } kernel_weights;
 
 SIMD_INLINE vf kernel_weigh(const kernel_weights *w, float fi, float fj, float fk)
 {
-    return (w->a * fi + w->b * fj) + w->c * fk;
+    return ((w->a * fi + w->b * fj) + w->c * fk) * w->inverse;
 }
 
 SIMD_INLINE void kernel_triangle_values(const kernel_cell *c, const kernel_shape *shape, const kernel_weights *w,
@@ -430,9 +453,8 @@ SIMD_INLINE vm kernel_triangle(const kernel_cell *c, const kernel_edges *edges, 
     const vm hit = kernel_inside(rays, edges->positive[i][j], edges->positive[j][k], edges->positive[i][k]);
     if (!vm_any(hit)) return hit;
     const vf e_ij = edges->e[i][j], e_jk = edges->e[j][k], e_ik = edges->e[i][k];
-    const vf inverse = 1.0f / ((e_jk - e_ik) + e_ij);
-    *w = (kernel_weights){i, j, k, e_jk * inverse, -(e_ik * inverse), e_ij * inverse};
-    *t = ((e_jk * c->z[i] - e_ik * c->z[j]) + e_ij * c->z[k]) * inverse;
+    *w = (kernel_weights){i, j, k, e_jk, -e_ik, e_ij, 1.0f / ((e_jk - e_ik) + e_ij)};
+    *t = kernel_weigh(w, c->z[i], c->z[j], c->z[k]);
     return hit;
 }
 

@@ -70,20 +70,20 @@ SIMD_INLINE kernel_light kernel_clear(void)
 }
 
 /* Pieces that rays are in: most often one for all, which saves the gathers. */
-typedef struct kernel_place {
+typedef struct kernel_piece_place {
     vi at;
     const kernel_piece *common;
-} kernel_place;
+} kernel_piece_place;
 
-SIMD_INLINE kernel_place kernel_place_of(const kernel_pieces *t, vm rays, vf piece)
+SIMD_INLINE kernel_piece_place kernel_piece_place_of(const kernel_pieces *t, vm rays, vf piece)
 {
     const int lane = __builtin_ctz(vm_bits(rays));
     const int first = (int)piece[lane];
     const bool is_common = !vm_any(vm_andnot(rays, vf_eq(piece, vf_set((kernel_real)first))));
-    return (kernel_place){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
+    return (kernel_piece_place){vi_from_vf(vf_select(rays, piece, vf_set(0))), is_common ? &t->pieces[first] : NULL};
 }
 
-SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_place *place, int entry)
+SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_place *place, int entry)
 {
     if (place->common) return vf_set(place->common->entry[entry]);
     return vf_gather(t->pieces[0].entry + entry, place->at * KERNEL_PIECE_ENTRIES);
@@ -95,7 +95,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vm falli
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
     vf piece = vf_gather(t->bin_first, vi_from_vf(spot));
     for (vm open = rays; vm_any(open);) {
-        const kernel_place at = kernel_place_of(t, open, piece);
+        const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
         const vf low = kernel_piece_entry(t, &at, KERNEL_PIECE_LOW),
                  high = kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH);
         const vm up = vm_and(open, vm_or(vf_lt(high, x), vm_andnot(vf_eq(high, x), falling)));
@@ -107,7 +107,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vm falli
 }
 
 /* Weighed from both ends, so that near an end of no opacity it is as exact as the distance to it. */
-SIMD_INLINE vf kernel_piece_opacity(const kernel_pieces *t, const kernel_place *place, vf x, vf low, vf high)
+SIMD_INLINE vf kernel_piece_opacity(const kernel_pieces *t, const kernel_piece_place *place, vf x, vf low, vf high)
 {
     const vf inverse = kernel_piece_entry(t, place, KERNEL_PIECE_INVERSE), zero = vf_set(0), one = vf_set(1);
     const vf from_low = kernel_piece_entry(t, place, KERNEL_PIECE_OPACITY) * vf_clamp((high - x) * inverse, zero, one);
@@ -170,7 +170,7 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, vf length, vf
     vf piece = kernel_piece_find(t, rays, v_in, falling), s = zero, value = v_in;
     vm open = rays;
     while (vm_any(open)) {
-        const kernel_place at = kernel_place_of(t, open, piece);
+        const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
         const vf low = kernel_piece_entry(t, &at, KERNEL_PIECE_LOW),
                  high = kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH);
         const vf edge = vf_select(falling, low, high), to_edge = (edge - v_in) / vf_select(level, one, rise);

@@ -66,7 +66,7 @@ static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uin
         const vm open = vm_andnot(rays, probe->found);
         if (!vm_any(open)) return;
         kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
-        if (!c->is_finite) continue;
+        if (!c->is_finite || c->type == GRID_POLYHEDRON) continue;
         const bool is_fresh = !c->is_placed;
         if (is_fresh) kernel_cell_place(c, p, p->frame->job->parts[part].cells);
         if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
@@ -99,7 +99,8 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
 }
 
 /* Replace the cells' gradients in normal (camera axes) on the rays of hit by differences over reach before and behind:
- * one-sided where one sample is in no cell; not where both of an axis are. layer: the surface's number. */
+ * one-sided where one sample is in no cell; not where both of an axis are, nor where there is no reach. layer: the
+ * surface's number. */
 SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int layer, int value, vm hit, vf t,
                                     vf reach, vf normal[3])
 {
@@ -107,6 +108,7 @@ SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface
     kernel_probe probe = {
         .surface = s, .layer = f->surface_count + f->volume_count + layer, .isovalue = s->layer->values[value]};
     vf g[3];
+    hit = vm_and(hit, vf_lt(vf_set(0), reach));
     vm whole = hit;
     for (int a = 0; a < 3; a++) {
         const vm before = kernel_probe_at(p, &probe, hit, t, a, -reach);

@@ -292,6 +292,10 @@ SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state
     }
 }
 
+/* kernel_polyhedron_volume.h */
+static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index,
+                                       vm rays);
+
 static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
                                 vm rays)
 {
@@ -301,6 +305,10 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
     const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, p->frame->surface_count, part, field, cells[n]);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_polyhedron_segments(p, state, part, cells[n], rays);
+            continue;
+        }
         if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
         if (!c->is_placed) {
             kernel_cell_place(c, p, g);

@@ -45,15 +45,9 @@ SIMD_INLINE bool kernel_cell_straddles(const kernel_cell *c, double value)
     return below && above;
 }
 
-/* f: values minus the isovalue, times a power of two that brings the largest near 1. The power is read off the bits
- * of the largest: its exponent, mirrored. */
-SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
+/* The power of two that brings largest near 1, read off its bits: its exponent, mirrored. */
+SIMD_INLINE double kernel_mirrored_power(double largest)
 {
-    double largest = 0;
-    for (int i = 0; i < c->count; i++) {
-        const double size = fabs(c->values[i] - value);
-        largest = size > largest ? size : largest;
-    }
     uint64_t bits;
     memcpy(&bits, &largest, sizeof bits);
     const uint64_t exponent = bits >> 52;
@@ -61,6 +55,18 @@ SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
     bits = mirrored << 52;
     double scale;
     memcpy(&scale, &bits, sizeof scale);
+    return scale;
+}
+
+/* f: values minus the isovalue, times a power of two that brings the largest near 1. */
+SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
+{
+    double largest = 0;
+    for (int i = 0; i < c->count; i++) {
+        const double size = fabs(c->values[i] - value);
+        largest = size > largest ? size : largest;
+    }
+    const double scale = kernel_mirrored_power(largest);
     for (int i = 0; i < c->count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
 }
 
@@ -107,7 +113,8 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     kernel_hits *hits = state->hits;
     vf colour[3];
     const bool by_differences = s->layer->normal == RENDER_DIFFERENCES;
-    const vf reach = vf_set(by_differences ? kernel_difference_reach(p, s->layer, c) : 0);
+    /* Polyhedra (no cell given) have their own gradient always. */
+    const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, w, colour);
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
@@ -288,6 +295,10 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
     }
 }
 
+/* kernel_polyhedron_surface.h */
+static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *state, int part, uint32_t index,
+                                       vm rays);
+
 static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
                                 vm rays)
 {
@@ -296,6 +307,10 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
     const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_polyhedron_surfaces(p, state, part, cells[n], rays);
+            continue;
+        }
         kernel_poly *poly = kernel_poly_find(p, c);
         if (!c->is_finite) continue;
         kernel_cell own_cell;

@@ -7,6 +7,7 @@
 
 #include "kernel_pieces.h"
 #include "render.h"
+#include "render_polyhedra.h"
 
 enum { KERNEL_TILE = 16, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
 
@@ -67,6 +68,10 @@ typedef struct kernel_thread {
     bool (*reserve)(fragment_list *list, int64_t more);
     bool out_of_memory;
     int64_t map_failures;
+    polyhedron_store *polyhedra; /* of the tile; NULL where no mesh has any */
+    polyhedron *(*find_polyhedron)(polyhedron_store *store, const grid *g, const grid_field *field, int part, int layer,
+                                   uint32_t index);
+    void *(*polyhedron_scratch)(polyhedron_store *store, size_t bytes);
     double surface_seconds, volume_seconds;
     double (*now)(void);
 } kernel_thread;

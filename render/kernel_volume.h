@@ -27,7 +27,7 @@ typedef struct kernel_blend {
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
     vf depth, lost[3]; /* of segments: -ln(transmittance), and what colour has lost to rounding */
-    vf light; /* what reaches this rank's next sample through all its samples so far */
+    vf light;          /* what reaches this rank's next sample through all its samples so far */
 } kernel_blend;
 
 typedef struct kernel_volume_state {
@@ -129,6 +129,9 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     }
 }
 
+/* kernel_polyhedron_volume.h */
+static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *state, int part, uint32_t index, vm rays);
+
 static void kernel_volume_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
                                vm rays)
 {
@@ -139,6 +142,10 @@ static void kernel_volume_leaf(kernel_packet *p, void *opaque_state, int part, c
     for (int n = 0; n < count; n++) {
         /* Layers of volumes are counted on from those of surfaces. */
         kernel_cell *c = kernel_cell_find(p, p->frame->surface_count + state->volume, part, field, cells[n]);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_polyhedron_volume(p, state, part, cells[n], rays);
+            continue;
+        }
         if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
         if (!c->is_placed) {
             kernel_cell_place(c, p, g);

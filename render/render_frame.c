@@ -6,6 +6,7 @@
 
 #include "memory.h"
 #include "render_isa.h"
+#include "render_polyhedra.h"
 #include "render_prepare.h"
 
 static double now(void)
@@ -34,9 +35,11 @@ static void trace_tiles(const kernel_frame *frame, kernel_thread *thread)
     const int columns = (frame->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
     const int rows = (frame->job->camera.height + KERNEL_TILE - 1) / KERNEL_TILE;
 #pragma omp for schedule(dynamic, 4)
-    for (int tile = 0; tile < columns * rows; tile++)
-        if (!thread->out_of_memory)
-            kernels->trace_tile(frame, thread, tile % columns * KERNEL_TILE, tile / columns * KERNEL_TILE);
+    for (int tile = 0; tile < columns * rows; tile++) {
+        if (thread->out_of_memory) continue;
+        if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
+        kernels->trace_tile(frame, thread, tile % columns * KERNEL_TILE, tile / columns * KERNEL_TILE);
+    }
 }
 
 static bool join_lists(fragment_list *out, fragment_list *lists, int count)
@@ -62,15 +65,25 @@ static insitu_status trace_frame(const kernel_frame *frame, fragment_list *lists
                                  render_statistics *statistics, base_error *error)
 {
     const size_t cache_bytes = render_kernels()->cache_bytes;
+    bool has_polyhedra = false;
+    for (int i = 0; i < frame->job->part_count; i++)
+        has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
     int failed = 0;
     int64_t failures = 0;
     double surface = 0, volume = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : failed, failures) reduction(max : surface, volume)
     {
         fragment_list *list = &lists[omp_get_thread_num()];
-        kernel_thread thread = {.cache = base_calloc(1, cache_bytes), .out = list, .reserve = reserve, .now = now};
-        thread.out_of_memory = !thread.cache;
+        kernel_thread thread = {.cache = base_calloc(1, cache_bytes),
+                                .out = list,
+                                .reserve = reserve,
+                                .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
+                                .find_polyhedron = polyhedra_find,
+                                .polyhedron_scratch = polyhedra_scratch,
+                                .now = now};
+        thread.out_of_memory = !thread.cache || (has_polyhedra && !thread.polyhedra);
         trace_tiles(frame, &thread);
+        polyhedra_free(thread.polyhedra);
         base_free(thread.cache);
         failed += thread.out_of_memory;
         failures += thread.map_failures;
@@ -78,7 +91,7 @@ static insitu_status trace_frame(const kernel_frame *frame, fragment_list *lists
         volume = thread.volume_seconds;
     }
     if (failed || !join_lists(out, lists, threads))
-        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments of %d x %d pixels",
+        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments and cells of %d x %d pixels",
                          frame->job->camera.width, frame->job->camera.height);
     if (statistics) {
         const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;

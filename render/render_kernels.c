@@ -3,6 +3,8 @@
 #include <math.h>
 
 #include "kernel_segments.h"
+#include "kernel_polyhedron_surface.h"
+#include "kernel_polyhedron_volume.h"
 
 /* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
 typedef struct kernel_parent_state {

@@ -11,6 +11,7 @@
 #include "reference_cell.h"
 
 #include "grid.h"
+#include "reference_polyhedron.h"
 
 #include <string.h>
 
@@ -96,6 +97,7 @@ static bool triangle_crossed(const reference_cell *cell, const reference_line *l
     triangle_weights(cell, line, triangle, weights);
     memset(out, 0, sizeof *out);
     for (int i = 0; i < 3; i++) out->z += weights[i] * cell->position[triangle[i]][2];
+    out->z_triangle = out->z;
     return true;
 }
 
@@ -179,9 +181,33 @@ static void move_to_patch(const reference_cell *cell, const reference_line *line
     if (!crossing->is_folded) crossing->z = bilinear(z, crossing->u, crossing->w);
 }
 
+static int insert_crossing(reference_crossing *crossings, int count, const reference_crossing *found)
+{
+    int at = count;
+    for (; at > 0 && crossings[at - 1].z > found->z; at--) crossings[at] = crossings[at - 1];
+    crossings[at] = *found;
+    return count + 1;
+}
+
+static int polyhedron_crossings(const reference_cell *cell, const reference_line *line, reference_crossing *crossings)
+{
+    const reference_polyhedron *p = &cell->poly;
+    int count = 0;
+    for (int i = 0; i < p->triangle_count; i++) {
+        reference_crossing found;
+        if (!triangle_crossed(cell, line, p->triangles[i], &found)) continue;
+        found.face = p->face_of[i];
+        found.triangle = i;
+        if (p->face_size[found.face] == 4) move_to_patch(cell, line, p->faces[found.face], &found);
+        count = insert_crossing(crossings, count, &found);
+    }
+    return count;
+}
+
 int reference_crossings(const reference_cell *cell, const reference_line *line,
                         reference_crossing crossings[REFERENCE_MAX_CROSSINGS])
 {
+    if (cell->type == GRID_POLYHEDRON) return polyhedron_crossings(cell, line, crossings);
     const cell_faces *faces = faces_of(cell->type);
     int count = 0;
     for (int face = 0; face < faces->count; face++) {
@@ -192,25 +218,30 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
             if (!triangle_crossed(cell, line, triangles[half], &found)) continue;
             found.face = face;
             if (halves == 2) move_to_patch(cell, line, faces->vertices[face], &found);
-            int at = count++;
-            for (; at > 0 && crossings[at - 1].z > found.z; at--) crossings[at] = crossings[at - 1];
-            crossings[at] = found;
+            count = insert_crossing(crossings, count, &found);
         }
     }
     return count;
 }
 
+static double triangle_value(const reference_cell *cell, const reference_line *line, const int *triangle,
+                             const double *values)
+{
+    double weights[3], value = 0;
+    triangle_weights(cell, line, triangle, weights);
+    for (int i = 0; i < 3; i++) value += weights[i] * values[triangle[i]];
+    return value;
+}
+
 double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
                             const double *values, bool *is_folded)
 {
-    const int *face = faces_of(cell->type)->vertices[crossing->face];
+    const bool is_polyhedron = cell->type == GRID_POLYHEDRON;
+    const int *face = is_polyhedron ? cell->poly.faces[crossing->face] : faces_of(cell->type)->vertices[crossing->face];
+    const bool is_quad = is_polyhedron ? cell->poly.face_size[crossing->face] == 4 : face[3] >= 0;
     *is_folded = crossing->is_folded;
-    if (face[3] < 0) {
-        double weights[3], value = 0;
-        triangle_weights(cell, line, face, weights);
-        for (int i = 0; i < 3; i++) value += weights[i] * values[face[i]];
-        return value;
-    }
+    if (!is_quad)
+        return triangle_value(cell, line, is_polyhedron ? cell->poly.triangles[crossing->triangle] : face, values);
     const double corners[4] = {values[face[0]], values[face[1]], values[face[2]], values[face[3]]};
     return bilinear(corners, crossing->u, crossing->w);
 }
@@ -225,18 +256,97 @@ static double segment_distance(const double *a, const double *b)
 
 double reference_edge_distance(const reference_cell *cell, const reference_line *line)
 {
+    const bool is_polyhedron = cell->type == GRID_POLYHEDRON;
     const cell_faces *faces = faces_of(cell->type);
+    const int face_count = is_polyhedron ? cell->poly.face_count : faces->count;
     double least = (double)INFINITY;
-    for (int face = 0; face < faces->count; face++) {
-        const int sides = faces->vertices[face][3] < 0 ? 3 : 4;
+    for (int face = 0; face < face_count; face++) {
+        const int *loop = is_polyhedron ? cell->poly.faces[face] : faces->vertices[face];
+        const int sides = is_polyhedron ? cell->poly.face_size[face] : loop[3] < 0 ? 3 : 4;
         for (int i = 0; i < sides; i++) {
             double a[2], b[2];
-            shear(line, cell->position[faces->vertices[face][i]], a);
-            shear(line, cell->position[faces->vertices[face][(i + 1) % sides]], b);
+            shear(line, cell->position[loop[i]], a);
+            shear(line, cell->position[loop[(i + 1) % sides]], b);
             least = fmin(least, segment_distance(a, b));
         }
     }
     return least;
+}
+
+/* ---- a polyhedron along a line ---- */
+
+static bool sum_on_line(const reference_cell *cell, const reference_line *line, double z, const double *values,
+                        double *value)
+{
+    const double point[3] = {line->base[0] + line->slope[0] * z, line->base[1] + line->slope[1] * z, z};
+    return reference_polyhedron_interpolate(cell, point, values, value, NULL);
+}
+
+/* The value from which the profile starts at a crossing; inward: towards the other one. */
+static double profile_end(const reference_cell *cell, const reference_line *line, const reference_crossing *end,
+                          const double *values, double inward)
+{
+    double sum;
+    bool is_folded;
+    const double face = reference_face_value(cell, line, end, values, &is_folded);
+    const double triangle = triangle_value(cell, line, cell->poly.triangles[end->triangle], values);
+    /* A little inside: the error is that much of the field's change in the cell. */
+    if (!sum_on_line(cell, line, end->z_triangle + 1e-10 * inward, values, &sum)) sum = triangle;
+    return face + (sum - triangle);
+}
+
+static int insert_depth(double *z, int count, double depth)
+{
+    int at = count;
+    for (; at > 0 && z[at - 1] > depth; at--) z[at] = z[at - 1];
+    z[at] = depth;
+    return count + 1;
+}
+
+int reference_profile_breaks(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
+                             double z[REFERENCE_MAX_BREAKS])
+{
+    int count = insert_depth(z, insert_depth(z, 0, ends[0].z), ends[1].z);
+    for (int i = 0; i < cell->poly.triangle_count; i++)
+        for (int k = 0; k < 3; k++) {
+            const int *t = cell->poly.triangles[i], sheet[3] = {t[k], t[(k + 1) % 3], cell->count};
+            reference_crossing met;
+            const double low = fmax(ends[0].z, ends[0].z_triangle), high = fmin(ends[1].z, ends[1].z_triangle);
+            if (triangle_crossed(cell, line, sheet, &met) && met.z > low && met.z < high)
+                count = insert_depth(z, count, met.z);
+        }
+    return count;
+}
+
+bool reference_profile_value(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
+                             const double *values, double z, double *value)
+{
+    const double length = ends[1].z - ends[0].z;
+    double breaks[REFERENCE_MAX_BREAKS], v0, v1;
+    const int count = reference_profile_breaks(cell, line, ends, breaks);
+    int next = 1;
+    while (next < count - 1 && breaks[next] <= z) next++;
+    const double before = breaks[next - 1], behind = breaks[next];
+    /* From triangles on the profile is the sum itself. */
+    const bool is_first = next == 1 && cell->poly.face_size[ends[0].face] == 4;
+    const bool is_last = next == count - 1 && cell->poly.face_size[ends[1].face] == 4;
+    if (!is_first && !is_last) {
+        const double inner = 1e-9 * length;
+        return sum_on_line(cell, line, fmin(fmax(z, ends[0].z + inner), ends[1].z - inner), values, value);
+    }
+    /* Sums a little inside the piece: a sheet may lie in the face at the other end. */
+    const double aside = 1e-9 * (behind - before);
+    bool is_good = true;
+    if (next == 1)
+        v0 = profile_end(cell, line, &ends[0], values, length);
+    else
+        is_good = sum_on_line(cell, line, before + aside, values, &v0);
+    if (next == count - 1)
+        v1 = profile_end(cell, line, &ends[1], values, -length);
+    else
+        is_good = sum_on_line(cell, line, behind - aside, values, &v1) && is_good;
+    *value = behind > before ? v0 + (z - before) / (behind - before) * (v1 - v0) : v0;
+    return is_good;
 }
 
 /* One vertex's weight and its derivatives by the parameters. */
@@ -443,6 +553,7 @@ bool reference_interpolate(const reference_cell *cell, const double point[3], co
     double parameter[3];
     *value = 0;
     if (gradient) gradient[0] = gradient[1] = gradient[2] = 0;
+    if (cell->type == GRID_POLYHEDRON) return reference_polyhedron_interpolate(cell, point, values, value, gradient);
     if (cell->type == GRID_PYRAMID) return interpolate_pyramid(cell, point, values, value, gradient);
     if (!invert(cell, point, parameter)) return false;
     if (gradient) gradient_at(cell, parameter, values, gradient);

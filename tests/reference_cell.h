@@ -5,12 +5,26 @@
 
 #include <stdbool.h>
 
+enum { REFERENCE_MAX_VERTICES = 96, REFERENCE_MAX_FACES = 64, REFERENCE_MAX_SIDES = 24, REFERENCE_MAX_TRIANGLES = 192 };
+
+/* What a polyhedron has beyond its vertices. */
+typedef struct reference_polyhedron {
+    int face_count;
+    int face_size[REFERENCE_MAX_FACES];
+    int faces[REFERENCE_MAX_FACES][REFERENCE_MAX_SIDES]; /* numbers of the cell's vertices, around */
+    int triangle_count;
+    int triangles[REFERENCE_MAX_TRIANGLES][3]; /* the canonical ones */
+    int face_of[REFERENCE_MAX_TRIANGLES];
+    int sign[REFERENCE_MAX_TRIANGLES]; /* of the tet with the centre */
+} reference_polyhedron;
+
 /* A cell in camera coordinates (right, up, forward from the eye). */
 typedef struct reference_cell {
     int type; /* GRID_* */
     int count;
-    double world[8][3]; /* as the simulation has them: decides how quads are split */
-    double position[8][3];
+    double world[REFERENCE_MAX_VERTICES][3];        /* as the simulation has them: decides how faces are split */
+    double position[REFERENCE_MAX_VERTICES + 1][3]; /* a polyhedron's centre behind its vertices */
+    reference_polyhedron poly;                      /* of polyhedra alone */
 } reference_cell;
 
 /* The ray x = base[0] + slope[0] z, y = base[1] + slope[1] z of camera coordinates. */
@@ -23,17 +37,39 @@ typedef struct reference_line {
 typedef struct reference_crossing {
     double z;
     int face;
+    int triangle;      /* of a polyhedron */
+    double z_triangle; /* where the triangle is met */
     double u, w;
     bool is_folded; /* the patch has no or no single such point: z is the triangle's */
 } reference_crossing;
 
-enum { REFERENCE_MAX_CROSSINGS = 12 };
+enum { REFERENCE_MAX_CROSSINGS = REFERENCE_MAX_TRIANGLES };
 
 /* Crossings sorted by z; their number is even for every line. */
 int reference_crossings(const reference_cell *cell, const reference_line *line,
                         reference_crossing crossings[REFERENCE_MAX_CROSSINGS]);
 
-/* The field at a crossing from the face's own vertices: linear on triangles, bilinear on quads. */
+/* Take a polyhedron apart: cell has its vertices (each once) and faces. */
+void reference_polyhedron_setup(reference_cell *cell);
+
+/* How near, in lengths, the point is to a sheet between two of the polyhedron's tets. */
+double reference_sheet_distance(const reference_cell *cell, const double point[3]);
+
+/* A polyhedron's field at depth z between two crossings: the sum over the tets that hold the point; and from a crossing
+ * to the next sheet linear along the line, from the face's own value, which on quads is the patch's. Where tets
+ * overlap at the crossing, what the others have there is added to the face's. False where no sum is found. */
+bool reference_profile_value(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
+                             const double *values, double z, double *value);
+
+enum { REFERENCE_MAX_BREAKS = 3 * REFERENCE_MAX_TRIANGLES + 2 };
+
+/* Where a polyhedron's profile bends: depths from the first crossing to the second, rising; sheets count where they are
+ * between both the faces and the triangles. Returns how many. */
+int reference_profile_breaks(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
+                             double z[REFERENCE_MAX_BREAKS]);
+
+/* The field at a crossing from the face's own vertices: linear on triangles, and on the triangles of faces of more than
+ * four; bilinear on quads. */
 double reference_face_value(const reference_cell *cell, const reference_line *line, const reference_crossing *crossing,
                             const double *values, bool *is_folded);
 

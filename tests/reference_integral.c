@@ -3,6 +3,8 @@
  * are found by halving. */
 #include "reference_integral.h"
 
+#include "reference_polyhedron.h"
+
 #include "reference_cell.h"
 
 #include <math.h>
@@ -11,7 +13,7 @@
 
 typedef struct placed_cell {
     reference_cell cell;
-    double values[8];
+    double values[REFERENCE_MAX_VERTICES];
 } placed_cell;
 
 struct reference_integral {
@@ -25,6 +27,7 @@ struct reference_integral {
 typedef struct stretch {
     const placed_cell *cell;
     double z_in, z_out;
+    reference_crossing ends[2];
 } stretch;
 
 /* What a stretch does to light: C and T. */
@@ -40,6 +43,7 @@ typedef struct sample {
 typedef struct course {
     const reference_integral *scene;
     const placed_cell *cell;
+    const reference_crossing *ends;
     reference_line line;
     double units; /* unit distances per z */
 } course;
@@ -88,11 +92,14 @@ static void add_cell(reference_integral *scene, int part, int64_t index)
     const render_job *job = scene->job;
     const grid *g = job->parts[part].cells;
     const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    int64_t vertices[REFERENCE_MAX_VERTICES];
     placed_cell *c = &scene->cells[scene->count];
     if (grid_is_ghost(g, index) || !job->volumes[0].field.ranges[part].low) return;
     c->cell.type = grid_cell_type(g, index);
-    c->cell.count = grid_cell_vertices(g, index, vertices);
+    if (c->cell.type == GRID_POLYHEDRON)
+        reference_polyhedron_read(g, index, &c->cell, vertices);
+    else
+        c->cell.count = grid_cell_vertices(g, index, vertices);
     if (!grid_cell_values(&job->volumes[0].field.fields[part], index, vertices, c->cell.count, c->values)) return;
     for (int i = 0; i < c->cell.count; i++) {
         double from_eye[3];
@@ -100,6 +107,7 @@ static void add_cell(reference_integral *scene, int part, int64_t index)
         for (int axis = 0; axis < 3; axis++) from_eye[axis] = c->cell.world[i][axis] - job->camera.eye[axis];
         for (int axis = 0; axis < 3; axis++) c->cell.position[i][axis] = dot(axes[axis], from_eye);
     }
+    if (c->cell.type == GRID_POLYHEDRON) reference_polyhedron_setup(&c->cell);
     scene->count++;
 }
 
@@ -126,7 +134,10 @@ static sample sample_at(const course *c, double z)
     const double point[3] = {c->line.base[0] + c->line.slope[0] * z, c->line.base[1] + c->line.slope[1] * z, z};
     double value;
     sample s;
-    reference_interpolate(&c->cell->cell, point, c->cell->values, &value, NULL);
+    if (c->cell->cell.type == GRID_POLYHEDRON)
+        reference_profile_value(&c->cell->cell, &c->line, c->ends, c->cell->values, z, &value);
+    else
+        reference_interpolate(&c->cell->cell, point, c->cell->values, &value, NULL);
     s.extinction = -log1p(-fmin(reference_opacity(t, value), 1 - 1e-15)) * c->units;
     reference_colour(t, value, s.colour);
     return s;
@@ -215,7 +226,8 @@ static stretch *collect(const reference_integral *scene, const reference_line *l
         for (int k = 0; k + 1 < found; k += 2) {
             if (!(crossings[k + 1].z > fmax(crossings[k].z, 0))) continue;
             if (*count == capacity) list = reserve(list, (size_t)(capacity = 2 * capacity + 64) * sizeof *list);
-            list[(*count)++] = (stretch){&scene->cells[i], fmax(crossings[k].z, 0), crossings[k + 1].z};
+            list[(*count)++] = (stretch){
+                &scene->cells[i], fmax(crossings[k].z, 0), crossings[k + 1].z, {crossings[k], crossings[k + 1]}};
         }
     }
     if (*count) qsort(list, (size_t)*count, sizeof *list, compare_stretches);
@@ -257,6 +269,7 @@ void reference_integral_trace(const reference_integral *scene, int x, int y, con
     for (int64_t i = 0; i < count; i++) {
         double from = list[i].z_in;
         c.cell = list[i].cell;
+        c.ends = list[i].ends;
         for (; next < hit_count && hits[next].depth < list[i].z_out; next++) {
             if (hits[next].depth > from && sum.transmittance > 0) {
                 const light part = integrate(&c, from, hits[next].depth);

@@ -7,6 +7,7 @@
 #include "reference_render.h"
 
 #include "reference_cell.h"
+#include "reference_polyhedron.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,8 +45,9 @@ typedef struct placed_cell {
     const render_part *part;
     int part_index;
     int64_t index;
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    int64_t vertices[REFERENCE_MAX_VERTICES];
     reference_cell cell;
+    reference_crossing ends[2]; /* of the interval at hand */
     double size;
 } placed_cell;
 
@@ -175,7 +177,10 @@ static double value_along(trace *t, const placed_cell *c, const double *values, 
 {
     double point[3], value;
     line_at(t, z, point);
-    if (!reference_interpolate(&c->cell, point, values, &value, NULL)) t->out->map_failed = true;
+    const bool is_found = c->cell.type == GRID_POLYHEDRON
+                              ? reference_profile_value(&c->cell, &t->line, c->ends, values, z, &value)
+                              : reference_interpolate(&c->cell, point, values, &value, NULL);
+    if (!is_found) t->out->map_failed = true;
     return value;
 }
 
@@ -301,6 +306,33 @@ static int crossing_fence(const along *a, double z_in, double z_out, double *z, 
     return n;
 }
 
+/* A polyhedron's first root: on the first piece of the profile whose end has the other side. */
+static double first_root(trace *t, const placed_cell *c, const double *values, double iso, bool side_in)
+{
+    double breaks[REFERENCE_MAX_BREAKS];
+    const int count = reference_profile_breaks(&c->cell, &t->line, c->ends, breaks);
+    int k = 1;
+    while (k < count - 1 && (value_along(t, c, values, breaks[k]) >= iso) == side_in) k++;
+    return bisect(t, c, values, iso, breaks[k - 1], breaks[k], side_in);
+}
+
+/* Does the inside at an end contradict the face? */
+static bool is_contradicted(trace *t, const placed_cell *c, const double *values, double iso, const bool side[2])
+{
+    double inside[2];
+    for (int i = 0; i < 2; i++)
+        if (!reference_profile_value(&c->cell, &t->line, c->ends, values, c->ends[i].z, &inside[i]))
+            t->out->map_failed = true;
+    return (inside[0] >= iso) != side[0] || (inside[1] >= iso) != side[1];
+}
+
+static void keep_off_sheets(trace *t, const placed_cell *c, double z)
+{
+    double point[3];
+    line_at(t, z, point);
+    lessen(&t->out->value_margin, reference_sheet_distance(&c->cell, point) / c->size);
+}
+
 static void range_of(const double *values, int count, double *low, double *high)
 {
     *low = *high = values[0];
@@ -316,15 +348,14 @@ static void to_world(const render_camera *camera, const double v[3], double worl
         world[axis] = camera->right[axis] * v[0] + camera->up[axis] * v[1] + camera->forward[axis] * v[2];
 }
 
-static void surface_colour(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index,
-                           const double point[3], double colour[3])
+static void surface_colour(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, double z,
+                           double colour[3])
 {
     for (int k = 0; k < 3; k++) colour[k] = layer->colour_map ? 0 : (double)layer->colours[3 * value_index + k];
     if (!layer->colour_map) return;
-    double values[8], value;
+    double values[REFERENCE_MAX_VERTICES];
     grid_cell_values(&layer->colour_field.fields[c->part_index], c->index, c->vertices, c->cell.count, values);
-    if (!reference_interpolate(&c->cell, point, values, &value, NULL)) t->out->map_failed = true;
-    table_colour(layer->colour_map, value, colour);
+    table_colour(layer->colour_map, value_along(t, c, values, z), colour);
 }
 
 static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index,
@@ -338,7 +369,12 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     e->hit.cell = c->index;
     e->hit.opacity = (double)layer->opacity;
     e->transmittance = 1 - e->hit.opacity;
-    line_at(t, depth, point);
+    double z = depth;
+    if (c->cell.type == GRID_POLYHEDRON) { /* a quad's patch may stand out of the tets */
+        const double inner = 1e-9 * (c->ends[1].z_triangle - c->ends[0].z_triangle);
+        z = fmin(fmax(depth, c->ends[0].z_triangle + inner), c->ends[1].z_triangle - inner);
+    }
+    line_at(t, z, point);
     reference_interpolate(&c->cell, point, values, &value, gradient);
     to_world(&t->scene->job->camera, gradient, e->hit.normal);
     normalize(e->hit.normal);
@@ -346,7 +382,7 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
     e->hit.conditioning = 1 / fabs(along);
     e->blur = c->size * e->hit.conditioning;
-    surface_colour(t, c, layer, value_index, point, colour);
+    surface_colour(t, c, layer, value_index, depth, colour);
     shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);
     return &e->hit;
 }
@@ -389,16 +425,22 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
         const double iso = layer->values[i];
         for (int end = 0; end < 2 && high > low; end++)
             lessen(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
-        if (layer->root == RENDER_ROBUST && c->cell.type != GRID_TET) {
+        if (layer->root == RENDER_ROBUST && c->cell.type != GRID_TET && c->cell.type != GRID_POLYHEDRON) {
             cross_every(t, c, layer, i, first_surface + i, values, ends, face);
             continue;
         }
         const bool side = face[0] >= iso;
         if (side == (face[1] >= iso) || ends[1].z < 0) continue;
-        const double z = bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
-        if (is_ambiguous(t, c, values, iso, ends[0].z, ends[1].z, side)) t->out->ambiguous = true;
+        const bool is_polyhedron = c->cell.type == GRID_POLYHEDRON;
+        const double z =
+            is_polyhedron ? first_root(t, c, values, iso, side) : bisect(t, c, values, iso, ends[0].z, ends[1].z, side);
+        const bool is_ambiguous_here = is_polyhedron ? is_contradicted(t, c, values, iso, (const bool[2]){side, !side})
+                                                     : is_ambiguous(t, c, values, iso, ends[0].z, ends[1].z, side);
+        if (is_ambiguous_here) t->out->ambiguous = true;
         lessen(&t->out->eye_margin, fabs(z) / c->size);
-        const double found = falsi(t, c, values, iso, ends, face, layer->root_steps);
+        /* In polyhedra kernels solve each linear piece, and the normal jumps from piece to piece. */
+        const double found = is_polyhedron ? z : falsi(t, c, values, iso, ends, face, layer->root_steps);
+        if (is_polyhedron) keep_off_sheets(t, c, z);
         if ((found < 0) != (z < 0)) t->out->ambiguous = true;
         if (z < 0) continue;
         add_hit(t, c, layer, i, first_surface + i, values, z)->falsi_error = fabs(found - z);
@@ -410,7 +452,7 @@ static void cross_surfaces(trace *t, const placed_cell *c, const reference_cross
     const render_job *job = t->scene->job;
     for (int layer = 0, first = 0; layer < job->surface_count; first += job->surfaces[layer++].value_count) {
         const render_surface_layer *s = &job->surfaces[layer];
-        double values[8];
+        double values[REFERENCE_MAX_VERTICES];
         if (!s->field.ranges[c->part_index].low) continue;
         if (grid_cell_values(&s->field.fields[c->part_index], c->index, c->vertices, c->cell.count, values))
             cross_surface(t, c, s, first, values, ends);
@@ -454,7 +496,7 @@ static void cross_volumes(trace *t, const placed_cell *c, const reference_crossi
     const render_job *job = t->scene->job;
     for (int layer = 0; layer < job->volume_count; layer++) {
         const render_field *field = &job->volumes[layer].field;
-        double values[8];
+        double values[REFERENCE_MAX_VERTICES];
         if (!field->ranges[c->part_index].low) continue;
         if (grid_cell_values(&field->fields[c->part_index], c->index, c->vertices, c->cell.count, values))
             cross_volume(t, c, layer, values, ends);
@@ -470,7 +512,10 @@ static void place_cell(const reference_scene *scene, int part, int64_t index, pl
     c->part_index = part;
     c->index = index;
     c->cell.type = grid_cell_type(c->part->cells, index);
-    c->cell.count = grid_cell_vertices(c->part->cells, index, c->vertices);
+    if (c->cell.type == GRID_POLYHEDRON)
+        reference_polyhedron_read(c->part->cells, index, &c->cell, c->vertices);
+    else
+        c->cell.count = grid_cell_vertices(c->part->cells, index, c->vertices);
     for (int i = 0; i < c->cell.count; i++) {
         grid_vertex(c->part->cells, c->vertices[i], c->cell.world[i]);
         memcpy(c->cell.position[i], scene->positions[part] + 3 * c->vertices[i], sizeof c->cell.position[i]);
@@ -483,6 +528,7 @@ static void place_cell(const reference_scene *scene, int part, int64_t index, pl
         }
         longest = fmax(longest, high[axis] - low[axis]);
     }
+    if (c->cell.type == GRID_POLYHEDRON) reference_polyhedron_setup(&c->cell);
     for (int axis = 0; axis < 3; axis++) volume *= fmax(high[axis] - low[axis], 1e-3 * longest);
     c->size = longest > 0 ? cbrt(volume) : 1;
 }
@@ -491,12 +537,12 @@ static void place_cell(const reference_scene *scene, int part, int64_t index, pl
 static bool is_near(const trace *t, int part, int64_t index)
 {
     const grid *g = t->scene->job->parts[part].cells;
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
-    const int count = grid_cell_vertices(g, index, vertices);
     for (int axis = 0; axis < 2; axis++) {
         double low = (double)INFINITY, high = -(double)INFINITY;
-        for (int i = 0; i < count; i++) {
-            const double *p = t->scene->positions[part] + 3 * vertices[i];
+        grid_walk walk = grid_walk_cell(g, index);
+        int64_t vertex;
+        while (grid_walk_next(&walk, &vertex)) {
+            const double *p = t->scene->positions[part] + 3 * vertex;
             const double u = p[axis] - t->line.base[axis] - t->line.slope[axis] * p[2];
             low = fmin(low, u);
             high = fmax(high, u);
@@ -516,6 +562,7 @@ static void cross_cell(trace *t, int part, int64_t index)
     lessen(&t->out->edge_margin, reference_edge_distance(&c.cell, &t->line) / c.size);
     const int count = reference_crossings(&c.cell, &t->line, crossings);
     for (int i = 0; i + 1 < count; i += 2) {
+        memcpy(c.ends, crossings + i, sizeof c.ends);
         cross_surfaces(t, &c, crossings + i);
         cross_volumes(t, &c, crossings + i);
     }

@@ -3,7 +3,8 @@ add_library(test_meshes STATIC test_meshes.c)
 target_include_directories(test_meshes PUBLIC . ${PROJECT_SOURCE_DIR}/libinsitu/base)
 target_link_libraries(test_meshes PUBLIC m PRIVATE insitu_flags)
 
-add_library(test_render_support STATIC reference_cell.c reference_integral.c reference_render.c test_render_fixture.c)
+add_library(test_render_support STATIC
+  reference_cell.c reference_integral.c reference_polyhedron.c reference_render.c test_render_fixture.c)
 target_link_libraries(test_render_support
   PUBLIC test_meshes insitu_internal PkgConfig::CMOCKA PRIVATE insitu_flags)
 
@@ -64,3 +65,7 @@ set_tests_properties(roots PROPERTIES TIMEOUT 120)
 insitu_render_program(test_hits)
 add_test(NAME hits COMMAND test_hits)
 set_tests_properties(hits PROPERTIES TIMEOUT 180)
+
+insitu_render_program(test_render_polyhedra)
+add_test(NAME render_polyhedra COMMAND test_render_polyhedra)
+set_tests_properties(render_polyhedra PROPERTIES TIMEOUT 120)

@@ -13,20 +13,25 @@ typedef double test_function(const double position[3]);
 
 typedef struct test_mesh {
     int64_t vertex_count, cell_count, connectivity_count;
-    double *coordinates; /* vertex_count × 3 */
-    double *values;      /* vertex_count */
-    int64_t *offsets;    /* cell_count + 1 */
-    int64_t *connectivity;
+    double *coordinates;                         /* vertex_count × 3 */
+    double *values;                              /* vertex_count */
+    int64_t *offsets;                            /* cell_count + 1 */
+    int64_t *connectivity;                       /* vertices; of polyhedra faces */
+    int64_t face_count, face_connectivity_count; /* 0 where there are no polyhedra */
+    int64_t *face_offsets;                       /* face_count + 1; NULL as well */
+    int64_t *face_connectivity;
     unsigned char *types;  /* cell_count, VTK's ids */
     unsigned char *ghosts; /* cell_count, 0 at first */
 } test_mesh;
 
 typedef enum test_mesh_kind {
-    TEST_TETS,     /* six conforming tets a cube, about its main diagonal */
-    TEST_HEXES,    /* with warped faces, where jittered */
-    TEST_WEDGES,   /* two a cube */
-    TEST_PYRAMIDS, /* six a cube, about its centre */
-    TEST_MIXED, /* all four, conforming: every second cube a hex, wedges or tets, those between of pyramids and tets */
+    TEST_TETS,      /* six conforming tets a cube, about its main diagonal */
+    TEST_HEXES,     /* with warped faces, where jittered */
+    TEST_WEDGES,    /* two a cube */
+    TEST_PYRAMIDS,  /* six a cube, about its centre */
+    TEST_POLYHEDRA, /* one to six tets of the tets' lattice grown together: concave, and not all star-shaped */
+    TEST_MIXED, /* all four others, conforming: every second cube a hex, wedges or tets, those between of pyramids and
+                   tets */
     TEST_KIND_COUNT
 } test_mesh_kind;
 
@@ -56,6 +61,23 @@ const char *test_cell_shape_name(test_cell_shape shape);
 
 void test_mesh_single(test_cell_shape shape, test_function *f, test_mesh *out);
 
+typedef enum test_polyhedron_shape {
+    TEST_L_PRISM,     /* the base a hexagon with a corner cut out */
+    TEST_U_PRISM,     /* not star-shaped, and the centre outside; a ray may enter twice */
+    TEST_SPIKES,      /* an octahedron with a spike on every face: concave, star-shaped */
+    TEST_BENT_SPIKES, /* the spikes bent over: not star-shaped */
+    TEST_CAVITY,      /* a cube with a cube cut out of its inside */
+    TEST_POLYHEDRON_COUNT
+} test_polyhedron_shape;
+
+const char *test_polyhedron_name(test_polyhedron_shape shape);
+
+void test_mesh_polyhedron(test_polyhedron_shape shape, test_function *f, test_mesh *out);
+
+/* Make cells of the four types into polyhedra with the same vertices and faces, shared between them: a share of them
+ * chosen by a hash, 1 for all. */
+void test_mesh_to_polyhedra(test_mesh *mesh, double share);
+
 void test_mesh_set_values(test_mesh *mesh, test_function *f);
 void test_mesh_free(test_mesh *mesh);
 
@@ -68,7 +90,8 @@ void test_mesh_mirror(test_mesh *mesh, bool every_second);
 /* Another order of the cells and of the vertices. The same geometry and field. */
 void test_mesh_shuffle(test_mesh *mesh, uint64_t seed);
 
-/* Each cell's vertices by a random symmetry of its kind (rotations and mirrors). The same geometry and field. */
+/* Each cell's vertices by a random symmetry of its kind (rotations and mirrors); faces begun at another vertex and run
+ * the other way, a polyhedron's faces in another order. The same geometry and field. */
 void test_mesh_turn(test_mesh *mesh, uint64_t seed);
 
 /* position * scale + offset. */
@@ -98,7 +121,7 @@ typedef struct test_layout {
 typedef struct test_view {
     grid cells;
     grid_field field;
-    void *storage[6];
+    void *storage[8];
 } test_view;
 
 /* Copies: the mesh may be freed. */

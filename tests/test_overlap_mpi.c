@@ -34,7 +34,19 @@ static void *grown(void *block, int64_t count, size_t size, const void *more, in
 /* The cells of both; more is freed. */
 static void join(test_mesh *mesh, test_mesh *more)
 {
-    for (int64_t i = 0; i < more->connectivity_count; i++) more->connectivity[i] += mesh->vertex_count;
+    for (int64_t cell = 0; cell < more->cell_count; cell++) {
+        const int64_t by = more->types[cell] == GRID_POLYHEDRON ? mesh->face_count : mesh->vertex_count;
+        for (int64_t i = more->offsets[cell]; i < more->offsets[cell + 1]; i++) more->connectivity[i] += by;
+    }
+    if (more->face_count) {
+        for (int64_t i = 0; i < more->face_connectivity_count; i++) more->face_connectivity[i] += mesh->vertex_count;
+        for (int64_t i = 0; i <= more->face_count; i++) more->face_offsets[i] += mesh->face_connectivity_count;
+        mesh->face_connectivity = grown(mesh->face_connectivity, mesh->face_connectivity_count, 8,
+                                        more->face_connectivity, more->face_connectivity_count);
+        mesh->face_offsets = grown(mesh->face_offsets, mesh->face_count, 8, more->face_offsets, more->face_count + 1);
+        mesh->face_connectivity_count += more->face_connectivity_count;
+        mesh->face_count += more->face_count;
+    }
     for (int64_t i = 0; i <= more->cell_count; i++) more->offsets[i] += mesh->connectivity_count;
     mesh->coordinates = grown(mesh->coordinates, 3 * mesh->vertex_count, 8, more->coordinates, 3 * more->vertex_count);
     mesh->values = grown(mesh->values, mesh->vertex_count, 8, more->values, more->vertex_count);

@@ -10,16 +10,37 @@
 #include <cmocka.h>
 
 /* A single cell seen by a camera at the origin that looks along z: camera coordinates are the world's. */
-static void load_cell(const test_mesh *mesh, int64_t index, reference_cell *cell, double values[8])
+static int add_vertex(const test_mesh *mesh, int64_t v, int64_t *met, reference_cell *cell, double *values)
 {
+    int at = 0;
+    while (at < cell->count && met[at] != v) at++;
+    if (at < cell->count && cell->type == GRID_POLYHEDRON) return at;
+    at = cell->count++;
+    met[at] = v;
+    memcpy(cell->world[at], mesh->coordinates + 3 * v, sizeof cell->world[at]);
+    memcpy(cell->position[at], mesh->coordinates + 3 * v, sizeof cell->position[at]);
+    values[at] = mesh->values[v];
+    return at;
+}
+
+static void load_cell(const test_mesh *mesh, int64_t index, reference_cell *cell, double values[REFERENCE_MAX_VERTICES])
+{
+    int64_t met[REFERENCE_MAX_VERTICES];
     cell->type = mesh->types[index];
-    cell->count = grid_type_vertices(cell->type);
-    for (int i = 0; i < cell->count; i++) {
-        const int64_t v = mesh->connectivity[mesh->offsets[index] + i];
-        memcpy(cell->world[i], mesh->coordinates + 3 * v, sizeof cell->world[i]);
-        memcpy(cell->position[i], mesh->coordinates + 3 * v, sizeof cell->position[i]);
-        values[i] = mesh->values[v];
+    cell->count = cell->poly.face_count = 0;
+    for (int64_t i = mesh->offsets[index]; i < mesh->offsets[index + 1]; i++) {
+        const int64_t entry = mesh->connectivity[i];
+        if (cell->type != GRID_POLYHEDRON) {
+            add_vertex(mesh, entry, met, cell, values);
+            continue;
+        }
+        const int face = cell->poly.face_count++;
+        const int64_t first = mesh->face_offsets[entry], end = mesh->face_offsets[entry + 1];
+        cell->poly.face_size[face] = (int)(end - first);
+        for (int64_t k = first; k < end; k++)
+            cell->poly.faces[face][k - first] = add_vertex(mesh, mesh->face_connectivity[k], met, cell, values);
     }
+    if (cell->type == GRID_POLYHEDRON) reference_polyhedron_setup(cell);
 }
 
 static reference_line random_line(uint64_t index)
@@ -33,7 +54,7 @@ static void crossings_of_unit_hex_are_those_of_its_slabs(void **state)
     (void)state;
     test_mesh mesh;
     reference_cell cell;
-    double values[8];
+    double values[REFERENCE_MAX_VERTICES];
     int met = 0;
     test_mesh_single(TEST_UNIT_HEX, test_linear, &mesh);
     load_cell(&mesh, 0, &cell, values);
@@ -77,7 +98,7 @@ static void crossings_of_every_shape_are_even(void **state)
     for (test_cell_shape shape = 0; shape < TEST_SHAPE_COUNT; shape++) {
         test_mesh mesh;
         reference_cell cell;
-        double values[8];
+        double values[REFERENCE_MAX_VERTICES];
         test_mesh_single(shape, test_linear, &mesh);
         load_cell(&mesh, 0, &cell, values);
         for (uint64_t i = 0; i < 3000; i++) {
@@ -103,7 +124,7 @@ static void intervals_of_lattices_tile_the_ray(void **state)
             double length = 0, low = 0, high = 0;
             for (int64_t index = 0; index < mesh.cell_count; index++) {
                 reference_cell cell;
-                double values[8];
+                double values[REFERENCE_MAX_VERTICES];
                 reference_crossing c[REFERENCE_MAX_CROSSINGS];
                 load_cell(&mesh, index, &cell, values);
                 const int count = reference_crossings(&cell, &line, c);
@@ -140,7 +161,7 @@ static void linear_field_is_exact_in_every_cell(void **state)
     for (test_cell_shape shape = 0; shape < TEST_FLAT_TET; shape++) {
         test_mesh mesh;
         reference_cell cell;
-        double values[8];
+        double values[REFERENCE_MAX_VERTICES];
         test_mesh_single(shape, test_linear, &mesh);
         load_cell(&mesh, 0, &cell, values);
         /* Rounding of values (1e-16) over the thinnest extent (1e-4) for the gradient. */
@@ -166,7 +187,7 @@ static void trilinear_field_is_exact_in_a_box(void **state)
     (void)state;
     test_mesh mesh;
     reference_cell cell;
-    double values[8];
+    double values[REFERENCE_MAX_VERTICES];
     test_mesh_single(TEST_UNIT_HEX, cubic, &mesh);
     load_cell(&mesh, 0, &cell, values);
     for (uint64_t i = 0; i < 300; i++) {
@@ -190,7 +211,7 @@ static void gradient_agrees_with_differences(void **state)
         if (shape == TEST_SLIVER_TET) continue;
         test_mesh mesh;
         reference_cell cell;
-        double values[8];
+        double values[REFERENCE_MAX_VERTICES];
         test_mesh_single(shape, test_wave, &mesh);
         load_cell(&mesh, 0, &cell, values);
         for (uint64_t i = 0; i < 100; i++) {
@@ -219,7 +240,7 @@ static void face_values_join_the_interior(void **state)
     for (size_t s = 0; s < sizeof shapes / sizeof shapes[0]; s++) {
         test_mesh mesh;
         reference_cell cell;
-        double values[8];
+        double values[REFERENCE_MAX_VERTICES];
         test_mesh_single(shapes[s], test_wave, &mesh);
         load_cell(&mesh, 0, &cell, values);
         for (uint64_t i = 0; i < 500; i++) {

@@ -332,8 +332,15 @@ static void parent_tree_changes_nothing(void **state)
 
 static bool touches(const test_mesh *mesh, int64_t cell)
 {
-    for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++)
-        if (!isfinite(mesh->values[mesh->connectivity[i]])) return true;
+    for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++) {
+        const int64_t entry = mesh->connectivity[i];
+        if (mesh->types[cell] != GRID_POLYHEDRON) {
+            if (!isfinite(mesh->values[entry])) return true;
+            continue;
+        }
+        for (int64_t k = mesh->face_offsets[entry]; k < mesh->face_offsets[entry + 1]; k++)
+            if (!isfinite(mesh->values[mesh->face_connectivity[k]])) return true;
+    }
     return false;
 }
 

@@ -90,6 +90,10 @@ void input_describe(session_input *in)
     mesh->cell_types = (insitu_array){part->types, INSITU_UINT8, 0};
     mesh->offsets = (insitu_array){part->offsets, INSITU_INT64, 0};
     mesh->ghosts = (insitu_array){part->ghosts, INSITU_UINT8, 0};
+    mesh->face_count = part->face_count;
+    mesh->face_offsets = (insitu_array){part->face_offsets, INSITU_INT64, 0};
+    mesh->face_connectivity_count = part->face_connectivity_count;
+    mesh->face_connectivity = (insitu_array){part->face_connectivity, INSITU_INT64, 0};
     insitu_field_defaults(&in->field);
     in->field.name = "f";
     in->field.count = part->vertex_count;

@@ -69,7 +69,7 @@ static void types_without_offsets(session_input *in)
 static void one_type_unknown(session_input *in)
 {
     in->mesh.cell_types.data = NULL;
-    in->mesh.cell_type = (insitu_cell_type)42;
+    in->mesh.cell_type = (insitu_cell_type)41;
 }
 static void one_type_wrong_count(session_input *in)
 {
@@ -176,7 +176,7 @@ static const spoilt_case cases[] = {
     {"last offset", offsets_end_early, INSITU_ERROR_MESH, false, {"the last offset is ", "not connectivity_count"}},
     {"unknown type", type_unknown, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 9"}},
     {"types alone", types_without_offsets, INSITU_ERROR_MESH, true, {"offsets are not given"}},
-    {"one unknown type", one_type_unknown, INSITU_ERROR_MESH, true, {"unknown cell_type 42"}},
+    {"one unknown type", one_type_unknown, INSITU_ERROR_MESH, true, {"unknown cell_type 41"}},
     {"one type's count", one_type_wrong_count, INSITU_ERROR_MESH, true, {"connectivity_count is ", "of 6 vertices"}},
     {"no coordinates", no_coordinates, INSITU_ERROR_MESH, true, {"z coordinates are not given"}},
     {"no connectivity", no_connectivity, INSITU_ERROR_MESH, true, {"connectivity indices are not given"}},

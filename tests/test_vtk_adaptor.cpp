@@ -1,8 +1,11 @@
 /* What the VTK adaptor hands over: VTK's own pointers where it may, right conversions where it must. The session is a
  * stub that records. Volumes of split and reordered cells are compared with those computed here from the corner
  * positions; everything else is compared element by element with what VTK holds. */
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -330,7 +333,22 @@ void voxel_becomes_a_right_handed_hexahedron(void **)
     assert_non_null(strstr(f.report.copied_why, "voxels reordered"));
 }
 
-void prisms_split_into_parts_that_fill_them(void **)
+/* The set of points of a face, rising. */
+std::vector<int64_t> face_points(const insitu_mesh &m, int64_t face)
+{
+    std::vector<int64_t> points;
+    for (int64_t i = integer_at(m.face_offsets, face); i < integer_at(m.face_offsets, face + 1); i++)
+        points.push_back(integer_at(m.face_connectivity, i));
+    std::sort(points.begin(), points.end());
+    return points;
+}
+
+int64_t cell_size(const insitu_mesh &m, int64_t cell)
+{
+    return integer_at(m.offsets, cell + 1) - integer_at(m.offsets, cell);
+}
+
+void prisms_are_polyhedra_of_their_faces(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_cell(grid, VTK_PENTAGONAL_PRISM, prism(5));
@@ -343,23 +361,29 @@ void prisms_split_into_parts_that_fill_them(void **)
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
     const insitu_mesh &m = f.mesh().mesh;
-    assert_int_equal(m.cell_count, 4);
-    assert_int_equal(f.report.cells_split, 2);
-    const int types[4] = {INSITU_HEX, INSITU_WEDGE, INSITU_HEX, INSITU_HEX};
-    for (int i = 0; i < 4; i++) {
-        assert_int_equal(integer_at(m.cell_types, i), types[i]);
-        assert_true(cell_volume(m, i) > 0);
+    assert_int_equal(m.cell_count, 2);
+    assert_int_equal(m.face_count, 7 + 8);
+    assert_int_equal(f.report.cells_split, 0);
+    for (int sides = 5, first = 0; sides <= 6; first += 2 * sides, sides++) {
+        const int64_t cell = sides - 5;
+        assert_int_equal(integer_at(m.cell_types, cell), INSITU_POLYHEDRON);
+        assert_int_equal(cell_size(m, cell), sides + 2);
+        std::map<std::pair<int64_t, int64_t>, int> edges;
+        for (int64_t i = integer_at(m.offsets, cell); i < integer_at(m.offsets, cell + 1); i++) {
+            const int64_t face = integer_at(m.connectivity, i), begin = integer_at(m.face_offsets, face);
+            const int64_t size = integer_at(m.face_offsets, face + 1) - begin;
+            for (int64_t k = 0; k < size; k++) {
+                const int64_t a = integer_at(m.face_connectivity, begin + k);
+                const int64_t b = integer_at(m.face_connectivity, begin + (k + 1) % size);
+                assert_true(a >= first && a < first + 2 * sides);
+                edges[std::minmax(a, b)]++;
+            }
+        }
+        assert_int_equal(edges.size(), 3 * sides);
+        for (const auto &[edge, count] : edges) assert_int_equal(count, 2);
     }
-    for (int sides = 5; sides <= 6; sides++) {
-        const int64_t first = sides == 5 ? 0 : 2;
-        const double expected = 0.7 * sides / 2.0 * std::sin(2 * M_PI / sides);
-        assert_true(std::fabs(cell_volume(m, first) + cell_volume(m, first + 1) - expected) < rounding);
-    }
-    const insitu_field &c = f.mesh().fields.at("c");
-    const float expected[8] = {1, 2, 1, 2, 3, 4, 3, 4};
-    assert_int_equal(c.count, 4);
-    assert_memory_equal(c.values.data, expected, sizeof expected);
-    assert_non_null(strstr(f.report.copied_why, "prisms split"));
+    assert_ptr_equal(f.mesh().fields.at("c").values.data, value->GetPointer(0));
+    assert_non_null(strstr(f.report.copied_why, "faces of polyhedra and prisms shared"));
 }
 
 void quadratic_cells_are_their_corners_with_a_warning(void **)
@@ -427,23 +451,36 @@ void add_polyhedron(vtkUnstructuredGrid *grid)
     grid->InsertNextCell(VTK_POLYHEDRON, 4, ids, 4, faces);
 }
 
-void only_polyhedra_is_an_error_with_their_number(void **)
+/* Two tets on a common triangle as polyhedra: 7 faces, one of them in both. */
+void polyhedra_share_their_faces(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_polyhedron(grid);
-    add_polyhedron(grid);
+    const vtkIdType top = grid->GetPoints()->InsertNextPoint(2, 2, 2);
+    vtkIdType ids[4] = {1, 2, 3, top};
+    const vtkIdType faces[16] = {3, 3, 2, 1, 3, 1, 2, top, 3, 2, 3, top, 3, 3, 1, top};
+    grid->InsertNextCell(VTK_POLYHEDRON, 4, ids, 4, faces);
     fixture f;
-    assert_int_equal(f.set(grid), INSITU_ERROR_MESH);
-    assert_non_null(strstr(insitu_vtk_error(f.adaptor), "none of its 2 cells"));
-    assert_int_equal(f.report.cells_not_drawn, 2);
-    assert_true(f.session.meshes.empty());
+    assert_int_equal(f.set(grid), INSITU_OK);
+    const insitu_mesh &m = f.mesh().mesh;
+    assert_int_equal(m.cell_count, 2);
+    assert_int_equal(m.face_count, 7);
+    assert_int_equal(m.connectivity_count, 8);
+    std::set<int64_t> first, shared;
+    for (int64_t i = 0; i < 4; i++) first.insert(integer_at(m.connectivity, i));
+    for (int64_t i = 4; i < 8; i++)
+        if (first.count(integer_at(m.connectivity, i))) shared.insert(integer_at(m.connectivity, i));
+    assert_int_equal(shared.size(), 1);
+    assert_true(face_points(m, *shared.begin()) == (std::vector<int64_t>{1, 2, 3}));
+    assert_int_equal(f.report.bytes_copied, 2 + 3 * 8 + 8 * 8 + 8 * 8 + 21 * 8);
 }
 
-void some_polyhedra_are_warned_about(void **)
+void polyhedra_without_faces_are_warned_about(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_polyhedron(grid);
     add_cell(grid, VTK_TETRA, corner);
+    grid->GetFaces()->SetValue(0, 5); /* one face more than there is */
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
     assert_int_equal(f.report.cells, 1);
@@ -475,19 +512,21 @@ void ghost_flags_that_hide_are_handed_over(void **)
     assert_null(f.mesh().mesh.ghosts.data);
 }
 
-void ghost_flags_follow_split_cells(void **)
+void ghost_flags_follow_cells_left_out(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_cell(grid, VTK_TETRA, corner);
+    add_cell(grid, VTK_TRIANGLE, {corner.begin(), corner.begin() + 3});
     add_cell(grid, VTK_HEXAGONAL_PRISM, prism(6));
     vtkNew<vtkUnsignedCharArray> ghosts;
     ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
-    for (const unsigned char flag : std::initializer_list<unsigned char>{0, 1}) ghosts->InsertNextValue(flag);
+    for (const unsigned char flag : std::initializer_list<unsigned char>{0, 0, 1}) ghosts->InsertNextValue(flag);
     grid->GetCellData()->AddArray(ghosts);
     fixture f;
     assert_int_equal(f.set(grid), INSITU_OK);
-    const int64_t expected[3] = {0, 1, 1};
-    for (int i = 0; i < 3; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
+    const int64_t expected[2] = {0, 1};
+    assert_int_equal(f.mesh().mesh.cell_count, 2);
+    for (int i = 0; i < 2; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
 }
 
 void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
@@ -635,14 +674,14 @@ int main()
         cmocka_unit_test(other_value_types_are_copied_and_declared),
         cmocka_unit_test(integer_points_become_doubles),
         cmocka_unit_test(voxel_becomes_a_right_handed_hexahedron),
-        cmocka_unit_test(prisms_split_into_parts_that_fill_them),
+        cmocka_unit_test(prisms_are_polyhedra_of_their_faces),
         cmocka_unit_test(quadratic_cells_are_their_corners_with_a_warning),
         cmocka_unit_test(every_higher_order_type_has_its_linear_one),
         cmocka_unit_test(flat_cells_are_left_out_and_fields_follow),
-        cmocka_unit_test(only_polyhedra_is_an_error_with_their_number),
-        cmocka_unit_test(some_polyhedra_are_warned_about),
+        cmocka_unit_test(polyhedra_share_their_faces),
+        cmocka_unit_test(polyhedra_without_faces_are_warned_about),
         cmocka_unit_test(ghost_flags_that_hide_are_handed_over),
-        cmocka_unit_test(ghost_flags_follow_split_cells),
+        cmocka_unit_test(ghost_flags_follow_cells_left_out),
         cmocka_unit_test(leaves_of_composites_are_meshes_and_go_when_they_are_gone),
         cmocka_unit_test(arrays_outlive_the_data_set),
         cmocka_unit_test(one_name_at_points_and_cells_warns),

@@ -2,10 +2,12 @@
  * its points are their vertices. Where every cell of a grid is its own recipe (tets, hexes, wedges, pyramids) VTK's
  * arrays are handed over untouched; one cell that is not makes a new list of all.
  *
- * A voxel differs from a hexahedron by the order of its points. A pentagonal prism is cut along the quad that joins its
- * points 0, 3, 8, 5, a hexagonal one along 0, 3, 9, 6; the two parts share that quad, so the cut is conforming inside
- * the cell. Higher-order cells list their corners first, in the order of the linear cell. */
+ * A voxel differs from a hexahedron by the order of its points. Polyhedra and prisms of five and six sides are
+ * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). Higher-order cells list their corners first, in the
+ * order of the linear cell. */
 #include "vtk_cells.h"
+
+#include "vtk_faces.h"
 
 #include <array>
 
@@ -20,7 +22,7 @@ namespace insitu_vtk
 namespace
 {
 
-enum class kind { not_drawn, flat, as_it_is, reordered, split, linear };
+enum class kind { not_drawn, flat, as_it_is, reordered, faces, linear };
 
 struct piece {
     uint8_t type;
@@ -32,7 +34,7 @@ struct recipe {
     kind what = kind::not_drawn;
     int needed_points = 0;
     int piece_count = 0;
-    std::array<piece, 2> pieces{};
+    piece part{};
 };
 
 constexpr piece tet = {INSITU_TET, 4, {0, 1, 2, 3}};
@@ -45,7 +47,7 @@ using recipe_table = std::array<recipe, 256>;
 
 void add(recipe_table &table, kind what, const piece &of, std::initializer_list<int> types)
 {
-    for (const int type : types) table[static_cast<size_t>(type)] = {what, of.vertex_count, 1, {of, piece{}}};
+    for (const int type : types) table[static_cast<size_t>(type)] = {what, of.vertex_count, 1, of};
 }
 
 recipe_table make_recipes()
@@ -65,10 +67,9 @@ recipe_table make_recipes()
          VTK_BEZIER_WEDGE});
     add(table, kind::linear, pyramid,
         {VTK_QUADRATIC_PYRAMID, VTK_TRIQUADRATIC_PYRAMID, VTK_LAGRANGE_PYRAMID, VTK_BEZIER_PYRAMID});
-    table[VTK_PENTAGONAL_PRISM] = {
-        kind::split, 10, 2, {{{INSITU_HEX, 8, {0, 1, 2, 3, 5, 6, 7, 8}}, {INSITU_WEDGE, 6, {0, 3, 4, 5, 8, 9}}}}};
-    table[VTK_HEXAGONAL_PRISM] = {
-        kind::split, 12, 2, {{{INSITU_HEX, 8, {0, 1, 2, 3, 6, 7, 8, 9}}, {INSITU_HEX, 8, {0, 3, 4, 5, 6, 9, 10, 11}}}}};
+    table[VTK_POLYHEDRON] = {kind::faces, 4, 0, piece{}};
+    table[VTK_PENTAGONAL_PRISM] = {kind::faces, 10, 0, piece{}};
+    table[VTK_HEXAGONAL_PRISM] = {kind::faces, 12, 0, piece{}};
     for (const int type : {VTK_EMPTY_CELL,
                            VTK_VERTEX,
                            VTK_POLY_VERTEX,
@@ -128,52 +129,78 @@ struct new_size {
     bool is_one_to_one = true;
 };
 
-template <typename Id> new_size count_new(const raw_cells<Id> &raw, cell_counts &counts)
+/* The cells with faces, in their order: has[i] where VTK's cell i is one that is whole. */
+struct faced_cells {
+    face_list faces;
+    std::vector<bool> has;
+};
+
+template <typename Id> void read_faces(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, faced_cells &faced)
 {
-    new_size size;
     for (int64_t i = 0; i < raw.count; i++) {
         const recipe &r = recipes()[raw.types[i]];
-        const bool is_drawn = r.piece_count > 0 && raw.size(i) >= r.needed_points;
+        if (r.what != kind::faces || raw.size(i) < r.needed_points) continue;
+        if (faced.has.empty()) faced.has.resize(static_cast<size_t>(raw.count));
+        const std::vector<int64_t> points(raw.connectivity + raw.offsets[i], raw.connectivity + raw.offsets[i + 1]);
+        faced.has[static_cast<size_t>(i)] = faced.faces.add_cell(grid, i, raw.types[i], points.data());
+    }
+}
+
+template <typename Id> new_size count_new(const raw_cells<Id> &raw, const faced_cells &faced, cell_counts &counts)
+{
+    new_size size;
+    size_t number = 0;
+    for (int64_t i = 0; i < raw.count; i++) {
+        const recipe &r = recipes()[raw.types[i]];
+        const bool is_faced = !faced.has.empty() && faced.has[static_cast<size_t>(i)];
+        const bool is_drawn = is_faced || (r.piece_count > 0 && raw.size(i) >= r.needed_points);
         if (r.what == kind::flat)
             counts.flat++;
         else if (!is_drawn)
             counts.not_drawn++, counts.left_out[raw.types[i]]++;
-        if (is_drawn && r.what == kind::split) counts.split++;
         if (is_drawn && r.what == kind::linear) counts.linear++;
-        const int pieces = is_drawn ? r.piece_count : 0;
-        size.cells += pieces;
-        for (int p = 0; p < pieces; p++) size.vertices += r.pieces[static_cast<size_t>(p)].vertex_count;
-        if (pieces != 1) size.is_one_to_one = false;
+        if (!is_drawn) size.is_one_to_one = false;
+        if (!is_drawn) continue;
+        size.cells++;
+        size.vertices += is_faced ? faced.faces.cell_size(number++) : r.part.vertex_count;
     }
     return size;
 }
 
 template <typename Id>
-void fill_new(const raw_cells<Id> &raw, uint8_t *types, int64_t *offsets, Id *connectivity,
+void fill_new(const raw_cells<Id> &raw, const faced_cells &faced, uint8_t *types, int64_t *offsets, Id *connectivity,
               std::vector<int64_t> *source)
 {
     int64_t at = 0;
+    size_t number = 0;
     for (int64_t i = 0; i < raw.count; i++) {
         const recipe &r = recipes()[raw.types[i]];
-        if (raw.size(i) < r.needed_points) continue;
-        for (int p = 0; p < r.piece_count; p++) {
-            const piece &q = r.pieces[static_cast<size_t>(p)];
-            *types++ = q.type;
-            *offsets++ = at;
-            for (size_t v = 0; v < q.vertex_count; v++)
-                connectivity[at++] = raw.connectivity[raw.offsets[i] + q.vertices[v]];
-            if (source) source->push_back(i);
+        const bool is_faced = !faced.has.empty() && faced.has[static_cast<size_t>(i)];
+        if (!is_faced && (r.piece_count == 0 || raw.size(i) < r.needed_points)) continue;
+        *types++ = is_faced ? static_cast<uint8_t>(INSITU_POLYHEDRON) : r.part.type;
+        *offsets++ = at;
+        if (source) source->push_back(i);
+        if (is_faced) {
+            const int64_t *faces = faced.faces.cell_faces(number), count = faced.faces.cell_size(number);
+            for (int64_t k = 0; k < count; k++) connectivity[at++] = static_cast<Id>(faces[k]);
+            number++;
+            continue;
         }
+        for (size_t v = 0; v < r.part.vertex_count; v++)
+            connectivity[at++] = raw.connectivity[raw.offsets[i] + r.part.vertices[v]];
     }
     *offsets = at;
 }
 
-/* "voxels reordered, prisms split" of what is there. */
+/* "voxels reordered, faces of polyhedra shared" of what is there. */
 std::string why_converted(const std::array<int64_t, 256> &by_type)
 {
-    const char *const reasons[] = {
-        "some cells not drawn", "flat cells left out", "",
-        "voxels reordered",     "prisms split",        "higher-order cells by their corners"};
+    const char *const reasons[] = {"some cells not drawn",
+                                   "flat cells left out",
+                                   "",
+                                   "voxels reordered",
+                                   "faces of polyhedra and prisms shared",
+                                   "higher-order cells by their corners"};
     std::array<bool, 6> has{};
     for (size_t type = 0; type < 256; type++)
         if (by_type[type] > 0) has[static_cast<size_t>(recipes()[type].what)] = true;
@@ -184,10 +211,12 @@ std::string why_converted(const std::array<int64_t, 256> &by_type)
 }
 
 template <typename Id>
-void convert_cells(const raw_cells<Id> &raw, const std::string &why, const std::string &what, hold &held, tally &count,
-                   insitu_mesh &mesh, cell_list &cells, cell_counts &counts)
+void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::string &why, const std::string &what,
+                   hold &held, tally &count, insitu_mesh &mesh, cell_list &cells, cell_counts &counts)
 {
-    const new_size size = count_new(raw, counts);
+    faced_cells faced;
+    read_faces(grid, raw, faced);
+    const new_size size = count_new(raw, faced, counts);
     cells.count = size.cells;
     cells.is_one_to_one = size.is_one_to_one;
     if (!cells.is_one_to_one) cells.source.reserve(static_cast<size_t>(size.cells));
@@ -196,15 +225,16 @@ void convert_cells(const raw_cells<Id> &raw, const std::string &why, const std::
     auto *types = reinterpret_cast<uint8_t *>(held.allocate(static_cast<size_t>(size.cells)));
     auto *offsets = reinterpret_cast<int64_t *>(held.allocate(static_cast<size_t>(size.cells + 1) * 8));
     auto *connectivity = reinterpret_cast<Id *>(held.allocate(static_cast<size_t>(size.vertices) * sizeof(Id)));
-    fill_new(raw, types, offsets, connectivity, cells.is_one_to_one ? nullptr : &cells.source);
+    fill_new(raw, faced, types, offsets, connectivity, cells.is_one_to_one ? nullptr : &cells.source);
 
     mesh.cell_count = size.cells;
     mesh.cell_types = {types, INSITU_UINT8, 0};
     mesh.offsets = {offsets, INSITU_INT64, 0};
     mesh.connectivity = {connectivity, sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64, 0};
     mesh.connectivity_count = size.vertices;
+    const int64_t face_bytes = faced.has.empty() ? 0 : faced.faces.hand_over(held, mesh);
     count.copied(what + " cells", why,
-                 size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)));
+                 size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) + face_bytes);
 }
 
 /* All cells are drawn as they are: VTK's arrays, and of one type in one size neither types nor offsets. */
@@ -254,7 +284,7 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
         cells.count = raw.count;
         borrow_cells(grid, raw, by_type, connectivity_count, held, count, mesh);
     } else {
-        convert_cells(raw, why_converted(by_type), what, held, count, mesh, cells, counts);
+        convert_cells(grid, raw, why_converted(by_type), what, held, count, mesh, cells, counts);
     }
     return true;
 }
@@ -285,7 +315,7 @@ void tell_about_cells(const cell_counts &counts, const std::string &what, tally 
         count.about_cells(what + ": " + std::to_string(counts.linear) +
                           " higher-order cells drawn by their corners as linear ones");
     for (const auto &[type, number] : counts.left_out) {
-        const char *why = recipes()[static_cast<size_t>(type)].piece_count > 0 ? " with too few points" : "";
+        const char *why = recipes()[static_cast<size_t>(type)].needed_points > 0 ? " with too few points or faces" : "";
         count.about_cells(what + ": " + std::to_string(number) + " cells of type " + std::to_string(type) + " (" +
                           vtkCellTypes::GetClassNameFromTypeId(type) + ")" + why + " are not drawn");
     }

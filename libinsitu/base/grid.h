@@ -10,7 +10,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { GRID_TET = 10, GRID_HEX = 12, GRID_WEDGE = 13, GRID_PYRAMID = 14, GRID_MAX_CELL_VERTICES = 8 };
+enum {
+    GRID_TET = 10,
+    GRID_HEX = 12,
+    GRID_WEDGE = 13,
+    GRID_PYRAMID = 14,
+    GRID_POLYHEDRON = 42,
+    GRID_MAX_CELL_VERTICES = 8 /* of the types of a fixed number of vertices: all but polyhedra */
+};
 
 /* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
 typedef struct grid_array {
@@ -24,14 +31,18 @@ typedef struct grid {
     int64_t vertex_count;
     int64_t cell_count;
     grid_array coordinates[3];
-    grid_array connectivity;
-    grid_array offsets;     /* data NULL: all cells are of cell_type */
-    const char *cell_types; /* NULL: all cells are of cell_type */
+    grid_array connectivity; /* vertices; of a polyhedron: faces */
+    grid_array offsets;      /* data NULL: all cells are of cell_type. Always given where there are polyhedra. */
+    const char *cell_types;  /* NULL: all cells are of cell_type */
     int64_t cell_types_stride;
     int cell_types_bytes; /* 1, 4 or 8 */
     int cell_type;
     const char *ghosts; /* NULL: none */
     int64_t ghosts_stride;
+    /* Faces of polyhedra, shared between them; no data: there are no polyhedra. */
+    int64_t face_count;
+    grid_array face_offsets;      /* face_count + 1 */
+    grid_array face_connectivity; /* the faces' vertices around */
 } grid;
 
 /* One scalar per vertex or per cell, out of a field of several components. */
@@ -56,6 +67,7 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
     return a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
 }
 
+/* 0 for a polyhedron, whose number is its own, and for what is no type. */
 static inline int grid_type_vertices(int cell_type)
 {
     switch (cell_type) {
@@ -75,13 +87,72 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return g->cell_types_bytes == 4 ? (int)*(const int32_t *)(const void *)p : (int)*(const int64_t *)(const void *)p;
 }
 
-/* The cell's vertex indices, in VTK's order; returns how many. */
+/* The cell's vertex indices, in VTK's order; returns how many. None of a polyhedron: see grid_walk. */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int count = grid_type_vertices(grid_cell_type(g, cell));
     const int64_t first = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
     for (int i = 0; i < count; i++) vertices[i] = grid_array_index(&g->connectivity, first + i);
     return count;
+}
+
+/* May there be polyhedra? */
+static inline bool grid_has_faces(const grid *g)
+{
+    return g->face_offsets.data != 0;
+}
+
+/* A polyhedron's faces: entries [*first, *end) of connectivity. */
+static inline void grid_cell_faces(const grid *g, int64_t cell, int64_t *first, int64_t *end)
+{
+    *first = grid_array_index(&g->offsets, cell);
+    *end = grid_array_index(&g->offsets, cell + 1);
+}
+
+/* A face's vertices: entries [*first, *end) of face_connectivity. */
+static inline void grid_face_vertices(const grid *g, int64_t face, int64_t *first, int64_t *end)
+{
+    *first = grid_array_index(&g->face_offsets, face);
+    *end = grid_array_index(&g->face_offsets, face + 1);
+}
+
+/* A walk over the vertices of a cell of any type. A polyhedron's come as often as its faces have them. */
+typedef struct grid_walk {
+    const grid *cells;
+    bool is_polyhedron;
+    int64_t next, end;           /* entries of connectivity */
+    int64_t face_next, face_end; /* entries of face_connectivity */
+} grid_walk;
+
+static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
+{
+    grid_walk w = {.cells = g};
+    const int type = grid_cell_type(g, cell), count = grid_type_vertices(type);
+    w.is_polyhedron = type == GRID_POLYHEDRON;
+    if (w.is_polyhedron) {
+        grid_cell_faces(g, cell, &w.next, &w.end);
+        return w;
+    }
+    w.next = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
+    w.end = w.next + count;
+    return w;
+}
+
+/* False when there are no more. */
+static inline bool grid_walk_next(grid_walk *w, int64_t *vertex)
+{
+    if (!w->is_polyhedron) {
+        if (w->next == w->end) return false;
+        *vertex = grid_array_index(&w->cells->connectivity, w->next++);
+        return true;
+    }
+    while (w->face_next == w->face_end) {
+        if (w->next == w->end) return false;
+        const int64_t face = grid_array_index(&w->cells->connectivity, w->next++);
+        grid_face_vertices(w->cells, face, &w->face_next, &w->face_end);
+    }
+    *vertex = grid_array_index(&w->cells->face_connectivity, w->face_next++);
+    return true;
 }
 
 static inline void grid_vertex(const grid *g, int64_t vertex, double position[3])

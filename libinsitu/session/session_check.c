@@ -8,14 +8,17 @@
 #include <stdio.h>
 
 #include "session.h"
+#include "session_faces.h"
 
-typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORDINATE } cell_fault;
+typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORDINATE, BAD_FACES } cell_fault;
 
 typedef struct fault_place {
     int type;
     int64_t first, next; /* offsets */
     int64_t vertex;      /* index as it stands in the connectivity */
     double position[3];
+    face_fault fault_of_faces;
+    face_place faces;
 } fault_place;
 
 static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int count, fault_place *place)
@@ -29,10 +32,23 @@ static cell_fault check_coordinates(const grid *g, const int64_t *vertices, int 
     return CELL_GOOD;
 }
 
-static cell_fault check_cell(const session_mesh *mesh, int64_t cell, fault_place *place)
+static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_room *room, fault_place *place)
+{
+    const grid *g = &mesh->cells;
+    if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
+    place->first = grid_array_index(&g->offsets, cell);
+    place->next = grid_array_index(&g->offsets, cell + 1);
+    if (place->first < 0 || place->next > mesh->given.connectivity_count || place->next < place->first)
+        return BAD_OFFSETS;
+    place->fault_of_faces = session_check_faces(mesh, cell, room, &place->faces);
+    return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
+}
+
+static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *room, fault_place *place)
 {
     const grid *g = &mesh->cells;
     place->type = grid_cell_type(g, cell);
+    if (place->type == GRID_POLYHEDRON) return check_polyhedron(mesh, cell, room, place);
     const int count = grid_type_vertices(place->type);
     if (count == 0) return BAD_TYPE;
     if (g->offsets.data) {
@@ -58,6 +74,7 @@ static const char *type_name(int type)
     case GRID_HEX: return "hex";
     case GRID_WEDGE: return "wedge";
     case GRID_PYRAMID: return "pyramid";
+    case GRID_POLYHEDRON: return "polyhedron";
     default: return "unknown";
     }
 }
@@ -85,14 +102,21 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_place place = {0};
-    const cell_fault fault = check_cell(mesh, cell, &place);
+    face_room room = {0};
+    const cell_fault fault = check_cell(mesh, cell, &room, &place);
+    session_faces_free(&room);
     const long long at = cell, vertex = place.vertex;
     const char *type = type_name(place.type);
     switch (fault) {
+    case BAD_FACES: return session_describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
     case BAD_TYPE:
-        return base_fail(error, INSITU_ERROR_MESH,
-                         "mesh \"%s\": cell %lld: unknown cell type %d (10 tet, 12 hex, 13 wedge, 14 pyramid)",
-                         mesh->name, at, place.type);
+        if (place.type == GRID_POLYHEDRON)
+            return base_fail(error, INSITU_ERROR_MESH,
+                             "mesh \"%s\": cell %lld is a polyhedron, and face_offsets are not given", mesh->name, at);
+        return base_fail(
+            error, INSITU_ERROR_MESH,
+            "mesh \"%s\": cell %lld: unknown cell type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron)",
+            mesh->name, at, place.type);
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
@@ -152,18 +176,20 @@ static void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
         tally->ghosts++;
         return;
     }
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int type = grid_cell_type(g, cell);
     double points[GRID_MAX_CELL_VERTICES][3];
-    const int count = grid_cell_vertices(g, cell, vertices);
-    for (int i = 0; i < count; i++) {
-        grid_vertex(g, vertices[i], points[i]);
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t vertex;
+    for (int i = 0; grid_walk_next(&walk, &vertex); i++) {
+        double *point = points[type == GRID_POLYHEDRON ? 0 : i];
+        grid_vertex(g, vertex, point);
         for (int axis = 0; axis < 3; axis++) {
-            tally->lower[axis] = fmin(tally->lower[axis], points[i][axis]);
-            tally->upper[axis] = fmax(tally->upper[axis], points[i][axis]);
+            tally->lower[axis] = fmin(tally->lower[axis], point[axis]);
+            tally->upper[axis] = fmax(tally->upper[axis], point[axis]);
         }
     }
     tally->drawn++;
-    const double volume = signed_volume(grid_cell_type(g, cell), points);
+    const double volume = type == GRID_POLYHEDRON ? session_polyhedron_volume(g, cell) : signed_volume(type, points);
     tally->inverted += volume < 0;
     tally->sizes += cbrt(fabs(volume));
 }
@@ -188,15 +214,17 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
 #pragma omp parallel num_threads(threads) reduction(min : first_bad)
     {
         mesh_tally mine = empty_tally;
+        face_room room = {0};
 #pragma omp for schedule(static)
         for (int64_t cell = 0; cell < count; cell++) {
             fault_place place;
             if (first_bad < count) continue;
-            if (check_cell(mesh, cell, &place) == CELL_GOOD)
+            if (check_cell(mesh, cell, &room, &place) == CELL_GOOD)
                 tally_cell(&mesh->cells, cell, &mine);
             else
                 first_bad = cell;
         }
+        session_faces_free(&room);
 #pragma omp critical(session_check_tally)
         merge_tally(tally, &mine);
     }

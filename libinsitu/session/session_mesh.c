@@ -101,14 +101,17 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     insitu_status status = check_count("vertex_count", mesh->vertex_count, INT64_MAX / 32, error);
     if (!status) status = check_count("cell_count", mesh->cell_count, 4294967294, error);
     if (!status) status = check_count("connectivity_count", mesh->connectivity_count, INT64_MAX / 32, error);
+    if (!status) status = check_count("face_count", mesh->face_count, INT64_MAX / 32, error);
+    if (!status) status = check_count("face_connectivity_count", mesh->face_connectivity_count, INT64_MAX / 32, error);
     return status;
 }
 
 static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
 {
-    const insitu_array *const arrays[] = {&mesh->coordinates[0], &mesh->coordinates[1], &mesh->coordinates[2],
-                                          &mesh->vertex_ids,     &mesh->cell_types,     &mesh->connectivity,
-                                          &mesh->offsets,        &mesh->ghosts};
+    const insitu_array *const arrays[] = {&mesh->coordinates[0],   &mesh->coordinates[1], &mesh->coordinates[2],
+                                          &mesh->vertex_ids,       &mesh->cell_types,     &mesh->connectivity,
+                                          &mesh->offsets,          &mesh->ghosts,         &mesh->face_offsets,
+                                          &mesh->face_connectivity};
     const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count;
     const array_rule rules[] = {
         {"x coordinates", vertices, ALLOW_FLOATS, false},
@@ -119,6 +122,8 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
         {"connectivity indices", mesh->connectivity_count, ALLOW_INTEGERS, false},
         {"offsets", cells, ALLOW_INTEGERS, true},
         {"ghost flags", cells, ALLOW_BYTES, true},
+        {"face offsets", mesh->face_count, ALLOW_INTEGERS, false},
+        {"face vertex indices", mesh->face_connectivity_count, ALLOW_INTEGERS, false},
     };
     for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
         const insitu_status status = check_array(arrays[i], &rules[i], INSITU_ERROR_MESH, error);
@@ -137,9 +142,13 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
             return base_fail(error, INSITU_ERROR_MESH, "offsets are not given, cell types are: mixed cells need both");
         return INSITU_OK;
     }
+    if (mesh->cell_type == INSITU_POLYHEDRON && !mesh->offsets.data)
+        return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polyhedra need them");
+    if (mesh->cell_type == INSITU_POLYHEDRON) return INSITU_OK;
     const int vertices = grid_type_vertices((int)mesh->cell_type);
     if (vertices == 0)
-        return base_fail(error, INSITU_ERROR_MESH, "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid)",
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron)",
                          (int)mesh->cell_type);
     if (!mesh->offsets.data && mesh->connectivity_count != mesh->cell_count * vertices)
         return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %d vertices need %lld",
@@ -173,6 +182,9 @@ static grid as_grid(const insitu_mesh *mesh)
     for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = as_grid_array(&mesh->coordinates[axis]);
     g.connectivity = as_grid_array(&mesh->connectivity);
     g.offsets = as_grid_array(&mesh->offsets);
+    g.face_count = mesh->face_count;
+    g.face_offsets = as_grid_array(&mesh->face_offsets);
+    g.face_connectivity = as_grid_array(&mesh->face_connectivity);
     if (mesh->cell_types.data) {
         const grid_array types = as_grid_array(&mesh->cell_types);
         g.cell_types = types.data;
@@ -192,7 +204,8 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
     return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||
            a->connectivity_count != b->connectivity_count || a->cell_type != b->cell_type ||
            !a->cell_types.data != !b->cell_types.data || !a->offsets.data != !b->offsets.data ||
-           !a->ghosts.data != !b->ghosts.data;
+           !a->ghosts.data != !b->ghosts.data || a->face_count != b->face_count ||
+           a->face_connectivity_count != b->face_connectivity_count;
 }
 
 /* ---- meshes -------------------------------------------------------------------------------------------------- */

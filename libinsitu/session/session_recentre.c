@@ -117,54 +117,59 @@ static void group_vertices(const session_mesh *mesh, bool by_id, vertex_groups *
     for (int64_t v = 0; v < g->vertex_count; v++) groups->of_vertex[v] = -1;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         if (grid_is_ghost(g, cell)) continue;
-        int64_t vertices[GRID_MAX_CELL_VERTICES];
-        const int count = grid_cell_vertices(g, cell, vertices);
-        for (int i = 0; i < count; i++) {
-            if (groups->of_vertex[vertices[i]] >= 0) continue;
-            const session_key key = vertex_key(mesh, vertices[i], by_id);
+        grid_walk walk = grid_walk_cell(g, cell);
+        int64_t vertex;
+        while (grid_walk_next(&walk, &vertex)) {
+            if (groups->of_vertex[vertex] >= 0) continue;
+            const session_key key = vertex_key(mesh, vertex, by_id);
             const int64_t group = session_keys_add(&groups->keys, &key);
-            groups->of_vertex[vertices[i]] = group;
-            groups->vertex[group] = vertices[i];
+            groups->of_vertex[vertex] = group;
+            groups->vertex[group] = vertex;
         }
     }
 }
 
-/* The groups of a cell's vertices, each once; none for a cell without a value. */
-static int cell_groups(const grid *g, const grid_field *field, const vertex_groups *groups, int64_t cell,
-                       int64_t out[GRID_MAX_CELL_VERTICES], double *value)
+/* Does the cell give its vertices a value? */
+static bool cell_gives(const grid *g, const grid_field *field, int64_t cell, double *value)
 {
-    int64_t vertices[GRID_MAX_CELL_VERTICES];
-    int distinct = 0;
-    if (grid_is_ghost(g, cell)) return 0;
+    if (grid_is_ghost(g, cell)) return false;
     *value = grid_field_value(field, cell);
-    if (!isfinite(*value)) return 0;
-    const int count = grid_cell_vertices(g, cell, vertices);
-    for (int i = 0; i < count; i++) {
-        const int64_t group = groups->of_vertex[vertices[i]];
-        int at = 0;
-        while (at < distinct && out[at] != group) at++;
-        if (at == distinct) out[distinct++] = group;
+    return isfinite(*value);
+}
+
+/* Each cell's value to the groups of its vertices, once to each: last has the last cell that gave to a group. The first
+ * pass counts, the second stores. */
+static void give_values(const grid *g, const grid_field *field, vertex_groups *groups, int64_t *last, bool is_stored)
+{
+    value_groups *values = &groups->values;
+    double value = 0;
+    for (int64_t i = 0; i < groups->keys.count; i++) last[i] = -1;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (!cell_gives(g, field, cell, &value)) continue;
+        grid_walk walk = grid_walk_cell(g, cell);
+        int64_t vertex;
+        while (grid_walk_next(&walk, &vertex)) {
+            const int64_t group = groups->of_vertex[vertex];
+            if (last[group] == cell) continue;
+            last[group] = cell;
+            if (is_stored)
+                values->values[values->starts[group]++] = value;
+            else
+                values->starts[group + 1]++;
+        }
     }
-    return distinct;
 }
 
 static bool collect_values(const session_mesh *mesh, const grid_field *field, vertex_groups *groups)
 {
-    const grid *g = &mesh->cells;
-    value_groups *values = &groups->values;
-    int64_t at[GRID_MAX_CELL_VERTICES];
-    double value = 0;
-    for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        const int count = cell_groups(g, field, groups, cell, at, &value);
-        for (int i = 0; i < count; i++) values->starts[at[i] + 1]++;
-    }
-    if (!groups_open(values)) return false;
-    for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        const int count = cell_groups(g, field, groups, cell, at, &value);
-        for (int i = 0; i < count; i++) values->values[values->starts[at[i]]++] = value;
-    }
-    groups_close(values);
-    return true;
+    int64_t *last = base_alloc((size_t)groups->keys.count * sizeof *last);
+    if (!last) return false;
+    give_values(&mesh->cells, field, groups, last, false);
+    const bool is_open = groups_open(&groups->values);
+    if (is_open) give_values(&mesh->cells, field, groups, last, true);
+    if (is_open) groups_close(&groups->values);
+    base_free(last);
+    return is_open;
 }
 
 static void vertex_groups_free(vertex_groups *groups)

@@ -69,6 +69,8 @@ static int64_t mesh_bytes(const insitu_mesh *m)
     for (int axis = 0; axis < 3; axis++) bytes += array_bytes(&m->coordinates[axis], m->vertex_count);
     bytes += array_bytes(&m->vertex_ids, m->vertex_count);
     bytes += array_bytes(&m->cell_types, m->cell_count);
+    bytes += array_bytes(&m->face_offsets, m->face_count + 1);
+    bytes += array_bytes(&m->face_connectivity, m->face_connectivity_count);
     bytes += array_bytes(&m->connectivity, m->connectivity_count);
     bytes += array_bytes(&m->offsets, m->offsets.data ? m->cell_count + 1 : 0);
     return bytes + array_bytes(&m->ghosts, m->cell_count);

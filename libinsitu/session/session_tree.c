@@ -180,20 +180,33 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
+/* False where one of the cell's values is not finite. */
+static bool cell_extent(const grid *g, const grid_field *field, int64_t cell, double *low, double *high)
+{
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t vertex;
+    *low = INFINITY;
+    *high = -INFINITY;
+    while (grid_walk_next(&walk, &vertex)) {
+        const double v = grid_field_value(field, field->is_cell_centred ? cell : vertex);
+        if (!isfinite(v)) return false;
+        *low = fmin(*low, v);
+        *high = fmax(*high, v);
+        if (field->is_cell_centred) break;
+    }
+    return true;
+}
+
 static void find_extent(const grid *g, const grid_field *field, int threads, double *low, double *high)
 {
     double least = INFINITY, most = -INFINITY;
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         if (grid_is_ghost(g, cell)) continue;
-        int64_t vertices[GRID_MAX_CELL_VERTICES];
-        double values[GRID_MAX_CELL_VERTICES];
-        const int count = field->is_cell_centred ? 1 : grid_cell_vertices(g, cell, vertices);
-        if (!grid_cell_values(field, cell, vertices, count, values)) continue;
-        for (int i = 0; i < count; i++) {
-            least = fmin(least, values[i]);
-            most = fmax(most, values[i]);
-        }
+        double lowest, highest;
+        if (!cell_extent(g, field, cell, &lowest, &highest)) continue;
+        least = fmin(least, lowest);
+        most = fmax(most, highest);
     }
     *low = least;
     *high = most;

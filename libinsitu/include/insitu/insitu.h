@@ -47,10 +47,11 @@ typedef struct insitu_array {
 
 /* Cell types by VTK's ids, vertices in VTK's order. */
 typedef enum insitu_cell_type {
-    INSITU_TET = 10,    /* 4 vertices */
-    INSITU_HEX = 12,    /* 8 vertices: the lower quad around, then the upper quad above it */
-    INSITU_WEDGE = 13,  /* 6 vertices: one triangle, then the other; either winding */
-    INSITU_PYRAMID = 14 /* 5 vertices: the quad around, then the apex */
+    INSITU_TET = 10,       /* 4 vertices */
+    INSITU_HEX = 12,       /* 8 vertices: the lower quad around, then the upper quad above it */
+    INSITU_WEDGE = 13,     /* 6 vertices: one triangle, then the other; either winding */
+    INSITU_PYRAMID = 14,   /* 5 vertices: the quad around, then the apex */
+    INSITU_POLYHEDRON = 42 /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
 } insitu_cell_type;
 
 /* What of a mesh or a field differs from the last time it was set. The safe default is everything. */
@@ -78,9 +79,18 @@ typedef struct insitu_mesh {
     insitu_array connectivity;   /* int32 or int64, connectivity_count: the cells' vertex indices from 0, one cell
                                     after the other */
     insitu_array offsets;        /* int32 or int64, cell_count + 1: where each cell begins in connectivity, the last
-                                    is connectivity_count. Not needed where all cells are of one type. */
-    insitu_array ghosts;         /* optional, uint8, cell_count: cells with a nonzero flag are not drawn */
-    unsigned changed;            /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
+                                    is connectivity_count. Not needed where all cells are of one type that is not
+                                    INSITU_POLYHEDRON. */
+    /* Faces of polyhedra: given where there are any. A polyhedron's entries in connectivity are its faces' indices from
+     * 0, at least 4, in any order; a face between two polyhedra is the same one in both. The faces of a cell must
+     * make a closed surface: along every edge two of them meet. */
+    int64_t face_count;
+    insitu_array face_offsets;       /* int32 or int64, face_count + 1: where each face begins in face_connectivity */
+    int64_t face_connectivity_count; /* elements in face_connectivity */
+    insitu_array face_connectivity;  /* int32 or int64, face_connectivity_count: the faces' vertex indices from 0, at
+                                        least 3 a face, around it in either direction, beginning anywhere */
+    insitu_array ghosts;             /* optional, uint8, cell_count: cells with a nonzero flag are not drawn */
+    unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
 } insitu_mesh;
 
 /* Whether a field has one value a vertex or one a cell. */

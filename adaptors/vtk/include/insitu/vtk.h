@@ -16,9 +16,11 @@
  *  - Points: float or double borrowed, whether interleaved (AOS) or a component apart (SOA); others copied to double.
  *  - Cells 10, 12, 13, 14: borrowed, with 32- or 64-bit storage.
  *  - Voxels (11): drawn as hexahedra; a copy of the connectivity.
- *  - Pentagonal and hexagonal prisms (15, 16): split into a hexahedron and a wedge, or two hexahedra; copied.
+ *  - Polyhedra (42): their face streams become faces shared between cells; a copy. Pentagonal and hexagonal prisms
+ *    (15, 16) come as polyhedra too.
  *  - Quadratic and higher-order 3-D cells: drawn by their corners as linear cells, and reported; copied.
- *  - Polyhedra and what else is left of 3-D cells: not drawn, and reported; so are flat, line and point cells.
+ *  - What else is left of 3-D cells, polyhedra without their faces too: not drawn, and reported; so are flat, line and
+ * point cells.
  *  - Fields: float, double and 32- or 64-bit signed integers borrowed; other types copied.
  *  - vtkGhostType of the cells: duplicate, hidden and refined cells are not drawn. Hidden points are ignored.
  *
@@ -38,11 +40,11 @@ typedef struct insitu_vtk_adaptor insitu_vtk_adaptor;
 typedef struct insitu_vtk_report {
     int meshes;              /* handed over: 1, or the leaves with cells to draw */
     int fields;              /* handed over, over all meshes */
-    int64_t cells;           /* handed over, after splitting, ghosts included */
-    int64_t cells_split;     /* prisms, as VTK counts them, that were split */
+    int64_t cells;           /* handed over, ghosts included */
+    int64_t cells_split;     /* cut into several: no type is at present, hence 0 */
     int64_t cells_linear;    /* quadratic and higher-order cells drawn by their corners */
     int64_t cells_flat;      /* not drawn: of less than 3 dimensions */
-    int64_t cells_not_drawn; /* not drawn: polyhedra, other 3-D cells that are not known, cells with too few points */
+    int64_t cells_not_drawn; /* not drawn: 3-D cells of unknown types, cells with too few points or faces */
     int64_t bytes_borrowed;  /* of VTK's arrays handed over as they are */
     int64_t bytes_copied;    /* of arrays converted, held until the mesh is set again */
     const char *copied_why;  /* "" or one "what: why (bytes)" a line; valid until the next call on the adaptor */

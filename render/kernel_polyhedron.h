@@ -1,0 +1,395 @@
+/* A ray and a polyhedron (render_polyhedra.h): its intervals inside, and the field's profile along them.
+ *
+ * The surface is met as other cells' is (kernel_cell.h): edge functions of the unique edges, crossed triangles, and
+ * between the crossings, sorted and paired, the ray is inside. There are as many intervals as the cell has: the list
+ * is as long as the list of triangles.
+ *
+ * The field is linear on each tet of a triangle and the centre. The tets meet in sheets: the triangles of an edge and
+ * the centre. Along the ray the field is continuous and piecewise linear, and bends only where the ray crosses a
+ * sheet; so a profile is the interval's ends with the crossed sheets between them, in their order:
+ *
+ *      v |        .sheet
+ *        |      .'      '.        .exit
+ *        |   .'           sheet.'
+ *        | in
+ *        +---t_in--------------------t_out---> t
+ *
+ * Where the cell is star-shaped from its centre, the tets fill it once, and the field on a sheet is the sheet's own.
+ * Else tets overlap, and stand out of the cell; the field at a place is then the sum over the tets that hold it, each
+ * with its sign (a place inside has one more of the positive ones; a sheet between two tets on its two sides is passed
+ * without a jump, and one with both on one side brings or takes f - f = 0). It is summed where the ray crosses sheets,
+ * by each tet's [t0, t1).
+ *
+ * Whether an isosurface crosses is decided by the faces' own values (kernel_surface.h): triangles linear, quads
+ * bilinear as their neighbours may have them, larger faces linear on their triangles. The interior field may say
+ * otherwise at a warped quad, and in a cell that is not star-shaped: where the signs differ, the face's value takes the
+ * place of the profile's end. */
+#ifndef RENDER_KERNEL_POLYHEDRON_H
+#define RENDER_KERNEL_POLYHEDRON_H
+
+#include "kernel_map.h"
+
+/* Rays that cross a triangle at t: v its value there, linear, and w the colour's. Of a facet also where its face is
+ * met and the face's values, which are others for quads. Of a sheet v_face and w_face are the field's values there. */
+typedef struct kernel_meeting {
+    vm mask;
+    vf t, v, w;
+    vf t_face, v_face, w_face;
+} kernel_meeting;
+
+/* Rays within a tet of the surface triangle facet: v along t is v0 + (t - t0) slope. */
+typedef struct kernel_tet_span {
+    vm mask;
+    vf t0, t1, v0, v1, w0, w1;
+    float sign;
+    int facet;
+} kernel_tet_span;
+
+/* What a packet meets of one polyhedron; in the thread's scratch memory. */
+typedef struct kernel_passage {
+    vf *x, *y;              /* vertices and centre in the rays' planes */
+    vf *edge;               /* edge functions: of the edges, then of the spokes, from each vertex to the centre */
+    vm *positive;           /* their signs */
+    kernel_meeting *facets; /* by number; only those met are set */
+    vm *left;               /* rays whose crossing is not yet taken into an interval */
+    int *met;
+    int met_count;
+    kernel_meeting *sheets; /* by edge; only those met are set */
+    int *met_sheets;
+    int sheet_count;
+    kernel_tet_span *segments;
+    int segment_count;
+    bool has_sheets;
+} kernel_passage;
+
+/* Between two crossings: the interval has the faces' values; u_in, u_out are the profile's at its ends. */
+typedef struct kernel_stay {
+    kernel_interval interval;
+    kernel_meeting in, out;
+    vf u_in, u_out;
+} kernel_stay;
+
+/* A linear piece of a profile. */
+typedef struct kernel_profile_piece {
+    vf t0, t1, v0, v1, w0, w1;
+} kernel_profile_piece;
+
+SIMD_INLINE void *kernel_carve(char **at, size_t bytes)
+{
+    void *p = *at;
+    *at += (bytes + 63) & ~(size_t)63;
+    return p;
+}
+
+/* False where memory ran out. */
+static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, kernel_passage *out)
+{
+    const size_t points = (size_t)c->vertex_count + 1, edges = (size_t)c->edge_count, facets = (size_t)c->facet_count;
+    const size_t pieces = 12, spare = 64 * pieces;
+    const size_t bytes = points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(vm) + sizeof(int)) +
+                         facets * (sizeof(kernel_meeting) + sizeof(vm) + sizeof(int) + sizeof(kernel_tet_span)) +
+                         edges * sizeof(kernel_meeting) + spare;
+    char *at = p->thread->polyhedron_scratch(p->thread->polyhedra, bytes);
+    if (!at) {
+        p->thread->out_of_memory = true;
+        return false;
+    }
+    out->x = kernel_carve(&at, points * sizeof(vf));
+    out->y = kernel_carve(&at, points * sizeof(vf));
+    out->edge = kernel_carve(&at, (edges + points) * sizeof(vf));
+    out->positive = kernel_carve(&at, (edges + points) * sizeof(vm));
+    out->facets = kernel_carve(&at, facets * sizeof(kernel_meeting));
+    out->left = kernel_carve(&at, facets * sizeof(vm));
+    out->met = kernel_carve(&at, facets * sizeof(int));
+    out->sheets = kernel_carve(&at, edges * sizeof(kernel_meeting));
+    out->met_sheets = kernel_carve(&at, edges * sizeof(int));
+    out->segments = kernel_carve(&at, facets * sizeof(kernel_tet_span));
+    out->met_count = out->sheet_count = out->segment_count = 0;
+    out->has_sheets = false;
+    return true;
+}
+
+SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
+{
+    for (int i = 0; i <= c->vertex_count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->is_placed = true;
+}
+
+/* ---- the surface ---- */
+
+/* Where and with what values the ray meets the patch of a quad whose half w it crosses: as a hex next to it has it. */
+static void kernel_polyhedron_quad(const polyhedron *c, const kernel_passage *r, const int around[4],
+                                   const kernel_weights *w, bool has_colour, kernel_meeting *out)
+{
+    static const signed char loop[4] = {0, 1, 2, 3};
+    kernel_cell quad;
+    kernel_projected q;
+    kernel_weights local = *w;
+    kernel_crossing crossing = {.mask = out->mask, .t = out->t};
+    int corner[4];
+    for (int i = 0; i < 4; i++) {
+        memcpy(quad.world[i], c->world[around[i]], sizeof quad.world[i]);
+        quad.z[i] = c->z[around[i]];
+        quad.f[i] = c->f[around[i]];
+        quad.g[i] = has_colour ? c->g[around[i]] : 0;
+        quad.rank[i] = around[i]; /* numbers are in the order */
+        q.x[i] = r->x[around[i]], q.y[i] = r->y[around[i]];
+        if (w->i == around[i]) local.i = i;
+        if (w->j == around[i]) local.j = i;
+        if (w->k == around[i]) local.k = i;
+    }
+    kernel_quad_corners(&quad, loop, corner);
+    if (kernel_quad_collapses(&quad, corner)) return;
+    kernel_quad_values(&quad, &kernel_shapes[0], &q, corner, &local, has_colour, &crossing);
+    out->t_face = crossing.t;
+    out->v_face = crossing.v;
+    out->w_face = crossing.w;
+}
+
+SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool has_colour, kernel_meeting *out)
+{
+    out->t = kernel_weigh(w, c->z[w->i], c->z[w->j], c->z[w->k]);
+    out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
+    out->w = has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
+    out->t_face = out->t;
+    out->v_face = out->v;
+    out->w_face = out->w;
+}
+
+SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf e_ij, vf e_jk, vf e_ik)
+{
+    return (kernel_weights){i, j, k, e_jk, -e_ik, e_ij, 1.0f / ((e_jk - e_ik) + e_ij)};
+}
+
+/* kernel_edge() on arrays of any length. */
+SIMD_INLINE void kernel_passage_edge(kernel_passage *r, int number, int a, int b)
+{
+    kernel_projected q;
+    q.x[0] = r->x[a], q.y[0] = r->y[a];
+    q.x[1] = r->x[b], q.y[1] = r->y[b];
+    r->edge[number] = kernel_edge(&q, 0, 1, &r->positive[number]);
+}
+
+/* All crossings of the surface; false where no ray has any. */
+static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
+                                 kernel_passage *r)
+{
+    for (int i = 0; i <= c->vertex_count; i++) {
+        r->x[i] = (vf_set(c->x[i]) - p->origin_x) - p->slope_x * c->z[i];
+        r->y[i] = (vf_set(c->y[i]) - p->origin_y) - p->slope_y * c->z[i];
+    }
+    for (int i = 0; i < c->edge_count; i++) kernel_passage_edge(r, i, c->edges[i][0], c->edges[i][1]);
+    for (int i = 0; i < c->facet_count; i++) {
+        const polyhedron_facet *t = &c->facets[i];
+        const vm hit = kernel_inside(rays, r->positive[t->edge[0]], r->positive[t->edge[1]], r->positive[t->edge[2]]);
+        if (!vm_any(hit)) continue;
+        const kernel_weights w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], r->edge[t->edge[0]],
+                                                   r->edge[t->edge[1]], r->edge[t->edge[2]]);
+        kernel_meeting *m = &r->facets[i];
+        kernel_meet(c, &w, has_colour, m);
+        m->mask = r->left[i] = hit;
+        if (t->quad >= 0) kernel_polyhedron_quad(c, r, c->quads[t->quad], &w, has_colour, m);
+        r->met[r->met_count++] = i;
+    }
+    return r->met_count > 0;
+}
+
+/* Take the crossing of each ray whose face is nearest: false where no ray has one left. */
+SIMD_INLINE bool kernel_passage_take(kernel_passage *r, kernel_meeting *out)
+{
+    const vf zero = vf_set(0);
+    vf taken = vf_set(-1);
+    *out = (kernel_meeting){vm_none(), zero, zero, zero, vf_set(INFINITY), zero, zero};
+    for (int n = 0; n < r->met_count; n++) {
+        const kernel_meeting *m = &r->facets[r->met[n]];
+        const vm nearer = vm_and(r->left[r->met[n]], vf_lt(m->t_face, out->t_face));
+        out->mask = vm_or(out->mask, nearer);
+        out->t = vf_select(nearer, m->t, out->t);
+        out->v = vf_select(nearer, m->v, out->v);
+        out->w = vf_select(nearer, m->w, out->w);
+        out->t_face = vf_select(nearer, m->t_face, out->t_face);
+        out->v_face = vf_select(nearer, m->v_face, out->v_face);
+        out->w_face = vf_select(nearer, m->w_face, out->w_face);
+        taken = vf_select(nearer, vf_set((float)n), taken);
+    }
+    for (int n = 0; n < r->met_count; n++)
+        r->left[r->met[n]] = vm_andnot(r->left[r->met[n]], vf_eq(taken, vf_set((float)n)));
+    return vm_any(out->mask);
+}
+
+/* The rays' next stay in the cell; false after the last. */
+static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
+{
+    if (!kernel_passage_take(r, &out->in) || !kernel_passage_take(r, &out->out)) return false;
+    kernel_interval *i = &out->interval;
+    i->mask = vm_and(out->in.mask, out->out.mask);
+    i->t_in = out->in.t_face;
+    i->t_out = out->out.t_face;
+    i->v_in = out->u_in = out->in.v_face;
+    i->v_out = out->u_out = out->out.v_face;
+    i->w_in = out->in.w_face;
+    i->w_out = out->out.w_face;
+    return true;
+}
+
+/* ---- the inside ---- */
+
+static void kernel_passage_sheets(const polyhedron *c, vm rays, bool has_colour, kernel_passage *r)
+{
+    const int centre = c->vertex_count, spokes = c->edge_count;
+    if (r->has_sheets) return;
+    r->has_sheets = true;
+    for (int i = 0; i < centre; i++) kernel_passage_edge(r, spokes + i, i, centre);
+    for (int i = 0; i < c->edge_count; i++) {
+        const int a = c->edges[i][0], b = c->edges[i][1];
+        kernel_meeting *m = &r->sheets[i];
+        m->mask = kernel_inside(rays, r->positive[i], r->positive[spokes + b], r->positive[spokes + a]);
+        if (!vm_any(m->mask)) continue;
+        const kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
+        kernel_meet(c, &w, has_colour, m);
+        r->met_sheets[r->sheet_count++] = i;
+    }
+}
+
+SIMD_INLINE void kernel_segment_add(kernel_tet_span *s, const kernel_meeting *m, vm hit)
+{
+    const vm first = vm_and(hit, vf_lt(m->t, s->t0)), last = vm_andnot(hit, vf_lt(m->t, s->t1));
+    s->t0 = vf_select(first, m->t, s->t0);
+    s->v0 = vf_select(first, m->v, s->v0);
+    s->w0 = vf_select(first, m->w, s->w0);
+    s->t1 = vf_select(last, m->t, s->t1);
+    s->v1 = vf_select(last, m->v, s->v1);
+    s->w1 = vf_select(last, m->w, s->w1);
+    s->mask = vm_or(s->mask, hit);
+}
+
+/* The tets that rays pass. */
+static void kernel_passage_segments(const polyhedron *c, vm rays, kernel_passage *r)
+{
+    if (r->segment_count) return;
+    for (int i = 0; i < c->facet_count; i++) {
+        const polyhedron_facet *t = &c->facets[i];
+        kernel_tet_span *s = &r->segments[r->segment_count];
+        if (t->sign == 0) continue;
+        s->mask = vm_none();
+        s->t0 = vf_set(INFINITY);
+        s->t1 = vf_set(-INFINITY);
+        s->v0 = s->v1 = s->w0 = s->w1 = vf_set(0);
+        for (int k = 0; k < 3; k++)
+            if (vm_any(r->sheets[t->edge[k]].mask))
+                kernel_segment_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
+        /* A ray that meets the tet meets a sheet of it; its triangle is met by who is inside all three edges. */
+        const vm hit = kernel_inside(rays, r->positive[t->edge[0]], r->positive[t->edge[1]], r->positive[t->edge[2]]);
+        if (vm_any(hit)) kernel_segment_add(s, &r->facets[i], hit);
+        if (!vm_any(s->mask)) continue;
+        s->sign = t->sign;
+        s->facet = i;
+        r->segment_count++;
+    }
+}
+
+/* Rays whose t is in the segment: [t0, t1), or (t0, t1] where what counts is the field just before t. */
+SIMD_INLINE vm kernel_tet_span_holds(const kernel_tet_span *s, vf t, bool before)
+{
+    if (before) return vm_and(s->mask, vm_and(vf_lt(s->t0, t), vf_le(t, s->t1)));
+    return vm_and(s->mask, vm_and(vf_le(s->t0, t), vf_lt(t, s->t1)));
+}
+
+SIMD_INLINE vf kernel_segment_at(const kernel_tet_span *s, vf t, vf v0, vf v1)
+{
+    return v0 + (t - s->t0) * ((v1 - v0) / (s->t1 - s->t0));
+}
+
+/* The signed sum at t. Rounding may put ends of neighbours, which meet in one place, in the wrong order: a place that
+ * is not covered once in sum is asked for a little before and behind, and last keeps what it had. */
+static void kernel_passage_sum(const kernel_passage *r, vm rays, vf t, bool before, vf *v, vf *w)
+{
+    static const float shifts[7] = {0, 1, -1, 4, -4, 16, -16};
+    vm open = rays;
+    for (int k = 0; k < 7 && vm_any(open); k++) {
+        const vf at = t + (vf_abs(t) + 1.0f) * (shifts[k] * 2.4e-7f);
+        vf cover = vf_set(0), sum = vf_set(0), colour = vf_set(0);
+        for (int n = 0; n < r->segment_count; n++) {
+            const kernel_tet_span *s = &r->segments[n];
+            const vm in = vm_and(open, kernel_tet_span_holds(s, at, before));
+            if (!vm_any(in)) continue;
+            cover = vf_select(in, cover + s->sign, cover);
+            sum = vf_select(in, sum + s->sign * kernel_segment_at(s, at, s->v0, s->v1), sum);
+            colour = vf_select(in, colour + s->sign * kernel_segment_at(s, at, s->w0, s->w1), colour);
+        }
+        const vm good = vm_and(open, vf_eq(cover, vf_set(1)));
+        *v = vf_select(good, sum, *v);
+        *w = vf_select(good, colour, *w);
+        open = vm_andnot(open, good);
+    }
+}
+
+/* Sheets between the crossed triangles and faces: those behind the triangles, of tets that stand out of the cell, are
+ * none of its field. */
+SIMD_INLINE vm kernel_stay_holds(const kernel_stay *stay, const kernel_meeting *sheet)
+{
+    const vm inside = vm_and(vf_lt(stay->interval.t_in, sheet->t), vf_lt(sheet->t, stay->interval.t_out));
+    const vm within = vm_and(vf_lt(stay->in.t, sheet->t), vf_lt(sheet->t, stay->out.t));
+    return vm_and(vm_and(stay->interval.mask, sheet->mask), vm_and(inside, within));
+}
+
+/* What other tets have at an end, beside the one whose triangle it is: added to the face's value. */
+SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const kernel_meeting *end, bool before, vf *u,
+                                     vf *w)
+{
+    vf v_sum = end->v, w_sum = end->w;
+    kernel_passage_sum(r, rays, end->t, before, &v_sum, &w_sum);
+    *u = end->v_face + (v_sum - end->v);
+    *w = end->w_face + (w_sum - end->w);
+}
+
+/* Make the sheets ready to be the profile of the stay: their values, and those at its ends, the field's. */
+static void kernel_passage_profile(const polyhedron *c, vm rays, bool has_colour, kernel_passage *r, kernel_stay *stay)
+{
+    kernel_interval *i = &stay->interval;
+    kernel_passage_sheets(c, rays, has_colour, r);
+    if (c->is_star) return;
+    kernel_passage_segments(c, rays, r);
+    kernel_passage_lift(r, i->mask, &stay->in, false, &stay->u_in, &i->w_in);
+    kernel_passage_lift(r, i->mask, &stay->out, true, &stay->u_out, &i->w_out);
+    for (int n = 0; n < r->sheet_count; n++) {
+        kernel_meeting *sheet = &r->sheets[r->met_sheets[n]];
+        const vm held = kernel_stay_holds(stay, sheet);
+        vf v = sheet->v, w = sheet->w;
+        if (!vm_any(held)) continue;
+        kernel_passage_sum(r, held, sheet->t, false, &v, &w);
+        sheet->v_face = vf_select(held, v, sheet->v_face);
+        sheet->w_face = vf_select(held, w, sheet->w_face);
+    }
+}
+
+/* The profile's begin, as a piece of no length. */
+SIMD_INLINE kernel_profile_piece kernel_profile_begin(const kernel_stay *stay, vf v_in)
+{
+    const kernel_interval *i = &stay->interval;
+    return (kernel_profile_piece){i->t_in, i->t_in, v_in, v_in, i->w_in, i->w_in};
+}
+
+/* The piece behind this one, each ray's own; v_out: the value at the profile's end. */
+SIMD_INLINE void kernel_profile_next(const kernel_passage *r, const kernel_stay *stay, vf v_out,
+                                     kernel_profile_piece *piece)
+{
+    vf t = stay->interval.t_out, v = v_out, w = stay->interval.w_out;
+    for (int n = 0; n < r->sheet_count; n++) {
+        const kernel_meeting *sheet = &r->sheets[r->met_sheets[n]];
+        const vm nearer =
+            vm_and(kernel_stay_holds(stay, sheet), vm_and(vf_lt(piece->t1, sheet->t), vf_lt(sheet->t, t)));
+        t = vf_select(nearer, sheet->t, t);
+        v = vf_select(nearer, sheet->v_face, v);
+        w = vf_select(nearer, sheet->w_face, w);
+    }
+    *piece = (kernel_profile_piece){piece->t1, t, piece->v1, v, piece->w1, w};
+}
+
+/* Rays of mask whose profile goes on behind the piece. */
+SIMD_INLINE vm kernel_profile_open(const kernel_stay *stay, const kernel_profile_piece *piece, vm mask)
+{
+    return vm_and(mask, vf_lt(piece->t1, stay->interval.t_out));
+}
+
+#endif

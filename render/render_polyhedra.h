@@ -1,0 +1,54 @@
+/* Polyhedra as kernels want them: taken apart once a tile, into one thread's memory. The essay is in
+ * render_polyhedra.c. */
+#ifndef RENDER_RENDER_POLYHEDRA_H
+#define RENDER_RENDER_POLYHEDRA_H
+
+#include <stddef.h>
+
+#include "grid.h"
+
+/* A triangle of the surface: vertices and edges (ab, bc, ac) by number, a < b < c. */
+typedef struct polyhedron_facet {
+    int vertex[3];
+    int edge[3];
+    int quad;   /* the quad it is half of, or -1 */
+    float sign; /* of the tet it spans with the centre: 1, -1 where that lies outside, 0 where it has no volume */
+} polyhedron_facet;
+
+/* Vertices are numbered in the order of coordinates, so that a < b says which of two comes first; the centre is number
+ * vertex_count, behind them all. Everything is in an order that depends on coordinates and values alone. */
+typedef struct polyhedron {
+    struct polyhedron *next; /* in the store's table */
+    uint32_t index;
+    int part, layer;
+    bool is_finite, is_placed, is_constant;
+    bool is_star; /* no sign is negative */
+    int vertex_count, edge_count, facet_count;
+    double (*world)[3]; /* vertex_count + 1 each, from here */
+    double *values;
+    float *x, *y, *z;  /* tile space */
+    float *f, *g;      /* values as the kernels want them; of the colour field */
+    int64_t *vertices; /* vertex_count */
+    int (*edges)[2];
+    polyhedron_facet *facets;
+    int (*quads)[4]; /* the corners around of faces of four vertices */
+} polyhedron;
+
+typedef struct polyhedron_store polyhedron_store;
+
+/* One thread's. NULL where memory ran out. */
+polyhedron_store *polyhedra_create(void);
+void polyhedra_free(polyhedron_store *store);
+
+/* Forget all. */
+void polyhedra_reset(polyhedron_store *store);
+
+/* The cell with the field's values, not placed when it is new. What an earlier call returned may be gone after this
+ * one. NULL where memory ran out. layer tells fields apart. */
+polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_field *field, int part, int layer,
+                           uint32_t index);
+
+/* Room for the kernels' own numbers about one cell, 64-byte aligned; the next call may take it back. */
+void *polyhedra_scratch(polyhedron_store *store, size_t bytes);
+
+#endif

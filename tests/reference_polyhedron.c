@@ -1,0 +1,249 @@
+/* A polyhedron in double, by the letter of its definition: every face a fan from its smallest vertex, every triangle of
+ * it with the centre a tet, and the field at a point the sum over the tets that hold it of sign times linear field.
+ *
+ * The signs come from faces turned alike: one face is taken as it is, and whatever face has a directed edge of a turned
+ * one in the same direction is turned over, until nothing changes. Then each connected piece is turned to have a
+ * positive volume, or a negative one if its first vertex is inside the rest. */
+#include "reference_polyhedron.h"
+#include <stdlib.h>
+
+#include <stdio.h>
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+
+static bool comes_before(const double *a, const double *b)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (a[axis] != b[axis]) return a[axis] < b[axis];
+    return false;
+}
+
+static double determinant(const double *a, const double *b, const double *c)
+{
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+/* 1 where the faces run along a common edge in opposite directions, -1 where in the same, 0 without one. */
+static int agreement(const reference_polyhedron *p, int one, int other)
+{
+    for (int i = 0; i < p->face_size[one]; i++)
+        for (int k = 0; k < p->face_size[other]; k++) {
+            const int a = p->faces[one][i], b = p->faces[one][(i + 1) % p->face_size[one]];
+            const int c = p->faces[other][k], d = p->faces[other][(k + 1) % p->face_size[other]];
+            if (a == d && b == c) return 1;
+            if (a == c && b == d) return -1;
+        }
+    return 0;
+}
+
+/* turn: 1 or -1 for each face; piece: the first face of its connected piece. */
+static void turn_faces(const reference_polyhedron *p, int *turn, int *piece)
+{
+    for (int face = 0; face < p->face_count; face++) turn[face] = 0;
+    for (int first = 0; first < p->face_count; first++) {
+        if (turn[first]) continue;
+        turn[first] = 1;
+        piece[first] = first;
+        for (bool changed = true; changed;) {
+            changed = false;
+            for (int i = 0; i < p->face_count; i++)
+                for (int k = 0; k < p->face_count && turn[i] && piece[i] == first; k++) {
+                    const int agree = turn[k] ? 0 : agreement(p, i, k);
+                    if (!agree) continue;
+                    turn[k] = agree * turn[i];
+                    piece[k] = first;
+                    changed = true;
+                }
+        }
+    }
+}
+
+static void add_triangles(reference_cell *cell)
+{
+    reference_polyhedron *p = &cell->poly;
+    p->triangle_count = 0;
+    for (int face = 0; face < p->face_count; face++) {
+        const int size = p->face_size[face], *loop = p->faces[face];
+        int least = 0;
+        for (int i = 1; i < size; i++)
+            if (comes_before(cell->world[loop[i]], cell->world[loop[least]])) least = i;
+        for (int i = 1; i + 1 < size; i++) {
+            int *t = p->triangles[p->triangle_count];
+            t[0] = loop[least];
+            t[1] = loop[(least + i) % size];
+            t[2] = loop[(least + i + 1) % size];
+            p->face_of[p->triangle_count++] = face;
+        }
+    }
+}
+
+/* Is the point inside the surface of the pieces other than the one given? By a ray in no direction in particular. */
+static bool is_inside_others(const reference_cell *cell, const int *piece, int mine, const double *point)
+{
+    static const double direction[3] = {0.5377, 0.1834, -0.7621};
+    const reference_polyhedron *p = &cell->poly;
+    bool inside = false;
+    for (int i = 0; i < p->triangle_count; i++) {
+        double d[3][3], along[3];
+        if (piece[p->face_of[i]] == mine) continue;
+        for (int k = 0; k < 3; k++)
+            for (int axis = 0; axis < 3; axis++) d[k][axis] = cell->position[p->triangles[i][k]][axis] - point[axis];
+        for (int k = 0; k < 3; k++) along[k] = determinant(d[(k + 1) % 3], d[(k + 2) % 3], direction);
+        const bool same = (along[0] > 0) == (along[1] > 0) && (along[1] > 0) == (along[2] > 0);
+        if (same && determinant(d[0], d[1], d[2]) / (along[0] + along[1] + along[2]) > 0) inside = !inside;
+    }
+    return inside;
+}
+
+static double signed_volume(const reference_cell *cell, int triangle, const double *apex)
+{
+    double d[3][3];
+    for (int k = 0; k < 3; k++)
+        for (int axis = 0; axis < 3; axis++)
+            d[k][axis] = cell->position[cell->poly.triangles[triangle][k]][axis] - apex[axis];
+    return determinant(d[0], d[1], d[2]);
+}
+
+static int vertex_number(reference_cell *cell, int64_t *vertices, int64_t vertex)
+{
+    int at = 0;
+    while (at < cell->count && vertices[at] != vertex) at++;
+    if (at == REFERENCE_MAX_VERTICES) {
+        fprintf(stderr, "reference: a polyhedron of more than %d vertices\n", at);
+        exit(1);
+    }
+    if (at == cell->count) vertices[cell->count++] = vertex;
+    return at;
+}
+
+void reference_polyhedron_read(const grid *g, int64_t index, reference_cell *cell,
+                               int64_t vertices[REFERENCE_MAX_VERTICES])
+{
+    reference_polyhedron *p = &cell->poly;
+    int64_t first, end;
+    cell->count = p->face_count = 0;
+    grid_cell_faces(g, index, &first, &end);
+    for (int64_t i = first; i < end; i++) {
+        int64_t from, to;
+        grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &to);
+        if (p->face_count == REFERENCE_MAX_FACES || to - from > REFERENCE_MAX_SIDES) {
+            fprintf(stderr, "reference: a polyhedron of too many faces or sides\n");
+            exit(1);
+        }
+        int *loop = p->faces[p->face_count];
+        p->face_size[p->face_count++] = (int)(to - from);
+        for (int64_t k = from; k < to; k++)
+            *loop++ = vertex_number(cell, vertices, grid_array_index(&g->face_connectivity, k));
+    }
+}
+
+void reference_polyhedron_setup(reference_cell *cell)
+{
+    reference_polyhedron *p = &cell->poly;
+    int turn[REFERENCE_MAX_FACES], piece[REFERENCE_MAX_FACES];
+    double volume[REFERENCE_MAX_FACES] = {0};
+    double *centre = cell->position[cell->count];
+    for (int axis = 0; axis < 3; axis++) {
+        centre[axis] = 0;
+        for (int i = 0; i < cell->count; i++) centre[axis] += cell->position[i][axis] / cell->count;
+    }
+    add_triangles(cell);
+    turn_faces(p, turn, piece);
+    for (int i = 0; i < p->triangle_count; i++)
+        volume[piece[p->face_of[i]]] += turn[p->face_of[i]] * signed_volume(cell, i, centre);
+    for (int i = 0; i < p->triangle_count; i++) {
+        const int face = p->face_of[i], mine = piece[face];
+        const double own = turn[face] * signed_volume(cell, i, centre);
+        const bool is_hole = is_inside_others(cell, piece, mine, cell->position[p->faces[mine][0]]);
+        p->sign[i] = own == 0 ? 0 : ((own > 0) == (volume[mine] > 0)) != is_hole ? 1 : -1;
+    }
+}
+
+/* Barycentric coordinates of a point in tet i: of the triangle's vertices, then the centre; slopes: their gradients. */
+static bool tet_coordinates(const reference_cell *cell, int i, const double point[3], double lambda[4],
+                            double slopes[4][3])
+{
+    const reference_polyhedron *p = &cell->poly;
+    const double *centre = cell->position[cell->count];
+    double d[3][3], from[3];
+    for (int axis = 0; axis < 3; axis++) {
+        from[axis] = point[axis] - centre[axis];
+        for (int k = 0; k < 3; k++) d[k][axis] = cell->position[p->triangles[i][k]][axis] - centre[axis];
+    }
+    const double volume = determinant(d[0], d[1], d[2]);
+    if (volume == 0) return false;
+    lambda[3] = 1;
+    slopes[3][0] = slopes[3][1] = slopes[3][2] = 0;
+    for (int k = 0; k < 3; k++) {
+        const double *u = d[(k + 1) % 3], *v = d[(k + 2) % 3];
+        lambda[k] = 0;
+        for (int axis = 0; axis < 3; axis++) {
+            const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+            slopes[k][axis] = (u[b] * v[c] - u[c] * v[b]) / volume;
+            lambda[k] += slopes[k][axis] * from[axis];
+            slopes[3][axis] -= slopes[k][axis];
+        }
+        lambda[3] -= lambda[k];
+    }
+    return true;
+}
+
+/* The sum at a point; returns how often the tets cover it. */
+static int sum_at(const reference_cell *cell, const double point[3], const double *values, double *value,
+                  double gradient[3])
+{
+    const reference_polyhedron *p = &cell->poly;
+    double mean = 0;
+    int cover = 0;
+    for (int i = 0; i < cell->count; i++) mean += values[i] / cell->count;
+    *value = gradient[0] = gradient[1] = gradient[2] = 0;
+    for (int i = 0; i < p->triangle_count; i++) {
+        double lambda[4], slopes[4][3];
+        if (!p->sign[i] || !tet_coordinates(cell, i, point, lambda, slopes)) continue;
+        if (lambda[0] < 0 || lambda[1] < 0 || lambda[2] < 0 || lambda[3] < 0) continue;
+        cover += p->sign[i];
+        for (int k = 0; k < 4; k++) {
+            const double f = p->sign[i] * (k < 3 ? values[p->triangles[i][k]] : mean);
+            *value += f * lambda[k];
+            for (int axis = 0; axis < 3; axis++) gradient[axis] += f * slopes[k][axis];
+        }
+    }
+    return cover;
+}
+
+/* Where rounding on a sheet has a point in none or two of its tets, a point a little farther serves. */
+bool reference_polyhedron_interpolate(const reference_cell *cell, const double point[3], const double *values,
+                                      double *value, double gradient[3])
+{
+    static const double aside[3] = {0.6123, -0.3217, 0.4871};
+    double slope[3];
+    for (int step = 0; step < 24; step++) {
+        const double by = step == 0 ? 0 : (step % 2 ? 1 : -1) * ldexp(1e-14, step / 2);
+        double moved[3];
+        for (int axis = 0; axis < 3; axis++) moved[axis] = point[axis] + by * aside[axis];
+        const bool good = sum_at(cell, moved, values, value, slope) == 1;
+        if (gradient) memcpy(gradient, slope, sizeof slope);
+        if (good) return true;
+    }
+    return false;
+}
+
+double reference_sheet_distance(const reference_cell *cell, const double point[3])
+{
+    double least = (double)INFINITY;
+    for (int i = 0; i < cell->poly.triangle_count; i++) {
+        double lambda[4], slopes[4][3], nearest = (double)INFINITY, outside = 0;
+        if (!tet_coordinates(cell, i, point, lambda, slopes)) continue;
+        for (int k = 0; k < 4; k++) {
+            const double height = lambda[k] / sqrt(slopes[k][0] * slopes[k][0] + slopes[k][1] * slopes[k][1] +
+                                                   slopes[k][2] * slopes[k][2]);
+            outside = fmin(outside, height);
+            if (k < 3) nearest = fmin(nearest, fabs(height));
+        }
+        least = fmin(least, fmax(nearest, -outside));
+    }
+    return least;
+}

@@ -1,0 +1,236 @@
+/* Polyhedra: against the reference, against the same cells given as tets and hexes, beside hexes, and dealt to ranks.
+ */
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+static const double values[3] = {-0.25, 0.1, 0.35};
+static const double wave_values[2] = {-0.2, 0.3};
+static const float constant_opacity[1] = {0.3f};
+
+static void mesh_fixture(render_fixture *f, const test_mesh *meshes, int count, double cell_size)
+{
+    fixture_create(f, meshes, count, (test_layout){.wide_coordinates = true, .wide_values = true}, cell_size, 1,
+                   (const double[]){0, 0, 0});
+}
+
+static const char *case_name(const char *what, fixture_camera camera)
+{
+    static char name[96];
+    snprintf(name, sizeof name, "%s, %s", what, fixture_camera_name(camera));
+    return name;
+}
+
+/* Prisms on bases that are not convex, spikes, a cavity. The fan of the U's base folds over itself in its plane: rays
+ * cross triangles that lie on each other, in an order that rounding decides. For a linear field that is nothing, for
+ * others the triangles' values differ, and there is no telling. */
+static void shapes_are_the_reference(void **state)
+{
+    (void)state;
+    for (test_polyhedron_shape shape = 0; shape < TEST_POLYHEDRON_COUNT; shape++)
+        for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++)
+            for (int field = 0; field < (shape == TEST_U_PRISM ? 1 : 2); field++) {
+                test_mesh mesh;
+                render_fixture f;
+                test_mesh_polyhedron(shape, field ? test_wave : test_linear, &mesh);
+                mesh_fixture(&f, &mesh, 1, 1);
+                fixture_look(&f, camera, 49, 43);
+                fixture_add_surface(&f, values, 3, 0.5f);
+                fixture_set_volume(&f, 0.05);
+                const fixture_outcome o =
+                    fixture_compare(&f, &fixture_usual_bounds, case_name(test_polyhedron_name(shape), camera));
+                assert_true(o.hits > 20);
+                assert_true(field == 1 || 100 * o.ambiguous <= o.rays);
+                fixture_free(&f);
+                test_mesh_free(&mesh);
+            }
+}
+
+static void assert_same_alpha(const drawn_frame *a, const drawn_frame *b)
+{
+    for (int64_t p = 0; p < (int64_t)a->picture.width * a->picture.height; p++)
+        if (a->picture.rgba[4 * p + 3] != b->picture.rgba[4 * p + 3])
+            fail_msg("pixel %d: alpha %.9g and %.9g", (int)p, (double)a->picture.rgba[4 * p + 3],
+                     (double)b->picture.rgba[4 * p + 3]);
+}
+
+typedef void scene_set(render_fixture *f);
+
+static void set_surfaces(render_fixture *f)
+{
+    fixture_add_surface(f, wave_values, 2, 0.5f);
+}
+
+static void set_volume(render_fixture *f)
+{
+    fixture_set_volume(f, 0.3);
+}
+
+/* Every sample counts the same: alpha is how many samples are in cells, and so the cells' intervals. */
+static void set_constant_volume(render_fixture *f)
+{
+    fixture_set_volume(f, 0.07);
+    f->transfer.opacity_count = 1;
+    f->transfer.opacities = constant_opacity;
+}
+
+static void draw_mesh(const test_mesh *mesh, fixture_camera camera, scene_set *set, drawn_frame *out)
+{
+    render_fixture f;
+    mesh_fixture(&f, mesh, 1, 0.5);
+    fixture_look(&f, camera, 61, 47);
+    set(&f);
+    fixture_draw(&f, out);
+    fixture_free(&f);
+}
+
+static void assert_same_as_polyhedra(test_mesh_kind kind, double share, double jitter, scene_set *set)
+{
+    for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+        test_mesh mesh;
+        drawn_frame first, other;
+        test_mesh_lattice(kind, 4, jitter, test_wave, &mesh);
+        draw_mesh(&mesh, camera, set, &first);
+        test_mesh_to_polyhedra(&mesh, share);
+        draw_mesh(&mesh, camera, set, &other);
+        assert_true(first.list.count > 100);
+        if (set == set_constant_volume)
+            assert_same_alpha(&first, &other);
+        else
+            drawn_assert_same(&first, &other);
+        drawn_free(&first);
+        drawn_free(&other);
+        test_mesh_free(&mesh);
+    }
+}
+
+static void tets_given_as_polyhedra_are_tets(void **state)
+{
+    (void)state;
+    for (int lattice = 0; lattice < 2; lattice++) {
+        assert_same_as_polyhedra(TEST_TETS, 1, lattice ? 0 : 0.2, set_surfaces);
+        assert_same_as_polyhedra(TEST_TETS, 0.5, lattice ? 0 : 0.2, set_volume);
+    }
+}
+
+/* Intervals are the same bits whichever of a face's cells is a polyhedron: nothing between them, nothing twice. */
+static void intervals_of_polyhedra_are_those_of_the_types(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int pass = 0; pass < 4 && kind != TEST_POLYHEDRA; pass++)
+            assert_same_as_polyhedra(kind, pass % 2 ? 0.5 : 1, pass / 2 ? 0 : 0.2, set_constant_volume);
+}
+
+static void polyhedra_beside_other_cells_are_the_reference(void **state)
+{
+    (void)state;
+    static const test_mesh_kind kinds[3] = {TEST_HEXES, TEST_WEDGES, TEST_MIXED};
+    for (int i = 0; i < 3; i++)
+        for (fixture_camera camera = 0; camera < CAMERA_ALONG_X; camera++)
+            for (int half = 0; half < 2; half++) {
+                test_mesh mesh;
+                render_fixture f;
+                test_mesh_lattice(kinds[i], 4, 0.2, test_wave, &mesh);
+                test_mesh_to_polyhedra(&mesh, half ? 0.5 : 1);
+                mesh_fixture(&f, &mesh, 1, 0.5);
+                fixture_look(&f, camera, 33, 29);
+                fixture_add_surface(&f, wave_values, 2, 0.5f);
+                fixture_set_volume(&f, 0.3);
+                fixture_compare(&f, &fixture_usual_bounds, case_name(test_mesh_kind_name(kinds[i]), camera));
+                fixture_free(&f);
+                test_mesh_free(&mesh);
+            }
+}
+
+/* Linear fields are exact, on warped faces too: the bound is that of linear_surface_is_a_plane_in_every_kind. */
+static void linear_surface_of_warped_polyhedra_is_a_plane(void **state)
+{
+    (void)state;
+    test_mesh mesh;
+    render_fixture f;
+    drawn_frame drawn;
+    test_mesh_lattice(TEST_HEXES, 4, 0.2, test_linear, &mesh);
+    test_mesh_to_polyhedra(&mesh, 0.7);
+    mesh_fixture(&f, &mesh, 1, 0.5);
+    fixture_look(&f, CAMERA_OUTSIDE, 61, 47);
+    fixture_add_surface(&f, values, 3, 0.5f);
+    fixture_draw(&f, &drawn);
+    for (int64_t i = 0; i < drawn.list.count; i++) {
+        const fragment *hit = &drawn.list.items[i];
+        double base[3], d[3];
+        render_camera_ray(&f.job.camera, (int)hit->pixel % 61, (int)hit->pixel / 61, base, d);
+        const double slope = 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
+        const double value = test_linear(base) + slope * fixture_depth(&f, hit->t_in);
+        if (!(fabs(value - values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope)))
+            fail_msg("pixel %u: value %.9g", hit->pixel, value);
+    }
+    assert_true(drawn.list.count > 300);
+    drawn_free(&drawn);
+    fixture_free(&f);
+    test_mesh_free(&mesh);
+}
+
+enum { RANKS = 7 };
+
+/* is_turned: the cells' own orders change as well, which polyhedra do not see (a hex's inverse map does). */
+static void draw_dealt(const test_mesh *mesh, bool is_turned, scene_set *set, drawn_frame *out)
+{
+    render_fixture parts[RANKS];
+    int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
+    test_partition(mesh, TEST_RANDOM, 4, RANKS, owners);
+    for (int rank = 0; rank < RANKS; rank++) {
+        test_mesh part;
+        test_mesh_part(mesh, owners, rank, &part);
+        test_mesh_shuffle(&part, (uint64_t)rank + 20);
+        if (is_turned) test_mesh_turn(&part, (uint64_t)rank + 40);
+        mesh_fixture(&parts[rank], &part, 1, 0.5);
+        fixture_look(&parts[rank], CAMERA_OUTSIDE, 61, 47);
+        set(&parts[rank]);
+        parts[rank].job.is_alone = false;
+        test_mesh_free(&part);
+    }
+    fixture_draw_apart(parts, RANKS, out);
+    for (int rank = 0; rank < RANKS; rank++) fixture_free(&parts[rank]);
+    free(owners);
+}
+
+/* Each cell on a random one of seven ranks, cells, vertices and faces numbered in another order on each. */
+static void random_ownership_changes_nothing(void **state)
+{
+    (void)state;
+    for (int pass = 0; pass < 6; pass++) {
+        test_mesh mesh;
+        drawn_frame alone, dealt;
+        test_mesh_lattice(pass % 3 == 0   ? TEST_POLYHEDRA
+                          : pass % 3 == 1 ? TEST_HEXES
+                                          : TEST_MIXED,
+                          4, 0.2, test_wave, &mesh);
+        if (pass % 3) test_mesh_to_polyhedra(&mesh, pass % 3 == 1 ? 1 : 0.6);
+        draw_mesh(&mesh, CAMERA_OUTSIDE, pass < 3 ? set_surfaces : set_volume, &alone);
+        draw_dealt(&mesh, pass % 3 < 2, pass < 3 ? set_surfaces : set_volume, &dealt);
+        if (pass < 3) drawn_assert_same(&alone, &dealt);
+        if (!(drawn_difference(&alone, &dealt) <= 1e-6)) fail_msg("off by %g", drawn_difference(&alone, &dealt));
+        drawn_free(&alone);
+        drawn_free(&dealt);
+        test_mesh_free(&mesh);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shapes_are_the_reference),
+        cmocka_unit_test(tets_given_as_polyhedra_are_tets),
+        cmocka_unit_test(intervals_of_polyhedra_are_those_of_the_types),
+        cmocka_unit_test(polyhedra_beside_other_cells_are_the_reference),
+        cmocka_unit_test(linear_surface_of_warped_polyhedra_is_a_plane),
+        cmocka_unit_test(random_ownership_changes_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
