@@ -116,7 +116,7 @@ static void measure_surface(bench *b)
                                         .colours = colour,
                                         .opacity = 1,
                                         .material = {0.15f, 0.75f, 0.25f, 32},
-                                        .root_steps = 2};
+                                        .root = RENDER_ROBUST};
     b->job.surfaces = &layer;
     b->job.surface_count = 1;
     measure_frame(b, "isosurface");

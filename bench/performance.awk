@@ -8,7 +8,7 @@ BEGIN {
     print "The mesh is the cube [-1, 1]^3 of n^3 cubes, inner vertices jittered by up to 0.2 of a cube's side, as hexes or as six"
     print "tets each; float32 coordinates and values, int32 indices. The field is sin 6x cos 6y + sin 6y cos 6z + sin 6z cos 6x. Images"
     print "are 1920 x 1080 from (2.4, 1.6, 3.0) to the origin, 40 degrees vertical: every pixel's ray counts, those that miss too."
-    print "The isosurface is at 0.3, shaded, 2 steps of Neubauer's method. The volume has a tent of opacity over |f| < 0.6 (at its peak"
+    print "The isosurface is at 0.3, shaded, by the robust root finder. The volume has a tent of opacity over |f| < 0.6 (at its peak"
     print "0.5 in a length of 0.5), samples each half side of a cube, jittered, in groups of 16."
     print ""
     print "A speed is the median of the runs, with the least and the greatest of them. Beside it stands the error on one pixel in each"
