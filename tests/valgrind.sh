@@ -12,9 +12,13 @@ trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 status=0
 export HWLOC_COMPONENTS=-x86 # which valgrind cannot run
-[ $# -gt 0 ] || set -- --size 4 --steps 20
+[ $# -gt 0 ] || set -- --size 4 --steps 50
 OMP_NUM_THREADS=2 mpirun -n 2 valgrind -q --keep-debuginfo=yes --num-callers=40 --error-exitcode=99 --leak-check=full --errors-for-leak-kinds=definite \
     --show-leak-kinds=definite --suppressions=/usr/share/openmpi/openmpi-valgrind.supp \
     --suppressions="$here/valgrind.supp" "$program" --scene "$scene" "$@" || status=$?
+if [ $status = 0 ] && ! ls ./*.png >/dev/null 2>&1; then
+    echo 'valgrind: no picture was drawn' >&2
+    status=1
+fi
 [ $status = 0 ] && echo 'valgrind: no errors' || echo "valgrind: errors, status $status" >&2
 exit $status
