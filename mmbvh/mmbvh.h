@@ -39,6 +39,32 @@ typedef struct mmbvh {
     int64_t unusable_cells; /* cells with the empty range in the nodes' own ranges */
 } mmbvh;
 
+/* Reading nodes, whatever their layout: what goes down a tree asks these and no array. The box is lower and upper in
+ * lanes 0 to 2; lane 3 is scratch, so that a box can be written by whole vectors. */
+static inline void mmbvh_node_box(const mmbvh *tree, int64_t index, float lower[4], float upper[4])
+{
+    const mmbvh_node *node = &tree->nodes[index];
+    for (int axis = 0; axis < 3; axis++) {
+        lower[axis] = node->lower[axis];
+        upper[axis] = node->upper[axis];
+    }
+}
+
+/* Cells in a leaf; 0: an inner node. */
+static inline int mmbvh_node_count(const mmbvh *tree, int64_t index)
+{
+    return (int)tree->nodes[index].count;
+}
+
+/* Of a leaf: its first entry in cells; of an inner node: its left child's index, the right one follows. */
+static inline int64_t mmbvh_node_ref(const mmbvh *tree, int64_t index)
+{
+    return (int64_t)tree->nodes[index].ref;
+}
+
+/* Bytes of nodes and cell indices. */
+int64_t mmbvh_bytes(const mmbvh *tree);
+
 /* Ranges of one field: the nodes' own (stride 40) or an array of pairs beside the tree (stride 8). */
 typedef struct mmbvh_ranges {
     const char *low; /* of node 0 */

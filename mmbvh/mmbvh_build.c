@@ -184,6 +184,11 @@ insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const fl
     return INSITU_OK;
 }
 
+int64_t mmbvh_bytes(const mmbvh *tree)
+{
+    return tree->node_count * (int64_t)sizeof *tree->nodes + tree->cell_count * (int64_t)sizeof *tree->cells;
+}
+
 void mmbvh_free(mmbvh *tree)
 {
     if (!tree) return;

@@ -210,7 +210,7 @@ static mmbvh_statistics statistics_of(const walk *w)
     const int64_t inner = w->tree->node_count - w->leaves;
     s.cells_a_leaf = w->leaves ? (double)w->tree->cell_count / (double)w->leaves : 0;
     s.sibling_overlap = inner ? w->overlap / (double)inner : 0;
-    s.bytes = w->tree->node_count * (int64_t)sizeof(mmbvh_node) + w->tree->cell_count * (int64_t)sizeof(uint32_t);
+    s.bytes = mmbvh_bytes(w->tree);
     return s;
 }
 

@@ -192,12 +192,14 @@ static inline void kernel_packet_setup(kernel_packet *p, const kernel_frame *f, 
 }
 
 /* Where the packet's rays are in the node's box, between low and high. */
-SIMD_INLINE vm kernel_box(const kernel_packet *p, const mmbvh_node *node, vf *t_in, vf *t_out)
+SIMD_INLINE vm kernel_box(const kernel_packet *p, const mmbvh *tree, int64_t node, vf *t_in, vf *t_out)
 {
     vf low = *t_in, high = *t_out;
+    float lower[4], upper[4];
+    mmbvh_node_box(tree, node, lower, upper);
     for (int a = 0; a < 3; a++) {
-        const vf t1 = vf_set(node->lower[a] - p->pad) * p->inverse[a] - p->shift[a];
-        const vf t2 = vf_set(node->upper[a] + p->pad) * p->inverse[a] - p->shift[a];
+        const vf t1 = vf_set(lower[a] - p->pad) * p->inverse[a] - p->shift[a];
+        const vf t2 = vf_set(upper[a] + p->pad) * p->inverse[a] - p->shift[a];
         low = vf_max(low, vf_min(t1, t2));
         high = vf_min(high, vf_max(t1, t2));
     }

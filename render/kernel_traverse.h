@@ -28,12 +28,12 @@ SIMD_INLINE bool kernel_node_shows(const kernel_interest *interest, const mmbvh_
 }
 
 /* Is the right child nearer than the left, seen along the packet? */
-SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh_node *left)
+SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
 {
-    const mmbvh_node *right = left + 1;
-    float along = 0;
+    float lower[2][4], upper[2][4], along = 0;
+    for (int side = 0; side < 2; side++) mmbvh_node_box(tree, left + side, lower[side], upper[side]);
     for (int a = 0; a < 3; a++)
-        along += p->centre_direction[a] * ((right->lower[a] + right->upper[a]) - (left->lower[a] + left->upper[a]));
+        along += p->centre_direction[a] * ((lower[1][a] + upper[1][a]) - (lower[0][a] + upper[0][a]));
     return along < 0;
 }
 
@@ -47,16 +47,17 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
     int top = 0;
     if (tree->node_count && (!interest || kernel_node_shows(interest, ranges, 0))) stack[top++] = 0;
     while (top) {
-        const mmbvh_node *node = &tree->nodes[stack[--top]];
+        const int64_t node = stack[--top];
         vf t_in = t_low, t_out = *t_high;
-        const vm met = vm_and(rays, kernel_box(p, node, &t_in, &t_out));
+        const vm met = vm_and(rays, kernel_box(p, tree, node, &t_in, &t_out));
         if (!vm_any(met)) continue;
-        if (node->count) {
-            leaf(p, state, part, tree->cells + node->ref, (int)node->count, met);
+        const int count = mmbvh_node_count(tree, node);
+        if (count) {
+            leaf(p, state, part, tree->cells + mmbvh_node_ref(tree, node), count, met);
             continue;
         }
-        const int64_t left = (int64_t)node->ref;
-        const bool swap = kernel_right_first(p, &tree->nodes[left]);
+        const int64_t left = mmbvh_node_ref(tree, node);
+        const bool swap = kernel_right_first(p, tree, left);
         const int64_t near = left + swap, far = left + !swap;
         if (!interest || kernel_node_shows(interest, ranges, far)) stack[top++] = far;
         if (!interest || kernel_node_shows(interest, ranges, near)) stack[top++] = near;

@@ -254,7 +254,7 @@ SIMD_INLINE bool kernel_sample_range(const kernel_packet *p, int *first, int *la
     for (int i = 0; i < job->part_count; i++) {
         vf t_in = p->t_near, t_out = p->t_far;
         if (!job->parts[i].tree->node_count) continue;
-        const vm met = vm_and(p->active, kernel_box(p, &job->parts[i].tree->nodes[0], &t_in, &t_out));
+        const vm met = vm_and(p->active, kernel_box(p, job->parts[i].tree, 0, &t_in, &t_out));
         from = vf_select(met, vf_min(from, t_in), from);
         to = vf_select(met, vf_max(to, t_out), to);
     }

@@ -182,9 +182,12 @@ static double scene_reach(const render_job *job)
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, square = 0;
     for (int i = 0; i < job->part_count; i++) {
         const mmbvh *tree = job->parts[i].tree;
-        for (int a = 0; a < 3 && tree->node_count; a++) {
-            low[a] = fmin(low[a], (double)tree->nodes[0].lower[a]);
-            high[a] = fmax(high[a], (double)tree->nodes[0].upper[a]);
+        if (!tree->node_count) continue;
+        float lower[4], upper[4];
+        mmbvh_node_box(tree, 0, lower, upper);
+        for (int a = 0; a < 3; a++) {
+            low[a] = fmin(low[a], (double)lower[a]);
+            high[a] = fmax(high[a], (double)upper[a]);
         }
     }
     for (int a = 0; a < 3; a++) square += low[a] < high[a] ? (high[a] - low[a]) * (high[a] - low[a]) : 0;

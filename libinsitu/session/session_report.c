@@ -92,11 +92,6 @@ static void report_field(insitu_session *session, const session_mesh *mesh, int 
         session_text_add(&session->left_out, "mesh \"%s\": field \"%s\" is in no picture", mesh->name, field->name);
 }
 
-static int64_t tree_bytes(const mmbvh *tree)
-{
-    return tree->node_count * (int64_t)sizeof *tree->nodes + tree->cell_count * (int64_t)sizeof *tree->cells;
-}
-
 static void report_scalar(insitu_session *session, const session_mesh *mesh, const session_scalar *scalar)
 {
     const char *name = mesh->fields[scalar->field].given.name;
@@ -124,7 +119,7 @@ static void report_mesh(insitu_session *session, const session_mesh *mesh)
         report->cells_ghost += mesh->ghost_count;
         report->cells_inverted += mesh->inverted_count;
     }
-    if (mesh->has_tree) report->bytes_trees += tree_bytes(&mesh->tree);
+    if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
     for (int i = 0; i < mesh->field_count; i++) report_field(session, mesh, i);
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *scalar = &mesh->scalars[i];
@@ -143,7 +138,7 @@ void session_end_report(insitu_session *session)
         session_text_add(&session->warnings, "the scene file's last edit was not taken: %s", session->scene_warning);
     if (render_isa_warning() && *render_isa_warning()) session_text_add(&session->warnings, "%s", render_isa_warning());
     for (int i = 0; i < session->mesh_count; i++) report_mesh(session, session->meshes[i]);
-    report->bytes_trees += tree_bytes(&session->parent);
+    report->bytes_trees += mmbvh_bytes(&session->parent);
     report->bytes_peak = base_memory_peak();
     report->copied_why = text_of(&session->copied_why);
     report->left_out = text_of(&session->left_out);

@@ -120,9 +120,11 @@ static void fill_boxes(const insitu_session *session, float *boxes, int count)
     for (int i = 0; i < session->mesh_count; i++) {
         const session_mesh *mesh = session->meshes[i];
         if (!mesh->is_needed || mesh->tree.node_count == 0) continue;
+        float lower[4], upper[4];
+        mmbvh_node_box(&mesh->tree, 0, lower, upper);
         for (int axis = 0; axis < 3; axis++) {
-            boxes[3 * part + axis] = mesh->tree.nodes[0].lower[axis];
-            boxes[3 * (count + part) + axis] = mesh->tree.nodes[0].upper[axis];
+            boxes[3 * part + axis] = lower[axis];
+            boxes[3 * (count + part) + axis] = upper[axis];
         }
         boxes[6 * count + 2 * part] = -INFINITY;
         boxes[6 * count + 2 * part + 1] = INFINITY;
