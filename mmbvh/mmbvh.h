@@ -72,8 +72,15 @@ typedef struct mmbvh_ranges {
     int64_t stride; /* bytes from node to node */
 } mmbvh_ranges;
 
+/* Some of a grid's cells, in rising order. Owns its list: mmbvh_selection_free(). */
+typedef struct mmbvh_selection {
+    uint32_t *cells;
+    int64_t count;
+} mmbvh_selection;
+
 typedef struct mmbvh_options {
-    int threads; /* >= 1; 0: as many as OpenMP would take */
+    int threads;                      /* >= 1; 0: as many as OpenMP would take */
+    const mmbvh_selection *selection; /* of a build: these cells alone; NULL: all. None may be a ghost. */
 } mmbvh_options;
 
 /* Build over the grid's cells (ghosts left out) with the ranges of field (NULL: all ranges (-inf, +inf)). Binned SAH,
@@ -81,6 +88,26 @@ typedef struct mmbvh_options {
  * an error *out is zeroed. */
 insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
                           const mmbvh_options *options, mmbvh *out, base_error *error);
+
+/* Values from low to high, ends included. */
+typedef struct mmbvh_interval {
+    float low, high;
+} mmbvh_interval;
+
+/* What is to be seen of a field: cells whose range, rounded to float, meets one of the intervals. */
+typedef struct mmbvh_wish {
+    const grid_field *field;
+    int interval_count;
+    const mmbvh_interval *intervals;
+} mmbvh_wish;
+
+/* The cells that one of the wishes can show: no ghosts, and none for a field of which it has a value that is not
+ * finite; unusable gets the number of these for each wish. Parallel; reads each cell's values once a wish, at about
+ * the speed of a refit of ranges. A tree over the selection (mmbvh_options) draws what the full tree does, for as long
+ * as cells, values and wishes stay. */
+insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_count, const mmbvh_options *options,
+                           mmbvh_selection *out, int64_t *unusable, base_error *error);
+void mmbvh_selection_free(mmbvh_selection *selection);
 
 /* Build over boxes (a parent tree over meshes): lower/upper are count × 3, ranges count × 2 (low, high). */
 insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const float *ranges, int64_t count,

@@ -8,12 +8,13 @@
 MMBVH_INLINE void fill_boxes(const bounds_source *source, int64_t begin, int64_t end, branch_box *boxes, bin_set *set,
                              const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
-    for (int64_t cell = begin; cell < end; cell++) {
+    for (int64_t i = begin; i < end; i++) {
+        const int64_t cell = source->cells ? (int64_t)source->cells[i] : i;
         if (grid_is_ghost(source->g, cell)) continue;
         fetch_box box;
         fetch_box_empty(&box);
         fetch_box_cell(&box, source->g, cell, shape, wide_index, wide_number);
-        branch_box *to = &boxes[cell];
+        branch_box *to = &boxes[i];
         fetch_box_round(&box, source->origin, source->scale, to->lower, to->upper);
         bin_set_add(set, branch_box_lower(to), branch_box_upper(to));
     }
@@ -28,12 +29,13 @@ FETCH_INSTANCES(DEFINE_FILL, fill)
 
 static void fill_any(const bounds_source *source, int64_t begin, int64_t end, branch_box *boxes, bin_set *set)
 {
-    for (int64_t cell = begin; cell < end; cell++) {
+    for (int64_t i = begin; i < end; i++) {
+        const int64_t cell = source->cells ? (int64_t)source->cells[i] : i;
         if (grid_is_ghost(source->g, cell)) continue;
         fetch_box box;
         fetch_box_empty(&box);
         fetch_box_any_cell(&box, source->g, cell);
-        branch_box *to = &boxes[cell];
+        branch_box *to = &boxes[i];
         fetch_box_round(&box, source->origin, source->scale, to->lower, to->upper);
         bin_set_add(set, branch_box_lower(to), branch_box_upper(to));
     }

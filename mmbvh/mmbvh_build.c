@@ -34,7 +34,7 @@ static int64_t list_chunk(const build *b, int chunk, uint32_t *cells)
 {
     int64_t count = 0;
     for (int64_t cell = chunk_start(b, chunk); cell < chunk_start(b, chunk + 1); cell++) {
-        if (b->source.g && grid_is_ghost(b->source.g, cell)) continue;
+        if (b->source.g && !b->source.cells && grid_is_ghost(b->source.g, cell)) continue;
         if (cells) cells[count] = (uint32_t)cell;
         count++;
     }
@@ -111,6 +111,13 @@ static void release(build *b)
     b->boxes = NULL;
 }
 
+/* The tree's cells were places in the selection. */
+static void name_cells(const build *b)
+{
+#pragma omp parallel for num_threads(b->threads) schedule(static)
+    for (int64_t i = 0; i < b->tree.cell_count; i++) b->tree.cells[i] = b->source.cells[b->tree.cells[i]];
+}
+
 /* Cells and nodes without ranges. */
 static bool build_topology(build *b)
 {
@@ -133,6 +140,7 @@ static bool build_topology(build *b)
         b->tree.cell_count = b->builder.count;
     }
     branch_free(root);
+    if (b->source.cells) name_cells(b);
     return b->tree.nodes != NULL;
 }
 
@@ -162,6 +170,10 @@ insitu_status mmbvh_build(const grid *g, const grid_field *field, const double o
     if (!g || !origin) return base_fail(error, INSITU_ERROR_ARGUMENT, "a tree needs a grid and an origin");
     if (!(scale > 0)) return base_fail(error, INSITU_ERROR_ARGUMENT, "a tree's scale must be above 0, not %g", scale);
     build b = {.source = {.g = g, .scale = scale}, .box_count = g->cell_count, .threads = sweep_threads(options)};
+    if (options && options->selection) {
+        b.source.cells = options->selection->cells;
+        b.box_count = options->selection->count;
+    }
     memcpy(b.source.origin, origin, sizeof b.source.origin);
     const insitu_status status = run(&b, out, error);
     return status ? status : mmbvh_refit_ranges(out, g, field, options);

@@ -9,7 +9,7 @@
 #include "render.h"
 #include "render_polyhedra.h"
 
-enum { KERNEL_TILE = 16, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
+enum { KERNEL_TILE = 16, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS };
 
 /* Values that show: a node whose range meets none of these intervals is skipped. Rounded outward. */
 typedef struct kernel_interest {

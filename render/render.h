@@ -60,6 +60,7 @@ typedef struct render_transfer {
 } render_transfer;
 
 enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 16, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
+enum { RENDER_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
 
 typedef struct render_light {
     double direction[3]; /* from the surface towards the light; unit length; world */
@@ -157,6 +158,11 @@ typedef struct render_statistics {
 
 /* The offset in [0, 1) of a pixel's samples in a frame. */
 double render_jitter(uint32_t pixel, uint32_t frame);
+
+/* The values that show: a cell whose range, rounded to float, meets none of the intervals shows nothing. Of a transfer
+ * function the stretches that are not transparent; returns how many, at most RENDER_MAX_INTERVALS. */
+mmbvh_interval render_isovalue_interval(double value);
+int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS]);
 
 /* Trace every pixel of the camera against this rank's parts and append what is seen to out (memory from memory.h;
  * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */

@@ -17,37 +17,52 @@ static float above(double v)
     return (double)f < v ? nextafterf(f, INFINITY) : f;
 }
 
+/* One more interval, or the last one made longer; returns how many there are. */
+static int add_interval(mmbvh_interval *intervals, int count, double low, double high)
+{
+    if (count && intervals[count - 1].high >= below(low)) {
+        intervals[count - 1].high = above(high);
+        return count;
+    }
+    intervals[count] = (mmbvh_interval){below(low), above(high)};
+    return count + 1;
+}
+
+mmbvh_interval render_isovalue_interval(double value)
+{
+    return (mmbvh_interval){below(value), above(value)};
+}
+
+int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER_MAX_INTERVALS])
+{
+    const int n = t->opacity_count;
+    int count = 0;
+    if (t->opacities[0] > 0) count = add_interval(out, count, -INFINITY, t->opacity_values[0]);
+    for (int i = 0; i + 1 < n; i++)
+        if (t->opacities[i] > 0 || t->opacities[i + 1] > 0)
+            count = add_interval(out, count, t->opacity_values[i], t->opacity_values[i + 1]);
+    if (t->opacities[n - 1] > 0) count = add_interval(out, count, t->opacity_values[n - 1], INFINITY);
+    return count;
+}
+
 static void prepare_isovalues(kernel_interest *interest, const render_surface_layer *layer)
 {
     interest->count = layer->value_count;
     for (int i = 0; i < layer->value_count; i++) {
-        interest->low[i] = below(layer->values[i]);
-        interest->high[i] = above(layer->values[i]);
+        const mmbvh_interval interval = render_isovalue_interval(layer->values[i]);
+        interest->low[i] = interval.low;
+        interest->high[i] = interval.high;
     }
 }
 
-static void add_interval(kernel_interest *interest, double low, double high)
-{
-    const int last = interest->count - 1;
-    if (last >= 0 && interest->high[last] >= below(low)) {
-        interest->high[last] = above(high);
-        return;
-    }
-    interest->low[interest->count] = below(low);
-    interest->high[interest->count] = above(high);
-    interest->count++;
-}
-
-/* The stretches between opacity points that are not transparent at both ends. */
 static void prepare_visible(kernel_interest *interest, const render_transfer *t)
 {
-    const int n = t->opacity_count;
-    interest->count = 0;
-    if (t->opacities[0] > 0) add_interval(interest, -INFINITY, t->opacity_values[0]);
-    for (int i = 0; i + 1 < n; i++)
-        if (t->opacities[i] > 0 || t->opacities[i + 1] > 0)
-            add_interval(interest, t->opacity_values[i], t->opacity_values[i + 1]);
-    if (t->opacities[n - 1] > 0) add_interval(interest, t->opacity_values[n - 1], INFINITY);
+    mmbvh_interval intervals[RENDER_MAX_INTERVALS];
+    interest->count = render_visible_intervals(t, intervals);
+    for (int i = 0; i < interest->count; i++) {
+        interest->low[i] = intervals[i].low;
+        interest->high[i] = intervals[i].high;
+    }
 }
 
 static void prepare_transfer(kernel_transfer *out, const render_transfer *t, double step)

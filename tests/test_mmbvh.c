@@ -18,7 +18,7 @@ static mmbvh build_by(const lattice *l, const grid_field *field, int threads)
 {
     mmbvh tree;
     base_error error = {0};
-    const insitu_status status = mmbvh_build(&l->g, field, no_shift, 1, &(mmbvh_options){threads}, &tree, &error);
+    const insitu_status status = mmbvh_build(&l->g, field, no_shift, 1, &(mmbvh_options){.threads = threads}, &tree, &error);
     if (status) fail_msg("%s", error.message);
     return tree;
 }
@@ -281,7 +281,7 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
     assert_memory_not_equal(old.nodes, fresh.nodes, (size_t)fresh.node_count * sizeof *fresh.nodes);
     for (int threads = 1; threads <= 3; threads++) {
         for (int64_t i = 0; i < old.node_count; i++) old.nodes[i].range_low = old.nodes[i].range_high = NAN;
-        assert_int_equal(mmbvh_refit_ranges(&old, &l.g, &l.field, &(mmbvh_options){threads}), INSITU_OK);
+        assert_int_equal(mmbvh_refit_ranges(&old, &l.g, &l.field, &(mmbvh_options){.threads = threads}), INSITU_OK);
         assert_memory_equal(old.nodes, fresh.nodes, (size_t)fresh.node_count * sizeof *fresh.nodes);
         assert_int_equal(old.unusable_cells, unusable);
     }
@@ -297,7 +297,7 @@ static void refitted_bounds_contain_moved_vertices_tightly(void **state)
         const lattice_layout layout = {bits & 1, false, false, bits & 1};
         lattice l = make_lattice(18, (lattice_kind)(bits / 2), layout);
         mmbvh tree = build_by(&l, &l.field, 2);
-        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){2});
+        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2});
         mmbvh same = build_by(&l, &l.field, 2);
         assert_memory_equal(tree.nodes, same.nodes, (size_t)same.node_count * sizeof *same.nodes);
         assert_true(mmbvh_cost(&tree) == tree.built_cost);
@@ -308,7 +308,7 @@ static void refitted_bounds_contain_moved_vertices_tightly(void **state)
             put_number(&l.g.coordinates[2], v, p[2] * 1.5 - 7);
         }
         assert_int_not_equal(mmbvh_check(&tree, &l.g, &l.field, NULL, NULL), INSITU_OK);
-        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){2});
+        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2});
         assert_proved(&tree, &l.g, &l.field);
         assert_tight(&l, &tree, &l.field);
         assert_true(mmbvh_cost(&tree) > tree.built_cost);
@@ -323,7 +323,7 @@ static void assert_pairs_equal_refit(lattice *l, const mmbvh *tree, const grid_f
 {
     float *pairs = malloc((size_t)tree->node_count * 2 * sizeof *pairs);
     int64_t unusable = -1;
-    assert_int_equal(mmbvh_compute_ranges(tree, &l->g, field, &(mmbvh_options){2}, pairs, &unusable), INSITU_OK);
+    assert_int_equal(mmbvh_compute_ranges(tree, &l->g, field, &(mmbvh_options){.threads = 2}, pairs, &unusable), INSITU_OK);
     mmbvh other = build_by(l, field, 1);
     assert_proved(&other, &l->g, field);
     assert_tight(l, &other, field);
@@ -444,8 +444,8 @@ static void refit_reaches_all_below_a_leafs_sibling(void **state)
             tree.nodes[i].range_low = tree.nodes[i].range_high = NAN;
             tree.nodes[i].lower[0] = tree.nodes[i].upper[2] = NAN;
         }
-        mmbvh_refit_ranges(&tree, &l.g, &l.field, &(mmbvh_options){2});
-        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){2});
+        mmbvh_refit_ranges(&tree, &l.g, &l.field, &(mmbvh_options){.threads = 2});
+        mmbvh_refit_bounds(&tree, &l.g, &(mmbvh_options){.threads = 2});
         assert_proved(&tree, &l.g, &l.field);
         assert_tight(&l, &tree, &l.field);
         mmbvh_free(&tree);
@@ -568,7 +568,7 @@ static void failed_allocations_give_an_error_and_leave_nothing(void **state)
             base_error error = {0};
             memset(&tree, 0xff, sizeof tree);
             base_memory_fail_nth(n);
-            assert_int_equal(mmbvh_build(&l.g, &l.field, no_shift, 1, &(mmbvh_options){threads}, &tree, &error),
+            assert_int_equal(mmbvh_build(&l.g, &l.field, no_shift, 1, &(mmbvh_options){.threads = threads}, &tree, &error),
                              INSITU_ERROR_MEMORY);
             assert_int_equal(error.status, INSITU_ERROR_MEMORY);
             const mmbvh zeroed = {0};

@@ -46,6 +46,7 @@ static void parse_good(const char *text, scene *s)
 }
 
 static const char every_key[] = "threads: 3\n"
+                                "tree: partial\n"
                                 "images:\n"
                                 "  - name: wave\n"
                                 "    size: [640, 480]\n"
@@ -120,6 +121,7 @@ static void scene_image_keys_are_read(void **state)
     scene s;
     parse_good(every_key, &s);
     assert_int_equal(s.threads, 3);
+    assert_int_equal(s.tree, SCENE_TREE_PARTIAL);
     assert_int_equal(s.image_count, 3);
     const scene_image *image = &s.images[0];
     assert_string_equal(image->name, "wave");
@@ -228,6 +230,7 @@ static void scene_image_defaults_hold(void **state)
     const scene_image *image = &s.images[0];
     const double length = sqrt(1 + 0.64 + 1.44);
     assert_int_equal(s.threads, 0);
+    assert_int_equal(s.tree, SCENE_TREE_AUTO);
     assert_true(image->width == 1280 && image->height == 720 && image->every == 1);
     check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
     assert_true(image->background[3] == 1);
@@ -345,7 +348,7 @@ static const struct bad_file {
     int told; /* the line in the message */
     const char *words[3];
 } bad_files[] = {
-    {1, "thread: 1", 1, {"the key \"thread\" is unknown", "threads, images"}},
+    {1, "thread: 1", 1, {"the key \"thread\" is unknown", "threads, tree, images"}},
     {1, "threads: many", 1, {"threads: \"many\"", "a whole number from 0 to 4096"}},
     {1, "threads: -1", 1, {"threads: \"-1\"", "from 0 to 4096"}},
     {1, "threads: 010", 1, {"threads: \"010\"", "a whole number"}},

@@ -134,6 +134,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
 static insitu_status convert_file(const scene_document *d, const scene_file *in, scene *out)
 {
     out->threads = in->threads ? *in->threads : 0;
+    out->tree = in->tree ? (scene_tree)*in->tree : SCENE_TREE_AUTO;
     out->images = base_calloc((size_t)in->images_count, sizeof *out->images);
     if (!out->images) return scene_no_memory(d);
     out->image_count = in->images_count;

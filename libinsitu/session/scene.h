@@ -109,8 +109,12 @@ typedef struct scene_image {
     int every; /* drawn at cycles that are multiples of it; 1 by default */
 } scene_image;
 
+/* What trees are built over: all cells, those that the images can show, or what costs less. */
+typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
+
 typedef struct scene {
     int threads; /* per rank; 0: the cores there are, shared by the ranks of a node */
+    scene_tree tree;
     int image_count;
     scene_image *images;
 } scene;

@@ -33,6 +33,8 @@ static const cyaml_strval_t map_words[] = {
 static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
 static const cyaml_strval_t root_words[] = {{"neubauer", SCENE_NEUBAUER}, {"robust", SCENE_ROBUST}};
 static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}};
+static const cyaml_strval_t tree_words[] = {
+    {"auto", SCENE_TREE_AUTO}, {"full", SCENE_TREE_FULL}, {"partial", SCENE_TREE_PARTIAL}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
 
 #define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
@@ -227,6 +229,10 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
     X(CYAML_FIELD_INT_PTR("threads", OPTIONAL, scene_file, threads),                                                   \
       .help = "Threads of each rank. 0: the cores of the node, shared among its ranks.", .by_default = "`0`",          \
       .low = 0, .high = 4096)                                                                                          \
+    X(CHOICE("tree", scene_file, tree, tree_words),                                                                    \
+      .help = "What the trees are built over: all cells (`full`), those that the images can show (`partial`), or "     \
+              "whichever has cost less so far (`auto`). Changes the speed, not the images.",                           \
+      .by_default = "`auto`")                                                                                          \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, 64),                           \
       .help = "The images to draw.", .child = &image_mapping)
 static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};

@@ -99,6 +99,7 @@ typedef struct scene_file_image {
 
 typedef struct scene_file {
     int *threads;
+    int *tree; /* scene_tree */
     scene_file_image *images;
     int images_count;
 } scene_file;

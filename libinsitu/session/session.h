@@ -10,6 +10,7 @@
  *     session_catalogue.c  which meshes and fields there are, over all ranks
  *     session_plan.c       due images to the scalars they need; nothing else is computed from here on
  *     session_recentre.c   cell values to vertices, where an isosurface wants them (session_exchange.c: over ranks)
+ *     session_shown.c      which values of them the images show
  *     session_tree.c       trees and ranges
  *     session_draw.c       frames, outputs (session_view.c: camera, lights, transfer functions)
  *     session_frame.c      one frame: tracing, compositing, pixels where cells overlap
@@ -39,8 +40,11 @@ typedef struct session_scalar {
     int field;     /* in the mesh's fields */
     int component; /* as grid_field.component */
     bool is_recentred;
-    bool is_used;          /* by an image of this step */
-    bool wants_ranges;     /* by an image of this step: colours need none */
+    bool is_used;       /* by an image of this step */
+    bool wants_ranges;  /* by an image of this step: colours need none */
+    bool shows_all;     /* an image of this step may need any cell */
+    int interval_count; /* else the values that its images show */
+    mmbvh_interval *intervals;
     double *vertex_values; /* recentred values, a declared copy; NULL until computed */
     bool are_values_stale;
     bool has_own_ranges; /* the tree nodes' own, else pairs */
@@ -71,6 +75,9 @@ typedef struct session_mesh {
     bool is_needed; /* by an image of this step */
     bool has_tree;
     mmbvh tree;
+    bool is_partial; /* the tree is over what the images of shown_key can show, while nothing changes */
+    uint64_t shown_key;
+    double rent; /* seconds spent on partial trees since the cells last changed, beyond what a full one would cost */
     int scalar_count;
     session_scalar *scalars;
 } session_mesh;
@@ -108,6 +115,11 @@ typedef struct session_extent {
     int rank_count;     /* ranks that have some */
 } session_extent;
 
+/* Seconds a cell takes on this rank, as measured; 0: not yet. */
+typedef struct session_rates {
+    double build, select, refit;
+} session_rates;
+
 /* Growing text for the report; what memory cannot hold is left away. */
 typedef struct session_text {
     char *data;
@@ -139,6 +151,7 @@ struct insitu_session {
     double space_lower[3], space_upper[3]; /* bounds for which the space was made */
     double origin[3], scale;
 
+    session_rates rates;
     mmbvh parent; /* over the trees of parent_key; none where that is one tree or none */
     uint64_t parent_key;
     bool is_parent_stale;

@@ -215,6 +215,7 @@ void session_drop_scalars(session_mesh *mesh)
     for (int i = 0; i < mesh->scalar_count; i++) {
         base_free(mesh->scalars[i].vertex_values);
         base_free(mesh->scalars[i].pairs);
+        base_free(mesh->scalars[i].intervals);
     }
     base_free(mesh->scalars);
     mesh->scalars = NULL;
@@ -225,7 +226,7 @@ void session_drop_tree(session_mesh *mesh)
 {
     if (mesh->has_tree) mmbvh_free(&mesh->tree);
     mesh->tree = (mmbvh){0};
-    mesh->has_tree = false;
+    mesh->has_tree = mesh->is_partial = false;
     for (int i = 0; i < mesh->scalar_count; i++) {
         session_scalar *scalar = &mesh->scalars[i];
         base_free(scalar->pairs);
@@ -311,6 +312,7 @@ static void take_mesh(insitu_session *session, session_mesh *mesh, const insitu_
     if (!mesh->is_given || has_other_shape(&mesh->given, given)) changed = INSITU_CHANGED_ALL;
     if (changed & INSITU_CHANGED_TOPOLOGY) {
         drop_contents(mesh);
+        mesh->rent = 0;
         mesh->is_topology_stale = true;
         session->is_table_changed = true;
     }

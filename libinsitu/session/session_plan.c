@@ -6,6 +6,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_shown.h"
 
 static int resolve_component(const scene_field *field, int component_count)
 {
@@ -165,16 +166,22 @@ static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_ve
     return true;
 }
 
-static bool mark_image(session_mesh *mesh, const scene_image *image)
+static bool mark_image(const insitu_session *session, session_mesh *mesh, const scene_image *image)
 {
     bool is_marked = true;
     for (int i = 0; i < image->isosurface_count && is_marked; i++) {
         const scene_isosurface *layer = &image->isosurfaces[i];
         is_marked = mark_scalar(mesh, &layer->field, true, true);
+        session_scalar *scalar = is_marked ? session_find_scalar(mesh, &layer->field, true) : NULL;
+        if (scalar) is_marked = session_shown_surface(scalar, layer);
         if (is_marked && layer->has_colour_by) is_marked = mark_scalar(mesh, &layer->colour_by, false, false);
     }
-    for (int i = 0; i < image->volume_count && is_marked; i++)
-        is_marked = mark_scalar(mesh, &image->volumes[i].field, false, true);
+    for (int i = 0; i < image->volume_count && is_marked; i++) {
+        const scene_volume *layer = &image->volumes[i];
+        is_marked = mark_scalar(mesh, &layer->field, false, true);
+        session_scalar *scalar = is_marked ? session_find_scalar(mesh, &layer->field, false) : NULL;
+        if (scalar) is_marked = session_shown_volume(session, scalar, layer);
+    }
     return is_marked;
 }
 
@@ -183,9 +190,12 @@ static bool mark_meshes(insitu_session *session, const session_plan *plan)
     for (int m = 0; m < session->mesh_count; m++) {
         session_mesh *mesh = session->meshes[m];
         mesh->is_needed = false;
-        for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].is_used = mesh->scalars[i].wants_ranges = false;
+        for (int i = 0; i < mesh->scalar_count; i++) {
+            mesh->scalars[i].is_used = mesh->scalars[i].wants_ranges = false;
+            session_shown_clear(&mesh->scalars[i]);
+        }
         for (int i = 0; i < plan->image_count && mesh->is_given; i++)
-            if (!mark_image(mesh, plan->images[i])) return false;
+            if (!mark_image(session, mesh, plan->images[i])) return false;
     }
     return true;
 }

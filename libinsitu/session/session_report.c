@@ -129,6 +129,10 @@ static void report_mesh(insitu_session *session, const session_mesh *mesh)
     report->cells_unusable += unusable;
     if (report->images && !mesh->is_needed)
         session_text_add(&session->left_out, "mesh \"%s\" is in no picture: no tree is built", mesh->name);
+    if (report->images && mesh->is_needed && mesh->is_partial)
+        session_text_add(
+            &session->left_out, "mesh \"%s\": %lld of %lld cells show nothing in this step: the tree is without them",
+            mesh->name, (long long)(mesh->drawn_count - mesh->tree.cell_count), (long long)mesh->drawn_count);
 }
 
 void session_end_report(insitu_session *session)

@@ -1,11 +1,35 @@
 /* What is up to date is left alone: new cells build a tree, moved vertices refit its bounds (until its cost has grown
  * by half, then it is built again), new values refit ranges. The first scalar that a mesh is drawn with has the nodes'
- * own ranges, further ones have pairs beside the tree. */
+ * own ranges, further ones have pairs beside the tree.
+ *
+ * A full tree is dear to build and cheap to keep; a partial one, over the cells that the images can show, is cheap to
+ * build where they show little, but ends with the values. Which serves better depends on how long the cells will stay,
+ * which nobody tells. So partial trees are rented until the rent since the cells last changed comes to the price of
+ * the full tree, and then that is bought: never more than twice what the best choice in hindsight would have cost
+ * (Karlin, Manasse, Rudolph and Sleator 1988). Prices are as measured in this run. */
 #include "session_tree.h"
 
 #include "memory.h"
+#include "session_shown.h"
 
 static const double worst_cost = 1.5; /* of a refitted tree, in costs when built */
+
+/* Seconds a cell on one thread, before anything was measured. */
+static const session_rates first_rates = {.build = 3e-7, .select = 2e-8, .refit = 1e-8};
+/* What takes no longer than so many cells' work says little about more. */
+enum { MEASURED_CELLS = 10000 };
+
+static double rate_of(const insitu_session *session, double measured, double first)
+{
+    return measured > 0 ? measured : first / session->threads;
+}
+
+static void measure(double *rate, double seconds, int64_t cells)
+{
+    if (cells < MEASURED_CELLS) return;
+    const double now = seconds / (double)cells;
+    *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
+}
 
 static mmbvh_options options_of(const insitu_session *session)
 {
@@ -34,10 +58,13 @@ static session_scalar *choose_own_scalar(session_mesh *mesh)
     return own;
 }
 
-static insitu_status build_tree(insitu_session *session, session_mesh *mesh, base_error *error)
+/* Over the selection, or over all cells where that is NULL. */
+static insitu_status build_tree(insitu_session *session, session_mesh *mesh, const mmbvh_selection *selection,
+                                base_error *error)
 {
     const double start = MPI_Wtime();
-    const mmbvh_options options = options_of(session);
+    mmbvh_options options = options_of(session);
+    options.selection = selection;
     session_drop_tree(mesh);
     session->is_parent_stale = true;
     session_scalar *own = choose_own_scalar(mesh);
@@ -49,8 +76,11 @@ static insitu_status build_tree(insitu_session *session, session_mesh *mesh, bas
     mesh->is_topology_stale = false;
     mesh->is_geometry_stale = false;
     own->are_ranges_stale = false;
-    own->unusable = mesh->tree.unusable_cells;
-    session->report.build_ms += 1e3 * (MPI_Wtime() - start);
+    mesh->is_partial = selection != NULL;
+    if (!selection) own->unusable = mesh->tree.unusable_cells;
+    const double seconds = MPI_Wtime() - start;
+    measure(&session->rates.build, seconds, mesh->tree.cell_count);
+    session->report.build_ms += 1e3 * seconds;
     return INSITU_OK;
 }
 
@@ -62,7 +92,7 @@ static insitu_status refit_bounds(insitu_session *session, session_mesh *mesh, b
     if (status) return base_fail(error, status, "mesh \"%s\": its tree could not be refitted", mesh->name);
     session->is_parent_stale = true;
     session->report.refit_ms += 1e3 * (MPI_Wtime() - start);
-    if (mmbvh_cost(&mesh->tree) > worst_cost * mesh->tree.built_cost) return build_tree(session, mesh, error);
+    if (mmbvh_cost(&mesh->tree) > worst_cost * mesh->tree.built_cost) return build_tree(session, mesh, NULL, error);
     mesh->is_geometry_stale = false;
     return INSITU_OK;
 }
@@ -72,12 +102,16 @@ static insitu_status refit_scalar(session_mesh *mesh, session_scalar *scalar, co
     const grid_field field = session_scalar_field(mesh, scalar);
     if (scalar->has_own_ranges) {
         const insitu_status status = mmbvh_refit_ranges(&mesh->tree, &mesh->cells, &field, options);
-        scalar->unusable = mesh->tree.unusable_cells;
+        if (!mesh->is_partial) scalar->unusable = mesh->tree.unusable_cells;
         return status;
     }
     if (!scalar->pairs) scalar->pairs = base_alloc((size_t)mesh->tree.node_count * 2 * sizeof *scalar->pairs);
     if (!scalar->pairs) return INSITU_ERROR_MEMORY;
-    return mmbvh_compute_ranges(&mesh->tree, &mesh->cells, &field, options, scalar->pairs, &scalar->unusable);
+    int64_t unusable;
+    const insitu_status status =
+        mmbvh_compute_ranges(&mesh->tree, &mesh->cells, &field, options, scalar->pairs, &unusable);
+    if (!mesh->is_partial) scalar->unusable = unusable;
+    return status;
 }
 
 static insitu_status refit_ranges(insitu_session *session, session_mesh *mesh, base_error *error)
@@ -93,7 +127,9 @@ static insitu_status refit_ranges(insitu_session *session, session_mesh *mesh, b
             return base_fail(error, status, "mesh \"%s\": no memory for the ranges of field \"%s\"", mesh->name,
                              mesh->fields[scalar->field].given.name);
         scalar->are_ranges_stale = false;
-        session->report.refit_ms += 1e3 * (MPI_Wtime() - start);
+        const double seconds = MPI_Wtime() - start;
+        measure(&session->rates.refit, seconds, mesh->tree.cell_count);
+        session->report.refit_ms += 1e3 * seconds;
     }
     return INSITU_OK;
 }
@@ -155,13 +191,67 @@ static insitu_status update_parent(insitu_session *session, base_error *error)
     return status;
 }
 
+/* ---- full or partial ----------------------------------------------------------------------------------------- */
+
+static double full_price(const insitu_session *session, const session_mesh *mesh)
+{
+    return rate_of(session, session->rates.build, first_rates.build) * (double)mesh->drawn_count;
+}
+
+/* Is there a full tree, of these cells? */
+static bool has_full_tree(const session_mesh *mesh)
+{
+    return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
+}
+
+static bool wants_partial(const insitu_session *session, const session_mesh *mesh)
+{
+    if (session->scene.tree == SCENE_TREE_FULL || !session_shown_is_bounded(mesh)) return false;
+    if (session->scene.tree == SCENE_TREE_PARTIAL) return true;
+    return !has_full_tree(mesh) && mesh->rent < full_price(session, mesh);
+}
+
+/* Nothing has changed that decides on the cells that show. */
+static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
+{
+    if (!mesh->has_tree || !mesh->is_partial || mesh->is_topology_stale || mesh->is_geometry_stale) return false;
+    for (int i = 0; i < mesh->scalar_count; i++)
+        if (mesh->scalars[i].wants_ranges && mesh->scalars[i].are_ranges_stale) return false;
+    return mesh->shown_key == key;
+}
+
+static insitu_status update_partial(insitu_session *session, session_mesh *mesh, base_error *error)
+{
+    const uint64_t key = session_shown_key(mesh);
+    if (is_partial_fresh(mesh, key)) return INSITU_OK;
+    const double start = MPI_Wtime();
+    mmbvh_selection selection;
+    insitu_status status = session_shown_select(mesh, session->threads, &selection, error);
+    if (status) return status;
+    const double seconds = MPI_Wtime() - start;
+    measure(&session->rates.select, seconds, mesh->given.cell_count);
+    session->report.build_ms += 1e3 * seconds;
+    /* Half of the full price or more: buy. */
+    const bool is_forced = session->scene.tree == SCENE_TREE_PARTIAL;
+    const bool is_partial = is_forced || 2 * selection.count <= mesh->drawn_count;
+    status = build_tree(session, mesh, is_partial ? &selection : NULL, error);
+    mmbvh_selection_free(&selection);
+    mesh->shown_key = key;
+    mesh->rent += MPI_Wtime() - start;
+    mesh->rent -= rate_of(session, session->rates.refit, first_rates.refit) * (double)mesh->drawn_count;
+    return status;
+}
+
+static insitu_status update_full(insitu_session *session, session_mesh *mesh, base_error *error)
+{
+    if (!has_full_tree(mesh)) return build_tree(session, mesh, NULL, error);
+    return mesh->is_geometry_stale ? refit_bounds(session, mesh, error) : INSITU_OK;
+}
+
 static insitu_status update_tree(insitu_session *session, session_mesh *mesh, base_error *error)
 {
-    insitu_status status = INSITU_OK;
-    if (!mesh->has_tree || mesh->is_topology_stale)
-        status = build_tree(session, mesh, error);
-    else if (mesh->is_geometry_stale)
-        status = refit_bounds(session, mesh, error);
+    const insitu_status status =
+        wants_partial(session, mesh) ? update_partial(session, mesh, error) : update_full(session, mesh, error);
     return status ? status : refit_ranges(session, mesh, error);
 }
 

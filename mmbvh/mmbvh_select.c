@@ -1,0 +1,198 @@
+/* The cells that can show (thesis, section 4.2: a node whose range meets no isovalue is culled; here a cell is, before
+ * there is a tree).
+ *
+ * One pass a wish writes a bit a cell, a second one lists the cells whose bit is set: the first is bound by reading the
+ * connectivity and the values, and the list is as long as it must be. */
+#include <string.h>
+
+#include "memory.h"
+#include "mmbvh.h"
+#include "mmbvh_fetch.h"
+#include "mmbvh_sweep.h"
+
+enum { WORD_CELLS = 64, BLOCK_WORDS = 64 };
+
+typedef struct selector selector;
+
+/* Set the bits of cells begin .. end, a multiple of 64 apart but for the last; returns how many are unusable. */
+typedef int64_t (*selector_run)(const selector *s, int64_t begin, int64_t end);
+
+struct selector {
+    selector_run run;
+    const grid *g;
+    const mmbvh_wish *wish;
+    grid_array values; /* of the field's component */
+    uint64_t *bits;
+};
+
+typedef struct extent {
+    double low, high;
+    bool is_finite;
+} extent;
+
+MMBVH_INLINE bool meets(const mmbvh_wish *wish, const extent *e)
+{
+    const float low = (float)e->low, high = (float)e->high;
+    bool any = false;
+    for (int i = 0; i < wish->interval_count; i++)
+        any |= (low <= wish->intervals[i].high) & (high >= wish->intervals[i].low);
+    return any;
+}
+
+/* Ghosts are passed over. */
+MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
+                          extent (*const find)(const selector *, int64_t))
+{
+    int64_t unusable = 0;
+    for (int64_t first = begin; first < end; first += WORD_CELLS) {
+        const int64_t count = end - first < WORD_CELLS ? end - first : WORD_CELLS;
+        uint64_t word = s->bits[first / WORD_CELLS];
+        for (int64_t i = 0; i < count; i++) {
+            if (grid_is_ghost(s->g, first + i)) continue;
+            const extent e = find(s, first + i);
+            unusable += !e.is_finite;
+            word |= (uint64_t)(e.is_finite & meets(s->wish, &e)) << i;
+        }
+        s->bits[first / WORD_CELLS] = word;
+    }
+    return unusable;
+}
+
+MMBVH_INLINE extent extent_of(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
+                              const bool wide_number)
+{
+    const int count = fetch_vertex_count(s->g, cell, shape);
+    const int64_t first = fetch_first(s->g, cell, count, shape);
+    double low = INFINITY, high = -INFINITY, poison = 0;
+    for (int i = 0; i < count; i++) {
+        const double v = fetch_number(&s->values, fetch_index(&s->g->connectivity, first + i, wide_index), wide_number);
+        low = v < low ? v : low;
+        high = v > high ? v : high;
+        poison += v - v; /* 0 while all are finite, then not a number */
+    }
+    return (extent){low, high, poison == 0};
+}
+
+#define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
+    MMBVH_INLINE extent name##_extent(const selector *s, int64_t cell)                                                 \
+    {                                                                                                                  \
+        return extent_of(s, cell, shape, wide_index, wide_number);                                                     \
+    }                                                                                                                  \
+    static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
+    {                                                                                                                  \
+        return mark(s, begin, end, name##_extent);                                                                     \
+    }
+FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
+
+static extent any_extent(const selector *s, int64_t cell)
+{
+    extent e = {INFINITY, -INFINITY, true};
+    grid_walk walk = grid_walk_cell(s->g, cell);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
+        const double v = grid_field_value(s->wish->field, vertex);
+        e.is_finite = e.is_finite && isfinite(v);
+        e.low = v < e.low ? v : e.low;
+        e.high = v > e.high ? v : e.high;
+    }
+    return e;
+}
+
+static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
+{
+    return mark(s, begin, end, any_extent);
+}
+
+static extent cell_extent(const selector *s, int64_t cell)
+{
+    const double v = grid_field_value(s->wish->field, cell);
+    return (extent){v, v, isfinite(v)};
+}
+
+static int64_t mark_by_cell(const selector *s, int64_t begin, int64_t end)
+{
+    return mark(s, begin, end, cell_extent);
+}
+
+static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *bits)
+{
+    static const selector_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(mark_vertices);
+    const grid_field *field = wish->field;
+    selector s = {.run = mark_any, .g = g, .wish = wish, .values = field->values, .bits = bits};
+    if (field->is_cell_centred)
+        s.run = mark_by_cell;
+    else if (field->component >= 0 && !field->values.is_integer && !grid_has_faces(g))
+        s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
+    if (field->component > 0) s.values.data += field->component * field->component_stride;
+    return s;
+}
+
+static int64_t mark_wish(const selector *s, int threads)
+{
+    const int64_t block = (int64_t)WORD_CELLS * BLOCK_WORDS, cells = s->g->cell_count;
+    int64_t unusable = 0;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 4) reduction(+ : unusable)
+    for (int64_t begin = 0; begin < cells; begin += block)
+        unusable += s->run(s, begin, begin + block < cells ? begin + block : cells);
+    return unusable;
+}
+
+static int64_t count_bits(const uint64_t *bits, int64_t begin, int64_t end)
+{
+    int64_t count = 0;
+    for (int64_t i = begin; i < end; i++) count += __builtin_popcountll(bits[i]);
+    return count;
+}
+
+static void list_bits(const uint64_t *bits, int64_t begin, int64_t end, uint32_t *out)
+{
+    for (int64_t i = begin; i < end; i++)
+        for (uint64_t word = bits[i]; word; word &= word - 1)
+            *out++ = (uint32_t)(WORD_CELLS * i + __builtin_ctzll(word));
+}
+
+/* One part of the words a thread: counted, then written where the parts before it end. */
+static bool list_cells(const uint64_t *bits, int64_t words, int threads, mmbvh_selection *out)
+{
+    int64_t *ends = base_calloc((size_t)threads + 1, sizeof *ends);
+    if (!ends) return false;
+#pragma omp parallel for num_threads(threads) schedule(static, 1)
+    for (int part = 0; part < threads; part++)
+        ends[part + 1] = count_bits(bits, words * part / threads, words * (part + 1) / threads);
+    for (int part = 0; part < threads; part++) ends[part + 1] += ends[part];
+    out->count = ends[threads];
+    out->cells = base_alloc((size_t)(out->count ? out->count : 1) * sizeof *out->cells);
+    if (out->cells) {
+#pragma omp parallel for num_threads(threads) schedule(static, 1)
+        for (int part = 0; part < threads; part++)
+            list_bits(bits, words * part / threads, words * (part + 1) / threads, out->cells + ends[part]);
+    }
+    base_free(ends);
+    return out->cells != NULL;
+}
+
+insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_count, const mmbvh_options *options,
+                           mmbvh_selection *out, int64_t *unusable, base_error *error)
+{
+    const int threads = sweep_threads(options);
+    const int64_t words = (g->cell_count + WORD_CELLS - 1) / WORD_CELLS;
+    uint64_t *bits = base_calloc((size_t)(words ? words : 1), sizeof *bits);
+    *out = (mmbvh_selection){0};
+    bool is_listed = bits != NULL;
+    for (int i = 0; i < wish_count && is_listed; i++) {
+        const selector s = make_selector(g, &wishes[i], bits);
+        unusable[i] = mark_wish(&s, threads);
+    }
+    is_listed = is_listed && list_cells(bits, words, threads, out);
+    base_free(bits);
+    if (is_listed) return INSITU_OK;
+    *out = (mmbvh_selection){0};
+    return base_fail(error, INSITU_ERROR_MEMORY, "no memory to list the cells that show, of %lld",
+                     (long long)g->cell_count);
+}
+
+void mmbvh_selection_free(mmbvh_selection *selection)
+{
+    base_free(selection->cells);
+    *selection = (mmbvh_selection){0};
+}

@@ -1,0 +1,191 @@
+/* Trees over the cells that show: the same pictures, bit for bit, as of full trees, whatever changes on the way, and
+ * the choice between the two. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session.h"
+#include "test_session_fixture.h"
+
+#define IMAGE(layers)                                                                                                  \
+    "images:\n  - name: a\n    size: [40, 30]\n    background: [0, 0, 0, 1]\n    layers:\n" layers                     \
+    "    outputs:\n      - path: a_{cycle}.exr\n"
+#define SURFACE "      - isosurface: {field: f, values: [0.1]}\n"
+#define SURFACES "      - isosurface: {field: f, values: [-0.8, 0.4], opacity: 0.5}\n"
+#define VOLUME "      - volume: {field: f, range: [-1, 1], opacity: [[0.6, 0], [0.7, 0.5], [0.8, 0]]}\n"
+#define STEPPED "      - volume: {field: f, range: [-1, 1], opacity: [[0.6, 0], [0.6, 0.5], [0.7, 0.5], [0.7, 0]]}\n"
+#define OWN_RANGE "      - volume: {field: f, opacity: [[0, 0.5], [1, 0.5]]}\n"
+#define PEAKS "      - isosurface: {field: f, values: [1.2]}\n"
+#define DIFFERENCES "      - isosurface: {field: f, values: [0.1], normals: differences}\n"
+
+static const test_mesh_kind kinds[] = {TEST_TETS, TEST_MIXED, TEST_POLYHEDRA};
+
+static insitu_session *open_tree(const char *tree, const char *images)
+{
+    char text[2000];
+    snprintf(text, sizeof text, "tree: %s\n%s", tree, images);
+    return open_session(MPI_COMM_WORLD, write_scene(text));
+}
+
+/* A step of the one and of the other: is the picture the same? */
+static void step_same(insitu_session *full, insitu_session *other, const session_input *in, int64_t cycle)
+{
+    forget_pictures();
+    everywhere(hand_over(full, in) == INSITU_OK && hand_over(other, in) == INSITU_OK);
+    told_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
+    told_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
+    if (own_rank == 0) {
+        const caught_picture *a = &caught[0], *b = &caught[1];
+        const size_t pixels = (size_t)a->width * (size_t)a->height;
+        assert_int_equal(caught_count, 2);
+        assert_memory_equal(a->rgba, b->rgba, pixels * 4 * sizeof(float));
+        assert_memory_equal(a->depth, b->depth, pixels * sizeof(float));
+        float sum = 0;
+        for (size_t i = 0; i < 4 * pixels; i++) sum += i % 4 < 3 ? a->rgba[i] : 0;
+        assert_true(sum > 1);
+    }
+    everywhere(insitu_last_report(full)->cells_unusable == insitu_last_report(other)->cells_unusable);
+}
+
+/* Cells in the trees of all ranks. */
+static int64_t tree_cells(const insitu_session *session)
+{
+    int64_t own = session->mesh_count ? session->meshes[0]->tree.cell_count : 0, all = 0;
+    MPI_Allreduce(&own, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    return all;
+}
+
+static void change_values(session_input *in, double by)
+{
+    for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] += by;
+}
+
+/* New values, moved vertices, a value that is no number, new cells; and a step with no change at all. */
+static void compare_trees(const char *tree, const char *images, test_mesh_kind kind)
+{
+    insitu_session *full = open_tree("full", images), *other = open_tree(tree, images);
+    session_input in;
+    input_create(&in, kind, 6, TEST_CHECKERBOARD, own_rank, rank_count);
+    step_same(full, other, &in, 0);
+    in.mesh.changed = INSITU_CHANGED_NOTHING;
+    change_values(&in, 0.15);
+    step_same(full, other, &in, 1);
+    in.field.changed = INSITU_CHANGED_NOTHING;
+    step_same(full, other, &in, 2);
+    in.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    for (int64_t i = 0; i < in.part.vertex_count; i++) in.part.coordinates[3 * i] *= 1.125;
+    step_same(full, other, &in, 3);
+    in.mesh.changed = INSITU_CHANGED_NOTHING;
+    in.field.changed = INSITU_CHANGED_VALUES;
+    if (in.part.vertex_count) in.part.values[in.part.vertex_count / 2] = NAN;
+    step_same(full, other, &in, 4);
+    input_free(&in);
+    input_create(&in, kind, 5, TEST_RANDOM, own_rank, rank_count);
+    step_same(full, other, &in, 5);
+    input_free(&in);
+    insitu_destroy(&full);
+    insitu_destroy(&other);
+}
+
+static void partial_trees_draw_what_full_ones_do(void **context)
+{
+    static const char *const images[] = {IMAGE(SURFACE),         IMAGE(SURFACES),  IMAGE(VOLUME),     IMAGE(STEPPED),
+                                         IMAGE(SURFACE STEPPED), IMAGE(OWN_RANGE), IMAGE(DIFFERENCES)};
+    (void)context;
+    for (size_t i = 0; i < sizeof images / sizeof images[0]; i++)
+        for (size_t kind = 0; kind < sizeof kinds / sizeof kinds[0]; kind++) {
+            compare_trees("partial", images[i], kinds[kind]);
+            if (kind == 0) compare_trees("auto", images[i], kinds[kind]);
+        }
+}
+
+/* Values in 0.1 alone show: a slice of the cells; the report says how many are left out. */
+static void partial_trees_are_of_the_cells_that_show(void **context)
+{
+    (void)context;
+    session_input in;
+    input_create(&in, TEST_TETS, 6, TEST_BLOCK, own_rank, rank_count);
+    int64_t straddling = 0, all = 0;
+    for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t i = in.part.offsets[cell]; i < in.part.offsets[cell + 1]; i++) {
+            low = fmin(low, in.part.values[in.part.connectivity[i]]);
+            high = fmax(high, in.part.values[in.part.connectivity[i]]);
+        }
+        straddling += low <= 0.1 && high >= 0.1;
+    }
+    MPI_Allreduce(&straddling, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    insitu_session *session = open_tree("partial", IMAGE(SURFACE));
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(tree_cells(session) == all);
+    everywhere(in.part.cell_count == 0 || strstr(insitu_last_report(session)->left_out, "show nothing in this step"));
+    forget_pictures();
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* As long as the cells change at every step, trees are partial; when they stand, the rent comes to a full tree's price
+ * at last, and that then stays. */
+static void standing_cells_get_a_full_tree(void **context)
+{
+    (void)context;
+    session_input in;
+    input_create(&in, TEST_TETS, 10, TEST_BLOCK, own_rank, rank_count);
+    int64_t cells = in.part.cell_count, all = 0;
+    MPI_Allreduce(&cells, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    insitu_session *session = open_tree("auto", IMAGE(PEAKS));
+    int64_t cycle = 0;
+    for (; cycle < 3; cycle++) {
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+        everywhere(tree_cells(session) < all);
+    }
+    in.mesh.changed = INSITU_CHANGED_NOTHING;
+    while (tree_cells(session) < all && cycle < 1000) {
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        told_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
+        forget_pictures();
+    }
+    everywhere(tree_cells(session) == all);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
+    everywhere(insitu_last_report(session)->build_ms == 0 &&
+               (insitu_last_report(session)->refit_ms > 0 || in.part.cell_count == 0));
+    forget_pictures();
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* Where nearly everything shows, a partial tree would save nothing. */
+static void full_trees_are_built_where_most_cells_show(void **context)
+{
+    (void)context;
+    session_input in;
+    input_create(&in, TEST_HEXES, 6, TEST_BLOCK, own_rank, rank_count);
+    int64_t cells = in.part.cell_count, all = 0;
+    MPI_Allreduce(&cells, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    insitu_session *session =
+        open_tree("auto", IMAGE("      - volume: {field: f, range: [-4, 4], opacity: [[0, 0.1], [1, 0.5]]}\n"));
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(tree_cells(session) == all && !session->meshes[0]->is_partial);
+    forget_pictures();
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(partial_trees_draw_what_full_ones_do),
+                                       cmocka_unit_test(partial_trees_are_of_the_cells_that_show),
+                                       cmocka_unit_test(standing_cells_get_a_full_tree),
+                                       cmocka_unit_test(full_trees_are_built_where_most_cells_show)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
