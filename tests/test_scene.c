@@ -125,7 +125,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(s.image_count, 3);
     const scene_image *image = &s.images[0];
     assert_string_equal(image->name, "wave");
-    assert_int_equal(image->line, 3);
+    assert_int_equal(image->line, 4);
     assert_int_equal(image->width, 640);
     assert_int_equal(image->height, 480);
     assert_int_equal(image->every, 10);
@@ -180,7 +180,7 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_int_equal(s.images[0].isosurface_count, 2);
     const scene_isosurface *first = &s.images[0].isosurfaces[0], *second = first + 1;
     assert_string_equal(first->field.name, "pressure");
-    assert_int_equal(first->field.line, 13);
+    assert_int_equal(first->field.line, 14);
     assert_int_equal(first->field.component, SCENE_COMPONENT_MAGNITUDE);
     assert_int_equal(first->value_count, 3);
     assert_true(first->values[0] == 0.2 && first->values[1] == 0.5 && first->values[2] == -1e-3);
@@ -512,7 +512,7 @@ static void scene_whole_file_faults_are_told(void **state)
     static const char *const files[][2] = {
         {"", "scene.yaml:1: the file is empty"},
         {"# nothing\n", "scene.yaml:1: the file is empty"},
-        {"- a\n", "scene.yaml:1: a list is not allowed, expected a mapping with the keys threads, images"},
+        {"- a\n", "scene.yaml:1: a list is not allowed, expected a mapping with the keys threads, tree, images"},
         {"hello", "scene.yaml:1: \"hello\" is not allowed"},
         {"threads: 1\n", "scene.yaml:1: images: missing, expected a list of 1 to 64 mappings"},
         {"threads: 1\nimages: \xff\n", "scene.yaml:2: not valid YAML: invalid leading UTF-8"},

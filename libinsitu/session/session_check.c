@@ -9,6 +9,9 @@
 
 #include "session.h"
 #include "session_faces.h"
+#include "session_tally.h"
+
+enum { BLOCK_CELLS = 4096 };
 
 typedef enum cell_fault { CELL_GOOD, BAD_TYPE, BAD_OFFSETS, BAD_INDEX, BAD_COORDINATE, BAD_FACES } cell_fault;
 
@@ -131,102 +134,37 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     return INSITU_OK;
 }
 
-/* Six times the signed volume of the tet of a corner and its three neighbours, these in right-handed order. */
-static double corner_volume(double points[][3], const signed char *corner)
+/* Cells of any layout, one by one. */
+static int64_t check_each(const session_mesh *mesh, int64_t begin, int64_t end, face_room *room, mesh_tally *tally)
 {
-    double edge[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int axis = 0; axis < 3; axis++) edge[i][axis] = points[corner[i + 1]][axis] - points[corner[0]][axis];
-    return edge[0][0] * (edge[1][1] * edge[2][2] - edge[1][2] * edge[2][1]) +
-           edge[0][1] * (edge[1][2] * edge[2][0] - edge[1][0] * edge[2][2]) +
-           edge[0][2] * (edge[1][0] * edge[2][1] - edge[1][1] * edge[2][0]);
-}
-
-/* Signed volume, from the corners' tets: exact for cells with parallel edges, else their mean. */
-static double signed_volume(int type, double points[][3])
-{
-    static const signed char tet[][4] = {{0, 1, 2, 3}};
-    static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
-                                         {4, 7, 5, 0}, {5, 4, 6, 1}, {6, 5, 7, 2}, {7, 6, 4, 3}};
-    static const signed char wedge[][4] = {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5},
-                                           {3, 5, 4, 0}, {4, 3, 5, 1}, {5, 4, 3, 2}};
-    static const signed char pyramid[][4] = {{0, 1, 3, 4}, {1, 2, 0, 4}, {2, 3, 1, 4}, {3, 0, 2, 4}};
-    const signed char(*corners)[4] = type == GRID_TET     ? tet
-                                     : type == GRID_HEX   ? hex
-                                     : type == GRID_WEDGE ? wedge
-                                                          : pyramid;
-    const int count = type == GRID_TET ? 1 : type == GRID_HEX ? 8 : type == GRID_WEDGE ? 6 : 4;
-    double sum = 0;
-    for (int i = 0; i < count; i++) sum += corner_volume(points, corners[i]);
-    const double shares = type == GRID_TET ? 6 : type == GRID_HEX ? 8 : 12; /* what a cell of volume 1 sums to */
-    return sum / shares;
-}
-
-typedef struct mesh_tally {
-    double lower[3], upper[3];
-    int64_t drawn, ghosts, inverted;
-    double sizes; /* sum of cube roots of volumes */
-} mesh_tally;
-
-static const mesh_tally empty_tally = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0, 0, 0, 0};
-
-static void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
-{
-    if (grid_is_ghost(g, cell)) {
-        tally->ghosts++;
-        return;
+    for (int64_t cell = begin; cell < end; cell++) {
+        fault_place place;
+        if (check_cell(mesh, cell, room, &place) != CELL_GOOD) return cell;
+        tally_cell(&mesh->cells, cell, tally);
     }
-    const int type = grid_cell_type(g, cell);
-    double points[GRID_MAX_CELL_VERTICES][3];
-    grid_walk walk = grid_walk_cell(g, cell);
-    int64_t vertex;
-    for (int i = 0; grid_walk_next(&walk, &vertex); i++) {
-        double *point = points[type == GRID_POLYHEDRON ? 0 : i];
-        grid_vertex(g, vertex, point);
-        for (int axis = 0; axis < 3; axis++) {
-            tally->lower[axis] = fmin(tally->lower[axis], point[axis]);
-            tally->upper[axis] = fmax(tally->upper[axis], point[axis]);
-        }
-    }
-    tally->drawn++;
-    const double volume = type == GRID_POLYHEDRON ? session_polyhedron_volume(g, cell) : signed_volume(type, points);
-    tally->inverted += volume < 0;
-    tally->sizes += cbrt(fabs(volume));
-}
-
-static void merge_tally(mesh_tally *sum, const mesh_tally *part)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        sum->lower[axis] = fmin(sum->lower[axis], part->lower[axis]);
-        sum->upper[axis] = fmax(sum->upper[axis], part->upper[axis]);
-    }
-    sum->drawn += part->drawn;
-    sum->ghosts += part->ghosts;
-    sum->inverted += part->inverted;
-    sum->sizes += part->sizes;
+    return end;
 }
 
 /* The lowest bad cell, or cell_count. */
 static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *tally)
 {
     const int64_t count = mesh->cells.cell_count;
+    const tally_run run = tally_choose(mesh);
     int64_t first_bad = count;
 #pragma omp parallel num_threads(threads) reduction(min : first_bad)
     {
-        mesh_tally mine = empty_tally;
+        mesh_tally mine = tally_empty();
         face_room room = {0};
 #pragma omp for schedule(static)
-        for (int64_t cell = 0; cell < count; cell++) {
-            fault_place place;
+        for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
-            if (check_cell(mesh, cell, &room, &place) == CELL_GOOD)
-                tally_cell(&mesh->cells, cell, &mine);
-            else
-                first_bad = cell;
+            const int64_t end = begin + BLOCK_CELLS < count ? begin + BLOCK_CELLS : count;
+            const int64_t bad = run ? run(mesh, begin, end, &mine) : check_each(mesh, begin, end, &room, &mine);
+            if (bad < end) first_bad = bad;
         }
         session_faces_free(&room);
 #pragma omp critical(session_check_tally)
-        merge_tally(tally, &mine);
+        tally_merge(tally, &mine);
     }
     return first_bad;
 }
@@ -243,7 +181,7 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
 
 insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
-    mesh_tally tally = empty_tally;
+    mesh_tally tally = tally_empty();
     const int64_t bad = check_cells(mesh, threads, &tally);
     if (bad < mesh->cells.cell_count) return describe_fault(mesh, bad, error);
     const insitu_status status = check_last_offset(mesh, error);

@@ -1,0 +1,26 @@
+/* What a check of a mesh adds up over its cells: bounds, counts and sizes. */
+#ifndef SESSION_TALLY_H
+#define SESSION_TALLY_H
+
+#include "session.h"
+
+typedef struct mesh_tally {
+    double lower[3], upper[3];
+    int64_t drawn, ghosts, inverted;
+    double sizes; /* sum of cube roots of volumes */
+} mesh_tally;
+
+mesh_tally tally_empty(void);
+void tally_merge(mesh_tally *sum, const mesh_tally *part);
+
+/* One good cell of any type. */
+void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
+
+/* Check and tally cells begin .. end; returns the first that is not good, or end. */
+typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
+
+/* The run for the mesh's layout, NULL where cells are to be taken one by one: where there may be polyhedra, or
+ * coordinates that are not all float or all double. */
+tally_run tally_choose(const session_mesh *mesh);
+
+#endif
