@@ -197,7 +197,7 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");
     assert_int_equal(second->colour_by.component, 2);
-    assert_int_equal(second->colour_by.line, 30);
+    assert_int_equal(second->colour_by.line, 31);
     assert_int_equal(second->colour_map, SCENE_INFERNO);
     assert_true(second->colour_range.is_fixed && second->colour_range.low == 0 && second->colour_range.high == 1);
     scene_free(&s);
