@@ -21,11 +21,12 @@
 
 static const test_mesh_kind kinds[] = {TEST_TETS, TEST_MIXED, TEST_POLYHEDRA};
 
-static insitu_session *open_tree(const char *tree, const char *images)
+/* The choice is not in the file: sessions of several choices read one file, and again when it changes. */
+static insitu_session *open_tree(scene_tree tree, const char *scene)
 {
-    char text[2000];
-    snprintf(text, sizeof text, "tree: %s\n%s", tree, images);
-    return open_session(MPI_COMM_WORLD, write_scene(text));
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+    session->scene.tree = tree;
+    return session;
 }
 
 /* A step of the one and of the other: is the picture the same? */
@@ -62,9 +63,10 @@ static void change_values(session_input *in, double by)
 }
 
 /* New values, moved vertices, a value that is no number, new cells; and a step with no change at all. */
-static void compare_trees(const char *tree, const char *images, test_mesh_kind kind)
+static void compare_trees(scene_tree tree, const char *images, test_mesh_kind kind)
 {
-    insitu_session *full = open_tree("full", images), *other = open_tree(tree, images);
+    const char *scene = write_scene(images);
+    insitu_session *full = open_tree(SCENE_TREE_FULL, scene), *other = open_tree(tree, scene);
     session_input in;
     input_create(&in, kind, 6, TEST_CHECKERBOARD, own_rank, rank_count);
     step_same(full, other, &in, 0);
@@ -95,8 +97,8 @@ static void partial_trees_draw_what_full_ones_do(void **context)
     (void)context;
     for (size_t i = 0; i < sizeof images / sizeof images[0]; i++)
         for (size_t kind = 0; kind < sizeof kinds / sizeof kinds[0]; kind++) {
-            compare_trees("partial", images[i], kinds[kind]);
-            if (kind == 0) compare_trees("auto", images[i], kinds[kind]);
+            compare_trees(SCENE_TREE_PARTIAL, images[i], kinds[kind]);
+            if (kind == 0) compare_trees(SCENE_TREE_AUTO, images[i], kinds[kind]);
         }
 }
 
@@ -116,7 +118,7 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
         straddling += low <= 0.1 && high >= 0.1;
     }
     MPI_Allreduce(&straddling, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
-    insitu_session *session = open_tree("partial", IMAGE(SURFACE));
+    insitu_session *session = open_tree(SCENE_TREE_PARTIAL, write_scene(IMAGE(SURFACE)));
     everywhere(hand_over(session, &in) == INSITU_OK);
     told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all);
@@ -135,7 +137,7 @@ static void standing_cells_get_a_full_tree(void **context)
     input_create(&in, TEST_TETS, 10, TEST_BLOCK, own_rank, rank_count);
     int64_t cells = in.part.cell_count, all = 0;
     MPI_Allreduce(&cells, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
-    insitu_session *session = open_tree("auto", IMAGE(PEAKS));
+    insitu_session *session = open_tree(SCENE_TREE_AUTO, write_scene(IMAGE(PEAKS)));
     int64_t cycle = 0;
     for (; cycle < 3; cycle++) {
         everywhere(hand_over(session, &in) == INSITU_OK);
@@ -167,7 +169,8 @@ static void full_trees_are_built_where_most_cells_show(void **context)
     int64_t cells = in.part.cell_count, all = 0;
     MPI_Allreduce(&cells, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     insitu_session *session =
-        open_tree("auto", IMAGE("      - volume: {field: f, range: [-4, 4], opacity: [[0, 0.1], [1, 0.5]]}\n"));
+        open_tree(SCENE_TREE_AUTO,
+                  write_scene(IMAGE("      - volume: {field: f, range: [-4, 4], opacity: [[0, 0.1], [1, 0.5]]}\n")));
     everywhere(hand_over(session, &in) == INSITU_OK);
     told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
     everywhere(tree_cells(session) == all && !session->meshes[0]->is_partial);
