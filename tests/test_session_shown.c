@@ -146,11 +146,13 @@ static void standing_cells_get_a_full_tree(void **context)
     }
     in.mesh.changed = INSITU_CHANGED_NOTHING;
     while (tree_cells(session) < all && cycle < 1000) {
+        change_values(&in, 1e-6);
         everywhere(hand_over(session, &in) == INSITU_OK);
         told_everywhere(session, insitu_step(session, cycle++, 0), INSITU_OK, "");
         forget_pictures();
     }
     everywhere(tree_cells(session) == all);
+    change_values(&in, 1e-6);
     everywhere(hand_over(session, &in) == INSITU_OK);
     told_everywhere(session, insitu_step(session, cycle, 0), INSITU_OK, "");
     everywhere(insitu_last_report(session)->build_ms == 0 &&

@@ -10,6 +10,7 @@
  *     session_catalogue.c  which meshes and fields there are, over all ranks
  *     session_plan.c       due images to the scalars they need; nothing else is computed from here on
  *     session_recentre.c   cell values to vertices, where an isosurface wants them (session_exchange.c: over ranks)
+ *     session_values.c     whether values that were set anew have changed
  *     session_shown.c      which values of them the images show
  *     session_tree.c       trees and ranges
  *     session_draw.c       frames, outputs (session_view.c: camera, lights, transfer functions)
@@ -46,7 +47,10 @@ typedef struct session_scalar {
     int interval_count; /* else the values that its images show */
     mmbvh_interval *intervals;
     double *vertex_values; /* recentred values, a declared copy; NULL until computed */
-    bool are_values_stale;
+    bool are_values_stale; /* recentred ones are to be computed again */
+    bool is_suspect;       /* the values were set anew: they may have changed */
+    bool has_checksum;
+    uint64_t checksum;
     bool has_own_ranges; /* the tree nodes' own, else pairs */
     float *pairs;        /* NULL until computed */
     bool are_ranges_stale;

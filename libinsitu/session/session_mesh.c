@@ -429,8 +429,7 @@ static void spoil_scalars(session_mesh *mesh, int field)
         session_scalar *scalar = &mesh->scalars[i];
         if (scalar->field != field) continue;
         scalar->are_values_stale = true;
-        scalar->are_ranges_stale = true;
-        scalar->is_extent_known = false;
+        scalar->is_suspect = true;
     }
 }
 

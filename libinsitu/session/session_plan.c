@@ -144,6 +144,7 @@ static bool add_scalar(session_mesh *mesh, int field, int component, bool is_rec
                                                      .component = component,
                                                      .is_recentred = is_recentred,
                                                      .are_values_stale = true,
+                                                     .is_suspect = true,
                                                      .are_ranges_stale = true};
     return true;
 }

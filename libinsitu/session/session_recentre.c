@@ -444,8 +444,7 @@ static insitu_status recentre(insitu_session *session, const session_recentring 
     if (!status && scalar) {
         spread_means(&groups, mesh->given.vertex_count, scalar->vertex_values, session->threads);
         scalar->are_values_stale = false;
-        scalar->are_ranges_stale = true;
-        scalar->is_extent_known = false;
+        scalar->is_suspect = true;
     }
     vertex_groups_free(&groups);
     return status;

@@ -11,6 +11,7 @@
 
 #include "memory.h"
 #include "session_shown.h"
+#include "session_values.h"
 
 static const double worst_cost = 1.5; /* of a refitted tree, in costs when built */
 
@@ -257,6 +258,7 @@ static insitu_status update_tree(insitu_session *session, session_mesh *mesh, ba
 
 insitu_status session_update_trees(insitu_session *session, base_error *error)
 {
+    session_settle_values(session);
     for (int i = 0; i < session->mesh_count; i++) {
         if (!session->meshes[i]->is_needed) continue;
         const insitu_status status = update_tree(session, session->meshes[i], error);

@@ -1,0 +1,93 @@
+#include "session_values.h"
+
+#include <string.h>
+
+#include "session_plan.h"
+
+enum { BLOCK_VALUES = 1 << 14, LANES = 4 };
+
+static uint64_t mix(uint64_t sum, uint64_t bits)
+{
+    const uint64_t product = (sum ^ bits) * 0x9e3779b97f4a7c15u;
+    return product ^ product >> 29;
+}
+
+/* Lanes of their own, since each multiplication waits for the one before. */
+static uint64_t sum_words(const char *data, int64_t bytes)
+{
+    uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
+    for (; bytes >= (int64_t)sizeof words; bytes -= (int64_t)sizeof words, data += sizeof words) {
+        memcpy(words, data, sizeof words);
+        for (int i = 0; i < LANES; i++) lanes[i] = mix(lanes[i], words[i]);
+    }
+    memset(words, 0, sizeof words);
+    memcpy(words, data, (size_t)bytes);
+    for (int i = 0; i < LANES; i++) lanes[i] = mix(lanes[i], words[i]);
+    return mix(mix(lanes[0], lanes[1]), mix(lanes[2], lanes[3]));
+}
+
+static uint64_t sum_strided(const char *data, int64_t stride, size_t size, int64_t count)
+{
+    uint64_t sum = 1;
+    for (int64_t i = 0; i < count; i++) {
+        uint64_t bits = 0;
+        memcpy(&bits, data + i * stride, size);
+        sum = mix(sum, bits);
+    }
+    return sum;
+}
+
+static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
+{
+    const int64_t size = a->is_wide ? 8 : 4, blocks = (count + BLOCK_VALUES - 1) / BLOCK_VALUES;
+    uint64_t sum = 0;
+#pragma omp parallel for num_threads(threads) schedule(static) reduction(+ : sum)
+    for (int64_t block = 0; block < blocks; block++) {
+        const int64_t first = block * BLOCK_VALUES;
+        const int64_t values = count - first < BLOCK_VALUES ? count - first : BLOCK_VALUES;
+        const char *data = a->data + first * a->stride;
+        const uint64_t own =
+            a->stride == size ? sum_words(data, values * size) : sum_strided(data, a->stride, (size_t)size, values);
+        sum += mix(own, (uint64_t)block); /* a sum, so that the order of the blocks does not matter */
+    }
+    return sum;
+}
+
+static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scalar, int threads)
+{
+    const grid_field field = session_scalar_field(mesh, scalar);
+    const int64_t count = field.is_cell_centred ? mesh->given.cell_count : mesh->given.vertex_count;
+    const int first = field.component < 0 ? 0 : field.component;
+    const int end = field.component < 0 ? field.component_count : first + 1;
+    uint64_t sum = 0;
+    for (int component = first; component < end && field.values.data; component++) {
+        grid_array a = field.values;
+        a.data += component * field.component_stride;
+        sum = mix(sum, sum_array(&a, count, threads));
+    }
+    return sum;
+}
+
+static void settle(insitu_session *session, const session_mesh *mesh, session_scalar *scalar)
+{
+    const uint64_t checksum = checksum_of(mesh, scalar, session->threads);
+    scalar->is_suspect = false;
+    if (scalar->has_checksum && scalar->checksum == checksum) {
+        session_text_add(&session->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
+                         mesh->name, mesh->fields[scalar->field].given.name);
+        return;
+    }
+    scalar->has_checksum = true;
+    scalar->checksum = checksum;
+    scalar->are_ranges_stale = true;
+    scalar->is_extent_known = false;
+}
+
+void session_settle_values(insitu_session *session)
+{
+    for (int i = 0; i < session->mesh_count; i++) {
+        session_mesh *mesh = session->meshes[i];
+        for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++)
+            if (mesh->scalars[k].is_used && mesh->scalars[k].is_suspect) settle(session, mesh, &mesh->scalars[k]);
+    }
+}
