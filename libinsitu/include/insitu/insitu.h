@@ -59,7 +59,7 @@ enum {
     INSITU_CHANGED_NOTHING = 0,
     INSITU_CHANGED_TOPOLOGY = 1, /* cells, their types, ghost flags: the tree is built again */
     INSITU_CHANGED_GEOMETRY = 2, /* coordinates: the tree's bounds are refitted */
-    INSITU_CHANGED_VALUES = 4,   /* a field's values: the tree's ranges are refitted */
+    INSITU_CHANGED_VALUES = 4,   /* a field's values: the tree's ranges are refitted, if they did change */
     INSITU_CHANGED_ALL = 7
 };
 
