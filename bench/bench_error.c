@@ -20,7 +20,7 @@ typedef struct chosen_pixel {
 
 struct bench_pixels {
     render_camera camera;
-    int columns, rows;
+    int block, columns, rows;
     chosen_pixel *pixels; /* columns × rows */
     grid kept;            /* the cells that matter, with the whole mesh's vertices; owns the three arrays below */
     int64_t *connectivity, *offsets;
@@ -33,12 +33,12 @@ static void *must(void *p)
     return p;
 }
 
-static chosen_pixel choose(const render_camera *camera, int column, int row)
+static chosen_pixel choose(const bench_pixels *all, int column, int row)
 {
     const uint64_t block = (uint64_t)(row * 100000 + column);
-    const int x = column * BENCH_BLOCK + (int)(test_uniform(2 * block, 11) * BENCH_BLOCK);
-    const int y = row * BENCH_BLOCK + (int)(test_uniform(2 * block + 1, 11) * BENCH_BLOCK);
-    return (chosen_pixel){(uint32_t)(y * camera->width + x), x, y};
+    const int x = column * all->block + (int)(test_uniform(2 * block, 11) * all->block);
+    const int y = row * all->block + (int)(test_uniform(2 * block + 1, 11) * all->block);
+    return (chosen_pixel){(uint32_t)(y * all->camera.width + x), x, y};
 }
 
 static void to_pixel(const render_camera *c, const double world[3], double out[2])
@@ -57,10 +57,10 @@ static void to_pixel(const render_camera *c, const double world[3], double out[2
 
 static bool holds_chosen(const bench_pixels *all, const double low[2], const double high[2])
 {
-    const int last_column = (int)fmin(all->columns - 1, floor(high[0] / BENCH_BLOCK));
-    const int last_row = (int)fmin(all->rows - 1, floor(high[1] / BENCH_BLOCK));
-    for (int row = (int)fmax(0, floor(low[1] / BENCH_BLOCK)); row <= last_row; row++)
-        for (int column = (int)fmax(0, floor(low[0] / BENCH_BLOCK)); column <= last_column; column++) {
+    const int last_column = (int)fmin(all->columns - 1, floor(high[0] / all->block));
+    const int last_row = (int)fmin(all->rows - 1, floor(high[1] / all->block));
+    for (int row = (int)fmax(0, floor(low[1] / all->block)); row <= last_row; row++)
+        for (int column = (int)fmax(0, floor(low[0] / all->block)); column <= last_column; column++) {
             const chosen_pixel *p = &all->pixels[row * all->columns + column];
             if (p->x >= low[0] && p->x <= high[0] && p->y >= low[1] && p->y <= high[1]) return true;
         }
@@ -124,15 +124,15 @@ static void keep_cells(bench_pixels *all, const grid *cells, const unsigned char
     all->kept.cell_types_stride = all->kept.cell_types_bytes = 1;
 }
 
-bench_pixels *bench_pixels_create(const grid *cells, const render_camera *camera)
+bench_pixels *bench_pixels_create(const grid *cells, const render_camera *camera, int block)
 {
     bench_pixels *all = must(calloc(1, sizeof *all));
     all->camera = *camera;
-    all->columns = camera->width / BENCH_BLOCK;
-    all->rows = camera->height / BENCH_BLOCK;
+    all->block = block;
+    all->columns = camera->width / block;
+    all->rows = camera->height / block;
     all->pixels = must(malloc((size_t)(all->columns * all->rows) * sizeof *all->pixels));
-    for (int i = 0; i < all->columns * all->rows; i++)
-        all->pixels[i] = choose(camera, i % all->columns, i / all->columns);
+    for (int i = 0; i < all->columns * all->rows; i++) all->pixels[i] = choose(all, i % all->columns, i / all->columns);
     unsigned char *wanted = must(malloc((size_t)cells->cell_count + 1));
 #pragma omp parallel for schedule(static)
     for (int64_t cell = 0; cell < cells->cell_count; cell++) wanted[cell] = is_wanted(all, cells, cell);
@@ -148,6 +148,22 @@ void bench_pixels_destroy(bench_pixels *pixels)
     free(pixels->offsets);
     free(pixels->types);
     free(pixels);
+}
+
+int bench_pixels_count(const bench_pixels *all)
+{
+    return all->columns * all->rows;
+}
+
+void bench_pixels_place(const bench_pixels *all, int i, int *x, int *y)
+{
+    *x = all->pixels[i].x;
+    *y = all->pixels[i].y;
+}
+
+const grid *bench_pixels_cells(const bench_pixels *all)
+{
+    return &all->kept;
 }
 
 /* The chosen pixels by the reference; the caller frees them. */
@@ -170,14 +186,13 @@ static reference_ray *trace_chosen(const bench_pixels *all, const render_job *jo
 static int chosen_index(const bench_pixels *all, uint32_t pixel)
 {
     const int x = (int)pixel % all->camera.width, y = (int)pixel / all->camera.width;
-    const int column = x / BENCH_BLOCK, row = y / BENCH_BLOCK, i = row * all->columns + column;
+    const int column = x / all->block, row = y / all->block, i = row * all->columns + column;
     return column < all->columns && row < all->rows && all->pixels[i].pixel == pixel ? i : -1;
 }
 
-/* The frame's chosen pixels as compositing would finish them, over nothing: count × 4, and their depths, which leave
- * the kernels as the ray's parameter t. */
-static void merge_chosen(const bench_pixels *all, const render_space *space, const fragment_list *fragments,
-                         float *rgba, double *depths)
+/* Depths leave the kernels as the ray's parameter t. */
+void bench_pixels_merge(const bench_pixels *all, const render_space *space, const fragment_list *fragments, float *rgba,
+                        double *depths)
 {
     enum { MANY = 4096 };
     const float nothing[4] = {0, 0, 0, 0};
@@ -218,7 +233,7 @@ bench_surface_error bench_surface_compare(const bench_pixels *all, const render_
     reference_ray *truth = trace_chosen(all, job);
     bench_surface_error out = {.checked = count};
     int both = 0, hits = 0;
-    merge_chosen(all, &job->space, fragments, rgba, depths);
+    bench_pixels_merge(all, &job->space, fragments, rgba, depths);
     for (int i = 0; i < count; i++) {
         const bool is_hit = isfinite(depths[i]), should_hit = truth[i].hit_count > 0;
         if (is_hit) fields[hits++] = field_error(all, job, &all->pixels[i], depths[i], exact);
@@ -242,7 +257,7 @@ bench_stats bench_volume_compare(const bench_pixels *all, const render_job *job,
     double *depths = must(malloc((size_t)count * sizeof *depths));
     double *errors = must(malloc((size_t)count * sizeof *errors));
     reference_ray *truth = trace_chosen(all, job);
-    merge_chosen(all, &job->space, fragments, rgba, depths);
+    bench_pixels_merge(all, &job->space, fragments, rgba, depths);
     int seen = 0;
     for (int i = 0; i < count; i++) {
         if (!truth[i].samples) continue;

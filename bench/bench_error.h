@@ -1,19 +1,29 @@
-/* How far a frame is from the truth, on some of its pixels: one at a hashed place in each block of BENCH_BLOCK ×
- * BENCH_BLOCK. The truth is the tests' brute-force renderer in double, which knows no tree. */
+/* How far a frame is from the truth, on some of its pixels: one at a hashed place in each square block of the image.
+ * The truth is the tests' brute-force renderer in double, which knows no tree. */
 #ifndef BENCH_ERROR_H
 #define BENCH_ERROR_H
 
 #include "bench_stats.h"
 #include "render.h"
 
-enum { BENCH_BLOCK = 60 };
-
 /* The chosen pixels, and the cells that can be seen in them. */
 typedef struct bench_pixels bench_pixels;
 
-/* camera is a perspective one with all cells in front of it. Running out of memory ends the process. */
-bench_pixels *bench_pixels_create(const grid *cells, const render_camera *camera);
+/* camera is a perspective one with all cells in front of it; block is the side of a block in pixels. Running out of
+ * memory ends the process. */
+bench_pixels *bench_pixels_create(const grid *cells, const render_camera *camera, int block);
 void bench_pixels_destroy(bench_pixels *pixels);
+
+int bench_pixels_count(const bench_pixels *pixels);
+void bench_pixels_place(const bench_pixels *pixels, int i, int *x, int *y);
+
+/* The cells that can be seen in the chosen pixels, with the whole mesh's vertices. */
+const grid *bench_pixels_cells(const bench_pixels *pixels);
+
+/* The chosen pixels of a frame as compositing would finish them, over nothing: count × 4, and their depths along the
+ * camera's axis, infinite where there is no surface. */
+void bench_pixels_merge(const bench_pixels *pixels, const render_space *space, const fragment_list *fragments,
+                        float *rgba, double *depths);
 
 typedef struct bench_surface_error {
     int checked;       /* pixels */

@@ -15,7 +15,7 @@
 #include "memory.h"
 #include "test_meshes.h"
 
-enum { WIDTH = 1920, HEIGHT = 1080, MAX_RUNS = 1000 };
+enum { WIDTH = 1920, HEIGHT = 1080, BLOCK = 60, MAX_RUNS = 1000 };
 
 static const double isovalue = 0.3, jitter = 0.2;
 
@@ -173,7 +173,7 @@ static void prepare(bench *b, test_mesh_kind kind, int n)
                           .is_alone = true};
     b->job.space = (render_space){.scale = 0.5, .depth_origin = sqrt(2.4 * 2.4 + 1.6 * 1.6 + 3.0 * 3.0)};
     render_camera_look_at(&b->job.camera, eye, focal, up, 40, WIDTH, HEIGHT);
-    b->pixels = bench_pixels_create(&b->view.cells, &b->job.camera);
+    b->pixels = bench_pixels_create(&b->view.cells, &b->job.camera, BLOCK);
 }
 
 static void measure(test_mesh_kind kind, int n, int runs)

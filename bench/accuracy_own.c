@@ -1,0 +1,224 @@
+/* libinsitu at each of its settings. A frame is timed from the trees to the finished pixels: what compositing on one
+ * rank does is part of it. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "accuracy_rows.h"
+#include "bench_stats.h"
+#include "comp.h"
+#include "memory.h"
+
+enum { MAX_RUNS = 64, FEW_RUNS = 3 };
+
+/* Pictures of one subject. */
+typedef struct studio {
+    const accuracy_context *context;
+    accuracy_scene scene;
+    fragment_list fragments;
+    float *image;   /* size × size × 4 */
+    float *chosen;  /* count × 4: the chosen pixels of the last frame */
+    double *depths; /* count */
+    int count;
+} studio;
+
+static void *must(void *p)
+{
+    if (!p) abort();
+    return p;
+}
+
+static void check(insitu_status status, const base_error *error)
+{
+    if (status == INSITU_OK) return;
+    fprintf(stderr, "bench_accuracy: %s\n", error->message);
+    exit(1);
+}
+
+static void build(accuracy_subject *s)
+{
+    base_error error;
+    mmbvh_free(&s->tree);
+    check(mmbvh_build(&s->view.cells, &s->view.field, s->space.origin, s->space.scale, &(mmbvh_options){0}, &s->tree,
+                      &error),
+          &error);
+}
+
+void accuracy_build(accuracy_context *context)
+{
+    double times[MAX_RUNS];
+    build(context->subject);
+    for (int i = 0; i < context->effort->runs; i++) {
+        const double began = bench_seconds();
+        build(context->subject);
+        times[i] = bench_seconds() - began;
+    }
+    context->build = bench_stats_of(times, context->effort->runs).median;
+}
+
+static studio open_studio(const accuracy_context *context)
+{
+    const size_t pixels = (size_t)context->effort->size * (size_t)context->effort->size;
+    studio s = {.context = context, .count = bench_pixels_count(accuracy_truth_pixels(context->truth))};
+    s.image = must(malloc(4 * pixels * sizeof *s.image));
+    s.chosen = must(malloc(4 * (size_t)s.count * sizeof *s.chosen));
+    s.depths = must(malloc((size_t)s.count * sizeof *s.depths));
+    return s;
+}
+
+static void close_studio(studio *s)
+{
+    base_free(s->fragments.items);
+    free(s->image);
+    free(s->chosen);
+    free(s->depths);
+}
+
+/* One rank's fragments of a pixel stand together. */
+static void finish(studio *s)
+{
+    const float nothing[4] = {0, 0, 0, 0};
+    fragment *items = s->fragments.items;
+    float depth;
+    for (int64_t i = 0, end; i < s->fragments.count; i = end) {
+        const uint32_t pixel = items[i].pixel;
+        for (end = i + 1; end < s->fragments.count && items[end].pixel == pixel;) end++;
+        comp_merge_pixel(items + i, end - i, nothing, s->image + 4 * (size_t)pixel, &depth);
+    }
+}
+
+/* Seconds of a frame. */
+static double draw(studio *s)
+{
+    base_error error;
+    const double began = bench_seconds();
+    s->fragments.count = 0;
+    check(render_frame(&s->scene.job, &s->fragments, NULL, &error), &error);
+    finish(s);
+    return bench_seconds() - began;
+}
+
+static void choose(studio *s)
+{
+    bench_pixels_merge(accuracy_truth_pixels(s->context->truth), &s->scene.job.space, &s->fragments, s->chosen,
+                       s->depths);
+}
+
+/* Draw, and draw again for the time; then what was drawn is compared. */
+static void measure(studio *s, accuracy_row *row)
+{
+    double frames[MAX_RUNS], total = 0;
+    row->status = "ok";
+    row->frames = frames;
+    row->first = s->context->build + draw(s);
+    while (row->runs < s->context->effort->runs && (row->runs < FEW_RUNS || total < s->context->effort->seconds))
+        total += frames[row->runs++] = draw(s);
+    choose(s);
+    row->error = s->scene.job.surface_count ? accuracy_surface_error(s->context->truth, s->depths)
+                                            : accuracy_volume_error(s->context->truth, ACCURACY_OPACITY, s->chosen);
+    accuracy_print(s->context, row);
+}
+
+void accuracy_surface_rows(const accuracy_context *context)
+{
+    studio s = open_studio(context);
+    accuracy_scene_surface(&s.scene, context->subject);
+    s.scene.surface.root = RENDER_NEUBAUER;
+    for (int n = 0; n <= 4; n++) {
+        accuracy_row row = {.layer = "isosurface", .method = "Neubauer"};
+        s.scene.surface.root_steps = n;
+        snprintf(row.setting, sizeof row.setting, "N = %d", n);
+        measure(&s, &row);
+    }
+    s.scene.surface.root = RENDER_ROBUST;
+    measure(&s, &(accuracy_row){.layer = "isosurface", .method = "robust", .setting = "robust"});
+    close_studio(&s);
+}
+
+/* A number of cells as a fraction. */
+static void name_cells(char *name, size_t bytes, double cells)
+{
+    if (cells >= 1)
+        snprintf(name, bytes, "%g", cells);
+    else
+        snprintf(name, bytes, "1/%g", 1 / cells);
+}
+
+static void step_rows(studio *s, const char *method, double most, double least)
+{
+    for (double cells = most; cells >= least; cells /= 2) {
+        accuracy_row row = {.layer = "volume", .method = method};
+        name_cells(row.setting, sizeof row.setting, cells);
+        s->scene.job.step = cells * s->context->subject->cell_size;
+        measure(s, &row);
+    }
+}
+
+static void group_rows(studio *s)
+{
+    s->scene.job.step = 0.25 * s->context->subject->cell_size;
+    for (int group = 1; group <= 64; group *= 4) {
+        accuracy_row row = {.layer = "volume", .method = "sample group"};
+        s->scene.job.sample_group = group;
+        snprintf(row.setting, sizeof row.setting, "%d", group);
+        measure(s, &row);
+    }
+    s->scene.job.sample_group = 16;
+}
+
+/* The mean of frames of different jitter: their times add up. */
+static void frame_rows(studio *s)
+{
+    const size_t channels = 4 * (size_t)s->count;
+    double *sum = must(calloc(channels, sizeof *sum)), total = 0, first = 0;
+    float *mean = must(malloc(channels * sizeof *mean));
+    s->scene.job.step = s->context->subject->cell_size;
+    for (int frame = 0; frame < s->context->effort->frames; frame++) {
+        s->scene.job.frame = frame;
+        total += draw(s);
+        if (frame == 0) first = total;
+        choose(s);
+        for (size_t i = 0; i < channels; i++) {
+            sum[i] += (double)s->chosen[i];
+            mean[i] = (float)(sum[i] / (frame + 1));
+        }
+        if (frame & (frame + 1)) continue;
+        accuracy_row row = {.layer = "volume",
+                            .method = "frames",
+                            .status = "ok",
+                            .first = s->context->build + first,
+                            .runs = 1,
+                            .frames = &(double){total}};
+        snprintf(row.setting, sizeof row.setting, "%d", frame + 1);
+        row.error = accuracy_volume_error(s->context->truth, ACCURACY_OPACITY, mean);
+        accuracy_print(s->context, &row);
+    }
+    s->scene.job.frame = 0;
+    free(sum);
+    free(mean);
+}
+
+static void max_error_rows(studio *s)
+{
+    for (int digits = 2; digits <= 4; digits++) {
+        accuracy_row row = {.layer = "volume", .method = "max_error"};
+        s->scene.job.max_error = pow(10, -digits);
+        snprintf(row.setting, sizeof row.setting, "1e-%d", digits);
+        measure(s, &row);
+    }
+    s->scene.job.max_error = 0;
+}
+
+void accuracy_volume_rows(const accuracy_context *context)
+{
+    studio s = open_studio(context);
+    accuracy_scene_volume(&s.scene, context->subject);
+    step_rows(&s, "samples", 4, 1.0 / 16);
+    group_rows(&s);
+    frame_rows(&s);
+    s.scene.job.integration = RENDER_SEGMENTS;
+    /* Linear cells are one segment whatever the step. */
+    step_rows(&s, "segments", accuracy_is_linear(context->subject) ? 1 : 4,
+              accuracy_is_linear(context->subject) ? 1 : 1.0 / 8);
+    max_error_rows(&s);
+    close_studio(&s);
+}

@@ -1,0 +1,145 @@
+/* The peers, each in a process of its own: one that crashes, or never ends, is a row that says so. */
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "accuracy_rows.h"
+#include "bench_vtk.h"
+
+typedef struct peer {
+    const char *method, *setting;
+    bench_vtk_mapper mapper;
+    accuracy_opacity meaning;
+    int coarser; /* resample: the finest resolution is halved so often */
+} peer;
+
+static const peer peers[] = {
+    {"VTK ray cast", "partial pre-integration", BENCH_VTK_RAY_PARTIAL, ACCURACY_EXTINCTION, 0},
+    {"VTK ray cast", "linear integrator", BENCH_VTK_RAY_LINEAR, ACCURACY_EXTINCTION, 0},
+    {"VTK Z-sweep", "partial pre-integration", BENCH_VTK_ZSWEEP, ACCURACY_EXTINCTION, 0},
+    {"VTK projected tets", "-", BENCH_VTK_PROJECTED, ACCURACY_EXTINCTION, 0},
+    {"VTK resample", NULL, BENCH_VTK_RESAMPLE, ACCURACY_OPACITY, 2},
+    {"VTK resample", NULL, BENCH_VTK_RESAMPLE, ACCURACY_OPACITY, 1},
+    {"VTK resample", NULL, BENCH_VTK_RESAMPLE, ACCURACY_OPACITY, 0},
+};
+
+static bench_vtk_request request_of(const accuracy_context *context, const peer *p, const int *pixels, int count,
+                                    double opacities[ACCURACY_KNOTS])
+{
+    const accuracy_subject *s = context->subject;
+    const int resolution = context->effort->resolution >> p->coarser;
+    double longest = 0;
+    for (int i = 0; i < ACCURACY_KNOTS; i++) {
+        const double a = (double)s->opacities[i];
+        opacities[i] = p->meaning == ACCURACY_EXTINCTION ? -log1p(-a) : a;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t v = 0; v < s->mesh.vertex_count; v++) {
+            low = fmin(low, s->mesh.coordinates[3 * v + axis]);
+            high = fmax(high, s->mesh.coordinates[3 * v + axis]);
+        }
+        longest = fmax(longest, high - low);
+    }
+    bench_vtk_request r = {.mesh = &s->mesh,
+                           .mapper = p->mapper,
+                           .resolution = resolution,
+                           .degrees = ACCURACY_DEGREES,
+                           .size = context->effort->size,
+                           .knot_count = ACCURACY_KNOTS,
+                           .knots = s->knots,
+                           .opacities = opacities,
+                           .colours = s->colours,
+                           .unit_distance = s->unit_distance,
+                           .sample_distance = 0.5 * longest / resolution,
+                           .runs = context->effort->runs,
+                           .seconds = context->effort->seconds,
+                           .pixel_count = count,
+                           .pixels = pixels};
+    for (int axis = 0; axis < 3; axis++) {
+        r.eye[axis] = s->look.eye[axis];
+        r.focal[axis] = s->look.focal[axis];
+        r.up[axis] = s->look.up[axis];
+    }
+    return r;
+}
+
+/* In the child: draw and write what came of it. */
+static void draw_and_send(const bench_vtk_request *request, float *rgba, size_t bytes, int seconds, int to)
+{
+    bench_vtk_result result = {0};
+    alarm((unsigned)seconds);
+    if (!freopen("/dev/null", "w", stderr)) _exit(1);
+    if (!bench_vtk_draw(request, &result, rgba)) _exit(2);
+    if (write(to, &result, sizeof result) != (ssize_t)sizeof result) _exit(3);
+    for (size_t sent = 0; sent < bytes;) {
+        const ssize_t now = write(to, (char *)rgba + sent, bytes - sent);
+        if (now <= 0) _exit(3);
+        sent += (size_t)now;
+    }
+    _exit(0);
+}
+
+static bool receive(int from, void *block, size_t bytes)
+{
+    for (size_t got = 0; got < bytes;) {
+        const ssize_t now = read(from, (char *)block + got, bytes - got);
+        if (now <= 0) return false;
+        got += (size_t)now;
+    }
+    return true;
+}
+
+/* Returns what the row says of it. */
+static const char *run(const bench_vtk_request *request, int seconds, bench_vtk_result *result, float *rgba)
+{
+    const size_t bytes = 4 * (size_t)request->pixel_count * sizeof *rgba;
+    int ends[2], status;
+    fflush(stdout);
+    if (pipe(ends)) return "no pipe";
+    const pid_t child = fork();
+    if (child < 0) return "no process";
+    if (child == 0) draw_and_send(request, rgba, bytes, seconds, ends[1]);
+    close(ends[1]);
+    const bool is_whole = receive(ends[0], result, sizeof *result) && receive(ends[0], rgba, bytes);
+    close(ends[0]);
+    waitpid(child, &status, 0);
+    if (WIFSIGNALED(status)) return WTERMSIG(status) == SIGALRM ? "too slow" : "crashed";
+    return is_whole && WEXITSTATUS(status) == 0 ? "ok" : "not drawn";
+}
+
+static void peer_row(const accuracy_context *context, const peer *p, const int *pixels, int count, float *rgba)
+{
+    double opacities[ACCURACY_KNOTS];
+    bench_vtk_result result = {0};
+    const bench_vtk_request request = request_of(context, p, pixels, count, opacities);
+    accuracy_row row = {.layer = "volume", .method = p->method};
+    if (p->setting)
+        snprintf(row.setting, sizeof row.setting, "%s", p->setting);
+    else
+        snprintf(row.setting, sizeof row.setting, "%d^3", request.resolution);
+    row.status = run(&request, context->effort->peer_seconds, &result, rgba);
+    if (row.status[0] == 'o') {
+        row.first = result.first;
+        row.runs = result.runs;
+        row.frames = result.frames;
+        row.error = accuracy_volume_error(context->truth, p->meaning, rgba);
+    }
+    accuracy_print(context, &row);
+}
+
+void accuracy_peer_rows(const accuracy_context *context)
+{
+    const bench_pixels *chosen = accuracy_truth_pixels(context->truth);
+    const int count = bench_pixels_count(chosen);
+    int *pixels = malloc(2 * (size_t)count * sizeof *pixels);
+    float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
+    if (!pixels || !rgba) abort();
+    for (int i = 0; i < count; i++) bench_pixels_place(chosen, i, &pixels[2 * i], &pixels[2 * i + 1]);
+    for (size_t i = 0; i < sizeof peers / sizeof *peers; i++) peer_row(context, &peers[i], pixels, count, rgba);
+    free(pixels);
+    free(rgba);
+}

@@ -1,0 +1,156 @@
+/* The adaptive integral knows opacities alone. Extinctions that are linear between the knots are given to it as a table
+ * of opacities dense enough to be one: 1 - exp(-e) between points 1/512 of a knot's interval apart is off its chord by
+ * at most (ln 2 / 512)^2 / 8 = 2.3e-7 of opacity. */
+#include "accuracy_truth.h"
+
+#include <stdlib.h>
+
+#include "reference_integral.h"
+
+enum { DENSE = 512, DENSE_POINTS = (ACCURACY_KNOTS - 1) * DENSE + 1 };
+
+/* What a cell's stretch may be off by: a hundred cells sum up to less than float32's rounding of a channel. */
+static const double tolerance = 1e-10;
+
+struct accuracy_truth {
+    const accuracy_subject *subject;
+    bench_pixels *pixels;
+    int count;
+    double *rgba[2]; /* of each accuracy_opacity: count × 4 */
+    accuracy_scene surface;
+    render_part kept;
+    reference_scene *reference;
+    reference_ray *rays; /* count */
+};
+
+static void *must(void *p)
+{
+    if (!p) abort();
+    return p;
+}
+
+static const float nothing[4] = {0, 0, 0, 0};
+
+static void trace_surface(accuracy_truth *t)
+{
+    accuracy_scene_surface(&t->surface, t->subject);
+    t->surface.job.parts = &t->kept;
+    t->reference = reference_create(&t->surface.job);
+    t->rays = must(malloc((size_t)t->count * sizeof *t->rays));
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < t->count; i++) {
+        int x, y;
+        bench_pixels_place(t->pixels, i, &x, &y);
+        reference_trace(t->reference, x, y, nothing, &t->rays[i]);
+    }
+}
+
+static void make_dense(const accuracy_subject *s, double values[DENSE_POINTS], float opacities[DENSE_POINTS])
+{
+    for (int i = 0; i < DENSE_POINTS; i++) {
+        const int knot = i / DENSE < ACCURACY_KNOTS - 1 ? i / DENSE : ACCURACY_KNOTS - 2;
+        const double part = (double)i / DENSE - knot;
+        const double low = -log1p(-(double)s->opacities[knot]), high = -log1p(-(double)s->opacities[knot + 1]);
+        values[i] = s->knots[knot] + part * (s->knots[knot + 1] - s->knots[knot]);
+        opacities[i] = (float)-expm1(-(low + part * (high - low)));
+    }
+}
+
+static double *integrate(const accuracy_truth *t, accuracy_opacity meaning)
+{
+    double values[DENSE_POINTS];
+    float opacities[DENSE_POINTS];
+    double *rgba = must(malloc(4 * (size_t)t->count * sizeof *rgba));
+    accuracy_scene scene;
+    accuracy_scene_volume(&scene, t->subject);
+    scene.job.parts = &t->kept;
+    if (meaning == ACCURACY_EXTINCTION) {
+        make_dense(t->subject, values, opacities);
+        scene.transfer.opacity_count = DENSE_POINTS;
+        scene.transfer.opacity_values = values;
+        scene.transfer.opacities = opacities;
+    }
+    reference_integral *integral = reference_integral_create(&scene.job, tolerance);
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < t->count; i++) {
+        int x, y;
+        bench_pixels_place(t->pixels, i, &x, &y);
+        reference_integral_trace(integral, x, y, nothing, NULL, 0, rgba + 4 * i);
+    }
+    reference_integral_free(integral);
+    return rgba;
+}
+
+accuracy_truth *accuracy_truth_create(const accuracy_subject *subject, int block)
+{
+    accuracy_truth *t = must(calloc(1, sizeof *t));
+    t->subject = subject;
+    t->pixels = bench_pixels_create(&subject->view.cells, &subject->camera, block);
+    t->count = bench_pixels_count(t->pixels);
+    t->kept = (render_part){bench_pixels_cells(t->pixels), NULL};
+    trace_surface(t);
+    t->rgba[ACCURACY_OPACITY] = integrate(t, ACCURACY_OPACITY);
+    t->rgba[ACCURACY_EXTINCTION] = integrate(t, ACCURACY_EXTINCTION);
+    return t;
+}
+
+void accuracy_truth_free(accuracy_truth *t)
+{
+    reference_free(t->reference);
+    bench_pixels_destroy(t->pixels);
+    free(t->rays);
+    free(t->rgba[0]);
+    free(t->rgba[1]);
+    free(t);
+}
+
+const bench_pixels *accuracy_truth_pixels(const accuracy_truth *t)
+{
+    return t->pixels;
+}
+
+accuracy_error accuracy_volume_error(const accuracy_truth *t, accuracy_opacity meaning, const float *rgba)
+{
+    const double *truth = t->rgba[meaning];
+    accuracy_error e = {0, 0, 0, 0, (double)NAN};
+    double sum = 0;
+    for (int i = 0; i < t->count; i++) {
+        if (!(truth[4 * i + 3] > 0)) continue;
+        e.pixels++;
+        for (int c = 4 * i; c < 4 * i + 4; c++) {
+            const double off = fabs((double)rgba[c] - truth[c]);
+            sum += off * off;
+            if (!(off <= e.max)) e.max = off;
+        }
+    }
+    if (e.pixels) e.rms = sqrt(sum / (4 * e.pixels));
+    return e;
+}
+
+accuracy_error accuracy_surface_error(const accuracy_truth *t, const double *depths)
+{
+    accuracy_error e = {0, 0, 0, 0, t->subject->mesh.face_count ? (double)NAN : 0};
+    double sum = 0;
+    int same = 0;
+    for (int i = 0; i < t->count; i++) {
+        const reference_hit *hit = t->rays[i].hit_count ? &t->rays[i].hits[0] : NULL;
+        if (!hit && !isfinite(depths[i])) continue;
+        e.pixels += hit != NULL;
+        const double off =
+            hit ? fabs(depths[i] - hit->depth) / accuracy_cell_size(t->kept.cells, hit->cell) : (double)INFINITY;
+        if (!(off <= 1)) {
+            e.wrong++;
+            continue;
+        }
+        int x, y;
+        double slope;
+        same++;
+        sum += off * off;
+        e.max = fmax(e.max, off);
+        if (isnan(e.residual)) continue;
+        bench_pixels_place(t->pixels, i, &x, &y);
+        e.residual = fmax(e.residual, fabs(reference_residual(t->reference, x, y, hit, depths[i], &slope, NULL)));
+    }
+    if (same) e.rms = sqrt(sum / same);
+    return e;
+}

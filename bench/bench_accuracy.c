@@ -1,0 +1,90 @@
+/* Speed against error: isosurfaces and volumes at every setting that trades one for the other, and VTK's volume mappers
+ * beside them, of the same meshes, cameras and transfer functions. Prints CSV: a setting a row. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <omp.h>
+
+#include "accuracy_rows.h"
+#include "bench_stats.h"
+#include "bench_vtk.h"
+
+static const accuracy_effort whole = {512, 32, 5, 1.5, 64, 256, 60}, quick = {256, 32, 3, 0.2, 16, 64, 20},
+                             smoke = {64, 16, 1, 0, 4, 16, 20};
+
+void accuracy_print_head(void)
+{
+    printf("program,isa,threads,mesh,cells,size,layer,method,setting,status,build,first,frame,frame_min,frame_max,runs,"
+           "pixels,rms,max,wrong,residual\n");
+}
+
+/* Times in milliseconds. */
+void accuracy_print(const accuracy_context *context, accuracy_row *row)
+{
+    const accuracy_error *e = &row->error;
+    const bench_stats frame = bench_stats_of(row->frames, row->runs);
+    printf("bench_accuracy,%s,%d,%s,%lld,%d,%s,%s,%s,%s,%.5g,%.5g,%.5g,%.5g,%.5g,%d,%d,%.5g,%.5g,%d,%.5g\n",
+           render_isa(), omp_get_max_threads(), context->subject->name, (long long)context->subject->mesh.cell_count,
+           context->effort->size, row->layer, row->method, row->setting, row->status, 1e3 * context->build,
+           1e3 * row->first, 1e3 * frame.median, 1e3 * frame.low, 1e3 * frame.high, frame.count, e->pixels, e->rms,
+           e->max, e->wrong, e->residual);
+    fflush(stdout);
+}
+
+static bool measure(const char *name, const accuracy_effort *effort, bool with_peers)
+{
+    accuracy_subject subject;
+    accuracy_context context = {.effort = effort, .subject = &subject};
+    if (!accuracy_subject_create(name, effort->size, &subject)) {
+        fprintf(stderr, "bench_accuracy: no mesh \"%s\"\n", name);
+        return false;
+    }
+    accuracy_build(&context);
+    accuracy_truth *truth = accuracy_truth_create(&subject, effort->block);
+    context.truth = truth;
+    accuracy_surface_rows(&context);
+    accuracy_volume_rows(&context);
+    if (with_peers) accuracy_peer_rows(&context);
+    accuracy_truth_free(truth);
+    accuracy_subject_free(&subject);
+    return true;
+}
+
+static int usage(int status)
+{
+    fprintf(
+        status ? stderr : stdout,
+        "Usage: bench_accuracy [--quick | --smoke] [--no-peers] MESH ...\n\n"
+        "Draws each MESH at every setting that trades speed for error and prints CSV.\n"
+        "  MESH        a lattice of N^3 cubes (tets:31, hexes:31, polyhedra:16 ...), or one of the real grids in the\n"
+        "              folder INSITU_TEST_DATA: bluntfin_hex, bluntfin_tet, post_hex, post_tet, mixed_lattice\n"
+        "  --quick     small pictures, few runs\n"
+        "  --smoke     tiny pictures, one run: does it work?\n"
+        "  --no-peers  without VTK's mappers, which need an X server (xvfb-run)\n\n"
+        "OMP_NUM_THREADS sets the threads, INSITU_ISA the instruction set.\n");
+    return status;
+}
+
+int main(int argc, char **argv)
+{
+    const accuracy_effort *effort = &whole;
+    bool with_peers = bench_vtk_is_there();
+    int i = 1;
+    for (; i < argc && !strncmp(argv[i], "--", 2); i++) {
+        if (!strcmp(argv[i], "--help")) return usage(0);
+        if (!strcmp(argv[i], "--quick"))
+            effort = &quick;
+        else if (!strcmp(argv[i], "--smoke"))
+            effort = &smoke;
+        else if (!strcmp(argv[i], "--no-peers"))
+            with_peers = false;
+        else
+            return usage(2);
+    }
+    if (i == argc) return usage(2);
+    accuracy_print_head();
+    for (; i < argc; i++)
+        if (!measure(argv[i], effort, with_peers)) return 1;
+    return 0;
+}

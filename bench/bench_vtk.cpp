@@ -1,0 +1,402 @@
+/* The peers.
+ *
+ * Debian's VTK draws through X and OpenGL; its ray casters work on the CPU and put their picture up as a texture at the
+ * end, so the server may be Xvfb. Times are of whole renders, with a context that is there already: a first render of
+ * nothing pays for that.
+ *
+ * The ray cast mapper keeps 8 bits a channel; the same rays are therefore cast once more, untimed, through the same
+ * function and integrator for the float colour. Z-sweep keeps a float image, the fixed-point mapper 15 bits, projected
+ * tetrahedra what the frame buffer has. */
+#include "bench_vtk.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <vtkAutoInit.h>
+#include <vtkCamera.h>
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkColorTransferFunction.h>
+#include <vtkDataSetTriangleFilter.h>
+#include <vtkDoubleArray.h>
+#include <vtkFixedPointRayCastImage.h>
+#include <vtkFixedPointVolumeRayCastMapper.h>
+#include <vtkFloatArray.h>
+#include <vtkIdList.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkObject.h>
+#include <vtkPiecewiseFunction.h>
+#include <vtkPointData.h>
+#include <vtkProjectedTetrahedraMapper.h>
+#include <vtkRenderWindow.h>
+#include <vtkRenderer.h>
+#include <vtkResampleToImage.h>
+#include <vtkSmartPointer.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkUnstructuredGridLinearRayIntegrator.h>
+#include <vtkUnstructuredGridPartialPreIntegration.h>
+#include <vtkUnstructuredGridVolumeRayCastFunction.h>
+#include <vtkUnstructuredGridVolumeRayCastIterator.h>
+#include <vtkUnstructuredGridVolumeRayCastMapper.h>
+#include <vtkUnstructuredGridVolumeZSweepMapper.h>
+#include <vtkVolume.h>
+#include <vtkVolumeProperty.h>
+#include <vtkXMLUnstructuredGridReader.h>
+
+VTK_MODULE_INIT(vtkRenderingOpenGL2)
+VTK_MODULE_INIT(vtkRenderingVolumeOpenGL2)
+
+namespace
+{
+
+class zsweep_mapper : public vtkUnstructuredGridVolumeZSweepMapper
+{
+  public:
+    static zsweep_mapper *New();
+    vtkTypeMacro(zsweep_mapper, vtkUnstructuredGridVolumeZSweepMapper) const float *pixel(int x, int y) const
+    {
+        return RealRGBAImage + 4 * (y * ImageInUseSize[0] + x);
+    }
+};
+vtkStandardNewMacro(zsweep_mapper)
+
+    /* The mapper with its input, and what its pictures are read by. */
+    struct peer {
+    const bench_vtk_request &request;
+    vtkNew<vtkRenderWindow> window;
+    vtkNew<vtkRenderer> renderer;
+    vtkNew<vtkVolume> volume;
+    vtkSmartPointer<vtkAbstractVolumeMapper> mapper;
+    vtkSmartPointer<vtkUnstructuredGridVolumeRayIntegrator> integrator;
+    vtkSmartPointer<vtkUnstructuredGrid> tets;
+};
+
+double seconds()
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/* A polyhedron as VTK's face stream. */
+void add_polyhedron(const test_mesh &mesh, int64_t cell, vtkUnstructuredGrid &grid)
+{
+    vtkNew<vtkIdList> stream;
+    stream->InsertNextId(mesh.offsets[cell + 1] - mesh.offsets[cell]);
+    for (int64_t i = mesh.offsets[cell]; i < mesh.offsets[cell + 1]; i++) {
+        const int64_t face = mesh.connectivity[i], first = mesh.face_offsets[face], end = mesh.face_offsets[face + 1];
+        stream->InsertNextId(end - first);
+        for (int64_t k = first; k < end; k++) stream->InsertNextId(mesh.face_connectivity[k]);
+    }
+    grid.InsertNextCell(VTK_POLYHEDRON, stream);
+}
+
+vtkSmartPointer<vtkUnstructuredGrid> to_vtk(const test_mesh &mesh)
+{
+    auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkFloatArray> values;
+    points->SetDataTypeToFloat();
+    points->SetNumberOfPoints(mesh.vertex_count);
+    values->SetNumberOfValues(mesh.vertex_count);
+    values->SetName("f");
+    for (int64_t v = 0; v < mesh.vertex_count; v++) {
+        points->SetPoint(v, mesh.coordinates + 3 * v);
+        values->SetValue(v, static_cast<float>(mesh.values[v]));
+    }
+    grid->SetPoints(points);
+    grid->GetPointData()->SetScalars(values);
+    grid->Allocate(mesh.cell_count);
+    for (int64_t cell = 0; cell < mesh.cell_count; cell++) {
+        if (mesh.types[cell] == VTK_POLYHEDRON) {
+            add_polyhedron(mesh, cell, *grid);
+            continue;
+        }
+        vtkIdType ids[8];
+        const int64_t first = mesh.offsets[cell], count = mesh.offsets[cell + 1] - first;
+        for (int64_t i = 0; i < count; i++) ids[i] = mesh.connectivity[first + i];
+        grid->InsertNextCell(mesh.types[cell], count, ids);
+    }
+    return grid;
+}
+
+/* The ray caster and projected tetrahedra take tets alone. */
+vtkSmartPointer<vtkUnstructuredGrid> only_tets(vtkUnstructuredGrid *grid)
+{
+    if (grid->IsHomogeneous() && grid->GetNumberOfCells() > 0 && grid->GetCellType(0) == VTK_TETRA) return grid;
+    vtkNew<vtkDataSetTriangleFilter> filter;
+    filter->SetInputData(grid);
+    filter->TetrahedraOnlyOn();
+    filter->Update();
+    return filter->GetOutput();
+}
+
+void set_ray_cast(peer &p, vtkUnstructuredGrid *grid)
+{
+    auto mapper = vtkSmartPointer<vtkUnstructuredGridVolumeRayCastMapper>::New();
+    if (p.request.mapper == BENCH_VTK_RAY_LINEAR)
+        p.integrator = vtkSmartPointer<vtkUnstructuredGridLinearRayIntegrator>::New();
+    else
+        p.integrator = vtkSmartPointer<vtkUnstructuredGridPartialPreIntegration>::New();
+    p.tets = only_tets(grid);
+    mapper->SetInputData(p.tets);
+    mapper->SetRayIntegrator(p.integrator);
+    mapper->AutoAdjustSampleDistancesOff();
+    mapper->IntermixIntersectingGeometryOff();
+    p.mapper = mapper;
+}
+
+void set_zsweep(peer &p, vtkUnstructuredGrid *grid)
+{
+    auto mapper = vtkSmartPointer<zsweep_mapper>::New();
+    p.integrator = vtkSmartPointer<vtkUnstructuredGridPartialPreIntegration>::New();
+    mapper->SetInputData(grid);
+    mapper->SetRayIntegrator(p.integrator);
+    mapper->AutoAdjustSampleDistancesOff();
+    mapper->IntermixIntersectingGeometryOff();
+    p.mapper = mapper;
+}
+
+void set_projected(peer &p, vtkUnstructuredGrid *grid)
+{
+    auto mapper = vtkSmartPointer<vtkProjectedTetrahedraMapper>::New();
+    p.tets = only_tets(grid);
+    mapper->SetInputData(p.tets);
+    p.mapper = mapper;
+}
+
+/* Points outside the mesh get the least knot, which has no opacity. */
+void clear_outside(vtkImageData *image, const char *mask_name, double value)
+{
+    vtkDataArray *values = image->GetPointData()->GetArray("f"), *mask = image->GetPointData()->GetArray(mask_name);
+    for (vtkIdType i = 0; i < values->GetNumberOfTuples(); i++)
+        if (mask->GetTuple1(i) == 0) values->SetTuple1(i, value);
+    image->GetPointData()->SetActiveScalars("f");
+}
+
+void set_resample(peer &p, vtkUnstructuredGrid *grid)
+{
+    vtkNew<vtkResampleToImage> sampler;
+    const double *bounds = grid->GetBounds();
+    double longest = 0;
+    int dimensions[3];
+    for (int axis = 0; axis < 3; axis++) longest = std::fmax(longest, bounds[2 * axis + 1] - bounds[2 * axis]);
+    for (int axis = 0; axis < 3; axis++)
+        dimensions[axis] = 1 + static_cast<int>(std::ceil((p.request.resolution - 1) *
+                                                          (bounds[2 * axis + 1] - bounds[2 * axis]) / longest));
+    sampler->SetInputDataObject(grid);
+    sampler->SetSamplingDimensions(dimensions);
+    sampler->Update();
+    vtkImageData *image = sampler->GetOutput();
+    clear_outside(image, sampler->GetMaskArrayName(), p.request.knots[0]);
+    auto mapper = vtkSmartPointer<vtkFixedPointVolumeRayCastMapper>::New();
+    image->GetPointData()->RemoveArray("vtkGhostType"); /* blanked points are drawn, transparent */
+    image->GetCellData()->Initialize();
+    mapper->SetInputData(image);
+    mapper->AutoAdjustSampleDistancesOff();
+    mapper->IntermixIntersectingGeometryOff();
+    mapper->SetImageSampleDistance(1);
+    mapper->SetSampleDistance(static_cast<float>(p.request.sample_distance));
+    p.mapper = mapper;
+}
+
+void set_mapper(peer &p, vtkUnstructuredGrid *grid)
+{
+    switch (p.request.mapper) {
+    case BENCH_VTK_RAY_PARTIAL:
+    case BENCH_VTK_RAY_LINEAR: set_ray_cast(p, grid); break;
+    case BENCH_VTK_ZSWEEP: set_zsweep(p, grid); break;
+    case BENCH_VTK_PROJECTED: set_projected(p, grid); break;
+    case BENCH_VTK_RESAMPLE: set_resample(p, grid); break;
+    }
+    p.volume->SetMapper(p.mapper);
+    p.renderer->AddVolume(p.volume);
+}
+
+void set_property(peer &p)
+{
+    vtkNew<vtkColorTransferFunction> colour;
+    vtkNew<vtkPiecewiseFunction> opacity;
+    for (int i = 0; i < p.request.knot_count; i++) {
+        const float *c = p.request.colours + 3 * i;
+        colour->AddRGBPoint(p.request.knots[i], static_cast<double>(c[0]), static_cast<double>(c[1]),
+                            static_cast<double>(c[2]));
+        opacity->AddPoint(p.request.knots[i], p.request.opacities[i]);
+    }
+    vtkVolumeProperty *property = p.volume->GetProperty();
+    property->SetColor(colour);
+    property->SetScalarOpacity(opacity);
+    property->SetScalarOpacityUnitDistance(p.request.unit_distance);
+    property->SetInterpolationTypeToLinear();
+    property->ShadeOff();
+}
+
+/* The ray caster's rays go through the lower left corners of pixels, everyone else's through their centres: its image
+ * plane is shifted by half a pixel. */
+void set_view(peer &p)
+{
+    vtkCamera *camera = p.renderer->GetActiveCamera();
+    camera->SetPosition(p.request.eye);
+    camera->SetFocalPoint(p.request.focal);
+    camera->SetViewUp(p.request.up);
+    camera->SetViewAngle(p.request.degrees);
+    if (p.request.mapper == BENCH_VTK_RAY_PARTIAL || p.request.mapper == BENCH_VTK_RAY_LINEAR)
+        camera->SetWindowCenter(1.0 / p.request.size, 1.0 / p.request.size);
+    p.renderer->ResetCameraClippingRange(p.mapper->GetBounds());
+}
+
+bool open_window(peer &p)
+{
+    if (!std::getenv("DISPLAY")) return false;
+    p.renderer->SetBackground(0, 0, 0);
+    p.window->SetOffScreenRendering(1);
+    p.window->SetAlphaBitPlanes(1);
+    p.window->SetMultiSamples(0);
+    p.window->SetSize(p.request.size, p.request.size);
+    p.window->AddRenderer(p.renderer);
+    p.window->Render();
+    return true;
+}
+
+void render(peer &p)
+{
+    p.window->Render();
+    p.window->WaitForCompletion();
+}
+
+void cast_pixel(peer &p, vtkUnstructuredGridVolumeRayCastMapper *mapper, int x, int y, float rgba[4])
+{
+    vtkDataArray *scalars = p.tets->GetPointData()->GetScalars();
+    auto rays =
+        vtkSmartPointer<vtkUnstructuredGridVolumeRayCastIterator>::Take(mapper->GetRayCastFunction()->NewIterator());
+    vtkNew<vtkDoubleArray> lengths;
+    vtkNew<vtkFloatArray> near, far;
+    double whole[2] = {0, 1};
+    rays->SetBounds(whole);
+    rays->Initialize(x, y);
+    while (rays->GetNextIntersections(nullptr, lengths, scalars, near, far) > 0)
+        p.integrator->Integrate(lengths, near, far, rgba);
+}
+
+void read_fixed_point(peer &p, float *rgba)
+{
+    vtkFixedPointRayCastImage *image = vtkFixedPointVolumeRayCastMapper::SafeDownCast(p.mapper)->GetRayCastImage();
+    int size[2], origin[2], stride[2];
+    image->GetImageInUseSize(size);
+    image->GetImageOrigin(origin);
+    image->GetImageMemorySize(stride);
+    for (int i = 0; i < p.request.pixel_count; i++) {
+        const int x = p.request.pixels[2 * i] - origin[0],
+                  y = p.request.size - 1 - p.request.pixels[2 * i + 1] - origin[1];
+        if (x < 0 || y < 0 || x >= size[0] || y >= size[1]) continue;
+        const unsigned short *from = image->GetImage() + 4 * (y * stride[0] + x);
+        for (int c = 0; c < 4; c++) rgba[4 * i + c] = static_cast<float>(from[c]) / 32767;
+    }
+}
+
+void read_window(peer &p, float *rgba)
+{
+    vtkNew<vtkFloatArray> data;
+    const int last = p.request.size - 1;
+    p.window->GetRGBAPixelData(0, 0, last, last, 0, data);
+    for (int i = 0; i < p.request.pixel_count; i++) {
+        const vtkIdType at = (last - p.request.pixels[2 * i + 1]) * p.request.size + p.request.pixels[2 * i];
+        for (int c = 0; c < 4; c++) rgba[4 * i + c] = static_cast<float>(data->GetComponent(at, c));
+    }
+}
+
+void read_pixels(peer &p, float *rgba)
+{
+    std::fill(rgba, rgba + 4 * p.request.pixel_count, 0.0f);
+    if (p.request.mapper == BENCH_VTK_RESAMPLE) return read_fixed_point(p, rgba);
+    if (p.request.mapper == BENCH_VTK_PROJECTED) return read_window(p, rgba);
+    for (int i = 0; i < p.request.pixel_count; i++) {
+        const int x = p.request.pixels[2 * i], y = p.request.size - 1 - p.request.pixels[2 * i + 1];
+        if (auto *sweep = zsweep_mapper::SafeDownCast(p.mapper))
+            std::copy(sweep->pixel(x, y), sweep->pixel(x, y) + 4, rgba + 4 * i);
+        else
+            cast_pixel(p, vtkUnstructuredGridVolumeRayCastMapper::SafeDownCast(p.mapper), x, y, rgba + 4 * i);
+    }
+}
+
+} // namespace
+
+bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, float *rgba)
+{
+    vtkObject::GlobalWarningDisplayOff();
+    peer p{*request, {}, {}, {}, nullptr, nullptr, nullptr};
+    if (!open_window(p)) return false;
+    const vtkSmartPointer<vtkUnstructuredGrid> grid = to_vtk(*request->mesh);
+    grid->GetBounds();
+    const double began = seconds();
+    set_mapper(p, grid);
+    set_property(p);
+    set_view(p);
+    render(p);
+    result->first = seconds() - began;
+    result->runs = 0;
+    double total = 0;
+    while (result->runs < request->runs && result->runs < BENCH_VTK_MAX_RUNS && total < request->seconds) {
+        const double start = seconds();
+        render(p);
+        total += result->frames[result->runs++] = seconds() - start;
+    }
+    read_pixels(p, rgba);
+    return true;
+}
+
+static bool is_taken(int type)
+{
+    return type == VTK_TETRA || type == VTK_HEXAHEDRON || type == VTK_WEDGE || type == VTK_PYRAMID;
+}
+
+template <typename T> static T *reserve(int64_t count)
+{
+    void *block = std::calloc(static_cast<size_t>(count) + 1, sizeof(T));
+    if (!block) std::abort();
+    return static_cast<T *>(block);
+}
+
+bool bench_vtk_read(const char *path, const char *field, test_mesh *out)
+{
+    vtkNew<vtkXMLUnstructuredGridReader> reader;
+    if (!reader->CanReadFile(path)) return false;
+    reader->SetFileName(path);
+    reader->Update();
+    vtkUnstructuredGrid *grid = reader->GetOutput();
+    vtkDataArray *values = grid->GetPointData()->GetArray(field);
+    if (!values || values->GetNumberOfComponents() != 1 || !grid->GetNumberOfCells()) return false;
+    *out = test_mesh{};
+    out->vertex_count = grid->GetNumberOfPoints();
+    out->cell_count = grid->GetNumberOfCells();
+    for (int64_t cell = 0; cell < out->cell_count; cell++)
+        if (!is_taken(grid->GetCellType(cell))) return false;
+    out->connectivity_count = grid->GetCells()->GetNumberOfConnectivityIds();
+    out->coordinates = reserve<double>(3 * out->vertex_count);
+    out->values = reserve<double>(out->vertex_count);
+    out->offsets = reserve<int64_t>(out->cell_count + 1);
+    out->connectivity = reserve<int64_t>(out->connectivity_count);
+    out->types = reserve<unsigned char>(out->cell_count);
+    out->ghosts = reserve<unsigned char>(out->cell_count);
+    for (int64_t v = 0; v < out->vertex_count; v++) {
+        grid->GetPoint(v, out->coordinates + 3 * v);
+        out->values[v] = values->GetTuple1(v);
+    }
+    for (int64_t cell = 0; cell < out->cell_count; cell++) {
+        vtkIdType count;
+        const vtkIdType *ids;
+        grid->GetCellPoints(cell, count, ids);
+        out->types[cell] = static_cast<unsigned char>(grid->GetCellType(cell));
+        out->offsets[cell + 1] = out->offsets[cell] + count;
+        for (vtkIdType i = 0; i < count; i++) out->connectivity[out->offsets[cell] + i] = ids[i];
+    }
+    return true;
+}
+
+bool bench_vtk_is_there(void)
+{
+    return true;
+}
