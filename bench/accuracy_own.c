@@ -120,6 +120,7 @@ static void measure(studio *s, accuracy_row *row)
 
 void accuracy_surface_rows(const accuracy_context *context)
 {
+    if (context->effort->is_brief) return;
     studio s = open_studio(context);
     accuracy_scene_surface(&s.scene, context->subject);
     s.scene.surface.root = RENDER_NEUBAUER;
@@ -208,17 +209,22 @@ static void max_error_rows(studio *s)
     s->scene.job.max_error = 0;
 }
 
+static void sample_rows(studio *s)
+{
+    step_rows(s, "samples", 4, 1.0 / 16);
+    group_rows(s);
+    frame_rows(s);
+}
+
 void accuracy_volume_rows(const accuracy_context *context)
 {
+    const bool is_linear = accuracy_is_linear(context->subject), is_brief = context->effort->is_brief;
     studio s = open_studio(context);
     accuracy_scene_volume(&s.scene, context->subject);
-    step_rows(&s, "samples", 4, 1.0 / 16);
-    group_rows(&s);
-    frame_rows(&s);
+    if (!is_brief) sample_rows(&s);
     s.scene.job.integration = RENDER_SEGMENTS;
     /* Linear cells are one segment whatever the step. */
-    step_rows(&s, "segments", accuracy_is_linear(context->subject) ? 1 : 4,
-              accuracy_is_linear(context->subject) ? 1 : 1.0 / 8);
-    max_error_rows(&s);
+    step_rows(&s, "segments", is_linear || is_brief ? 1 : 4, is_linear || is_brief ? 1 : 1.0 / 8);
+    if (!is_brief) max_error_rows(&s);
     close_studio(&s);
 }

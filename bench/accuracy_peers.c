@@ -47,7 +47,7 @@ static bench_vtk_request request_of(const accuracy_context *context, const peer 
     bench_vtk_request r = {.mesh = &s->mesh,
                            .mapper = p->mapper,
                            .resolution = resolution,
-                           .degrees = ACCURACY_DEGREES,
+                           .degrees = s->degrees,
                            .size = context->effort->size,
                            .knot_count = ACCURACY_KNOTS,
                            .knots = s->knots,
@@ -139,7 +139,9 @@ void accuracy_peer_rows(const accuracy_context *context)
     float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
     if (!pixels || !rgba) abort();
     for (int i = 0; i < count; i++) bench_pixels_place(chosen, i, &pixels[2 * i], &pixels[2 * i + 1]);
-    for (size_t i = 0; i < sizeof peers / sizeof *peers; i++) peer_row(context, &peers[i], pixels, count, rgba);
+    for (size_t i = 0; i < sizeof peers / sizeof *peers; i++)
+        if (!context->effort->is_brief || peers[i].mapper != BENCH_VTK_ZSWEEP)
+            peer_row(context, &peers[i], pixels, count, rgba);
     free(pixels);
     free(rgba);
 }

@@ -10,6 +10,7 @@ typedef struct accuracy_effort {
     int runs;         /* frames timed for a row at most; at least 3 where they take longer than seconds */
     double seconds;   /* spent on a row's frames, when there are 3 */
     int frames;       /* accumulated at most */
+    bool is_brief;    /* only the exact setting, and no peer that takes minutes for such a picture */
     int resolution;   /* of the finest image that VTK samples */
     int peer_seconds; /* after which a peer is stopped */
 } accuracy_effort;
@@ -24,7 +25,7 @@ typedef struct accuracy_context {
 /* Build the subject's tree, timed. */
 void accuracy_build(accuracy_context *context);
 
-void accuracy_surface_rows(const accuracy_context *context);
+void accuracy_surface_rows(const accuracy_context *context); /* none where brief */
 void accuracy_volume_rows(const accuracy_context *context);
 void accuracy_peer_rows(const accuracy_context *context);
 

@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bench_stats.h"
 #include "bench_vtk.h"
 
 static const double jitter = 0.2;
@@ -110,7 +109,7 @@ static bool read_grid(const char *name, accuracy_subject *s)
     return false;
 }
 
-double accuracy_cell_size(const grid *g, int64_t cell)
+double accuracy_box_size(const grid *g, int64_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, cell);
@@ -126,22 +125,92 @@ double accuracy_cell_size(const grid *g, int64_t cell)
     return cbrt((high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]));
 }
 
-static double median_cell_size(const grid *g)
+static double tet_volume(const double *a, const double *b, const double *c, const double *d)
 {
-    double *sizes = malloc((size_t)g->cell_count * sizeof *sizes);
-    if (!sizes) abort();
-    for (int64_t cell = 0; cell < g->cell_count; cell++) sizes[cell] = accuracy_cell_size(g, cell);
-    const double median = bench_stats_of(sizes, (int)g->cell_count).median;
-    free(sizes);
-    return median;
+    double u[3], v[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        u[i] = b[i] - a[i];
+        v[i] = c[i] - a[i];
+        w[i] = d[i] - a[i];
+    }
+    return fabs(u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
+                u[2] * (v[0] * w[1] - v[1] * w[0])) /
+           6;
+}
+
+/* By the tets that join the triangles of its faces to its centre. */
+static double polyhedron_volume(const test_mesh *m, int64_t cell)
+{
+    double centre[3] = {0, 0, 0}, sum = 0;
+    int count = 0;
+    for (int64_t i = m->offsets[cell]; i < m->offsets[cell + 1]; i++)
+        for (int64_t k = m->face_offsets[m->connectivity[i]]; k < m->face_offsets[m->connectivity[i] + 1]; k++, count++)
+            for (int axis = 0; axis < 3; axis++) centre[axis] += m->coordinates[3 * m->face_connectivity[k] + axis];
+    for (int axis = 0; axis < 3; axis++) centre[axis] /= count;
+    for (int64_t i = m->offsets[cell]; i < m->offsets[cell + 1]; i++) {
+        const int64_t first = m->face_offsets[m->connectivity[i]], end = m->face_offsets[m->connectivity[i] + 1];
+        const int64_t *v = m->face_connectivity;
+        for (int64_t k = first + 1; k + 1 < end; k++)
+            sum += tet_volume(centre, m->coordinates + 3 * v[first], m->coordinates + 3 * v[k],
+                              m->coordinates + 3 * v[k + 1]);
+    }
+    return sum;
+}
+
+/* Warped faces as two triangles. */
+static double cell_volume(const test_mesh *m, int64_t cell)
+{
+    static const signed char tet[][4] = {{0, 1, 2, 3}}, pyramid[][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}},
+                             wedge[][4] = {{0, 1, 2, 5}, {0, 1, 5, 4}, {0, 4, 5, 3}},
+                             hex[][4] = {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6},
+                                         {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
+    const int type = m->types[cell];
+    const signed char(*tets)[4] = type == GRID_TET       ? tet
+                                  : type == GRID_PYRAMID ? pyramid
+                                  : type == GRID_WEDGE   ? wedge
+                                                         : hex;
+    const int count = type == GRID_TET ? 1 : type == GRID_PYRAMID ? 2 : type == GRID_WEDGE ? 3 : 6;
+    const int64_t *v = m->connectivity + m->offsets[cell];
+    double sum = 0;
+    if (type == GRID_POLYHEDRON) return polyhedron_volume(m, cell);
+    for (int i = 0; i < count; i++)
+        sum += tet_volume(m->coordinates + 3 * v[tets[i][0]], m->coordinates + 3 * v[tets[i][1]],
+                          m->coordinates + 3 * v[tets[i][2]], m->coordinates + 3 * v[tets[i][3]]);
+    return sum;
+}
+
+static double mean_cell_size(const test_mesh *m)
+{
+    double sum = 0;
+    for (int64_t cell = 0; cell < m->cell_count; cell++) sum += cbrt(cell_volume(m, cell));
+    return sum / (double)m->cell_count;
+}
+
+/* The whole angle in which the corners of the bounds are seen. */
+static double fitting_degrees(const render_camera *camera, const double low[3], const double high[3])
+{
+    double steepest = 0;
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3] = {0, 0, 0};
+        for (int axis = 0; axis < 3; axis++) {
+            const double d = (corner >> axis & 1 ? high[axis] : low[axis]) - camera->eye[axis];
+            p[0] += d * camera->right[axis];
+            p[1] += d * camera->up[axis];
+            p[2] += d * camera->forward[axis];
+        }
+        steepest = fmax(steepest, fmax(fabs(p[0]), fabs(p[1])) / p[2]);
+    }
+    return 2 * atan(steepest) * 57.29577951308232;
 }
 
 static void place(accuracy_subject *s, int size)
 {
     const accuracy_view *look = &s->look;
     double low[3], high[3], centre_depth = 0;
-    render_camera_look_at(&s->camera, look->eye, look->focal, look->up, ACCURACY_DEGREES, size, size);
     bounds_of(&s->mesh, low, high);
+    render_camera_look_at(&s->camera, look->eye, look->focal, look->up, 40, size, size);
+    s->degrees = fitting_degrees(&s->camera, low, high);
+    render_camera_look_at(&s->camera, look->eye, look->focal, look->up, s->degrees, size, size);
     for (int axis = 0; axis < 3; axis++) {
         s->space.origin[axis] = 0.5 * (low[axis] + high[axis]);
         centre_depth += (s->space.origin[axis] - look->eye[axis]) * s->camera.forward[axis];
@@ -157,7 +226,7 @@ bool accuracy_subject_create(const char *name, int size, accuracy_subject *out)
     if (!make_lattice(name, out) && !read_grid(name, out)) return false;
     test_view_create(&out->mesh, (test_layout){0}, &out->view);
     out->view.cells.ghosts = NULL;
-    out->cell_size = median_cell_size(&out->view.cells);
+    out->cell_size = mean_cell_size(&out->mesh);
     place(out, size);
     return true;
 }

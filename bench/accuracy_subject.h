@@ -18,17 +18,16 @@ typedef struct accuracy_subject {
     test_mesh mesh;
     test_view view; /* the mesh as a simulation would hold it: float32 coordinates and values, int32 indices */
     mmbvh tree;
-    accuracy_view look; /* 40 degrees vertical; pictures are square */
+    accuracy_view look;
+    double degrees; /* the whole angle of the square picture: the bounds just fit */
     double isovalue;
     double knots[ACCURACY_KNOTS];
     float opacities[ACCURACY_KNOTS], colours[3 * ACCURACY_KNOTS];
     double unit_distance;
-    double cell_size; /* the median over the cells of the cube root of the box's volume */
+    double cell_size; /* as of step_cells in a scene: the mean over the cells of the cube root of the volume */
     render_camera camera;
     render_space space;
 } accuracy_subject;
-
-enum { ACCURACY_DEGREES = 40 };
 
 /* name: a kind of lattice with its number of cubes a side ("tets:31"), or a file of INSITU_TEST_DATA without its ending
  * ("bluntfin_hex"). size: pixels a side. False where there is no such subject. */
@@ -50,7 +49,7 @@ void accuracy_scene_surface(accuracy_scene *scene, const accuracy_subject *subje
 void accuracy_scene_volume(accuracy_scene *scene, const accuracy_subject *subject);
 
 /* The cube root of the volume of a cell's box. */
-double accuracy_cell_size(const grid *cells, int64_t cell);
+double accuracy_box_size(const grid *cells, int64_t cell);
 
 /* Is every cell linear along a ray, or piecewise so where the kernels know the pieces? */
 bool accuracy_is_linear(const accuracy_subject *subject);

@@ -1,13 +1,13 @@
 /* The adaptive integral knows opacities alone. Extinctions that are linear between the knots are given to it as a table
- * of opacities dense enough to be one: 1 - exp(-e) between points 1/512 of a knot's interval apart is off its chord by
- * at most (ln 2 / 512)^2 / 8 = 2.3e-7 of opacity. */
+ * of opacities dense enough to be one: 1 - exp(-e) between points 1/256 of a knot's interval apart is off its chord by
+ * at most (ln 2 / 256)^2 / 8 = 9.2e-7 of opacity. */
 #include "accuracy_truth.h"
 
 #include <stdlib.h>
 
 #include "reference_integral.h"
 
-enum { DENSE = 512, DENSE_POINTS = (ACCURACY_KNOTS - 1) * DENSE + 1 };
+enum { DENSE = 256, DENSE_POINTS = (ACCURACY_KNOTS - 1) * DENSE + 1 };
 
 /* What a cell's stretch may be off by: a hundred cells sum up to less than float32's rounding of a channel. */
 static const double tolerance = 1e-10;
@@ -137,7 +137,7 @@ accuracy_error accuracy_surface_error(const accuracy_truth *t, const double *dep
         if (!hit && !isfinite(depths[i])) continue;
         e.pixels += hit != NULL;
         const double off =
-            hit ? fabs(depths[i] - hit->depth) / accuracy_cell_size(t->kept.cells, hit->cell) : (double)INFINITY;
+            hit ? fabs(depths[i] - hit->depth) / accuracy_box_size(t->kept.cells, hit->cell) : (double)INFINITY;
         if (!(off <= 1)) {
             e.wrong++;
             continue;

@@ -10,8 +10,8 @@
 #include "bench_stats.h"
 #include "bench_vtk.h"
 
-static const accuracy_effort whole = {512, 32, 5, 1.5, 64, 256, 60}, quick = {256, 32, 3, 0.2, 16, 64, 20},
-                             smoke = {64, 16, 1, 0, 4, 16, 20};
+static const accuracy_effort whole = {512, 32, 5, 1, 16, 128, 60, false}, large = {1024, 64, 5, 2, 0, 128, 60, true},
+                             quick = {256, 16, 3, 0.2, 8, 64, 30, false}, smoke = {64, 8, 1, 0, 4, 16, 20, false};
 
 void accuracy_print_head(void)
 {
@@ -55,7 +55,7 @@ static int usage(int status)
 {
     fprintf(
         status ? stderr : stdout,
-        "Usage: bench_accuracy [--quick | --smoke] [--no-peers] MESH ...\n\n"
+        "Usage: bench_accuracy [--large | --quick | --smoke] [--no-head] [--no-peers] MESH ...\n\n"
         "Draws each MESH at every setting that trades speed for error and prints CSV.\n"
         "  MESH        a lattice of N^3 cubes (tets:31, hexes:31, polyhedra:16 ...), or one of the real grids in the\n"
         "              folder INSITU_TEST_DATA: bluntfin_hex, bluntfin_tet, post_hex, post_tet, mixed_lattice\n"
@@ -69,21 +69,25 @@ static int usage(int status)
 int main(int argc, char **argv)
 {
     const accuracy_effort *effort = &whole;
-    bool with_peers = bench_vtk_is_there();
+    bool with_peers = bench_vtk_is_there(), with_head = true;
     int i = 1;
     for (; i < argc && !strncmp(argv[i], "--", 2); i++) {
         if (!strcmp(argv[i], "--help")) return usage(0);
-        if (!strcmp(argv[i], "--quick"))
+        if (!strcmp(argv[i], "--large"))
+            effort = &large;
+        else if (!strcmp(argv[i], "--quick"))
             effort = &quick;
         else if (!strcmp(argv[i], "--smoke"))
             effort = &smoke;
+        else if (!strcmp(argv[i], "--no-head"))
+            with_head = false;
         else if (!strcmp(argv[i], "--no-peers"))
             with_peers = false;
         else
             return usage(2);
     }
     if (i == argc) return usage(2);
-    accuracy_print_head();
+    if (with_head) accuracy_print_head();
     for (; i < argc; i++)
         if (!measure(argv[i], effort, with_peers)) return 1;
     return 0;

@@ -1,0 +1,236 @@
+# Draws docs/accuracy.md from the CSV of bench_accuracy named as argument. images: the figures' names, without which none are
+# shown.
+BEGIN {
+    FS = ","
+    targets = split("1e-1 1e-2 1e-3 1e-4 1e-5", target, " ")
+}
+
+/^#/ { machine = machine (machine == "" ? "" : "; ") substr($0, 3); next }
+$1 != "bench_accuracy" { next }
+{
+    if (!($4 in cells)) {
+        mesh[++meshes] = $4
+        cells[$4] = $5
+        isa = $2; threads = $3; size = $6
+    }
+    n = ++rows[$4]
+    layer[$4, n] = $7; method[$4, n] = $8; setting[$4, n] = $9; status[$4, n] = $10
+    build[$4] = $11; first[$4, n] = $12; frame[$4, n] = $13; slowest[$4, n] = $15; runs[$4, n] = $16
+    pixels[$4, n] = $17; rms[$4, n] = $18; most[$4, n] = $19; wrong[$4, n] = $20; residual[$4, n] = $21
+}
+
+function number(x) {
+    x += 0
+    if (x == 0) return "0"
+    if (x < 0.001) return sprintf("%.1e", x)
+    return sprintf(x < 1 ? "%.3f" : x < 10 ? "%.2f" : x < 100 ? "%.1f" : "%.0f", x)
+}
+
+function is_peer(m, i) { return method[m, i] ~ /^VTK/ }
+function is_volume(m, i) { return layer[m, i] == "volume" }
+
+function name_of(m, i,    what) {
+    what = method[m, i]
+    if (what == "samples") return "samples, step of " cells_named(setting[m, i])
+    if (what == "segments") return exact(m) ? "segments" : "segments, parts of " cells_named(setting[m, i])
+    if (what == "frames") return "samples a cell apart, " setting[m, i] (setting[m, i] == "1" ? " frame" : " frames")
+    if (what == "sample group") return "samples, step of 1/4 cell, groups of " setting[m, i]
+    if (what == "max_error") return "max_error: " setting[m, i]
+    return setting[m, i] == "-" ? what : what ", " setting[m, i]
+}
+
+function cells_named(s) { return s (s ~ /^[24]$/ ? " cells" : " cell") }
+
+# One segment a cell whatever the step.
+function exact(m,    i, count) {
+    for (i = 1; i <= rows[m]; i++) count += method[m, i] == "segments"
+    return count == 1
+}
+
+# The cheapest of our volume rows that is off by no more than these; 0 where there is none.
+function cheapest(m, rms_wanted, most_wanted, what,    i, best) {
+    best = 0
+    for (i = 1; i <= rows[m]; i++) {
+        if (!is_volume(m, i) || is_peer(m, i) || status[m, i] != "ok") continue
+        if (rms[m, i] + 0 > rms_wanted || most[m, i] + 0 > most_wanted) continue
+        if (!best || (what == "first" ? first[m, i] < first[m, best] : frame[m, i] < frame[m, best])) best = i
+    }
+    return best
+}
+
+function times(x) { return sprintf(x < 10 ? "%.1f" : "%.0f", x) }
+
+function ratio(x) { return x >= 10 ? times(x) : "**" times(x) "**" }
+
+function figure(name, text) { if (images != "") print "\n![" text "](images/" name ".png)" }
+
+function heading(    i) {
+    print "# Accuracy: which setting for which error"
+    print ""
+    print "Drawn by `bench/run accuracy` from bench/results/accuracy-*.csv; do not edit."
+    print ""
+    print "- **Isosurfaces:** leave `roots: robust`. It is the only setting that misses nothing, and is exact to rounding."
+    print "- **Volumes of tets or polyhedra:** `method: segments`. There is nothing to trade: it is exact to rounding."
+    print "- **Volumes of hexes, wedges, pyramids:** `method: segments` with `max_error`: 1e-2 for pictures on a screen, 1e-3 where"
+    print "  pictures are compared, 1e-4 where numbers are taken from them. It cuts cells only where the error asks for it and keeps"
+    print "  its word with much to spare."
+    print "- **Samples** are for several volumes in one picture, and for a fast look: their error falls with the step, by two for"
+    print "  each halving in the mean; it is a tenth and more with a step of a cell."
+    print "- **Frames of different jitter** average the noise of samples, not their bias: rather halve the step."
+    print "- Sample groups change the time alone; 16 and 64 are the fastest."
+    print ""
+    print "An 8-bit picture is off by 0.002 by rounding alone; no error below that can be seen on a screen."
+}
+
+function measured() {
+    print "\n## What is measured\n"
+    print machine ". " isa ", " threads (threads == 1 ? " thread" : " threads") ", pictures of " size " x " size "."
+    print ""
+    print "Errors are those of one pixel in each block of 32 x 32 against brute force in double over all cells: volumes against"
+    print "an adaptive integral to 1e-10 a cell, of red, green, blue and opacity, linear and premultiplied, over black. The field"
+    print "within a cell is the truth: trilinear in hexes, piecewise linear in polyhedra. A frame is the median of up to 5, from"
+    print "the trees to the finished pixels. The first picture counts the build of the tree, and for VTK all that it does"
+    print "to its input until the first render has ended, but not the opening of its window."
+    print ""
+    print "All have the same camera, colours and opacity with three knots, unshaded. VTK reads an unstructured grid's opacity as"
+    print "extinction, linear between the knots; libinsitu, and VTK for images, as the opacity of a unit distance, whose extinction is"
+    print "-ln(1 - opacity). So VTK's mappers of grids are given -ln(1 - opacity) at the knots, and compared with the integral of"
+    print "what they were given. The ray caster and projected tetrahedra take only tets, so hexes and polyhedra are cut for them,"
+    print "which their first picture pays for, and the field is another then, which their error has. VTK's ray"
+    print "caster works in float and hands over 8 bits, cut off rather than rounded, 0.004 off at most: the errors here are the"
+    print "float's. Its rays go through corners of pixels; the camera is shifted for it, so that all have the same rays. The"
+    print "resampled images are of 15 bits with samples half a voxel apart. Projected tetrahedra are drawn by Mesa on the CPU."
+    print "Each peer runs in a process of its own, stopped after a minute."
+}
+
+function settings_table(    i, j, m, best) {
+    print "\n## Volumes: which setting for which error\n"
+    print "The cheapest setting whose largest error is below, and its milliseconds a frame:\n"
+    printf "| mesh | cells | tree, ms |"
+    for (j = 1; j <= targets; j++) printf " %s |", target[j]
+    printf "\n|---|--:|--:|"
+    for (j = 1; j <= targets; j++) printf "---|"
+    print ""
+    for (i = 1; i <= meshes; i++) {
+        m = mesh[i]
+        printf "| %s | %d | %s |", m, cells[m], number(build[m])
+        for (j = 1; j <= targets; j++) {
+            best = cheapest(m, 1, target[j] + 0, "frame")
+            printf " %s |", best ? name_of(m, best) ": " number(frame[m, best]) : "-"
+        }
+        print ""
+    }
+    figure("accuracy_lattices", "error over time: lattices")
+    figure("accuracy_grids", "error over time: real grids")
+}
+
+# The least ratios of a mesh over the peers that drew it: into least[] by frame and first.
+function peers_table(    i, j, m, a, b) {
+    print "\n## Volumes: against VTK at equal error\n"
+    print "Beside each of VTK's mappers the cheapest setting of libinsitu that is off by no more, in the mean square and at most."
+    print "Bold: less than 10 times as fast.\n"
+    print "| mesh | VTK | RMS error, at most | frame, ms | first, ms | libinsitu | at most | frame, ms | first, ms | frame, times | first, times |"
+    print "|---|---|--:|--:|--:|---|--:|--:|--:|--:|--:|"
+    for (i = 1; i <= meshes; i++) {
+        m = mesh[i]
+        for (j = 1; j <= rows[m]; j++) {
+            if (!is_peer(m, j)) continue
+            if (status[m, j] != "ok") {
+                printf "| %s | %s | %s | - | - | - | - | - | - | - | - |\n", m, name_of(m, j), status[m, j]
+                continue
+            }
+            a = cheapest(m, rms[m, j] + 0, most[m, j] + 0, "frame")
+            b = cheapest(m, rms[m, j] + 0, most[m, j] + 0, "first")
+            printf "| %s | %s | %s, %s | %s | %s |", m, name_of(m, j), number(rms[m, j]), number(most[m, j]),
+                number(frame[m, j]), number(first[m, j])
+            if (!a) { print " none is so near | - | - | - | - | - |"; continue }
+            printf " %s | %s | %s | %s | %s | %s |\n", name_of(m, a), number(most[m, a]), number(frame[m, a]),
+                number(first[m, b]), ratio(frame[m, j] / frame[m, a]), ratio(first[m, j] / first[m, b])
+            compare_least(m, j, "frame", frame[m, j] / frame[m, a])
+            compare_least(m, j, "first", first[m, j] / first[m, b])
+        }
+    }
+    verdicts()
+}
+
+function compare_least(m, j, what, x) {
+    if ((m, what) in least && least[m, what] <= x) return
+    least[m, what] = x
+    least_peer[m, what] = name_of(m, j)
+}
+
+# Meshes of tets are those that the promise of ten times is about.
+function verdicts(    i, m) {
+    print ""
+    for (i = 1; i <= meshes; i++) {
+        m = mesh[i]
+        if (!((m, "frame") in least)) continue
+        printf "- **%s:** the nearest peer by the frame is %s, %s times as long; by the first picture %s, %s times.%s\n", m,
+            least_peer[m, "frame"], times(least[m, "frame"]), least_peer[m, "first"], times(least[m, "first"]),
+            (least[m, "frame"] >= 10 && least[m, "first"] >= 10 ? "" : " Ten times is not reached.")
+    }
+    print ""
+    print "Where ten times is not reached, the peer is one that gives up the cells: an image sampled once is drawn fast ever after,"
+    print "and a projected tetrahedron costs a few triangles. Their errors are those of the resampling and of colours that are"
+    print "linear over cells, so that a frame of equal error is one of few samples, and the rest of its time is finding the cells."
+}
+
+function ladder(    i, j, m) {
+    print "\n## Volumes: the ladder\n"
+    print "RMS error, the largest error, and milliseconds a frame:\n"
+    printf "| setting |"
+    for (i = 1; i <= meshes && i <= 4; i++) printf " %s |", mesh[i]
+    printf "\n|---|"
+    for (i = 1; i <= meshes && i <= 4; i++) printf "---|"
+    print ""
+    for (i = 1; i <= meshes && i <= 4; i++)
+        for (j = 1; j <= rows[mesh[i]]; j++) {
+            m = mesh[i]
+            if (!is_volume(m, j) || (i > 1 && method[m, j] != "segments")) continue
+            line(method[m, j], setting[m, j], exact(m))
+        }
+}
+
+# One setting over the meshes, once.
+function line(what, which, is_exact,    i, j, m, cell, text, label) {
+    for (i = 1; i <= meshes && i <= 4; i++) {
+        m = mesh[i]
+        cell = "-"
+        for (j = 1; j <= rows[m]; j++) {
+            if (!is_volume(m, j) || method[m, j] != what || setting[m, j] != which) continue
+            if (what == "segments" && exact(m) != is_exact) continue
+            label = name_of(m, j)
+            cell = status[m, j] != "ok" ? status[m, j] : number(rms[m, j]) ", " number(most[m, j]) ", " number(frame[m, j])
+        }
+        text = text " " cell " |"
+    }
+    if (!(label in said)) print "| " label " |" text
+    said[label] = 1
+}
+
+function surfaces(    i, j, m) {
+    print "\n## Isosurfaces\n"
+    print "Depth against the reference in sizes of the cell hit, RMS and at most, where both are on the same sheet; pixels that miss,"
+    print "or are on another sheet, of those compared; the largest |field at the hit - isovalue| over the range of the cell's values"
+    print "(not taken in polyhedra); milliseconds a frame. On tets and in polyhedra all settings solve the same linear equation.\n"
+    print "| mesh | setting | depth | wrong | residual | frame, ms |"
+    print "|---|---|--:|--:|--:|--:|"
+    for (i = 1; i <= meshes; i++)
+        for (j = 1; j <= rows[mesh[i]]; j++) {
+            m = mesh[i]
+            if (is_volume(m, j)) continue
+            if (exact(m) && setting[m, j] ~ /N = [134]/) continue
+            printf "| %s | %s | %s, %s | %d of %d | %s | %s |\n", m, setting[m, j], number(rms[m, j]), number(most[m, j]),
+                wrong[m, j], pixels[m, j], residual[m, j] == "nan" ? "-" : number(residual[m, j]), number(frame[m, j])
+        }
+    figure("accuracy_isosurfaces", "depth error over time: isosurfaces")
+}
+
+END {
+    heading()
+    settings_table()
+    peers_table()
+    surfaces()
+    ladder()
+    measured()
+}
