@@ -1,5 +1,5 @@
-# Draws docs/accuracy.md from the CSV of bench_accuracy named as argument. images: the figures' names, without which none are
-# shown.
+# Draws docs/accuracy.md from the CSV of bench_accuracy named as argument. figures: the names of those that have been drawn,
+# each between spaces.
 BEGIN {
     FS = ","
     targets = split("1e-1 1e-2 1e-3 1e-4 1e-5", target, " ")
@@ -8,15 +8,18 @@ BEGIN {
 /^#/ { machine = machine (machine == "" ? "" : "; ") substr($0, 3); next }
 $1 != "bench_accuracy" { next }
 {
-    if (!($4 in cells)) {
-        mesh[++meshes] = $4
-        cells[$4] = $5
-        isa = $2; threads = $3; size = $6
+    if (size == "") size = $6
+    m = $4 ($6 == size ? "" : ", " $6 " x " $6)
+    if (!(m in cells)) {
+        mesh[++meshes] = m
+        cells[m] = $5
+        isa = $2; threads = $3
     }
-    n = ++rows[$4]
-    layer[$4, n] = $7; method[$4, n] = $8; setting[$4, n] = $9; status[$4, n] = $10
-    build[$4] = $11; first[$4, n] = $12; frame[$4, n] = $13; slowest[$4, n] = $15; runs[$4, n] = $16
-    pixels[$4, n] = $17; rms[$4, n] = $18; most[$4, n] = $19; wrong[$4, n] = $20; residual[$4, n] = $21
+    n = ++rows[m]
+    layer[m, n] = $7; method[m, n] = $8; setting[m, n] = $9; status[m, n] = $10
+    build[m] = $11; first[m, n] = $12; frame[m, n] = $13
+    pixels[m, n] = $17; rms[m, n] = $18; most[m, n] = $19; wrong[m, n] = $20; residual[m, n] = $21
+    if ($8 == "samples") has_ladder[m] = 1
 }
 
 function number(x) {
@@ -48,12 +51,12 @@ function exact(m,    i, count) {
 }
 
 # The cheapest of our volume rows that is off by no more than these; 0 where there is none.
-function cheapest(m, rms_wanted, most_wanted, what,    i, best) {
+function cheapest(m, rms_wanted, most_wanted,    i, best) {
     best = 0
     for (i = 1; i <= rows[m]; i++) {
-        if (!is_volume(m, i) || is_peer(m, i) || status[m, i] != "ok") continue
+        if (!is_volume(m, i) || is_peer(m, i) || status[m, i] != "ok" || method[m, i] == "sample group") continue
         if (rms[m, i] + 0 > rms_wanted || most[m, i] + 0 > most_wanted) continue
-        if (!best || (what == "first" ? first[m, i] < first[m, best] : frame[m, i] < frame[m, best])) best = i
+        if (!best || frame[m, i] + 0 < frame[m, best] + 0) best = i
     }
     return best
 }
@@ -62,7 +65,7 @@ function times(x) { return sprintf(x < 10 ? "%.1f" : "%.0f", x) }
 
 function ratio(x) { return x >= 10 ? times(x) : "**" times(x) "**" }
 
-function figure(name, text) { if (images != "") print "\n![" text "](images/" name ".png)" }
+function figure(name, text) { if (index(figures, " " name " ")) print "\n![" text "](images/" name ".png)" }
 
 function heading(    i) {
     print "# Accuracy: which setting for which error"
@@ -113,9 +116,10 @@ function settings_table(    i, j, m, best) {
     print ""
     for (i = 1; i <= meshes; i++) {
         m = mesh[i]
+        if (!(m in has_ladder)) continue
         printf "| %s | %d | %s |", m, cells[m], number(build[m])
         for (j = 1; j <= targets; j++) {
-            best = cheapest(m, 1, target[j] + 0, "frame")
+            best = cheapest(m, 1, target[j] + 0)
             printf " %s |", best ? name_of(m, best) ": " number(frame[m, best]) : "-"
         }
         print ""
@@ -125,7 +129,7 @@ function settings_table(    i, j, m, best) {
 }
 
 # The least ratios of a mesh over the peers that drew it: into least[] by frame and first.
-function peers_table(    i, j, m, a, b) {
+function peers_table(    i, j, m, a) {
     print "\n## Volumes: against VTK at equal error\n"
     print "Beside each of VTK's mappers the cheapest setting of libinsitu that is off by no more, in the mean square and at most."
     print "Bold: less than 10 times as fast.\n"
@@ -139,15 +143,14 @@ function peers_table(    i, j, m, a, b) {
                 printf "| %s | %s | %s | - | - | - | - | - | - | - | - |\n", m, name_of(m, j), status[m, j]
                 continue
             }
-            a = cheapest(m, rms[m, j] + 0, most[m, j] + 0, "frame")
-            b = cheapest(m, rms[m, j] + 0, most[m, j] + 0, "first")
+            a = cheapest(m, rms[m, j] + 0, most[m, j] + 0)
             printf "| %s | %s | %s, %s | %s | %s |", m, name_of(m, j), number(rms[m, j]), number(most[m, j]),
                 number(frame[m, j]), number(first[m, j])
             if (!a) { print " none is so near | - | - | - | - | - |"; continue }
             printf " %s | %s | %s | %s | %s | %s |\n", name_of(m, a), number(most[m, a]), number(frame[m, a]),
-                number(first[m, b]), ratio(frame[m, j] / frame[m, a]), ratio(first[m, j] / first[m, b])
+                number(first[m, a]), ratio(frame[m, j] / frame[m, a]), ratio(first[m, j] / first[m, a])
             compare_least(m, j, "frame", frame[m, j] / frame[m, a])
-            compare_least(m, j, "first", first[m, j] / first[m, b])
+            compare_least(m, j, "first", first[m, j] / first[m, a])
         }
     }
     verdicts()

@@ -1,4 +1,5 @@
-# Draws error over time, a panel a mesh: gnuplot -e "csv='...'; out='...'; layer='volume'; meshes='a b c d'" accuracy.gp
+# Draws error over time, a panel a mesh: gnuplot -e "csv='...'; out='...'; layer='volume'; meshes='a b c d'; size=512" \
+#            accuracy.gp
 set terminal pngcairo size 1500,1180 font "DejaVu Sans,11" background rgb "white"
 set output out
 set datafile separator ","
@@ -13,7 +14,7 @@ set key off
 set xlabel "milliseconds a frame" offset 0,0.4
 
 # Rows of the CSV.
-own(mesh, method, column) = (strcol(4) eq mesh && strcol(7) eq layer && strcol(8) eq method && strcol(10) eq "ok") ? column : NaN
+own(mesh, method, column) = (strcol(4) eq mesh && $6 == size && strcol(7) eq layer && strcol(8) eq method && strcol(10) eq "ok") ? column : NaN
 setting(mesh, method, name, column) = strcol(9) eq name ? own(mesh, method, column) : NaN
 above(y, least) = y > least ? y : least
 

@@ -10,9 +10,9 @@ typedef struct accuracy_effort {
     int runs;         /* frames timed for a row at most; at least 3 where they take longer than seconds */
     double seconds;   /* spent on a row's frames, when there are 3 */
     int frames;       /* accumulated at most */
-    bool is_brief;    /* only the exact setting, and no peer that takes minutes for such a picture */
     int resolution;   /* of the finest image that VTK samples */
     int peer_seconds; /* after which a peer is stopped */
+    bool is_brief;    /* only the exact setting, and no peer that takes minutes for such a picture */
 } accuracy_effort;
 
 typedef struct accuracy_context {

@@ -54,7 +54,10 @@ function error(s, measure, scale) {
 }
 
 function section(    i, s) {
-    if (title == "") return
+    if (title == "") {
+        machine = ""
+        return
+    }
     print "\n## " title "\n"
     print machine ". " runs " runs.\n"
     print "| mesh | n | cells | build, Mcells/s | refit ranges, Mcells/s | refit bounds, Mcells/s | tree, bytes/cell | peak of the build, bytes/cell |"
