@@ -9,7 +9,7 @@ set grid xtics ytics lc rgb "#cccccc" lw 1
 set border 3 lc rgb "#555555"
 set tics nomirror
 set format y "10^{%L}"
-set format x "%g"
+set xtics (1, 2, 5, 10, 20, 50, 100, 200, 500, "1 s" 1000, "2 s" 2000, "5 s" 5000, "10 s" 10000, "20 s" 20000, "50 s" 50000)
 set key off
 set xlabel "milliseconds a frame" offset 0,0.4
 
@@ -67,8 +67,8 @@ if (layer eq "volume") {
     do for [mesh in meshes] {
         set title title_of(mesh) offset 0,-0.6
         panel = panel + 1
-        if (panel == 3) { set key at screen 0.5,0.022 center center horizontal maxrows 1 samplen 2 width 1 } else { set key off }
-        plot csv using (own(mesh, "Neubauer", $13)):(above($19, floor)) with linespoints lc rgb "#1f5fbf" pt 7 ps 1 lw 1.5 title "Neubauer's method, N = 0 to 4 (and how many pixels are on no or another sheet)", \
+        if (panel == 3) { set key at screen 0.5,0.022 center center vertical maxrows 1 Left reverse samplen 2 width 2 } else { set key off }
+        plot csv using (own(mesh, "Neubauer", $13)):(above($19, floor)) with linespoints lc rgb "#1f5fbf" pt 7 ps 1 lw 1.5 title "Neubauer's method (wrong: pixels on no or another sheet)", \
              csv using (own(mesh, "Neubauer", $13)):(above($19, floor)):(note($20, strcol(9), strcol(20))) with labels left font ",9" tc rgb "#1f5fbf" offset 0.8,0.45 notitle, \
              csv using (own(mesh, "robust", $13)):(above($19, floor)) with points lc rgb "#117733" pt 5 ps 1.3 title "robust roots", \
              csv using (own(mesh, "robust", $13)):(above($19, floor)):(note($20, strcol(9), strcol(20))) with labels left font ",9" tc rgb "#117733" offset 0.8,0.45 notitle

@@ -1,5 +1,5 @@
-# What ./demo and ./test share; sourced from the root of the tree. Each step looks first whether it has been done, so that
-# a second run goes straight to the work.
+# What ./demo, ./test and bench/run share; sourced from the root of the tree. Each step looks first whether it has been done,
+# so that a second run goes straight to the work.
 
 setup_fail() {
     echo "$0: $*" >&2
