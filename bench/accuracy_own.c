@@ -209,10 +209,11 @@ static void max_error_rows(studio *s)
     s->scene.job.max_error = 0;
 }
 
+/* Groups are a matter of time alone, and of one kind of cell as of another. */
 static void sample_rows(studio *s)
 {
     step_rows(s, "samples", 4, 1.0 / 16);
-    group_rows(s);
+    if (accuracy_is_linear(s->context->subject)) group_rows(s);
     frame_rows(s);
 }
 
