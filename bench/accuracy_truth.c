@@ -127,6 +127,13 @@ accuracy_error accuracy_volume_error(const accuracy_truth *t, accuracy_opacity m
     return e;
 }
 
+/* In a polyhedron a quad's patch and the tets behind it may be on different sides of the isovalue: where the surface is
+ * between them is a matter of definition. Elsewhere what is ambiguous is what settings differ in. */
+static bool is_undefined(const accuracy_truth *t, const reference_ray *ray)
+{
+    return ray->ambiguous && t->subject->mesh.face_count > 0;
+}
+
 accuracy_error accuracy_surface_error(const accuracy_truth *t, const double *depths)
 {
     accuracy_error e = {0, 0, 0, 0, t->subject->mesh.face_count ? (double)NAN : 0};
@@ -134,7 +141,7 @@ accuracy_error accuracy_surface_error(const accuracy_truth *t, const double *dep
     int same = 0;
     for (int i = 0; i < t->count; i++) {
         const reference_hit *hit = t->rays[i].hit_count ? &t->rays[i].hits[0] : NULL;
-        if (!hit && !isfinite(depths[i])) continue;
+        if ((!hit && !isfinite(depths[i])) || is_undefined(t, &t->rays[i])) continue;
         e.pixels += hit != NULL;
         const double off =
             hit ? fabs(depths[i] - hit->depth) / accuracy_box_size(t->kept.cells, hit->cell) : (double)INFINITY;

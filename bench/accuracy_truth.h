@@ -21,7 +21,8 @@ void accuracy_truth_free(accuracy_truth *truth);
 const bench_pixels *accuracy_truth_pixels(const accuracy_truth *truth);
 
 typedef struct accuracy_error {
-    int pixels;      /* of those chosen: whose truth shows something */
+    int pixels;      /* of those chosen: whose truth shows something; without rays of polyhedra of which even the
+                        reference cannot tell (reference_ray's ambiguous) */
     double rms, max; /* volume: of linear premultiplied red, green, blue and opacity; surface: depth, in sizes of the
                         truth's cell, where both hit the same sheet */
     int wrong;       /* surface: pixels of which only one hits, or whose depths differ by more than a cell */
