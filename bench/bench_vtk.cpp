@@ -295,7 +295,8 @@ bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, 
     result->first = seconds() - began;
     result->runs = 0;
     double total = 0;
-    while (result->runs < request->runs && result->runs < BENCH_VTK_MAX_RUNS && total < request->seconds) {
+    while (result->runs < request->runs && result->runs < BENCH_VTK_MAX_RUNS &&
+           (result->runs == 0 || total < request->seconds)) {
         const double start = seconds();
         render(p);
         total += result->frames[result->runs++] = seconds() - start;

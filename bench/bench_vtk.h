@@ -38,7 +38,7 @@ typedef struct bench_vtk_request {
     const float *colours; /* knot_count × 3 */
     double unit_distance;
     double sample_distance; /* of the fixed-point mapper */
-    int runs;               /* frames to time after the first, fewer if they take longer than seconds */
+    int runs;               /* frames to time after the first: one, and more as long as seconds have not passed */
     double seconds;
     int pixel_count;
     const int *pixels; /* pixel_count × 2: x and y, y = 0 at the top */
