@@ -17,6 +17,9 @@ set xlabel "milliseconds a frame" offset 0,0.4
 own(mesh, method, column) = (strcol(4) eq mesh && $6 == size && strcol(7) eq layer && strcol(8) eq method && strcol(10) eq "ok") ? column : NaN
 setting(mesh, method, name, column) = strcol(9) eq name ? own(mesh, method, column) : NaN
 above(y, least) = y > least ? y : least
+# The panel whose plot carries the key of all.
+key_panel = words(meshes) < 3 ? words(meshes) : 3
+
 title_of(mesh) = mesh." — ".system(sprintf("awk -F, '$4 == \"%s\" { print $5; exit }' %s", mesh, csv))." cells"
 
 if (layer eq "volume") {
@@ -29,11 +32,11 @@ if (layer eq "volume") {
     set multiplot layout 2,2 margins 0.06,0.975,0.16,0.965 spacing 0.06,0.085
     panel = 0
     do for [mesh in meshes] {
-        set title title_of(mesh) offset 0,-0.6
+        set title title_of(mesh) noenhanced offset 0,-0.6
         # Cells that are linear are one segment, whatever its length.
         parts = int(system(sprintf("awk -F, '$4 == \"%s\" && $6 == %d && $8 == \"segments\"' %s | wc -l", mesh, size, csv)))
         panel = panel + 1
-        if (panel == 3) { set key at screen 0.5,0.06 center center vertical maxrows 3 Left reverse samplen 2 width 2 } else { set key off }
+        if (panel == key_panel) { set key at screen 0.5,0.06 center center vertical maxrows 3 Left reverse samplen 2 width 2 } else { set key off }
         plot csv using (own(mesh, "samples", $13)):(above($19, floor)) with linespoints lc rgb "#1f5fbf" pt 7 ps 0.9 lw 1.5 notitle, \
              csv using (own(mesh, "samples", $13)):(above($19, floor)):9 with labels font ",7" tc rgb "#1f5fbf" offset 1.3,0.45 notitle, \
              csv using (own(mesh, "frames", $13)):(above($19, floor)) with linespoints lc rgb "#7fb2e5" pt 6 ps 0.8 lw 1.2 notitle, \
@@ -65,9 +68,9 @@ if (layer eq "volume") {
     set multiplot layout 2,2 margins 0.06,0.975,0.09,0.965 spacing 0.06,0.085
     panel = 0
     do for [mesh in meshes] {
-        set title title_of(mesh) offset 0,-0.6
+        set title title_of(mesh) noenhanced offset 0,-0.6
         panel = panel + 1
-        if (panel == 3) { set key at screen 0.5,0.022 center center vertical maxrows 1 Left reverse samplen 2 width 2 } else { set key off }
+        if (panel == key_panel) { set key at screen 0.5,0.022 center center vertical maxrows 1 Left reverse samplen 2 width 2 } else { set key off }
         plot csv using (own(mesh, "Neubauer", $13)):(above($19, floor)) with linespoints lc rgb "#1f5fbf" pt 7 ps 1 lw 1.5 title "Neubauer's method (wrong: pixels on no or another sheet)", \
              csv using (own(mesh, "Neubauer", $13)):(above($19, floor)):(note($20, strcol(9), strcol(20))) with labels left font ",9" tc rgb "#1f5fbf" offset 0.8,0.45 notitle, \
              csv using (own(mesh, "robust", $13)):(above($19, floor)) with points lc rgb "#117733" pt 5 ps 1.3 title "robust roots", \
