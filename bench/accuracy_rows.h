@@ -7,8 +7,8 @@
 /* How much work a run is. */
 typedef struct accuracy_effort {
     int size, block;  /* pixels a side of the picture, and of the block of which one is compared */
-    int runs;         /* frames timed for a row at most; at least 3 where they take longer than seconds */
-    double seconds;   /* spent on a row's frames, when there are 3 */
+    int runs;         /* frames timed for a row at most; */
+    double seconds;   /* 3 when this has passed, and one when four times this has */
     int frames;       /* accumulated at most */
     int resolution;   /* of the finest image that VTK samples */
     int peer_seconds; /* after which a peer is stopped */
