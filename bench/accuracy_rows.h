@@ -7,8 +7,8 @@
 /* How much work a run is. */
 typedef struct accuracy_effort {
     int size, block;  /* pixels a side of the picture, and of the block of which one is compared */
-    int runs;         /* frames timed for a row at most; */
-    double seconds;   /* 3 when this has passed, and one when four times this has */
+    int runs;         /* frames timed for a row, at most */
+    double seconds;   /* no more than 3 frames are timed when they have taken this, and no more when four times this */
     int frames;       /* accumulated at most */
     int resolution;   /* of the finest image that VTK samples */
     int peer_seconds; /* after which a peer is stopped */
