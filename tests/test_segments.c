@@ -112,7 +112,7 @@ static void surfaces_cut_segments(void **state)
         }
 }
 
-/* Errors of steps 1, 1/2, 1/4 ... of a cell, and the order seen between the first and the last. */
+/* Errors of steps 1/4, 1/8 ... of a cell, and the order seen between the first and the last. */
 static double order_of(render_fixture *f, const double *truth, render_integration how, int halvings)
 {
     double first = 0, last = 0;
@@ -139,7 +139,9 @@ static void orders_on_jittered_hexes(void **state)
     double *truth = truth_of(&f);
     const double segments = order_of(&f, truth, RENDER_SEGMENTS, 4), samples = order_of(&f, truth, RENDER_SAMPLES, 5);
     fprintf(stderr, "observed orders: segments %.2f, samples %.2f\n", segments, samples);
-    assert_true(segments >= 1.9);
+    /* Third at the transfer function's points, fourth elsewhere; first in the intervals that are shorter than a step
+     * and not cut, of which each halving leaves half. */
+    assert_true(segments >= 2.5);
     assert_true(samples >= 0.95);
     free(truth);
     fixture_free(&f);
