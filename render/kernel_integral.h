@@ -195,15 +195,18 @@ SIMD_INLINE kernel_stretch kernel_stretch_begin(const kernel_pieces *t, const ke
 SIMD_INLINE void kernel_stretch_limit(kernel_stretch *st, vf left, vf shortest)
 {
     const vf zero = vf_set(0), one = vf_set(1), rise = vf_abs(st->rise), ratio = st->clear * KERNEL_STEP_RATIO;
-    const vf bent = vf_min(vf_max(ratio / rise, shortest / left), one);
-    st->share = vf_select(vf_lt(ratio, rise), bent, one);
+    const vm bent = vf_lt(ratio, rise);
+    st->share = one;
+    if (vm_any(bent)) st->share = vf_select(bent, vf_min(vf_max(ratio / rise, shortest / left), one), one);
     st->is_opaque = vm_and(vf_eq(st->clear, zero), vf_eq(rise, zero));
     const vf up = vf_max(st->share * st->rise, zero), clear = vf_max(st->clear - up, vf_set(KERNEL_TINY));
-    const vf most = kernel_extinction(vf_min(st->opacity + up, one), clear);
-    const vf length = left * st->share, depth = length * vf_select(st->is_opaque, vf_set(KERNEL_OPAQUE), most);
-    const vf change = length * st->share * rise / clear;
-    vf less = vf_max(depth * (1 / KERNEL_STEP_DEPTH), vf_sqrt(vf_min(change, depth) * (1 / KERNEL_STEP_CHANGE)));
-    st->share = vf_select(vf_lt(one, less), st->share / less, st->share);
+    const vf most = kernel_extinction(vf_min(st->opacity + up, one), clear), length = left * st->share;
+    const vf depth = length * vf_select(st->is_opaque, vf_set(KERNEL_OPAQUE), most);
+    if (vm_any(vf_lt(vf_set(KERNEL_STEP_CHANGE), depth))) {
+        const vf change = vf_min(length * st->share * rise / clear, depth);
+        const vf over = vf_max(depth * (1 / KERNEL_STEP_DEPTH), vf_sqrt(change * (1 / KERNEL_STEP_CHANGE)));
+        st->share = vf_select(vf_lt(one, over), st->share / over, st->share);
+    }
     st->length = left * st->share;
 }
 
