@@ -122,7 +122,63 @@ SIMD_INLINE void kernel_cell_swap(kernel_cell *c, int i, int j)
     c->vertices[j] = n;
 }
 
-/* The order of coordinates: a tet, symmetric in its vertices, is put in that order; other cells get ranks. */
+SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
+{
+    return c->rank[i] < c->rank[j];
+}
+
+/* A cell's vertices begun at the one of least rank, and along its edges in the order of ranks: from[i] is the vertex
+ * that takes place i. Mirrored, where that is so: orientation means nothing here. */
+SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_VERTICES])
+{
+    static const signed char corner[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* a hex's vertices as bits of x, y, z; and back */
+    const int begins = c->type == GRID_PYRAMID ? 4 : c->count;
+    int least = 0, swap;
+    for (int i = 1; i < begins; i++)
+        if (kernel_rank_before(c, i, least)) least = i;
+    if (c->type == GRID_HEX) {
+        int axes[3] = {1, 2, 4};
+        for (int k = 0; k < 3; k++) {
+            const int at = k == 1; /* 0 and 1, 1 and 2, 0 and 1 */
+            if (kernel_rank_before(c, corner[corner[least] ^ axes[at + 1]], corner[corner[least] ^ axes[at]]))
+                swap = axes[at], axes[at] = axes[at + 1], axes[at + 1] = swap;
+        }
+        for (int i = 0; i < 8; i++) {
+            int bits = corner[least];
+            for (int a = 0; a < 3; a++) bits ^= corner[i] >> a & 1 ? axes[a] : 0;
+            from[i] = corner[bits];
+        }
+    } else if (c->type == GRID_WEDGE) {
+        const int base = least < 3 ? 0 : 3;
+        int ahead = base + (least + 1) % 3, behind = base + (least + 2) % 3;
+        if (kernel_rank_before(c, behind, ahead)) swap = ahead, ahead = behind, behind = swap;
+        const int first[3] = {least, ahead, behind};
+        for (int i = 0; i < 3; i++) {
+            from[i] = first[i];
+            from[i + 3] = (first[i] + 3) % 6;
+        }
+    } else {
+        int ahead = (least + 1) & 3, behind = (least + 3) & 3;
+        if (kernel_rank_before(c, behind, ahead)) swap = ahead, ahead = behind, behind = swap;
+        const int first[5] = {least, ahead, (least + 2) & 3, behind, 4};
+        memcpy(from, first, sizeof first);
+    }
+}
+
+SIMD_INLINE void kernel_cell_rank(kernel_cell *c)
+{
+    for (int i = 0; i < c->count; i++) c->rank[i] = 0;
+    for (int i = 0; i < c->count; i++)
+        for (int j = i + 1; j < c->count; j++) {
+            const bool after = kernel_position_before(c->world[j], c->world[i]);
+            c->rank[i] += after;
+            c->rank[j] += !after;
+        }
+}
+
+/* The order of coordinates: a tet, symmetric in its vertices, is put in that order; other cells get ranks, and are
+ * turned to begin by them. Nothing in a cell then depends on how the simulation numbers its vertices, not even where
+ * its map is folded and has several solutions. */
 SIMD_INLINE void kernel_cell_order(kernel_cell *c)
 {
     if (c->type == GRID_TET) {
@@ -132,13 +188,16 @@ SIMD_INLINE void kernel_cell_order(kernel_cell *c)
                 kernel_cell_swap(c, network[k][0], network[k][1]);
         return;
     }
-    for (int i = 0; i < c->count; i++) c->rank[i] = 0;
-    for (int i = 0; i < c->count; i++)
-        for (int j = i + 1; j < c->count; j++) {
-            const bool after = kernel_position_before(c->world[j], c->world[i]);
-            c->rank[i] += after;
-            c->rank[j] += !after;
-        }
+    int from[GRID_MAX_CELL_VERTICES];
+    kernel_cell_rank(c);
+    kernel_cell_turn(c, from);
+    const kernel_cell own = *c;
+    for (int i = 0; i < c->count; i++) {
+        memcpy(c->world[i], own.world[from[i]], sizeof c->world[i]);
+        c->values[i] = own.values[from[i]];
+        c->vertices[i] = own.vertices[from[i]];
+        c->rank[i] = own.rank[from[i]];
+    }
 }
 
 /* A position into tile space (kernel_packet.h). */

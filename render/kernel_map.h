@@ -188,20 +188,24 @@ SIMD_INLINE vf kernel_map_beyond(const vf r[3])
     return most;
 }
 
+/* Points of a cell have coordinates in its domain; those between a warped face's triangles and its patch, and of cells
+ * so flat that rounding tells, somewhat beyond. */
+#define KERNEL_MAP_BEYOND 0.25f
+
 /* The coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method may diverge or come
- * to another solution far outside: then once more from the middle of the cell. Returns the rays that found none: theirs
- * are not to be used. */
+ * to another solution outside of the cell: then once more from the middle of the cell. Returns the rays that found none
+ * in the cell or near: theirs are not to be used. */
 SIMD_INLINE vm kernel_map_invert(const kernel_packet *p, const kernel_map *map, vm wanted, vf t, vf r[3])
 {
-    vm failed = kernel_map_newton(p, map, wanted, t, r);
-    const vm again = vm_or(failed, vm_and(wanted, vf_lt(vf_set(0.25f), kernel_map_beyond(r))));
+    const vf most = vf_set(KERNEL_MAP_BEYOND);
+    const vm failed = kernel_map_newton(p, map, wanted, t, r);
+    const vm again = vm_or(failed, vm_and(wanted, vf_lt(most, kernel_map_beyond(r))));
     if (__builtin_expect(!vm_any(again), 1)) return failed;
     vf middle[3] = {vf_set(0.4f), vf_set(0.4f), vf_set(0.5f)};
     const vm worse = kernel_map_newton(p, map, again, t, middle);
-    const vm nearer = vm_or(failed, vf_lt(kernel_map_beyond(middle), kernel_map_beyond(r)));
-    const vm better = vm_and(vm_andnot(again, worse), nearer);
+    const vm better = vm_andnot(vm_andnot(again, worse), vf_lt(most, kernel_map_beyond(middle)));
     for (int a = 0; a < 3; a++) r[a] = vf_select(better, middle[a], r[a]);
-    return vm_andnot(failed, better);
+    return vm_andnot(again, better);
 }
 
 SIMD_INLINE vf kernel_map_value(const kernel_map *map, const kernel_polynomial *field, const vf r[3])

@@ -4,26 +4,31 @@
 
 #include <stdbool.h>
 
-/* KERNEL_BLACK: what is behind so little light is left out of a segment. */
+/* KERNEL_BLACK: what is behind so little light is left out of a segment. KERNEL_SHORT: kernel_integral.h. */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
 #define KERNEL_BLACK 1e-16
+#define KERNEL_SHORT 1e-12
 #else
 typedef float kernel_real;
 #define KERNEL_BLACK 1e-8f
+#define KERNEL_SHORT 2e-6f
 #endif
 
 enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64 };
 
-/* Opacity and colour at a value x of the piece: entry[..] + (x - low) * slope. Where a function is constant to either
- * side, the pieces' ends are at -+1e30. */
+/* Opacity and colour at a value x of the piece: entry[..] + (x - low) * slope. What opacity leaves, 1 - opacity, has
+ * entries of its own: near an opacity of 1 the difference would be all rounding. Where a function is constant to either
+ * side, the pieces' ends are at -+2^100, so that INVERSE times the width is 1. */
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
     KERNEL_PIECE_OPACITY,
     KERNEL_PIECE_OPACITY_HIGH, /* at the upper end */
-    KERNEL_PIECE_INVERSE,      /* 1 / (high - low) */
-    KERNEL_PIECE_SLOPE,
+    KERNEL_PIECE_CLEAR,        /* 1 - opacity */
+    KERNEL_PIECE_CLEAR_HIGH,
+    KERNEL_PIECE_INVERSE, /* 1 / (high - low) */
+    KERNEL_PIECE_SLOPE,   /* of the opacity */
     KERNEL_PIECE_COLOUR,
     KERNEL_PIECE_COLOUR_SLOPE = KERNEL_PIECE_COLOUR + 3,
     KERNEL_PIECE_ENTRIES = KERNEL_PIECE_COLOUR_SLOPE + 3

@@ -251,25 +251,60 @@ SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state 
     return vf_clamp(-vf_floor(-vf_sqrt(ratio)), vf_set(1), most);
 }
 
+/* A stretch in equal parts: the field at three of their ends in turn. */
+typedef struct kernel_parts {
+    vf t0, t1, span, count;
+    vf last;                 /* the value at t1 */
+    vf from, to;             /* the current part, */
+    vf before, after, ahead; /* the field at its ends and at the end of the next, */
+    vf bend, next_bend;      /* second differences at its ends */
+} kernel_parts;
+
+/* The n-th end, and the field there. */
+SIMD_INLINE vf kernel_parts_end(kernel_packet *p, const kernel_course *course, const kernel_parts *s, vm rays, int n,
+                                vf *value)
+{
+    const vm inner = vm_and(rays, vf_lt(vf_set((float)n), s->count));
+    const vf t = vf_select(inner, s->t0 + s->span * (float)n, s->t1);
+    *value = s->last;
+    if (vm_any(inner)) *value = vf_select(inner, kernel_course_value(p, course, inner, t), s->last);
+    return t;
+}
+
+/* By how much to raise a part's chord so that the mean along it is the field's: where the field is a parabola, by a
+ * twelfth of its second difference, which the parts beside it tell; a single part tells none. */
+SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
+{
+    const vf zero = vf_set(0), both = 0.5f * (s->bend + s->next_bend);
+    const vf bend = vf_select(is_first, vf_select(is_last, zero, s->next_bend), vf_select(is_last, s->bend, both));
+    return bend * (-1.0f / 12);
+}
+
 /* The stretch from t0 to t1 as segments; those that begin in the window are kept. */
 SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *state, const kernel_course *course,
                                         vm rays, vf t0, vf t1)
 {
     kernel_segments *list = state->list;
-    vf from = t0, before = kernel_course_value(p, course, rays, t0);
-    const vf last = kernel_course_value(p, course, rays, t1);
-    const vf parts = kernel_course_parts(p, state, course, rays, t0, t1, before, last);
-    const vf span = (t1 - t0) / parts;
+    kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
+    s.before = kernel_course_value(p, course, rays, t0);
+    s.last = kernel_course_value(p, course, rays, t1);
+    s.count = kernel_course_parts(p, state, course, rays, t0, t1, s.before, s.last);
+    s.span = (t1 - t0) / s.count;
+    s.to = kernel_parts_end(p, course, &s, rays, 1, &s.after);
+    s.bend = vf_set(0);
     vm open = rays;
     for (int n = 1; vm_any(open); n++) {
-        const vm inner = vm_and(open, vf_lt(vf_set((float)n), parts));
-        const vf to = vf_select(inner, t0 + span * (float)n, t1);
-        vf after = last;
-        if (vm_any(inner)) after = vf_select(inner, kernel_course_value(p, course, inner, to), last);
-        const vm mine = vm_and(vf_le(list->t_begin, from), vf_lt(from, list->t_end));
-        kernel_segments_add(state->pieces, list, vm_and(open, mine), from, to, before, after);
-        from = to;
-        before = after;
+        const vm inner = vm_and(open, vf_lt(vf_set((float)n), s.count));
+        const vf next = kernel_parts_end(p, course, &s, inner, n + 1, &s.ahead);
+        s.next_bend = (s.before - s.after) + (s.ahead - s.after);
+        const vf lift = kernel_parts_lift(&s, n == 1 ? rays : vm_none(), vm_not(inner));
+        const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
+        kernel_segments_add(state->pieces, list, vm_and(open, mine), s.from, s.to, s.before + lift, s.after + lift);
+        s.from = s.to;
+        s.to = next;
+        s.before = s.after;
+        s.after = s.ahead;
+        s.bend = s.next_bend;
         open = inner;
     }
 }

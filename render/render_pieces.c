@@ -10,7 +10,7 @@
 #include "memory.h"
 
 /* Far outside of every domain, and finite so that 0 times it is 0. */
-static const kernel_real endless = (kernel_real)1e30;
+static const kernel_real endless = (kernel_real)0x1p100;
 /* No extinction, nor its slope, is more. */
 static const double steepest = 1e6;
 static const double rounding = 1e-7;
@@ -112,9 +112,13 @@ static void set_piece(const render_transfer *t, const int *entries, kernel_real 
     double slope;
     piece->entry[KERNEL_PIECE_LOW] = low;
     piece->entry[KERNEL_PIECE_HIGH] = high;
-    piece->entry[KERNEL_PIECE_OPACITY] = (kernel_real)opacity_on(t, middle, (double)low, &slope);
+    const double at_low = opacity_on(t, middle, (double)low, &slope),
+                 at_high = opacity_on(t, middle, (double)high, &slope);
+    piece->entry[KERNEL_PIECE_OPACITY] = (kernel_real)at_low;
+    piece->entry[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)at_high;
+    piece->entry[KERNEL_PIECE_CLEAR] = (kernel_real)(1 - at_low);
+    piece->entry[KERNEL_PIECE_CLEAR_HIGH] = (kernel_real)(1 - at_high);
     piece->entry[KERNEL_PIECE_SLOPE] = (kernel_real)slope;
-    piece->entry[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)opacity_on(t, middle, (double)high, &slope);
     piece->entry[KERNEL_PIECE_INVERSE] = 1 / (high - low);
     set_colours(t, entries, middle, (double)low, piece);
 }

@@ -42,6 +42,10 @@ SIMD_INLINE vm vm_or(vm a, vm b)
 {
     return a | b;
 }
+SIMD_INLINE vm vm_none(void)
+{
+    return (vm){0, 0};
+}
 SIMD_INLINE vm vm_andnot(vm a, vm b)
 {
     return a & ~b;
@@ -90,9 +94,13 @@ SIMD_INLINE vf kernel_exp(vf a)
 {
     return (vf){exp(a[0]), exp(a[1])};
 }
-SIMD_INLINE vf kernel_extinction(vf a)
+SIMD_INLINE double extinction_of_one(double a, double clear)
 {
-    return (vf){-log1p(-a[0]), -log1p(-a[1])};
+    return a < 0.5 ? -log1p(-a) : -log(clear);
+}
+SIMD_INLINE vf kernel_extinction(vf a, vf clear)
+{
+    return (vf){extinction_of_one(a[0], clear[0]), extinction_of_one(a[1], clear[1])};
 }
 
 enum { KERNEL_NODES = 9 };

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 static const double three_values[3] = {-0.6, 0.3, 0.95};
-static const test_mesh_kind kinds[3] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS};
+static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_TETS};
 
 /* What a ray's hits were, over a test. */
 typedef struct tally {
@@ -112,7 +112,7 @@ static void add_robust(render_fixture *f, float opacity)
 static void robust_hits_are_on_the_surface(void **state)
 {
     (void)state;
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 4; k++)
         for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
             render_fixture f;
             tally t = {.rays = 0};
@@ -252,7 +252,7 @@ static void judge_normal(const render_fixture *f, const reference_scene *scene, 
 static void cell_gradients_are_the_reference(void **state)
 {
     (void)state;
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 4; k++) {
         render_fixture f;
         drawn_frame drawn;
         render_light lights[3];

@@ -19,7 +19,7 @@
 #include <cmocka.h>
 
 static const long double band = 4e-6L;
-static int64_t cubics = 100000;
+static int64_t cubics = 1000000;
 static uint64_t drawn_numbers;
 
 typedef struct cubic {
@@ -230,13 +230,15 @@ static void make_bundle(bundle *b, int64_t n)
         int c[3];
         hex_corner(i, c);
         for (int a = 0; a < 3; a++) b->cell.world[i][a] = c[a];
-        b->cell.x[i] = (float)c[0];
-        b->cell.y[i] = (float)c[1];
-        b->cell.z[i] = (float)c[2];
         b->cell.values[i] = b->values[i];
-        b->cell.f[i] = (float)b->values[i];
     }
     kernel_cell_order(&b->cell);
+    for (int i = 0; i < 8; i++) {
+        b->cell.x[i] = (float)b->cell.world[i][0];
+        b->cell.y[i] = (float)b->cell.world[i][1];
+        b->cell.z[i] = (float)b->cell.world[i][2];
+        b->cell.f[i] = (float)b->cell.values[i];
+    }
 }
 
 typedef struct count {

@@ -75,6 +75,72 @@ static void tets_are_exact_for_every_camera(void **state)
     }
 }
 
+static double uniform(uint64_t n, uint64_t seed, double low, double high)
+{
+    return low + (high - low) * test_uniform(n, seed);
+}
+
+enum { RANDOM_POINTS = 4, RANDOM_COLOURS = 5 };
+
+typedef struct random_function {
+    double values[RANDOM_POINTS];
+    float opacities[RANDOM_POINTS], colours[3 * RANDOM_COLOURS];
+} random_function;
+
+/* On the tet's range of values, with a step in one of four; opacities to most. */
+static void set_random_function(render_fixture *f, random_function *r, uint64_t seed, double most, double unit)
+{
+    for (uint64_t i = 0; i < RANDOM_POINTS; i++) {
+        r->values[i] = seed % 4 == 0 && i == 2 ? r->values[1] : 0.25 * (double)i + uniform(i, seed, 0.05, 0.2);
+        r->opacities[i] = (float)uniform(i, seed + 1, 0, most);
+    }
+    for (uint64_t i = 0; i < 3 * RANDOM_COLOURS; i++) r->colours[i] = (float)test_uniform(i, seed + 2);
+    f->transfer = (render_transfer){.low = 0,
+                                    .high = 1,
+                                    .colour_count = RANDOM_COLOURS,
+                                    .colours = r->colours,
+                                    .opacity_count = RANDOM_POINTS,
+                                    .opacity_values = r->values,
+                                    .opacities = r->opacities,
+                                    .unit_distance = unit};
+}
+
+/* Random tets, slivers among them, with random functions and unit distances from 1e-3 to 1e4 of the tet's size: optical
+ * depths from 1e-8 to 1e3 and more. The integral itself is exact to 4e-7 (test_integral.c); the rest is what float32
+ * makes of a ray's ends in the tet. A length errs by some 1e-7 of the whole, of which light sees at most 1/e however
+ * dense the medium. A face's value errs by some 4e-7 (three weights, their sum and the vertices' places, 6e-8 each): by
+ * the slope of colour, 4 on entries a quarter apart, 1.6e-6; and by that of the extinction, as steep over 1 - opacity,
+ * of which again light sees a part. */
+static void random_tets_are_exact(void **state)
+{
+    static const double most[3] = {0.5, 0.9, 0.99};
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        double worst = 0;
+        for (uint64_t seed = 0; seed < 60; seed++) {
+            test_mesh mesh;
+            render_fixture f;
+            random_function function;
+            test_mesh_single(seed % 5 ? TEST_UNIT_TET : TEST_SLIVER_TET, test_linear, &mesh);
+            for (uint64_t i = 0; i < 12; i++)
+                mesh.coordinates[i] += uniform(i, 100 * seed + 7, -0.25, 0.25) * (seed % 5 ? 1 : 1e-5);
+            for (uint64_t i = 0; i < 4; i++) mesh.values[i] = uniform(i, 100 * seed + 8, -0.1, 1.1);
+            fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                           (const double[]){0, 0, 0});
+            fixture_look(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 15, 13);
+            set_segments(&f, 1, 0);
+            set_random_function(&f, &function, 100 * seed + 9, most[k], pow(10, uniform(0, 100 * seed + 10, -3, 4)));
+            double *truth = truth_of(&f);
+            worst = fmax(worst, error_of(&f, truth, NULL));
+            free(truth);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+        fprintf(stderr, "random tets, opacities to %g: %.2g\n", most[k], worst);
+        assert_true(worst < 2e-6 + 2e-7 / (1 - most[k]));
+    }
+}
+
 static void linear_fields_are_exact_on_every_kind(void **state)
 {
     (void)state;
@@ -112,7 +178,7 @@ static void surfaces_cut_segments(void **state)
         }
 }
 
-/* Errors of steps 1, 1/2, 1/4 ... of a cell, and the order seen between the first and the last. */
+/* Errors of steps 1/4, 1/8 ... of a cell, and the order seen between the first and the last. */
 static double order_of(render_fixture *f, const double *truth, render_integration how, int halvings)
 {
     double first = 0, last = 0;
@@ -139,7 +205,9 @@ static void orders_on_jittered_hexes(void **state)
     double *truth = truth_of(&f);
     const double segments = order_of(&f, truth, RENDER_SEGMENTS, 4), samples = order_of(&f, truth, RENDER_SAMPLES, 5);
     fprintf(stderr, "observed orders: segments %.2f, samples %.2f\n", segments, samples);
-    assert_true(segments >= 1.9);
+    /* Third at the transfer function's points, fourth elsewhere; first in the intervals that are shorter than a step
+     * and not cut, of which each halving leaves half. */
+    assert_true(segments >= 2.5);
     assert_true(samples >= 0.95);
     free(truth);
     fixture_free(&f);
@@ -283,6 +351,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tets_are_exact_for_every_camera),
+        cmocka_unit_test(random_tets_are_exact),
         cmocka_unit_test(linear_fields_are_exact_on_every_kind),
         cmocka_unit_test(surfaces_cut_segments),
         cmocka_unit_test(orders_on_jittered_hexes),

@@ -1,4 +1,5 @@
-/* A step under hostile floating-point settings: traps armed as gfortran's -ffpe-trap does, and small numbers flushed. */
+/* A step under hostile floating-point settings: traps armed as gfortran's -ffpe-trap does, and small numbers flushed.
+ */
 #define _GNU_SOURCE
 #include <fenv.h>
 #include <omp.h>
@@ -23,16 +24,20 @@ static void divide_by_zero_on(int threads)
     }
 }
 
+static void arm_traps(void)
+{
+    feclearexcept(FE_ALL_EXCEPT);
+    feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
+}
+
 static void traps_are_off_inside_and_on_again_after(void **state)
 {
     (void)state;
     enum { threads = 3 };
     session_guard guard;
+    arm_traps(); /* where workers take the calling thread's settings */
 #pragma omp parallel num_threads(threads)
-    {
-        feclearexcept(FE_ALL_EXCEPT);
-        feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
-    }
+    arm_traps(); /* where they keep their own */
     session_guard_begin(&guard, threads);
     divide_by_zero_on(threads); /* unguarded, this ends the process */
     session_guard_end(&guard);
@@ -43,6 +48,7 @@ static void traps_are_off_inside_and_on_again_after(void **state)
         flags += fetestexcept(FE_DIVBYZERO) != 0;
         fedisableexcept(FE_ALL_EXCEPT);
     }
+    fedisableexcept(FE_ALL_EXCEPT);
     assert_int_equal(armed, threads);
     assert_int_equal(flags, 0);
 }

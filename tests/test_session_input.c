@@ -330,12 +330,28 @@ static void value_that_is_not_finite_is_counted(void **context)
     everywhere(hand_over(session, &input) == INSITU_OK);
 }
 
+/* Every vertex somewhere else: folded cells, some points of which have no coordinates in them. */
+static void inverse_maps_that_fail_are_counted(void **context)
+{
+    (void)context;
+    step_is_good(15);
+    everywhere(insitu_last_report(session)->map_failures == 0);
+    for (int64_t i = 0; i < 3 * input.part.vertex_count; i++)
+        input.part.coordinates[i] = 2 * test_uniform((uint64_t)i, 21 + (uint64_t)own_rank) - 1;
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(16);
+    everywhere(insitu_last_report(session)->map_failures > 0);
+    input_is_renewed();
+    everywhere(hand_over(session, &input) == INSITU_OK);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spoilt_input_is_told_to_all),        cmocka_unit_test(call_without_a_mesh_is_told_once),
         cmocka_unit_test(field_missing_on_one_rank_names_it), cmocka_unit_test(field_of_two_centrings_is_refused),
         cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine), cmocka_unit_test(value_that_is_not_finite_is_counted),
+        cmocka_unit_test(inverse_maps_that_fail_are_counted),
     };
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
