@@ -107,7 +107,7 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 
 /* Lanes of a packet under construction: plain arrays and one loop a quantity, which compilers vectorize. */
 typedef struct kernel_lanes {
-    double px[SIMD_WIDTH], py[SIMD_WIDTH], length[SIMD_WIDTH];
+    double px[SIMD_WIDTH], py[SIMD_WIDTH], inverse[SIMD_WIDTH];
     float value[SIMD_WIDTH];
 } kernel_lanes;
 
@@ -172,12 +172,13 @@ static inline void kernel_packet_view(kernel_packet *p)
     p->has_view = true;
     kernel_packet_lanes(p, l);
     const bool flat = p->frame->job->camera.is_orthographic;
-    for (int i = 0; i < SIMD_WIDTH; i++) l->length[i] = flat ? 1 : sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->px[i] / l->length[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++)
+        l->inverse[i] = flat ? 1 : 1 / sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->px[i] * l->inverse[i]);
     p->view[0] = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->py[i] / l->length[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->py[i] * l->inverse[i]);
     p->view[1] = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)(-1 / l->length[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)-l->inverse[i];
     p->view[2] = vf_load(l->value);
 }
 

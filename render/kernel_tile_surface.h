@@ -92,35 +92,69 @@ SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, ui
     if (is_nearer) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
 }
 
-SIMD_INLINE void kernel_tile_value(kernel_tile_trace *t, int part, int value, unsigned blocks)
+/* Blocks in which the cell's surface may show. */
+SIMD_INLINE unsigned kernel_tile_narrow(const kernel_tile_trace *t, const kernel_cell *c, unsigned blocks)
 {
-    kernel_cell *c = &t->cell;
     kernel_outline outline;
-    kernel_surface_prepare(t->frame, &t->tile, t->surface, part, value, c, &t->poly);
     if (c->type != GRID_TET)
         kernel_vertex_outline(c, &outline);
     else if (!kernel_tet_outline(c, &outline))
-        return;
+        return 0;
     const kernel_lie lie = kernel_outline_lie(&t->tile_planes, &outline);
-    if (lie.far < t->t_near) return;
-    blocks &= lie.blocks & kernel_blocks_beyond(t, lie.near);
-    for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, c->index, c, value);
+    if (lie.far < t->t_near) return 0;
+    return blocks & lie.blocks & kernel_blocks_beyond(t, lie.near);
+}
+
+/* Most cells are not ordered, for they turn out to lie beside the tile. */
+SIMD_INLINE void kernel_tile_cell(kernel_tile_trace *t, int part, unsigned blocks)
+{
+    const render_surface_layer *layer = t->surface->layer;
+    kernel_cell *c = &t->cell;
+    bool is_ordered = false;
+    for (int value = 0; value < layer->value_count; value++) {
+        if (!kernel_cell_straddles(c, layer->values[value])) continue;
+        if (!c->is_placed) kernel_cell_move(c, t->frame, &t->tile, t->frame->job->parts[part].cells);
+        kernel_cell_relative(c, layer->values[value]);
+        t->poly.is_set_up = false;
+        unsigned left = kernel_tile_narrow(t, c, blocks);
+        if (left && !is_ordered) {
+            is_ordered = true;
+            kernel_cell_order(c);
+            if (layer->colour_map) kernel_cell_colours(c, t->surface, part);
+        }
+        for (; left; left &= left - 1) kernel_block_meet(t, __builtin_ctz(left), part, c->index, c, value);
+    }
+}
+
+/* All that the cells are made of is on its way from memory before the first of it is looked at. */
+SIMD_INLINE void kernel_tile_prefetch(const grid *g, const grid_field *field, const uint32_t *cells, int count)
+{
+    const int vertices = grid_type_vertices(g->cell_type);
+    if (g->offsets.data || !vertices) return;
+    for (int n = 0; n < count; n++)
+        __builtin_prefetch(g->connectivity.data + (int64_t)cells[n] * vertices * g->connectivity.stride);
+    for (int n = 0; n < count; n++)
+        for (int i = 0; i < vertices; i++) {
+            const int64_t v = grid_array_index(&g->connectivity, (int64_t)cells[n] * vertices + i);
+            __builtin_prefetch(field->values.data + v * field->values.stride);
+            for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
+        }
 }
 
 static void kernel_tile_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
     const render_surface_layer *layer = t->surface->layer;
+    const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = &t->cell;
+    kernel_tile_prefetch(g, &layer->field.fields[part], cells, count);
     for (int n = 0; n < count; n++) {
-        kernel_cell_fetch(c, t->frame->job->parts[part].cells, &layer->field.fields[part], cells[n]);
+        kernel_cell_fetch(c, g, &layer->field.fields[part], cells[n]);
         if (c->type == GRID_POLYHEDRON) {
             for (unsigned left = blocks; left; left &= left - 1)
                 kernel_block_meet(t, __builtin_ctz(left), part, cells[n], NULL, 0);
             continue;
         }
-        if (!c->is_finite) continue;
-        for (int value = 0; value < layer->value_count; value++)
-            if (kernel_cell_straddles(c, layer->values[value])) kernel_tile_value(t, part, value, blocks);
+        if (c->is_finite) kernel_tile_cell(t, part, blocks);
     }
 }
 
@@ -134,6 +168,14 @@ SIMD_INLINE kernel_lie kernel_tile_look(const kernel_tile_trace *t, const mmbvh 
     if (interest && !kernel_node_shows(interest, ranges, node)) return lie;
     lie = kernel_box_lie(&t->tree_planes, tree, node);
     lie.blocks &= lie.far < t->t_near ? 0 : blocks;
+    if (lie.blocks) {
+        /* What comes next of it, if it is an inner node or a leaf. */
+        const int64_t ref = mmbvh_node_ref(tree, node);
+        if (mmbvh_node_count(tree, node))
+            __builtin_prefetch(tree->cells + ref);
+        else if (interest)
+            __builtin_prefetch(ranges->low + ref * ranges->stride);
+    }
     return lie;
 }
 
