@@ -84,19 +84,10 @@ static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
     return count == 4;
 }
 
-/* The cell with its values; a new one is not placed yet. Of a polyhedron only the type: see kernel_polyhedron.h. layer
- * tells apart the fields that cells are asked for. */
-SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
-                                          uint32_t index)
+/* The cell with its values; not placed yet. Of a polyhedron only the type: see kernel_polyhedron.h. */
+SIMD_INLINE void kernel_cell_fetch(kernel_cell *c, const grid *g, const grid_field *field, uint32_t index)
 {
-    const uint32_t key = index + 0x85ebca6bu * (uint32_t)part + 0xc2b2ae35u * (uint32_t)layer;
-    kernel_cell *c = &((kernel_cache *)p->thread->cache)->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];
-    if (c->serial == p->thread->serial && c->index == index && c->part == part && c->layer == layer) return c;
-    const grid *g = p->frame->job->parts[part].cells;
-    c->serial = p->thread->serial;
     c->index = index;
-    c->part = part;
-    c->layer = layer;
     c->is_placed = false;
     c->type = grid_cell_type(g, index);
     if (c->type == GRID_POLYHEDRON && kernel_is_tet(g, index, c->vertices))
@@ -104,6 +95,19 @@ SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int
     else
         c->count = grid_cell_vertices(g, index, c->vertices);
     c->is_finite = grid_cell_values(field, index, c->vertices, c->count, c->values);
+}
+
+/* The same from the cache, where it may have been placed. layer tells apart the fields that cells are asked for. */
+SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
+                                          uint32_t index)
+{
+    const uint32_t key = index + 0x85ebca6bu * (uint32_t)part + 0xc2b2ae35u * (uint32_t)layer;
+    kernel_cell *c = &((kernel_cache *)p->thread->cache)->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];
+    if (c->serial == p->thread->serial && c->index == index && c->part == part && c->layer == layer) return c;
+    c->serial = p->thread->serial;
+    c->part = part;
+    c->layer = layer;
+    kernel_cell_fetch(c, p->frame->job->parts[part].cells, field, index);
     return c;
 }
 
@@ -120,6 +124,12 @@ SIMD_INLINE void kernel_cell_swap(kernel_cell *c, int i, int j)
     const int64_t n = c->vertices[i];
     c->vertices[i] = c->vertices[j];
     c->vertices[j] = n;
+    float *lists[4] = {c->x, c->y, c->z, c->f};
+    for (int a = 0; a < 4; a++) {
+        const float w = lists[a][i];
+        lists[a][i] = lists[a][j];
+        lists[a][j] = w;
+    }
 }
 
 SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
@@ -177,8 +187,9 @@ SIMD_INLINE void kernel_cell_rank(kernel_cell *c)
 }
 
 /* The order of coordinates: a tet, symmetric in its vertices, is put in that order; other cells get ranks, and are
- * turned to begin by them. Nothing in a cell then depends on how the simulation numbers its vertices, not even where
- * its map is folded and has several solutions. */
+ * turned to begin by them, with all that a cell has of its vertices (but the colours, which come later). Nothing in a
+ * cell then depends on how the simulation numbers its vertices, not even where its map is folded and has several
+ * solutions. */
 SIMD_INLINE void kernel_cell_order(kernel_cell *c)
 {
     if (c->type == GRID_TET) {
@@ -197,30 +208,73 @@ SIMD_INLINE void kernel_cell_order(kernel_cell *c)
         c->values[i] = own.values[from[i]];
         c->vertices[i] = own.vertices[from[i]];
         c->rank[i] = own.rank[from[i]];
+        c->x[i] = own.x[from[i]];
+        c->y[i] = own.y[from[i]];
+        c->z[i] = own.z[from[i]];
+        c->f[i] = own.f[from[i]];
     }
 }
 
 /* A position into tile space (kernel_packet.h). */
-SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
+SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile, const double *world, float *out_x,
+                                 float *out_y, float *out_z)
 {
-    const kernel_frame *f = p->frame;
     const double *eye = f->job->camera.eye;
     const double d0 = world[0] - eye[0], d1 = world[1] - eye[1], d2 = world[2] - eye[2];
     const double x = f->scaled_axes[0][0] * d0 + f->scaled_axes[0][1] * d1 + f->scaled_axes[0][2] * d2;
     const double y = f->scaled_axes[1][0] * d0 + f->scaled_axes[1][1] * d1 + f->scaled_axes[1][2] * d2;
     const double z = f->scaled_axes[2][0] * d0 + f->scaled_axes[2][1] * d1 + f->scaled_axes[2][2] * d2;
     const double depth = f->job->camera.is_orthographic ? f->job->space.scale : z;
-    *out_x = (float)(x - p->tile->centre_x * depth);
-    *out_y = (float)(y - p->tile->centre_y * depth);
+    *out_x = (float)(x - tile->centre_x * depth);
+    *out_y = (float)(y - tile->centre_y * depth);
     *out_z = (float)(z - f->depth_shift);
+}
+
+SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
+{
+    kernel_place_in(p->frame, p->tile, world, out_x, out_y, out_z);
+}
+
+typedef double kernel_doubles __attribute__((vector_size(32)));
+
+/* kernel_place_in() of a tet's vertices at once: the same operations, and so the same bits. */
+SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+{
+    typedef float floats __attribute__((vector_size(16)));
+    kernel_doubles d[3], place[3];
+    for (int a = 0; a < 3; a++)
+        d[a] = (kernel_doubles){c->world[0][a], c->world[1][a], c->world[2][a], c->world[3][a]} - f->job->camera.eye[a];
+    for (int a = 0; a < 3; a++)
+        place[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
+    const kernel_doubles depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * place[2] : place[2];
+    const floats x = __builtin_convertvector(place[0] - tile->centre_x * depth, floats);
+    const floats y = __builtin_convertvector(place[1] - tile->centre_y * depth, floats);
+    const floats z = __builtin_convertvector(place[2] - f->depth_shift, floats);
+    memcpy(c->x, &x, sizeof x);
+    memcpy(c->y, &y, sizeof y);
+    memcpy(c->z, &z, sizeof z);
+}
+
+/* Into tile space, but not in order yet. */
+SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
+{
+    for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
+    if (c->type == GRID_TET)
+        kernel_tet_place(c, f, tile);
+    else
+        for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->is_placed = true;
+}
+
+SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
+{
+    kernel_cell_move(c, f, tile, g);
+    kernel_cell_order(c);
 }
 
 SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
-    for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
-    kernel_cell_order(c);
-    for (int i = 0; i < c->count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    c->is_placed = true;
+    kernel_cell_place_in(c, p->frame, p->tile, g);
 }
 
 SIMD_INLINE void kernel_project(const kernel_packet *p, const kernel_cell *c, int i, kernel_projected *out)

@@ -16,26 +16,33 @@
 #include "simd.h"
 
 typedef struct kernel_tile {
+    int x0, y0;                /* the upper left pixel */
     double centre_x, centre_y; /* slope (perspective) or offset (orthographic) of the centre */
     float shear_x, shear_y;    /* the centre's slope; 0 where orthographic */
+    /* Rays in tile space, by the tile's columns and rows. */
+    float origin_x[KERNEL_TILE], origin_y[KERNEL_TILE], slope_x[KERNEL_TILE], slope_y[KERNEL_TILE];
 } kernel_tile;
 
 typedef struct kernel_packet {
     const kernel_frame *frame;
     const kernel_tile *tile;
     kernel_thread *thread;
+    int x0, y0; /* the upper left pixel */
     vm active;
-    uint32_t pixel[SIMD_WIDTH];
+    bool is_nearer; /* t_far has changed since this was last made false */
+    bool has_view;
     /* tile space */
     vf origin_x, origin_y, slope_x, slope_y;
-    /* tree space: planes are met at t = plane * inverse - shift */
+    vf t_near; /* the eye's plane */
+    vf t_far;  /* nearest opaque hit so far, +inf at first */
+    uint32_t pixel[SIMD_WIDTH];
+    /* camera space direction to the eye, for shading: unit length; where has_view */
+    vf view[3];
+    /* What follows is set up where rays of the packet go down trees on their own (kernel_packet_complete()).
+     * Tree space: planes are met at t = plane * inverse - shift */
     vf inverse[3], shift[3];
     float pad; /* boxes are widened by it: more than all rounding in the box test */
     float centre_direction[3];
-    vf t_near; /* the eye's plane */
-    vf t_far;  /* nearest opaque hit so far, +inf at first */
-    /* camera space direction to the eye, for shading: unit length */
-    vf view[3];
     /* samples: at t = sample_base + m * sample_step for whole numbers m >= sample_first */
     vf sample_base, sample_step;
     int sample_first;
@@ -55,11 +62,33 @@ static inline double kernel_row(const kernel_frame *f, double y)
 
 static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, int x0, int y0)
 {
+    tile->x0 = x0;
+    tile->y0 = y0;
     tile->centre_x = kernel_column(f, x0 + 0.5 * (KERNEL_TILE - 1));
     tile->centre_y = kernel_row(f, y0 + 0.5 * (KERNEL_TILE - 1));
     const bool flat = f->job->camera.is_orthographic;
     tile->shear_x = flat ? 0 : (float)tile->centre_x;
     tile->shear_y = flat ? 0 : (float)tile->centre_y;
+}
+
+/* What a slope is multiplied by to make the origin at Z = 0. */
+static inline double kernel_reach(const kernel_frame *f)
+{
+    return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
+}
+
+static inline void kernel_tile_rays(kernel_tile *tile, const kernel_frame *f)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const double reach = kernel_reach(f);
+    for (int i = 0; i < KERNEL_TILE; i++) {
+        const double dx = kernel_column(f, tile->x0 + i) - tile->centre_x;
+        const double dy = kernel_row(f, tile->y0 + i) - tile->centre_y;
+        tile->origin_x[i] = (float)(dx * reach);
+        tile->origin_y[i] = (float)(dy * reach);
+        tile->slope_x[i] = flat ? 0 : (float)dx;
+        tile->slope_y[i] = flat ? 0 : (float)dy;
+    }
 }
 
 /* Base point at t = 0 and direction per t of the ray with column and row parameters (px, py), in tree space. */
@@ -78,25 +107,33 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 
 /* Lanes of a packet under construction: plain arrays and one loop a quantity, which compilers vectorize. */
 typedef struct kernel_lanes {
-    double px[SIMD_WIDTH], py[SIMD_WIDTH], length[SIMD_WIDTH];
+    double px[SIMD_WIDTH], py[SIMD_WIDTH], inverse[SIMD_WIDTH];
     float value[SIMD_WIDTH];
 } kernel_lanes;
 
-static inline void kernel_packet_tile_rays(kernel_packet *p, kernel_lanes *l)
+static inline void kernel_packet_lanes(const kernel_packet *p, kernel_lanes *l)
 {
-    const kernel_frame *f = p->frame;
-    const bool flat = f->job->camera.is_orthographic;
-    const double reach = flat ? f->job->space.scale : f->depth_shift;
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)((l->px[i] - p->tile->centre_x) * reach);
-    p->origin_x = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)((l->py[i] - p->tile->centre_y) * reach);
-    p->origin_y = vf_load(l->value);
-    p->slope_x = p->slope_y = vf_set(0);
-    if (flat) return;
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)(l->px[i] - p->tile->centre_x);
-    p->slope_x = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)(l->py[i] - p->tile->centre_y);
-    p->slope_y = vf_load(l->value);
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        l->px[i] = kernel_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
+        l->py[i] = kernel_row(p->frame, p->y0 + i / KERNEL_PACKET_COLUMNS);
+    }
+}
+
+static inline void kernel_packet_tile_rays(kernel_packet *p)
+{
+    const kernel_tile *tile = p->tile;
+    const int column = p->x0 - tile->x0, row = p->y0 - tile->y0;
+    float lanes[4][SIMD_WIDTH];
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        lanes[0][i] = tile->origin_x[column + i % KERNEL_PACKET_COLUMNS];
+        lanes[1][i] = tile->slope_x[column + i % KERNEL_PACKET_COLUMNS];
+        lanes[2][i] = tile->origin_y[row + i / KERNEL_PACKET_COLUMNS];
+        lanes[3][i] = tile->slope_y[row + i / KERNEL_PACKET_COLUMNS];
+    }
+    p->origin_x = vf_load(lanes[0]);
+    p->slope_x = vf_load(lanes[1]);
+    p->origin_y = vf_load(lanes[2]);
+    p->slope_y = vf_load(lanes[3]);
 }
 
 /* Rays in tree space, axis by axis: position = base + t * direction. */
@@ -127,15 +164,21 @@ static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
     p->pad = 16 * 6e-8f * ((float)size + 2);
 }
 
-static inline void kernel_packet_view(kernel_packet *p, kernel_lanes *l)
+/* Before kernel_shade(). */
+static inline void kernel_packet_view(kernel_packet *p)
 {
+    if (p->has_view) return;
+    kernel_lanes lanes, *l = &lanes;
+    p->has_view = true;
+    kernel_packet_lanes(p, l);
     const bool flat = p->frame->job->camera.is_orthographic;
-    for (int i = 0; i < SIMD_WIDTH; i++) l->length[i] = flat ? 1 : sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->px[i] / l->length[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++)
+        l->inverse[i] = flat ? 1 : 1 / sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->px[i] * l->inverse[i]);
     p->view[0] = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->py[i] / l->length[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->py[i] * l->inverse[i]);
     p->view[1] = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)(-1 / l->length[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)-l->inverse[i];
     p->view[2] = vf_load(l->value);
 }
 
@@ -153,7 +196,9 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     float step[SIMD_WIDTH];
     p->sample_first = kernel_sample_first(f);
     for (int i = 0; i < SIMD_WIDTH; i++) {
-        const double dt = f->scaled_step / l->length[i];
+        const bool flat = f->job->camera.is_orthographic;
+        const double length = flat ? 1 : sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
+        const double dt = f->scaled_step / length;
         const double jitter = f->job->jitter ? render_jitter(p->pixel[i], (uint32_t)f->job->frame) : 0.5;
         l->value[i] = (float)((-p->sample_first + jitter) * dt - f->depth_shift);
         step[i] = (float)dt;
@@ -162,32 +207,42 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     p->sample_step = vf_load(step);
 }
 
-static inline void kernel_packet_setup(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
+/* What rays need in cells: the tile's rays must be there. */
+static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
     const render_camera *camera = &f->job->camera;
-    kernel_lanes l;
     unsigned bits = 0;
     p->frame = f;
     p->tile = tile;
     p->thread = thread;
+    p->x0 = x0;
+    p->y0 = y0;
+    p->has_view = p->is_nearer = false;
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const int x = x0 + lane % KERNEL_PACKET_COLUMNS, y = y0 + lane / KERNEL_PACKET_COLUMNS;
         const bool is_inside = x < camera->width && y < camera->height;
         p->pixel[lane] = (uint32_t)y * (uint32_t)camera->width + (uint32_t)x;
-        if (is_inside && (!f->job->pixels || pixel_set_has(f->job->pixels, p->pixel[lane]))) bits |= 1u << lane;
-        l.px[lane] = kernel_column(f, x);
-        l.py[lane] = kernel_row(f, y);
+        bits |= (unsigned)is_inside << lane;
     }
+    for (int lane = 0; f->job->pixels && lane < SIMD_WIDTH; lane++)
+        if (bits >> lane & 1 && !pixel_set_has(f->job->pixels, p->pixel[lane])) bits &= ~(1u << lane);
     p->active = vm_from_bits(bits);
-    kernel_packet_tile_rays(p, &l);
-    kernel_packet_tree_rays(p, &l);
-    kernel_packet_view(p, &l);
-    double base[3], direction[3];
-    kernel_tree_ray(f, tile->centre_x, tile->centre_y, base, direction);
-    for (int a = 0; a < 3; a++) p->centre_direction[a] = (float)direction[a];
+    kernel_packet_tile_rays(p);
     p->t_near = vf_set((float)-f->depth_shift);
     p->t_far = vf_set(INFINITY);
+}
+
+/* What rays need beside that to go down trees on their own, and for volumes. */
+static inline void kernel_packet_complete(kernel_packet *p)
+{
+    const kernel_frame *f = p->frame;
+    kernel_lanes l;
+    kernel_packet_lanes(p, &l);
+    kernel_packet_tree_rays(p, &l);
+    double base[3], direction[3];
+    kernel_tree_ray(f, p->tile->centre_x, p->tile->centre_y, base, direction);
+    for (int a = 0; a < 3; a++) p->centre_direction[a] = (float)direction[a];
     if (f->volume_count) kernel_packet_samples(p, &l);
 }
 

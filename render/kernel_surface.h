@@ -28,6 +28,14 @@ typedef struct kernel_hits {
     vf cut[KERNEL_MAX_CUTS];
 } kernel_hits;
 
+static inline void kernel_hits_begin(kernel_hits *hits)
+{
+    hits->found = vm_none();
+    hits->cut_count = 0;
+    hits->kind = hits->reach = vf_set(0);
+    for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
+}
+
 typedef struct kernel_surface_state {
     const kernel_surface *surface;
     int layer;
@@ -101,6 +109,7 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
     vf lit[3] = {colour[0], colour[1], colour[2]};
+    kernel_packet_view(p);
     kernel_shade(p, &s->layer->material, normal, lit);
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, vf_set(0), t, t, lit, vf_set(0));
 }
@@ -124,6 +133,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
             hit = vm_andnot(hit, tied);
         }
         p->t_far = vf_select(hit, t, p->t_far);
+        p->is_nearer = true;
         hits->found = vm_or(hits->found, hit);
         for (int a = 0; a < 3; a++) {
             hits->normal[a] = vf_select(hit, normal[a], hits->normal[a]);
@@ -134,6 +144,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         return;
     }
     if (by_differences) kernel_differences(p, s, state->layer, value, hit, t, reach, normal);
+    kernel_packet_view(p);
     kernel_shade(p, &s->layer->material, normal, colour);
     for (int a = 0; a < 3; a++) colour[a] *= s->layer->opacity;
     kernel_emit(p, hit, s->first_kind + (uint32_t)value, vf_set(0), t, t, colour, vf_set(1 - s->layer->opacity));
@@ -295,16 +306,45 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
     }
 }
 
+/* kernel_spmd.h */
+SIMD_INLINE void kernel_trace_parts_spmd(kernel_packet *p, const render_field *field, const kernel_interest *interest,
+                                         kernel_surface_state *state);
+
 /* kernel_polyhedron_surface.h */
 static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *state, int part, uint32_t index,
                                        vm rays);
+
+/* In a cell that is neither a polyhedron nor without finite values: its surface of an isovalue. The cell is in the
+ * frame's coordinates. */
+static __attribute__((noinline)) void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state,
+                                                          const kernel_cell *c, kernel_poly *poly, int value, vm rays)
+{
+    if (c->type == GRID_TET)
+        kernel_tet_surface(p, state, c, value, rays);
+    else
+        kernel_poly_surface(p, state, c, poly, value, rays);
+}
+
+/* Make the cell ready for the isovalue. */
+SIMD_INLINE void kernel_surface_prepare(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
+                                        int part, int value, kernel_cell *c, kernel_poly *poly)
+{
+    const bool is_fresh = !c->is_placed;
+    if (is_fresh) {
+        kernel_cell_place_in(c, f, tile, f->job->parts[part].cells);
+        if (s->layer->colour_map) kernel_cell_colours(c, s, part);
+    }
+    if (is_fresh || s->layer->value_count > 1) {
+        kernel_cell_relative(c, s->layer->values[value]);
+        poly->is_set_up = false;
+    }
+}
 
 static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
                                 vm rays)
 {
     kernel_surface_state *state = opaque_state;
     const render_surface_layer *layer = state->surface->layer;
-    const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
         kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
         if (c->type == GRID_POLYHEDRON) {
@@ -324,19 +364,8 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
         }
         for (int value = 0; value < layer->value_count; value++) {
             if (!kernel_cell_straddles(c, layer->values[value])) continue;
-            const bool is_fresh = !c->is_placed;
-            if (is_fresh) {
-                kernel_cell_place(c, p, g);
-                if (layer->colour_map) kernel_cell_colours(c, state->surface, part);
-            }
-            if (is_fresh || layer->value_count > 1) {
-                kernel_cell_relative(c, layer->values[value]);
-                poly->is_set_up = false;
-            }
-            if (c->type == GRID_TET)
-                kernel_tet_surface(p, state, c, value, rays);
-            else
-                kernel_poly_surface(p, state, c, poly, value, rays);
+            kernel_surface_prepare(p->frame, p->tile, state->surface, part, value, c, poly);
+            kernel_cell_surface(p, state, c, poly, value, rays);
         }
     }
 }
@@ -348,8 +377,12 @@ SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
     for (int n = 0; n < f->surface_count; n++) {
         kernel_surface_state state = {
             .surface = &f->surfaces[n], .layer = n, .hits = hits, .is_opaque = n < f->opaque_count};
-        kernel_trace_parts(p, &f->surfaces[n].layer->field, &f->surfaces[n].interest, p->t_near, &p->t_far,
-                           kernel_surface_leaf, &state);
+        const render_field *field = &f->surfaces[n].layer->field;
+        const kernel_interest *interest = &f->surfaces[n].interest;
+        if (f->job->traversal == RENDER_SPMD)
+            kernel_trace_parts_spmd(p, field, interest, &state);
+        else
+            kernel_trace_parts(p, field, interest, p->t_near, &p->t_far, kernel_surface_leaf, &state);
     }
 }
 
@@ -374,6 +407,7 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         if (!vm_any(write)) continue;
         if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, n, write, hits);
         vf colour[3] = {hits->colour[0], hits->colour[1], hits->colour[2]};
+        kernel_packet_view(p);
         kernel_shade(p, &s->layer->material, hits->normal, colour);
         kernel_emit(p, write, 0, hits->kind, p->t_far, p->t_far, colour, vf_set(0));
     }

@@ -116,6 +116,14 @@ typedef struct render_part {
     const mmbvh *tree; /* over cells; its origin and scale are the space's */
 } render_part;
 
+/* How rays find isosurfaces: the same hits to the last bit, at different speed. By tiles of 16 x 16 rays wherever that
+ * can be had; packets are taken instead where volumes are to be cut by transparent surfaces. */
+typedef enum render_traversal {
+    RENDER_TILES,   /* a tile of the picture goes down the tree at once */
+    RENDER_PACKETS, /* as many rays as a vector has lanes, together (thesis, 4.3.1) */
+    RENDER_SPMD     /* every lane on its own */
+} render_traversal;
+
 /* How a volume is integrated: by samples (thesis, 4.4), whose error goes with the step, or by segments, exact where the
  * field is linear along the ray (tets) and of second order in the parts of cells elsewhere. Several volumes are
  * sampled, and so are rays on which cells overlap.
@@ -130,6 +138,7 @@ typedef struct render_job {
     const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
     const render_surface_layer *surfaces;
     int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
+    render_traversal traversal; /* of surfaces */
     const render_volume_layer *volumes;
     int volume_count;
     const render_light *lights;

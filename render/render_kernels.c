@@ -1,10 +1,13 @@
-/* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile of
- * pixels is cut into packets; each packet finds its surfaces first, so that volumes know where opaque ones end them. */
+/* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
+ * its surfaces first, so that volumes know where opaque ones end them: all of it in one traversal, or packet by packet.
+ * Volumes are traced packet by packet. */
 #include <math.h>
 
 #include "kernel_segments.h"
 #include "kernel_polyhedron_surface.h"
 #include "kernel_polyhedron_volume.h"
+#include "kernel_spmd.h"
+#include "kernel_tile_surface.h"
 
 /* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
 typedef struct kernel_parent_state {
@@ -44,52 +47,113 @@ SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field,
                             leaf, state);
 }
 
+/* What a thread holds from tile to tile. */
+typedef struct kernel_memory {
+    kernel_surface_cache cache; /* first: kernel_thread's cache is this */
+    kernel_tile_trace tile;
+} kernel_memory;
+
+static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
+{
+    kernel_thread *thread = p->thread;
+    const double start = thread->now();
+    if (p->frame->has_segments)
+        kernel_trace_segments(p, first_fragment);
+    else
+        kernel_trace_volumes(p, hits);
+    thread->volume_seconds += thread->now() - start;
+}
+
 static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread, int x0, int y0)
 {
     kernel_packet p;
     kernel_hits hits;
     const int64_t first_fragment = thread->out->count;
-    kernel_packet_setup(&p, f, tile, thread, x0, y0);
-    hits.found = vm_none();
-    hits.cut_count = 0;
-    hits.kind = hits.reach = vf_set(0);
-    for (int a = 0; a < 3; a++) hits.normal[a] = hits.colour[a] = vf_set(0);
+    kernel_packet_begin(&p, f, tile, thread, x0, y0);
+    kernel_packet_complete(&p);
+    kernel_hits_begin(&hits);
     if (f->surface_count) {
         const double start = thread->now();
         kernel_trace_surfaces(&p, &hits);
         kernel_emit_opaque(&p, &hits);
         thread->surface_seconds += thread->now() - start;
     }
-    if (f->volume_count) {
-        const double start = thread->now();
-        if (f->has_segments)
-            kernel_trace_segments(&p, first_fragment);
-        else
-            kernel_trace_volumes(&p, &hits);
-        thread->volume_seconds += thread->now() - start;
-    }
+    if (f->volume_count) trace_packet_volumes(&p, &hits, first_fragment);
 }
 
-/* Is one of the packet's pixels to be traced? */
-static bool is_wanted(const render_job *job, int x0, int y0)
+/* Is one of the pixels of the rectangle to be traced? */
+static bool is_wanted(const render_job *job, int x0, int y0, int columns, int rows)
 {
-    const int x1 = x0 + KERNEL_PACKET_COLUMNS, y1 = y0 + KERNEL_PACKET_ROWS;
-    if (!job->pixels) return true;
+    const int x1 = x0 + columns, y1 = y0 + rows;
+    if (!job->pixels) return x0 < job->camera.width && y0 < job->camera.height;
     for (int y = y0; y < y1 && y < job->camera.height; y++)
         for (int x = x0; x < x1 && x < job->camera.width; x++)
             if (pixel_set_has(job->pixels, (int64_t)y * job->camera.width + x)) return true;
     return false;
 }
 
-static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
+static void trace_packets(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
 {
-    const render_camera *camera = &f->job->camera;
     kernel_tile tile;
-    thread->serial++;
     kernel_tile_setup(&tile, f, x0, y0);
-    for (int y = y0; y < y0 + KERNEL_TILE && y < camera->height; y += KERNEL_PACKET_ROWS)
-        for (int x = x0; x < x0 + KERNEL_TILE && x < camera->width; x += KERNEL_PACKET_COLUMNS)
-            if (is_wanted(f->job, x, y)) trace_packet(f, &tile, thread, x, y);
+    kernel_tile_rays(&tile, f);
+    for (int y = y0; y < y0 + KERNEL_TILE; y += KERNEL_PACKET_ROWS)
+        for (int x = x0; x < x0 + KERNEL_TILE; x += KERNEL_PACKET_COLUMNS)
+            if (is_wanted(f->job, x, y, KERNEL_PACKET_COLUMNS, KERNEL_PACKET_ROWS))
+                trace_packet(f, &tile, thread, x, y);
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_surface_cache), trace_tile};
+static unsigned wanted_blocks(const render_job *job, int x0, int y0)
+{
+    unsigned blocks = 0;
+    for (int i = 0; i < KERNEL_BLOCKS; i++)
+        if (is_wanted(job, x0 + i % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, y0 + i / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK,
+                      KERNEL_BLOCK, KERNEL_BLOCK))
+            blocks |= 1u << i;
+    return blocks;
+}
+
+static void trace_tile_surfaces(kernel_tile_trace *t)
+{
+    const double start = t->thread->now();
+    for (t->layer = 0; t->layer < t->frame->surface_count; t->layer++) {
+        t->surface = &t->frame->surfaces[t->layer];
+        kernel_tile_surface(t);
+    }
+    for (unsigned begun = t->begun; begun; begun &= begun - 1)
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            const int i = __builtin_ctz(begun) * KERNEL_BLOCK_PACKETS + n;
+            kernel_emit_opaque(&t->packets[i], &t->hits[i]);
+        }
+    t->thread->surface_seconds += t->thread->now() - start;
+}
+
+static void trace_tile_volumes(kernel_tile_trace *t)
+{
+    for (unsigned left = t->wanted; left; left &= left - 1) {
+        const int block = __builtin_ctz(left);
+        kernel_block_begin(t, block);
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            const int i = block * KERNEL_BLOCK_PACKETS + n;
+            kernel_packet_complete(&t->packets[i]);
+            trace_packet_volumes(&t->packets[i], &t->hits[i], t->thread->out->count);
+        }
+    }
+}
+
+static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
+{
+    thread->serial++;
+    if (!f->by_tiles) {
+        trace_packets(f, thread, x0, y0);
+        return;
+    }
+    kernel_tile_trace *t = &((kernel_memory *)thread->cache)->tile;
+    const unsigned wanted = wanted_blocks(f->job, x0, y0);
+    if (!wanted) return;
+    kernel_tile_begin(t, f, thread, x0, y0, wanted);
+    trace_tile_surfaces(t);
+    if (f->volume_count) trace_tile_volumes(t);
+}
+
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), trace_tile};

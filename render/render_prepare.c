@@ -138,6 +138,7 @@ static void prepare_surfaces(kernel_frame *f)
                 s->first_kind = kind;
                 prepare_isovalues(&s->interest, layer);
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, layer);
+                f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 f->opaque_count += is_opaque;
                 f->has_transparent = f->has_transparent || !is_opaque;
@@ -242,6 +243,8 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     frame->volume_count = job->volume_count;
     for (int i = 0; i < job->volume_count; i++)
         prepare_transfer(&frame->volumes[i], job->volumes[i].transfer, job->step);
+    frame->by_tiles =
+        job->traversal == RENDER_TILES && job->surface_count && !(job->volume_count && frame->has_transparent);
     frame->needs_contact = job->volume_count && job->surface_count && !job->is_alone;
     const insitu_status segments = prepare_segments(frame, error);
     if (segments != INSITU_OK) render_unprepare(frame);

@@ -1,0 +1,234 @@
+/* A tile's blocks and what they can meet. A tile of 16 × 16 pixels is 4 × 4 blocks of 4 × 4 pixels, on every
+ * instruction set; a block is one packet or several:
+ *
+ *     border     0     1     2     3     4
+ *          0     +-----+-----+-----+-----+
+ *                |     |     |     |     |      Five borders between columns of pixels and five between rows, half a
+ *          1     +-----+-----+-----+-----+      pixel from the rays: each is a plane, through the eye where the camera
+ *                |     |     |     |     |      is a perspective one. A convex body that lies on both sides of a
+ *          2     +-----+-----+-----+-----+      border, or on the side of a column, for every column that it may
+ *                                               touch; columns and rows together give a mask of blocks.
+ *
+ * All planes stand in the lanes of a vector, beside the depth and the direction along the tile: a body is classified
+ * against all of them at once. Planes through the eye are right for what lies before the eye, and what does not is
+ * behind the rays' begin. A body that straddles the eye's plane is on both sides of what it may meet: nothing is lost.
+ * Masks are never too small, by pads that are more than all rounding: they say where to look, never what is there. */
+#ifndef RENDER_KERNEL_TILE_H
+#define RENDER_KERNEL_TILE_H
+
+#include "kernel_packet.h"
+
+enum {
+    KERNEL_BLOCK = 4, /* pixels along its side */
+    KERNEL_BLOCKS_ACROSS = KERNEL_TILE / KERNEL_BLOCK,
+    KERNEL_BLOCKS = KERNEL_BLOCKS_ACROSS * KERNEL_BLOCKS_ACROSS,
+    KERNEL_BLOCK_PACKETS = KERNEL_BLOCK * KERNEL_BLOCK / SIMD_WIDTH,
+    KERNEL_TILE_PACKETS = KERNEL_BLOCKS * KERNEL_BLOCK_PACKETS,
+    KERNEL_ALL_BLOCKS = (1 << KERNEL_BLOCKS) - 1,
+    /* Lanes: five borders of columns, five of rows, depth (tree space: t), distance along the tile's direction. */
+    KERNEL_ROWS_LANE = KERNEL_BLOCKS_ACROSS + 1,
+    KERNEL_DEPTH_LANE = 2 * KERNEL_ROWS_LANE,
+    KERNEL_ALONG_LANE,
+    KERNEL_LANES = SIMD_WIDTH == 4 ? 12 : 16,
+    KERNEL_LANE_VECTORS = KERNEL_LANES / SIMD_WIDTH
+};
+
+/* normal · position + offset in each lane; size is |normal|, and error a bound of the rounding at positions near the
+ * scene. */
+typedef struct kernel_planes {
+    vf normal[3][KERNEL_LANE_VECTORS], size[3][KERNEL_LANE_VECTORS];
+    vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
+} kernel_planes;
+
+/* On which sides of the planes a body is, a bit a lane. */
+typedef struct kernel_sides {
+    unsigned below, above; /* on the negative or zero, and on the positive or zero side, in part at least */
+} kernel_sides;
+
+/* Lane by lane, to be made into planes: normals in camera axes. */
+typedef struct kernel_plane_lanes {
+    double right[KERNEL_LANES], up[KERNEL_LANES], forward[KERNEL_LANES], offset[KERNEL_LANES];
+} kernel_plane_lanes;
+
+SIMD_INLINE vf kernel_lanes_load(const float *lanes, int v)
+{
+    return vf_load(lanes + v * SIMD_WIDTH);
+}
+
+/* The slope (perspective) or offset (orthographic) of border n, relative to the tile's centre. */
+static inline double kernel_border_x(const kernel_frame *f, const kernel_tile *tile, int n)
+{
+    return kernel_column(f, tile->x0 + n * KERNEL_BLOCK - 0.5) - tile->centre_x;
+}
+static inline double kernel_border_y(const kernel_frame *f, const kernel_tile *tile, int n)
+{
+    return kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5) - tile->centre_y;
+}
+
+/* The planes relative to the eye: positive on the side of greater columns and rows. */
+static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_frame *f, const kernel_tile *tile)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const double scale = f->job->space.scale;
+    memset(l, 0, sizeof *l);
+    for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
+        const double x = kernel_border_x(f, tile, n) + tile->centre_x, y = kernel_border_y(f, tile, n) + tile->centre_y;
+        const int row = KERNEL_ROWS_LANE + n;
+        l->right[n] = 1;
+        l->up[row] = -1;
+        l->forward[n] = flat ? 0 : -x;
+        l->forward[row] = flat ? 0 : y;
+        l->offset[n] = flat ? -x * scale : 0;
+        l->offset[row] = flat ? y * scale : 0;
+    }
+    l->forward[KERNEL_DEPTH_LANE] = l->forward[KERNEL_ALONG_LANE] = 1;
+    l->offset[KERNEL_DEPTH_LANE] = -f->depth_shift;
+    l->right[KERNEL_ALONG_LANE] = flat ? 0 : tile->centre_x;
+    l->up[KERNEL_ALONG_LANE] = flat ? 0 : tile->centre_y;
+}
+
+/* Planes in tree space, for boxes. Normals are rounded before the plane is put through the eye, so that it goes
+ * through it: what is left is a turn by one rounding, at a distance of no more than the eye's and the scene's. */
+static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
+{
+    const render_camera *c = &f->job->camera;
+    const render_space *s = &f->job->space;
+    kernel_plane_lanes l;
+    float normal[3][KERNEL_LANES], offset[KERNEL_LANES], error[KERNEL_LANES];
+    double size = 0;
+    kernel_plane_lanes_setup(&l, f, tile);
+    for (int i = 0; i < KERNEL_LANES; i++) error[i] = 0;
+    for (int a = 0; a < 3; a++) {
+        const double eye = (c->eye[a] - s->origin[a]) * s->scale;
+        size = fabs(eye) > size ? fabs(eye) : size;
+        for (int i = 0; i < KERNEL_LANES; i++) {
+            normal[a][i] = (float)(l.right[i] * c->right[a] + l.up[i] * c->up[a] + l.forward[i] * c->forward[a]);
+            l.offset[i] -= (double)normal[a][i] * eye;
+            error[i] += fabsf(normal[a][i]);
+        }
+    }
+    /* Positions are at most of size + 1 (kernel_packet_tree_rays()). A sum of three products errs by 4 roundings of
+     * that times the normal's 1-norm, the middle and half widths of a box by one, the normal and the offset by one. */
+    for (int i = 0; i < KERNEL_LANES; i++) {
+        offset[i] = (float)l.offset[i];
+        error[i] = 16 * 6e-8f * (error[i] * ((float)size + 2) + fabsf(offset[i]));
+    }
+    for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
+        for (int a = 0; a < 3; a++) {
+            q->normal[a][v] = kernel_lanes_load(normal[a], v);
+            q->size[a][v] = vf_abs(q->normal[a][v]);
+        }
+        q->offset[v] = kernel_lanes_load(offset, v);
+        q->error[v] = kernel_lanes_load(error, v);
+    }
+}
+
+/* Planes in tile space, for cells: X - slope Z - origin, and the like. The lane along the direction is not used. */
+static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const double reach = kernel_reach(f);
+    float normal[3][KERNEL_LANES] = {{0}}, offset[KERNEL_LANES] = {0};
+    for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
+        const double x = kernel_border_x(f, tile, n), y = kernel_border_y(f, tile, n);
+        const int row = KERNEL_ROWS_LANE + n;
+        normal[0][n] = 1;
+        normal[1][row] = -1;
+        normal[2][n] = flat ? 0 : (float)-x;
+        normal[2][row] = flat ? 0 : (float)y;
+        offset[n] = (float)(-x * reach);
+        offset[row] = (float)(y * reach);
+    }
+    normal[2][KERNEL_DEPTH_LANE] = 1;
+    for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
+        for (int a = 0; a < 3; a++) {
+            q->normal[a][v] = kernel_lanes_load(normal[a], v);
+            q->size[a][v] = vf_abs(q->normal[a][v]);
+        }
+        q->offset[v] = kernel_lanes_load(offset, v);
+        q->error[v] = vf_abs(q->offset[v]);
+    }
+}
+
+/* Blocks between borders of which the body is on both inner sides. */
+SIMD_INLINE unsigned kernel_blocks_of(kernel_sides s)
+{
+    static const uint16_t spread[KERNEL_BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
+                                                   0x1000, 0x1001, 0x1010, 0x1011, 0x1100, 0x1101, 0x1110, 0x1111};
+    const unsigned inner = s.above & s.below >> 1;
+    return (inner & 15) * spread[inner >> KERNEL_ROWS_LANE & 15];
+}
+
+/* Bits of the lanes where low <= 0, and where high >= 0. */
+SIMD_INLINE void kernel_sides_add(kernel_sides *s, int v, vf low, vf high)
+{
+    s->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;
+    s->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
+}
+
+/* How a body lies: the blocks it may meet, its least and greatest depth, and its place along the tile's direction. */
+typedef struct kernel_lie {
+    unsigned blocks;
+    float near, far, along;
+} kernel_lie;
+
+SIMD_INLINE kernel_lie kernel_box_lie(const kernel_planes *q, const mmbvh *tree, int64_t node)
+{
+    float lower[4], upper[4];
+    kernel_sides sides = {0, 0};
+    kernel_lie lie = {0};
+    mmbvh_node_box(tree, node, lower, upper);
+    const float middle[3] = {0.5f * (lower[0] + upper[0]), 0.5f * (lower[1] + upper[1]), 0.5f * (lower[2] + upper[2])};
+    const float half[3] = {0.5f * (upper[0] - lower[0]), 0.5f * (upper[1] - lower[1]), 0.5f * (upper[2] - lower[2])};
+    for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
+        const vf at =
+            (q->normal[0][v] * middle[0] + q->normal[1][v] * middle[1]) + (q->normal[2][v] * middle[2] + q->offset[v]);
+        const vf reach = (q->size[0][v] * half[0] + q->size[1][v] * half[1]) + (q->size[2][v] * half[2] + q->error[v]);
+        kernel_sides_add(&sides, v, at - reach, at + reach);
+        if (v == KERNEL_DEPTH_LANE / SIMD_WIDTH) {
+            lie.near = (at - reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            lie.far = (at + reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            lie.along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
+        }
+    }
+    lie.blocks = kernel_blocks_of(sides);
+    return lie;
+}
+
+/* Points in tile space. */
+typedef struct kernel_outline {
+    int count;
+    float point[3][GRID_MAX_CELL_VERTICES];
+    float size[3]; /* of the cell: largest |X|, |Y|, |Z| of its vertices */
+} kernel_outline;
+
+/* Pads of a hundred-thousandth of the cell and its place: rays that hit by a rounding have theirs wholly within. */
+#define KERNEL_OUTLINE_PAD 1e-5f
+
+SIMD_INLINE kernel_lie kernel_outline_lie(const kernel_planes *q, const kernel_outline *o)
+{
+    kernel_sides sides = {0, 0};
+    kernel_lie lie = {0};
+    for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
+        vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
+        for (int i = 0; i < o->count; i++) {
+            const vf at = (q->normal[0][v] * o->point[0][i] + q->normal[1][v] * o->point[1][i]) +
+                          (q->normal[2][v] * o->point[2][i] + q->offset[v]);
+            low = vf_min(low, at);
+            high = vf_max(high, at);
+        }
+        const vf size =
+            (q->size[0][v] * o->size[0] + q->size[1][v] * o->size[1]) + (q->size[2][v] * o->size[2] + q->error[v]);
+        low -= size * KERNEL_OUTLINE_PAD;
+        high += size * KERNEL_OUTLINE_PAD;
+        kernel_sides_add(&sides, v, low, high);
+        if (v == KERNEL_DEPTH_LANE / SIMD_WIDTH) {
+            lie.near = low[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            lie.far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+        }
+    }
+    lie.blocks = kernel_blocks_of(sides);
+    return lie;
+}
+
+#endif
