@@ -418,13 +418,17 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
     return false;
 }
 
-/* A quad in the ray's plane: corner 0, the edges to corners 1 and 3, and corner 0 - 1 + 2 - 3. */
+/* A quad in the ray's plane: corner 0, the edges to corners 1 and 3, and corner 0 - 1 + 2 - 3; how far the edges reach
+ * along the ray. */
 typedef struct kernel_patch {
     vf ax, ay, ex, ey, gx, gy, hx, hy;
+    float ez, gz;
 } kernel_patch;
 
-SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_projected *q, const int corner[4])
+SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_projected *q, const float *z, const int corner[4])
 {
+    p->ez = fmaxf(fabsf(z[corner[1]] - z[corner[0]]), fabsf(z[corner[2]] - z[corner[3]]));
+    p->gz = fmaxf(fabsf(z[corner[3]] - z[corner[0]]), fabsf(z[corner[2]] - z[corner[1]]));
     p->ax = q->x[corner[0]], p->ay = q->y[corner[0]];
     p->ex = q->x[corner[1]] - p->ax, p->ey = q->y[corner[1]] - p->ay;
     p->gx = q->x[corner[3]] - p->ax, p->gy = q->y[corner[3]] - p->ay;
@@ -432,71 +436,124 @@ SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_projected *q, 
 }
 
 /* Newton's method for the ray's place (s, r) on the patch, within [0, 1]: the error goes as its square in each step,
- * 0.2 to 1e-9 in four. Returns the rays that have arrived: to 1e-5 of the quad's size, which is what float32 leaves of
- * a quad seen nearly edge-on. */
+ * 0.2 to 1e-9 in four. Returns the rays that have arrived: to what float32 leaves of the quad's size, across the ray.
+ * Where the quad is so steep that this is 8 times as much along it, none have. */
 SIMD_INLINE vm kernel_patch_newton(const kernel_patch *p, vf *s, vf *r)
 {
     for (int step = 0;; step++) {
         const vf rx = p->gx + *s * p->hx, ry = p->gy + *s * p->hy;
         const vf dx = -((p->ax + *s * p->ex) + *r * rx), dy = -((p->ay + *s * p->ey) + *r * ry);
-        if (step == 4) {
-            const vf size = (vf_abs(p->ex) + vf_abs(p->ey)) + (vf_abs(p->gx) + vf_abs(p->gy));
-            return vf_le(vf_abs(dx) + vf_abs(dy), size * 1e-6f);
-        }
         const vf sx = p->ex + *r * p->hx, sy = p->ey + *r * p->hy;
         const vf det = sx * ry - sy * rx;
+        if (step == 4) {
+            const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
+            const vm open = vf_lt(e * p->gz + g * p->ez, vf_abs(det) * 8.0f);
+            return vm_and(open, vf_le(vf_abs(dx) + vf_abs(dy), (e + g) * 1.2e-7f));
+        }
         const vf inverse = vf_select(vf_eq(det, vf_set(0)), vf_set(0), 1.0f / det);
         *s = vf_clamp(*s + (dx * ry - dy * rx) * inverse, vf_set(0), vf_set(1));
         *r = vf_clamp(*r + (sx * dy - sy * dx) * inverse, vf_set(0), vf_set(1));
     }
 }
 
-/* How far outside [0, 1]; large for NaN. */
-SIMD_INLINE vf kernel_beyond(vf v)
+/* A quad in one ray's plane, in double: products of float32 are exact there. */
+typedef struct kernel_flat_quad {
+    double x[4], y[4];
+} kernel_flat_quad;
+
+static inline double kernel_flat_cross(const kernel_flat_quad *q, int i, int j)
 {
-    const vf beyond = vf_max(vf_max(-v, v - 1.0f), vf_set(0));
-    return vf_select(vf_eq(v, v), beyond, vf_set(1e30f));
+    return q->x[i] * q->y[j] - q->x[j] * q->y[i];
 }
 
-/* The root of the patch's two equations nearest to [0, 1]: eliminating s leaves a quadratic in r. */
-SIMD_INLINE void kernel_patch_quadratic(const kernel_patch *p, vf *s, vf *r)
+/* The two x of b0 (1-x)² + 2 b1 (1-x) x + b2 x² = 0; twice one place, the double root's, where there is none. */
+static inline void kernel_flat_roots(double b0, double b1, double b2, double x[2])
 {
-    const vf a = p->hx * p->gy - p->hy * p->gx;
-    const vf b = (p->ex * p->gy - p->ey * p->gx) + (p->hx * p->ay - p->hy * p->ax);
-    const vf c = p->ex * p->ay - p->ey * p->ax;
-    const vf root = vf_sqrt(vf_max(b * b - (a * c) * 4.0f, vf_set(0)));
-    const vf h = (b + vf_select(vf_lt(b, vf_set(0)), -root, root)) * -0.5f;
-    const vf candidates[2] = {c / h, h / a};
-    vf best = vf_set(INFINITY);
-    for (int i = 0; i < 2; i++) {
-        const vf w = candidates[i];
-        const vf x = p->ex + w * p->hx, y = p->ey + w * p->hy;
-        const vm by_x = vf_lt(vf_abs(y), vf_abs(x));
-        const vf u = -vf_select(by_x, (p->ax + w * p->gx) / x, (p->ay + w * p->gy) / y);
-        const vf beyond = kernel_beyond(u) + kernel_beyond(w);
-        const vm nearer = vf_lt(beyond, best);
-        best = vf_select(nearer, beyond, best);
-        *s = vf_select(nearer, u, *s);
-        *r = vf_select(nearer, w, *r);
+    const double square = b1 * b1 - b0 * b2, root = square > 0 ? __builtin_sqrt(square) : 0;
+    const double h = b1 < 0 ? root - b1 : -(b1 + root);
+    x[0] = h / (h + b2);
+    x[1] = square > 0 ? b0 / (b0 + h) : x[0];
+}
+
+static inline double kernel_flat_beyond(const double place[2])
+{
+    double most = 0;
+    for (int i = 0; i < 2; i++) most = fmax(most, fmax(-place[i], place[i] - 1));
+    return most;
+}
+
+/* The patch's point at the origin, of two the one nearer to the guess in place. For a given r the points are on the
+ * line from u = (1-r) c0 + r c3 to w = (1-r) c1 + r c2, which goes through the origin where u × w = 0:
+ *     (1-r)² c0×c1 + (1-r) r (c0×c2 + c3×c1) + r² c3×c2 = 0,
+ * and likewise for a given s. Of a quad seen all but edge-on, whose corners' cross products are tiny, both are as exact
+ * as these. Where the patch has no such point, although the ray crosses its two triangles, the one nearest to being it,
+ * whatever the guess: the ray then enters and leaves behind the quad at one place. False where the triangle's place is
+ * to be kept: two corners are in one place, at the ray, or the quad is a line to float32, and so flat: which of two
+ * such quads at an edge comes first, their triangles tell by exact signs. */
+static inline bool kernel_flat_solve(const kernel_flat_quad *q, double place[2])
+{
+    const double across = kernel_flat_cross(q, 0, 2), other = kernel_flat_cross(q, 3, 1);
+    double r[2], s[2], least = 1e30, nearest = 1e30, best[2] = {0, 0}, size = 0, breadth = 0;
+    for (int i = 0; i < 4; i++) {
+        size = fmax(size, fabs(q->x[i]) + fabs(q->y[i]));
+        breadth = fmax(breadth, fmax(fabs(kernel_flat_cross(q, i, (i + 1) & 3)), fabs(i % 2 ? across : other)));
     }
-    *s = vf_clamp(*s, vf_set(0), vf_set(1));
-    *r = vf_clamp(*r, vf_set(0), vf_set(1));
+    if (!(breadth > 1e-6 * size * size)) return false;
+    kernel_flat_roots(kernel_flat_cross(q, 0, 1), 0.5 * (across + other), kernel_flat_cross(q, 3, 2), r);
+    kernel_flat_roots(kernel_flat_cross(q, 0, 3), 0.5 * (across - other), kernel_flat_cross(q, 1, 2), s);
+    for (int i = 0; i < 2; i++) {
+        const double ux = q->x[0] + r[i] * (q->x[3] - q->x[0]), uy = q->y[0] + r[i] * (q->y[3] - q->y[0]);
+        const double wx = q->x[1] + r[i] * (q->x[2] - q->x[1]), wy = q->y[1] + r[i] * (q->y[2] - q->y[1]);
+        const double near = fabs(ux - wx) > fabs(uy - wy) ? ux / (ux - wx) : uy / (uy - wy);
+        const double at[2] = {fabs(s[0] - near) <= fabs(s[1] - near) ? s[0] : s[1], r[i]};
+        const double beyond = fmax(kernel_flat_beyond(at), 1e-6);
+        const double away = fabs(at[0] - place[0]) + fabs(at[1] - place[1]);
+        if (!(away < 1e30) || !(beyond < least || (beyond == least && away < nearest))) continue;
+        least = beyond;
+        nearest = away;
+        for (int k = 0; k < 2; k++) best[k] = fmin(fmax(at[k], 0), 1);
+    }
+    if (least == 1e30) return false;
+    place[0] = best[0];
+    place[1] = best[1];
+    return true;
 }
 
-/* Where the rays of wanted meet the quad's bilinear patch: s along corners 0 to 1, r along 0 to 3. From the guess;
- * where that does not lead there, from the closed form. Returns those that have a point. */
-SIMD_INLINE vm kernel_quad_solve(const kernel_projected *q, const int corner[4], vm wanted, vf *s, vf *r)
+/* Ray by ray in double: quads seen nearly edge-on, where float32 leaves no place along the ray, and folded ones. */
+static __attribute__((noinline, cold)) vm kernel_quad_exactly(const kernel_projected *q, const int corner[4], vm wanted,
+                                                              vf *s, vf *r)
+{
+    unsigned found = 0;
+    for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
+        const int lane = __builtin_ctz(bits);
+        double place[2] = {(double)(*s)[lane], (double)(*r)[lane]};
+        kernel_flat_quad flat;
+        for (int i = 0; i < 4; i++) {
+            flat.x[i] = (double)q->x[corner[i]][lane];
+            flat.y[i] = (double)q->y[corner[i]][lane];
+        }
+        if (!kernel_flat_solve(&flat, place)) continue;
+        (*s)[lane] = (float)place[0];
+        (*r)[lane] = (float)place[1];
+        found |= 1u << lane;
+    }
+    return vm_from_bits(found);
+}
+
+/* Where the rays of wanted meet the quad's bilinear patch: s along corners 0 to 1, r along 0 to 3, from the guess in
+ * them. Returns those that have a point; the others' s and r are not to be used. */
+SIMD_INLINE vm kernel_quad_solve(const kernel_projected *q, const float *z, const int corner[4], vm wanted, vf *s,
+                                 vf *r)
 {
     kernel_patch patch;
-    kernel_patch_setup(&patch, q, corner);
+    const vf guess_s = *s, guess_r = *r;
+    kernel_patch_setup(&patch, q, z, corner);
     const vm arrived = kernel_patch_newton(&patch, s, r);
-    if (!vm_any(vm_andnot(wanted, arrived))) return arrived;
-    vf other_s = *s, other_r = *r;
-    kernel_patch_quadratic(&patch, &other_s, &other_r);
-    const vm also = vm_andnot(kernel_patch_newton(&patch, &other_s, &other_r), arrived);
-    *s = vf_select(also, other_s, *s);
-    *r = vf_select(also, other_r, *r);
-    return vm_or(arrived, also);
+    const vm left = vm_andnot(wanted, arrived);
+    if (__builtin_expect(!vm_any(left), 1)) return arrived;
+    *s = vf_select(arrived, *s, guess_s);
+    *r = vf_select(arrived, *r, guess_r);
+    return vm_or(arrived, kernel_quad_exactly(q, corner, left, s, r));
 }
 
 SIMD_INLINE vf kernel_bilinear(const float *f, const int corner[4], vf s, vf r)
@@ -543,7 +600,7 @@ SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *sh
     const vf guess_s = kernel_weigh(w, unit_s[at[0]], unit_s[at[1]], unit_s[at[2]]);
     const vf guess_r = kernel_weigh(w, unit_r[at[0]], unit_r[at[1]], unit_r[at[2]]);
     vf s = guess_s, r = guess_r;
-    const vm arrived = kernel_quad_solve(q, corner, out->mask, &s, &r);
+    const vm arrived = kernel_quad_solve(q, c->z, corner, out->mask, &s, &r);
     s = vf_select(arrived, s, guess_s);
     r = vf_select(arrived, r, guess_r);
     out->t = vf_select(arrived, kernel_bilinear(c->z, corner, s, r), out->t);

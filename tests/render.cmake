@@ -75,3 +75,28 @@ foreach(isa plain avx512)
   add_test(NAME folded_${isa} COMMAND test_folded)
   set_tests_properties(folded_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 120)
 endforeach()
+
+# Rays' intervals: the kernels' headers compiled into the test, once an instruction set.
+add_executable(test_chords test_chords.c chord_aim.c test_mesh_honeycomb.c)
+target_link_libraries(test_chords PRIVATE test_render_support insitu_flags)
+function(insitu_chords isa definition)
+  add_library(chord_trace_${isa} OBJECT chord_trace.c)
+  target_compile_definitions(chord_trace_${isa} PRIVATE CHORD_TABLE=chord_table_${isa} ${definition})
+  target_compile_options(chord_trace_${isa} PRIVATE ${ARGN} -fno-math-errno -fno-trapping-math
+    -Wno-unused-function # of the headers not all is wanted
+    $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
+  target_link_libraries(chord_trace_${isa} PRIVATE insitu_internal insitu_flags)
+  target_link_libraries(test_chords PRIVATE chord_trace_${isa})
+endfunction()
+insitu_chords(plain SIMD_PLAIN)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  insitu_chords(sse42 SIMD_SSE42 -msse4.2)
+  insitu_chords(avx2 SIMD_AVX2 -mavx2 -mfma)
+  insitu_chords(avx512 SIMD_AVX512 -mavx512f -mavx512dq -mavx512bw -mavx512vl)
+endif()
+add_test(NAME chords COMMAND test_chords)
+set_tests_properties(chords PROPERTIES TIMEOUT 180)
+
+insitu_render_program(test_hard_cases)
+add_test(NAME hard_cases COMMAND test_hard_cases)
+set_tests_properties(hard_cases PROPERTIES TIMEOUT 120)

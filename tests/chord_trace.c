@@ -1,0 +1,111 @@
+/* The intervals of the cells on rays, by the kernels of one instruction set (chord_trace.h). */
+#include <math.h>
+
+#include "chord_trace.h"
+#include "kernel_polyhedron.h"
+#include "kernel_traverse.h"
+
+typedef struct chord_state {
+    chord_rays *rays;
+    int first; /* lane 0's number */
+} chord_state;
+
+static void chord_note(const chord_state *state, vm mask, vf t_in, vf t_out)
+{
+    float in[SIMD_WIDTH], out[SIMD_WIDTH];
+    vf_store(in, t_in);
+    vf_store(out, t_out);
+    for (unsigned bits = vm_bits(mask); bits; bits &= bits - 1) {
+        const int lane = __builtin_ctz(bits), ray = state->first + lane;
+        const int at = state->rays->span_count[ray]++;
+        if (at < CHORD_MAX_SPANS) state->rays->spans[ray][at] = (chord_span){in[lane], out[lane]};
+    }
+}
+
+static void chord_polyhedron(kernel_packet *p, const chord_state *state, const grid_field *field, int part,
+                             uint32_t index, vm rays)
+{
+    polyhedron *c =
+        p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part, 0, index);
+    kernel_passage r;
+    kernel_stay stay;
+    if (!c) p->thread->out_of_memory = true;
+    if (!c) return;
+    if (!c->is_placed) {
+        kernel_polyhedron_place(c, p);
+        for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
+    }
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
+    while (kernel_passage_next(&r, &stay))
+        chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
+}
+
+static void chord_cell(kernel_packet *p, const chord_state *state, const grid_field *field, int part, uint32_t index,
+                       vm rays)
+{
+    kernel_cell *c = kernel_cell_find(p, 0, part, field, index);
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    int intervals = 1;
+    if (c->type == GRID_POLYHEDRON) {
+        chord_polyhedron(p, state, field, part, index, rays);
+        return;
+    }
+    if (!c->is_placed) {
+        kernel_cell_place(c, p, p->frame->job->parts[part].cells);
+        for (int i = 0; i < c->count; i++) c->f[i] = 0;
+    }
+    if (c->type == GRID_TET)
+        kernel_tet_interval(p, c, rays, false, &list[0]);
+    else
+        intervals = kernel_poly_intervals(p, c, rays, false, list);
+    for (int n = 0; n < intervals; n++) chord_note(state, list[n].mask, list[n].t_in, list[n].t_out);
+}
+
+static void chord_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count, vm rays)
+{
+    const grid_field *field = &p->frame->job->surfaces[0].field.fields[part];
+    for (int n = 0; n < count; n++) chord_cell(p, opaque_state, field, part, cells[n], rays);
+}
+
+/* As kernel_packet_setup(), with rays that need not be those of pixels. */
+static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
+                         const chord_rays *rays, int first)
+{
+    kernel_lanes l;
+    const int count = rays->count - first < SIMD_WIDTH ? rays->count - first : SIMD_WIDTH;
+    p->frame = f;
+    p->tile = tile;
+    p->thread = thread;
+    p->active = vm_from_bits((1u << count) - 1u);
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+        const int ray = first + (lane < count ? lane : 0);
+        l.px[lane] = rays->x[ray];
+        l.py[lane] = rays->y[ray];
+    }
+    kernel_packet_tile_rays(p, &l);
+    kernel_packet_tree_rays(p, &l);
+    double base[3], direction[3];
+    kernel_tree_ray(f, tile->centre_x, tile->centre_y, base, direction);
+    for (int a = 0; a < 3; a++) p->centre_direction[a] = (float)direction[a];
+    p->t_near = vf_set((float)-f->depth_shift);
+    p->t_far = vf_set(INFINITY);
+}
+
+static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays *rays)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const kernel_tile tile = {rays->centre_x, rays->centre_y, flat ? 0 : (float)rays->centre_x,
+                              flat ? 0 : (float)rays->centre_y};
+    thread->serial++;
+    for (int i = 0; i < rays->count; i++) rays->span_count[i] = 0;
+    for (int first = 0; first < rays->count; first += SIMD_WIDTH) {
+        kernel_packet p;
+        chord_state state = {rays, first};
+        chord_packet(&p, f, &tile, thread, rays, first);
+        for (int part = 0; part < f->job->part_count; part++)
+            kernel_traverse(&p, f->job->parts[part].tree, NULL, NULL, p.active, p.t_near, &p.t_far, part, chord_leaf,
+                            &state);
+    }
+}
+
+const chord_table CHORD_TABLE = {SIMD_WIDTH, sizeof(kernel_cache), chord_trace};

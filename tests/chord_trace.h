@@ -1,0 +1,33 @@
+/* Rays for the tests of exactness, and the intervals of cells that the kernels find on them. The kernels' own headers
+ * are compiled into chord_trace.c, once an instruction set as render_kernels.c is: the rays are put into packets, the
+ * packets go down the tree, and what is written down is every [t_in, t_out) that volumes and surfaces would be given.
+ */
+#ifndef CHORD_TRACE_H
+#define CHORD_TRACE_H
+
+#include "kernel_types.h"
+
+enum { CHORD_MAX_RAYS = 64, CHORD_MAX_SPANS = 160 };
+
+typedef struct chord_span {
+    float t_in, t_out;
+} chord_span;
+
+/* Rays of one tile. Where there are more spans than fit, span_count says so all the same. */
+typedef struct chord_rays {
+    int count;
+    double centre_x, centre_y;                   /* the tile's middle in the image plane: slopes, or offsets */
+    double x[CHORD_MAX_RAYS], y[CHORD_MAX_RAYS]; /* the rays */
+    int span_count[CHORD_MAX_RAYS];
+    chord_span spans[CHORD_MAX_RAYS][CHORD_MAX_SPANS]; /* in the order of the tree */
+} chord_rays;
+
+typedef struct chord_table {
+    int width;
+    size_t cache_bytes;
+    void (*trace)(const kernel_frame *frame, kernel_thread *thread, chord_rays *rays);
+} chord_table;
+
+extern const chord_table chord_table_plain, chord_table_sse42, chord_table_avx2, chord_table_avx512;
+
+#endif

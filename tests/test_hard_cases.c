@@ -1,0 +1,98 @@
+/* Hard cases that no other program has; all are listed in docs/hard-cases.md. */
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static const double values[2] = {-0.2, 0.3};
+static const test_mesh_kind kinds[5] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
+
+/* What is drawn: an opaque surface, transparent ones in a sampled volume, a volume by segments. */
+typedef enum scene_kind { OPAQUE, SURFACES_IN_SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
+
+static void draw(const test_mesh *mesh, scene_kind scene, fixture_camera camera, drawn_frame *out)
+{
+    render_fixture f;
+    fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.5, 1,
+                   (const double[]){0, 0, 0});
+    fixture_look(&f, camera, 61, 47);
+    if (scene != SEGMENTS) fixture_add_surface(&f, values, 2, scene == OPAQUE ? 1 : 0.4f);
+    if (scene != SEGMENTS) f.surfaces[0].root = RENDER_ROBUST;
+    if (scene != OPAQUE) fixture_set_volume(&f, 0.3);
+    if (scene == SEGMENTS) f.job.integration = RENDER_SEGMENTS;
+    fixture_draw(&f, out);
+    fixture_free(&f);
+}
+
+/* Ways to be of no volume: of a cell's vertices only these are left, others stand in for the rest. */
+typedef enum collapse { TO_A_POINT, TO_AN_EDGE, TO_A_FACE, COLLAPSE_COUNT } collapse;
+
+/* Which vertex takes the place of the i-th. The face is the cell's first one with all its corners, the cell two of it.
+ */
+static int stand_in(int type, collapse how, int i)
+{
+    static const int tet[4] = {0, 1, 2, 2}, pyramid[5] = {0, 1, 1, 0, 4};
+    if (how == TO_A_POINT) return 0;
+    if (how == TO_AN_EDGE) return i % 2;
+    return type == GRID_TET ? tet[i] : type == GRID_PYRAMID ? pyramid[i] : type == GRID_WEDGE ? i % 3 : i % 4;
+}
+
+static void *grow(void *block, int64_t count, size_t size)
+{
+    void *larger = realloc(block, (size_t)count * size);
+    assert_non_null(larger);
+    return larger;
+}
+
+/* Beside every third cell one of no volume, of its vertices. */
+static void add_collapsed(test_mesh *mesh)
+{
+    const int64_t cells = mesh->cell_count, most = cells + cells / 3 + 1;
+    mesh->types = grow(mesh->types, most, 1);
+    mesh->ghosts = grow(mesh->ghosts, most, 1);
+    mesh->offsets = grow(mesh->offsets, most + 1, sizeof *mesh->offsets);
+    mesh->connectivity = grow(mesh->connectivity, 8 * most, sizeof *mesh->connectivity);
+    for (int64_t cell = 0; cell < cells; cell += 3) {
+        const int64_t first = mesh->offsets[cell];
+        const int type = mesh->types[cell], count = grid_type_vertices(type);
+        for (int i = 0; i < count; i++)
+            mesh->connectivity[mesh->connectivity_count++] =
+                mesh->connectivity[first + stand_in(type, (collapse)(cell / 3 % COLLAPSE_COUNT), i)];
+        mesh->ghosts[mesh->cell_count] = 0;
+        mesh->types[mesh->cell_count++] = (unsigned char)type;
+        mesh->offsets[mesh->cell_count] = mesh->connectivity_count;
+    }
+}
+
+static void cells_of_no_volume_change_no_pixel(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 5; k++)
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
+            for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+                test_mesh mesh;
+                drawn_frame without, with;
+                test_mesh_lattice(kinds[k], 4, camera == CAMERA_ALONG_X ? 0 : 0.1, test_wave, &mesh);
+                draw(&mesh, scene, camera, &without);
+                add_collapsed(&mesh);
+                draw(&mesh, scene, camera, &with);
+                assert_true(without.list.count > 100);
+                drawn_assert_same(&without, &with);
+                drawn_free(&without);
+                drawn_free(&with);
+                test_mesh_free(&mesh);
+            }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cells_of_no_volume_change_no_pixel),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,154 @@
+/* Where and how large a scene is does not show: far from the origin, as projected coordinates of maps are, and a
+ * million times smaller or larger, with the camera and all lengths of the scene file, it is the same picture.
+ *
+ * An offset of whole numbers is exact on coordinates of multiples of 2^-24, so that nothing at all may change but the
+ * rounding of the eye's place. A factor of 1e6 is not a power of two: all float32 numbers then round otherwise. The
+ * normals of hexes are then off by some 1e-6 where the field is nearly level (test_hits.c), and so is the light on
+ * them: 2e-6 is allowed there, 1e-6 elsewhere. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+enum { WIDTH = 48, HEIGHT = 40 };
+
+typedef struct space_case {
+    const char *name;
+    test_mesh_kind kind;
+    bool as_polyhedra;
+    double allowed;
+    const char *layers, *sampling; /* each with at most one length in it */
+} space_case;
+
+#define FIELD "volume: {field: f, range: [-1.5, 1.5], opacity: [[0, 0.1], [0.5, 0.8], [1, 0.3]], unit_distance: %.17g}"
+
+static const space_case cases[] = {
+    {"isosurface of tets", TEST_TETS, false, 1e-6, "isosurface: {field: f, values: [-0.2, 0.3]}", ""},
+    {"isosurface of hexes", TEST_HEXES, false, 2e-6, "isosurface: {field: f, values: [-0.2, 0.3], opacity: 0.5}", ""},
+    {"isosurface of polyhedra", TEST_HEXES, true, 1e-6, "isosurface: {field: f, values: [-0.2, 0.3], opacity: 0.5}",
+     ""},
+    {"samples", TEST_MIXED, false, 1e-6, FIELD, "    sampling: {step: %.17g, jitter: true}\n"},
+    {"samples of polyhedra", TEST_POLYHEDRA, false, 1e-6, FIELD, "    sampling: {step: %.17g}\n"},
+    {"segments", TEST_TETS, false, 1e-6, FIELD, "    sampling: {method: segments, step: %.17g}\n"},
+    {"segments of polyhedra", TEST_MIXED, true, 1e-6, FIELD, "    sampling: {method: segments, step: %.17g}\n"},
+    {"max_error", TEST_HEXES, false, 1e-6, FIELD, "    sampling: {max_error: 0.001}\n"},
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+static void scene_text(const space_case *c, double scale, const double offset[3], char *out, size_t size)
+{
+    static const double eye[3] = {2.5, 1.5, 3}, focal[3] = {0.125, 0, -0.0625};
+    char layer[256], sampling[128];
+    snprintf(layer, sizeof layer, c->layers, 0.3 * scale);
+    snprintf(sampling, sizeof sampling, c->sampling, 0.1 * scale);
+    snprintf(out, size,
+             "images:\n  - name: a\n    size: [%d, %d]\n    background: [0.1, 0.2, 0.3, 1]\n"
+             "    camera: {position: [%.17g, %.17g, %.17g], focal: [%.17g, %.17g, %.17g]}\n    layers:\n      - %s\n%s"
+             "    outputs:\n      - path: a.exr\n",
+             WIDTH, HEIGHT, eye[0] * scale + offset[0], eye[1] * scale + offset[1], eye[2] * scale + offset[2],
+             focal[0] * scale + offset[0], focal[1] * scale + offset[1], focal[2] * scale + offset[2], layer, sampling);
+}
+
+static void create_input(const space_case *c, double scale, const double offset[3], session_input *in)
+{
+    test_mesh whole;
+    test_mesh_lattice(c->kind, 4, 0.1, test_wave, &whole);
+    if (c->as_polyhedra) test_mesh_to_polyhedra(&whole, 0.6);
+    for (int64_t i = 0; i < 3 * whole.vertex_count; i++)
+        whole.coordinates[i] = ldexp(rint(ldexp(whole.coordinates[i], 24)), -24);
+    int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
+    assert_non_null(owners);
+    test_partition(&whole, TEST_RANDOM, 4, rank_count, owners);
+    test_mesh_transform(&whole, scale, offset);
+    test_mesh_part(&whole, owners, own_rank, &in->part);
+    free(owners);
+    test_mesh_free(&whole);
+    input_describe(in);
+}
+
+static void draw(const space_case *c, double scale, const double offset[3], caught_picture *out)
+{
+    char text[2048];
+    session_input in;
+    scene_text(c, scale, offset, text, sizeof text);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+    create_input(c, scale, offset, &in);
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+    everywhere(caught_count == (own_rank == 0));
+    if (own_rank == 0) *out = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* The largest difference of a channel; not a number counts as infinite. */
+static double difference(const caught_picture *a, const caught_picture *b)
+{
+    double worst = 0;
+    for (int i = 0; i < 4 * WIDTH * HEIGHT; i++) {
+        const double off = fabs((double)a->rgba[i] - (double)b->rgba[i]);
+        if (!(off <= worst)) worst = isnan(off) ? (double)INFINITY : off;
+    }
+    return worst;
+}
+
+static int drawn_pixels(const caught_picture *p)
+{
+    int count = 0;
+    for (int i = 1; i < WIDTH * HEIGHT; i++) count += memcmp(p->rgba, p->rgba + 4 * i, 4 * sizeof(float)) != 0;
+    return count;
+}
+
+static void pictures_are_the_same(double scale, const double offset[3])
+{
+    static const double nowhere[3] = {0, 0, 0};
+    bool is_same = true;
+    for (int i = 0; i < CASES; i++) {
+        caught_picture here = {0}, there = {0};
+        draw(&cases[i], 1, nowhere, &here);
+        draw(&cases[i], scale, offset, &there);
+        if (own_rank == 0) {
+            const double off = difference(&here, &there);
+            printf("%s, times %g: off by %.2g\n", cases[i].name, scale, off);
+            is_same = is_same && off <= cases[i].allowed && drawn_pixels(&here) > WIDTH * HEIGHT / 4;
+            free(here.rgba), free(here.depth), free(there.rgba), free(there.depth);
+        }
+    }
+    everywhere(is_same);
+}
+
+static void exact_offsets_change_no_pixel(void **context)
+{
+    (void)context;
+    pictures_are_the_same(1, (const double[]){5e5, 5.8e6, 0});
+}
+
+static void scenes_a_million_times_smaller_look_the_same(void **context)
+{
+    (void)context;
+    pictures_are_the_same(1e-6, (const double[]){0, 0, 0});
+}
+
+static void scenes_a_million_times_larger_look_the_same(void **context)
+{
+    (void)context;
+    pictures_are_the_same(1e6, (const double[]){0, 0, 0});
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(exact_offsets_change_no_pixel),
+        cmocka_unit_test(scenes_a_million_times_smaller_look_the_same),
+        cmocka_unit_test(scenes_a_million_times_larger_look_the_same),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
