@@ -67,7 +67,25 @@ static void chord_leaf(kernel_packet *p, void *opaque_state, int part, const uin
     for (int n = 0; n < count; n++) chord_cell(p, opaque_state, field, part, cells[n], rays);
 }
 
-/* As kernel_packet_setup(), with rays that need not be those of pixels. */
+static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
+{
+    const bool flat = p->frame->job->camera.is_orthographic;
+    const double reach = kernel_reach(p->frame);
+    float lanes[4][SIMD_WIDTH];
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        const double dx = l->px[i] - p->tile->centre_x, dy = l->py[i] - p->tile->centre_y;
+        lanes[0][i] = (float)(dx * reach);
+        lanes[1][i] = flat ? 0 : (float)dx;
+        lanes[2][i] = (float)(dy * reach);
+        lanes[3][i] = flat ? 0 : (float)dy;
+    }
+    p->origin_x = vf_load(lanes[0]);
+    p->slope_x = vf_load(lanes[1]);
+    p->origin_y = vf_load(lanes[2]);
+    p->slope_y = vf_load(lanes[3]);
+}
+
+/* As kernel_packet_setup() and kernel_packet_complete(), with rays that need not be those of pixels. */
 static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
                          const chord_rays *rays, int first)
 {
@@ -82,7 +100,7 @@ static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_t
         l.px[lane] = rays->x[ray];
         l.py[lane] = rays->y[ray];
     }
-    kernel_packet_tile_rays(p, &l);
+    chord_tile_rays(p, &l);
     kernel_packet_tree_rays(p, &l);
     double base[3], direction[3];
     kernel_tree_ray(f, tile->centre_x, tile->centre_y, base, direction);
@@ -94,8 +112,10 @@ static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_t
 static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays *rays)
 {
     const bool flat = f->job->camera.is_orthographic;
-    const kernel_tile tile = {rays->centre_x, rays->centre_y, flat ? 0 : (float)rays->centre_x,
-                              flat ? 0 : (float)rays->centre_y};
+    const kernel_tile tile = {.centre_x = rays->centre_x,
+                              .centre_y = rays->centre_y,
+                              .shear_x = flat ? 0 : (float)rays->centre_x,
+                              .shear_y = flat ? 0 : (float)rays->centre_y};
     thread->serial++;
     for (int i = 0; i < rays->count; i++) rays->span_count[i] = 0;
     for (int first = 0; first < rays->count; first += SIMD_WIDTH) {
