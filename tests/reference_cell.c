@@ -131,28 +131,27 @@ static double bilinear_residual(const double *a, const double *b, const double *
     return size > 0 ? residual / size : 0;
 }
 
-/* The (u, w) nearest to the unit square with a + u b + w c + u w d = 0: eliminating u leaves a quadratic in w. Of a
- * quad with two corners in one place one root is none. */
-static bool solve_bilinear(const double *a, const double *b, const double *c, const double *d, double *u, double *w)
+typedef struct patch_point {
+    double u, w, beyond;
+} patch_point;
+
+/* The two (u, w) with a + u b + w c + u w d = 0, and how far beyond the unit square they are: eliminating u leaves a
+ * quadratic in w. Of a quad with two corners in one place one root is none. Returns how many are in the square. */
+static int solve_bilinear(const double *a, const double *b, const double *c, const double *d, patch_point points[2])
 {
     const double qa = (double)cross(d, c), qb = (double)(cross(b, c) + cross(d, a)), qc = (double)cross(b, a);
-    const double root = sqrt(fmax(qb * qb - 4 * qa * qc, 0)), h = -0.5 * (qb + (qb < 0 ? -root : root));
+    const double square = qb * qb - 4 * qa * qc;
+    const double root = sqrt(fmax(square, 0)), h = -0.5 * (qb + (qb < 0 ? -root : root));
     const double candidates[2] = {h != 0 ? qc / h : 0.5, qa != 0 ? h / qa : (double)INFINITY};
-    double best = (double)INFINITY;
     int inside = 0;
-    *u = *w = 0.5;
     for (int i = 0; i < 2; i++) {
+        points[i] = (patch_point){0.5, 0.5, (double)INFINITY};
         if (!isfinite(candidates[i])) continue;
-        const double v = solve_u(a, b, c, d, candidates[i]);
-        const double beyond =
-            beyond_unit(candidates[i]) + beyond_unit(v) + bilinear_residual(a, b, c, d, v, candidates[i]);
-        inside += beyond < 1e-9;
-        if (beyond >= best) continue;
-        best = beyond;
-        *u = v;
-        *w = candidates[i];
+        const double w = candidates[i], u = solve_u(a, b, c, d, w);
+        points[i] = (patch_point){u, w, beyond_unit(w) + beyond_unit(u) + bilinear_residual(a, b, c, d, u, w)};
+        inside += points[i].beyond < 1e-9;
     }
-    return inside == 1;
+    return inside;
 }
 
 static double bilinear(const double values[4], double u, double w)
@@ -160,25 +159,46 @@ static double bilinear(const double values[4], double u, double w)
     return (1 - w) * ((1 - u) * values[0] + u * values[1]) + w * ((1 - u) * values[3] + u * values[2]);
 }
 
-/* From a quad's triangle to its patch. */
-static void move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
-                          reference_crossing *crossing)
+static int find_patch_points(const reference_cell *cell, const reference_line *line, const int *face,
+                             patch_point points[2])
 {
-    double p[4][2], z[4], a[2], b[2], c[2], d[2];
-    for (int i = 0; i < 4; i++) {
-        shear(line, cell->position[face[i]], p[i]);
-        z[i] = cell->position[face[i]][2];
-    }
+    double p[4][2], a[2], b[2], c[2], d[2];
+    for (int i = 0; i < 4; i++) shear(line, cell->position[face[i]], p[i]);
     for (int i = 0; i < 2; i++) {
         a[i] = p[0][i];
         b[i] = p[1][i] - p[0][i];
         c[i] = p[3][i] - p[0][i];
         d[i] = p[0][i] - p[1][i] + p[2][i] - p[3][i];
     }
-    crossing->is_folded = !solve_bilinear(a, b, c, d, &crossing->u, &crossing->w);
-    crossing->u = clamp_unit(crossing->u);
-    crossing->w = clamp_unit(crossing->w);
+    return solve_bilinear(a, b, c, d, points);
+}
+
+static void move_to_point(const reference_cell *cell, const int *face, const patch_point *point,
+                          reference_crossing *crossing)
+{
+    double z[4];
+    for (int i = 0; i < 4; i++) z[i] = cell->position[face[i]][2];
+    crossing->u = clamp_unit(point->u);
+    crossing->w = clamp_unit(point->w);
     if (!crossing->is_folded) crossing->z = bilinear(z, crossing->u, crossing->w);
+}
+
+/* From a quad's triangles that are crossed to its patch. A ray through one of them meets the patch once. A ray through
+ * both has one of them from behind: it meets the patch twice or, the patch being smooth where the triangles have a
+ * fold, not at all. Returns how many crossings are left. Where rounding makes it none of these, the nearest point, or
+ * the triangle's place, is marked as folded. */
+static int move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
+                         reference_crossing *crossings, int count)
+{
+    patch_point points[2];
+    const int inside = find_patch_points(cell, line, face, points);
+    const int nearest = points[1].beyond < points[0].beyond;
+    if (count == 2 && inside == 0) return 0;
+    for (int i = 0; i < count; i++) {
+        crossings[i].is_folded = inside != count;
+        move_to_point(cell, face, &points[inside == 2 ? i : nearest], &crossings[i]);
+    }
+    return count;
 }
 
 static int insert_crossing(reference_crossing *crossings, int count, const reference_crossing *found)
@@ -193,13 +213,17 @@ static int polyhedron_crossings(const reference_cell *cell, const reference_line
 {
     const reference_polyhedron *p = &cell->poly;
     int count = 0;
-    for (int i = 0; i < p->triangle_count; i++) {
-        reference_crossing found;
-        if (!triangle_crossed(cell, line, p->triangles[i], &found)) continue;
-        found.face = p->face_of[i];
-        found.triangle = i;
-        if (p->face_size[found.face] == 4) move_to_patch(cell, line, p->faces[found.face], &found);
-        count = insert_crossing(crossings, count, &found);
+    for (int i = 0, next; i < p->triangle_count; i = next) {
+        const int face = p->face_of[i];
+        reference_crossing found[REFERENCE_MAX_CROSSINGS];
+        int of_face = 0;
+        for (next = i; next < p->triangle_count && p->face_of[next] == face; next++) {
+            if (!triangle_crossed(cell, line, p->triangles[next], &found[of_face])) continue;
+            found[of_face].face = face;
+            found[of_face++].triangle = next;
+        }
+        if (of_face && p->face_size[face] == 4) of_face = move_to_patch(cell, line, p->faces[face], found, of_face);
+        for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
     return count;
 }
@@ -213,13 +237,14 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
     for (int face = 0; face < faces->count; face++) {
         int triangles[2][3];
         const int halves = split_face(cell, faces->vertices[face], triangles);
+        reference_crossing found[2];
+        int of_face = 0;
         for (int half = 0; half < halves; half++) {
-            reference_crossing found;
-            if (!triangle_crossed(cell, line, triangles[half], &found)) continue;
-            found.face = face;
-            if (halves == 2) move_to_patch(cell, line, faces->vertices[face], &found);
-            count = insert_crossing(crossings, count, &found);
+            if (!triangle_crossed(cell, line, triangles[half], &found[of_face])) continue;
+            found[of_face++].face = face;
         }
+        if (of_face && halves == 2) of_face = move_to_patch(cell, line, faces->vertices[face], found, of_face);
+        for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
     return count;
 }
