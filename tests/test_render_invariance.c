@@ -58,6 +58,46 @@ static void threads_do_not_change_a_bit(void **state)
     }
 }
 
+/* A tile at once, a packet, each ray on its own: the same cells are met, or at least those that have a hit. Cells are of
+ * ten pixels and of three, and some of the pixels are left out. */
+static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fixture_camera camera, bool all)
+{
+    enum { WIDTH = 61, HEIGHT = 47, TRAVERSALS = 3 };
+    render_fixture f;
+    drawn_frame drawn[TRAVERSALS];
+    unsigned char pixels[(WIDTH * HEIGHT + 7) / 8] = {0};
+    for (int64_t p = 0; p < WIDTH * HEIGHT; p++)
+        if (p * p % 7 < 3) pixel_set_add(pixels, p);
+    fixture_create_lattice(&f, kind, n, 0.2, test_wave);
+    fixture_look(&f, camera, WIDTH, HEIGHT);
+    add_layers(&f, scene);
+    if (scene == TRANSPARENT && kind == TEST_HEXES) {
+        f.surfaces[0].normal = RENDER_DIFFERENCES;
+        f.surfaces[0].difference = 1;
+    }
+    f.job.pixels = all ? NULL : pixels;
+    for (int i = 0; i < TRAVERSALS; i++) {
+        f.job.traversal = (render_traversal)i;
+        fixture_draw(&f, &drawn[i]);
+        drawn_assert_same(&drawn[0], &drawn[i]);
+        assert_int_equal(drawn[0].list.count, drawn[i].list.count);
+    }
+    for (int i = 0; i < TRAVERSALS; i++) drawn_free(&drawn[i]);
+    fixture_free(&f);
+}
+
+static void traversals_do_not_change_a_bit(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+            compare_traversals(kind, 4, OPAQUE, camera, true);
+            compare_traversals(kind, 13, OPAQUE, camera, camera % 2);
+            compare_traversals(kind, 4, TRANSPARENT, camera, true);
+            compare_traversals(kind, 4, OPAQUE_VOLUME, camera, false);
+        }
+}
+
 /* Groups only say how many samples are gathered before they are blended: the blend itself may round elsewhere. */
 static void sample_groups_draw_the_same(void **state)
 {
@@ -463,6 +503,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(threads_do_not_change_a_bit),
+        cmocka_unit_test(traversals_do_not_change_a_bit),
         cmocka_unit_test(sample_groups_draw_the_same),
         cmocka_unit_test(order_and_numbering_do_not_change_a_bit),
         cmocka_unit_test(turned_cells_draw_the_same),
