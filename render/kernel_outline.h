@@ -75,4 +75,99 @@ SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
     }
 }
 
+/* ---- cells with quads ----
+ *
+ * Let L be linear in the point, and E its largest difference from the field at a vertex. The field less L is the
+ * vertices' differences weighed by the shape functions, which in the cell are not negative and sum to 1: so |F - L| <=
+ * E in all of it, however distorted it is, and at most 2 E on the eighth around that kernel_roots.h counts with. Where
+ * a face's patch is not found its triangle is taken: the values differ by at most a quarter of L's alternating sum over
+ * the quad. A hit is a zero of F, or between two values of opposite signs, so L is no larger there than these sums: the
+ * hit is in a slab of the cell's hull, thin where the field is smooth. */
+
+/* Sums over the edges along each of the cell's coordinates: a mean edge times their number. */
+static inline int kernel_cell_edges(int type, signed char edges[3][4][2], int count[3])
+{
+    static const signed char hex[3][4][2] = {
+        {{0, 1}, {3, 2}, {4, 5}, {7, 6}}, {{0, 3}, {1, 2}, {4, 7}, {5, 6}}, {{0, 4}, {1, 5}, {2, 6}, {3, 7}}};
+    static const signed char wedge[3][4][2] = {{{0, 1}, {3, 4}}, {{0, 2}, {3, 5}}, {{0, 3}, {1, 4}, {2, 5}}};
+    static const signed char pyramid[3][4][2] = {{{0, 1}, {3, 2}}, {{0, 3}, {1, 2}}, {{0, 4}, {1, 4}, {2, 4}, {3, 4}}};
+    static const int counts[3][3] = {{4, 4, 4}, {2, 2, 3}, {2, 2, 4}};
+    const int which = type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : 2;
+    memcpy(edges, which == 0 ? hex : which == 1 ? wedge : pyramid, sizeof hex);
+    memcpy(count, counts[which], sizeof counts[which]);
+    return which;
+}
+
+/* L at the vertices, and how thick the slab is: |L| <= *thickness. False where no L is of use. */
+static inline bool kernel_linear_part(const kernel_cell *c, float at[GRID_MAX_CELL_VERTICES], float *thickness)
+{
+    const float *places[4] = {c->x, c->y, c->z, c->f};
+    signed char edges[3][4][2];
+    int count[3];
+    float d[3][4], n[3][3], middle[4], g[3], size = 0, error = 0, bend = 0;
+    kernel_cell_edges(c->type, edges, count);
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 4; a++) {
+            d[i][a] = 0;
+            for (int e = 0; e < count[i]; e++) d[i][a] += places[a][edges[i][e][1]] - places[a][edges[i][e][0]];
+        }
+    for (int i = 0; i < 3; i++) {
+        const float *u = d[(i + 1) % 3], *v = d[(i + 2) % 3];
+        for (int a = 0; a < 3; a++) n[i][a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
+    }
+    const float volume = d[0][0] * n[0][0] + d[0][1] * n[0][1] + d[0][2] * n[0][2];
+    if (!(fabsf(volume) > 0)) return false;
+    for (int a = 0; a < 3; a++) g[a] = (d[0][3] * n[0][a] + d[1][3] * n[1][a] + d[2][3] * n[2][a]) / volume;
+    for (int a = 0; a < 4; a++) {
+        middle[a] = 0;
+        for (int i = 0; i < c->count; i++) middle[a] += places[a][i];
+        middle[a] /= (float)c->count;
+    }
+    for (int i = 0; i < c->count; i++) {
+        at[i] = middle[3];
+        for (int a = 0; a < 3; a++) {
+            const float part = g[a] * (places[a][i] - middle[a]);
+            at[i] += part;
+            size = fabsf(part) > size ? fabsf(part) : size;
+        }
+        error = fabsf(at[i] - c->f[i]) > error ? fabsf(at[i] - c->f[i]) : error;
+    }
+    const kernel_shape *shape = kernel_cell_shape(c->type);
+    for (int i = 0; i < shape->face_count; i++) {
+        const signed char *v = shape->faces[i].vertices;
+        if (shape->faces[i].count == 3) continue;
+        const float sum = fabsf((at[v[0]] - at[v[1]]) + (at[v[2]] - at[v[3]]));
+        bend = sum > bend ? sum : bend;
+    }
+    /* f is at most about 1; places are known to a rounding of their distance from the tile, see KERNEL_OUTLINE_PAD. */
+    *thickness = 2 * error + 0.25f * bend + KERNEL_OUTLINE_PAD * (1 + size);
+    return *thickness < 1;
+}
+
+static inline void kernel_outline_add(kernel_outline *o, const kernel_cell *c, int i, int j, float along)
+{
+    const float *places[3] = {c->x, c->y, c->z};
+    for (int a = 0; a < 3; a++) o->point[a][o->count] = places[a][i] + along * (places[a][j] - places[a][i]);
+    o->count++;
+}
+
+/* The corners of the hull's slab, and points within it: vertices in the slab, and where lines between two vertices meet
+ * its sides. False where there are none. o has the vertices at first, which stay where no slab is to be had. */
+static inline bool kernel_slab_outline(const kernel_cell *c, kernel_outline *o)
+{
+    float at[GRID_MAX_CELL_VERTICES], thickness;
+    if (!kernel_linear_part(c, at, &thickness)) return true;
+    o->count = 0;
+    for (int i = 0; i < c->count; i++) {
+        if (fabsf(at[i]) <= thickness) kernel_outline_add(o, c, i, i, 0);
+        for (int j = 0; j < i; j++)
+            for (int side = -1; side <= 1; side += 2) {
+                const float level = (float)side * thickness;
+                if ((at[i] < level) != (at[j] < level))
+                    kernel_outline_add(o, c, i, j, (level - at[i]) / (at[j] - at[i]));
+            }
+    }
+    return o->count > 0;
+}
+
 #endif

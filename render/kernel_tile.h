@@ -196,9 +196,11 @@ SIMD_INLINE kernel_lie kernel_box_lie(const kernel_planes *q, const mmbvh *tree,
 }
 
 /* Points in tile space. */
+enum { KERNEL_OUTLINE_POINTS = 64 }; /* eight vertices, and two on each line between two of them */
+
 typedef struct kernel_outline {
     int count;
-    float point[3][GRID_MAX_CELL_VERTICES];
+    float point[3][KERNEL_OUTLINE_POINTS];
     float size[3]; /* of the cell: largest |X|, |Y|, |Z| of its vertices */
 } kernel_outline;
 

@@ -92,6 +92,14 @@ SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, ui
     if (is_nearer) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
 }
 
+/* Blocks in which a body of this outline may show. */
+SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
+{
+    const kernel_lie lie = kernel_outline_lie(&t->tile_planes, outline);
+    if (lie.far < t->t_near) return 0;
+    return blocks & lie.blocks & kernel_blocks_beyond(t, lie.near);
+}
+
 /* Blocks in which the cell's surface may show. */
 SIMD_INLINE unsigned kernel_tile_narrow(const kernel_tile_trace *t, const kernel_cell *c, unsigned blocks)
 {
@@ -100,9 +108,9 @@ SIMD_INLINE unsigned kernel_tile_narrow(const kernel_tile_trace *t, const kernel
         kernel_vertex_outline(c, &outline);
     else if (!kernel_tet_outline(c, &outline))
         return 0;
-    const kernel_lie lie = kernel_outline_lie(&t->tile_planes, &outline);
-    if (lie.far < t->t_near) return 0;
-    return blocks & lie.blocks & kernel_blocks_beyond(t, lie.near);
+    blocks = kernel_tile_keep(t, &outline, blocks);
+    if (!blocks || c->type == GRID_TET) return blocks;
+    return kernel_slab_outline(c, &outline) ? kernel_tile_keep(t, &outline, blocks) : 0;
 }
 
 /* Most cells are not ordered, for they turn out to lie beside the tile. */

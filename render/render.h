@@ -137,7 +137,7 @@ typedef struct render_job {
     int part_count;
     const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
     const render_surface_layer *surfaces;
-    int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
+    int surface_count;          /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
     render_traversal traversal; /* of surfaces */
     const render_volume_layer *volumes;
     int volume_count;
