@@ -76,18 +76,38 @@ MMBVH_INLINE void fetch_box_empty(fetch_box *box)
     }
 }
 
+MMBVH_INLINE void fetch_box_unite(fetch_box *to, const fetch_box *box)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        to->lower[axis] = box->lower[axis] < to->lower[axis] ? box->lower[axis] : to->lower[axis];
+        to->upper[axis] = box->upper[axis] > to->upper[axis] ? box->upper[axis] : to->upper[axis];
+    }
+}
+
+/* The box grows by a cell. Floats are compared as floats, and only the outcome is widened. */
 MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
                                  const bool wide_index, const bool wide_number)
 {
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
+    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int i = 0; i < count; i++) {
         const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
         for (int axis = 0; axis < 3; axis++) {
             const double x = fetch_number(&g->coordinates[axis], vertex, wide_number);
-            box->lower[axis] = x < box->lower[axis] ? x : box->lower[axis];
-            box->upper[axis] = x > box->upper[axis] ? x : box->upper[axis];
+            if (wide_number) {
+                box->lower[axis] = x < box->lower[axis] ? x : box->lower[axis];
+                box->upper[axis] = x > box->upper[axis] ? x : box->upper[axis];
+            } else {
+                low[axis] = (float)x < low[axis] ? (float)x : low[axis];
+                high[axis] = (float)x > high[axis] ? (float)x : high[axis];
+            }
         }
+    }
+    if (wide_number) return;
+    for (int axis = 0; axis < 3; axis++) {
+        box->lower[axis] = (double)low[axis] < box->lower[axis] ? (double)low[axis] : box->lower[axis];
+        box->upper[axis] = (double)high[axis] > box->upper[axis] ? (double)high[axis] : box->upper[axis];
     }
 }
 

@@ -54,4 +54,13 @@ static inline ivec4 vec4_truncate(vec4 a)
 #endif
 }
 
+static inline vec4 vec4_from_int(ivec4 a)
+{
+#if defined(__SSE2__)
+    return (vec4)_mm_cvtepi32_ps((__m128i)a);
+#else
+    return __builtin_convertvector(a, vec4);
+#endif
+}
+
 #endif
