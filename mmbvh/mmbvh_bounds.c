@@ -7,20 +7,26 @@
     static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)                  \
     {                                                                                                                  \
         for (int i = 0; i < count; i++) {                                                                              \
-            fetch_box box;                                                                                             \
-            fetch_box_empty(&box);                                                                                     \
-            fetch_box_cell(&box, source->g, cells[i], shape, wide_index, wide_number);                                 \
-            boxes[i] = box;                                                                                            \
+            fetch_box_empty(&boxes[i]);                                                                                \
+            fetch_box_cells(&boxes[i], source->g, cells + i, 1, shape, wide_index, wide_number);                       \
         }                                                                                                              \
     }
 FETCH_INSTANCES(DEFINE_READ, read)
 
+MMBVH_INLINE void prefetch_cells(const grid *g, const uint32_t *cells, int cell_count, const fetch_shape shape)
+{
+    for (int k = 0; k < cell_count; k++) {
+        const int64_t first = fetch_first(g, cells[k], fetch_vertex_count(g, cells[k], shape), shape);
+        __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
+    }
+}
+
 #define DEFINE_UNITE(name, shape, wide_index, wide_number)                                                             \
-    static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_box *box)                    \
+    static void name(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,              \
+                     fetch_box *box)                                                                                   \
     {                                                                                                                  \
-        fetch_box own = *box;                                                                                          \
-        for (int i = 0; i < count; i++) fetch_box_cell(&own, source->g, cells[i], shape, wide_index, wide_number);     \
-        *box = own;                                                                                                    \
+        if (soon) prefetch_cells(source->g, soon, count, shape);                                                       \
+        fetch_box_cells(box, source->g, cells, count, shape, wide_index, wide_number);                                 \
     }
 FETCH_INSTANCES(DEFINE_UNITE, unite)
 
@@ -32,8 +38,10 @@ static void read_any(const bounds_source *source, const uint32_t *cells, int cou
     }
 }
 
-static void unite_any(const bounds_source *source, const uint32_t *cells, int count, fetch_box *box)
+static void unite_any(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+                      fetch_box *box)
 {
+    (void)soon;
     for (int i = 0; i < count; i++) fetch_box_any_cell(box, source->g, cells[i]);
 }
 
@@ -47,8 +55,10 @@ static void read_given(const bounds_source *source, const uint32_t *cells, int c
     }
 }
 
-static void unite_given(const bounds_source *source, const uint32_t *cells, int count, fetch_box *box)
+static void unite_given(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+                        fetch_box *box)
 {
+    (void)soon;
     for (int i = 0; i < count; i++) {
         fetch_box given;
         read_given(source, cells + i, 1, &given);

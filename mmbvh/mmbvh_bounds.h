@@ -9,8 +9,9 @@
 /* The boxes of so many cells, in the source's own coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
-/* box grows by so many cells. */
-typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, fetch_box *box);
+/* box grows by so many cells. As many after soon, if not NULL, will be asked for later. */
+typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+                          fetch_box *box);
 
 struct bounds_source {
     const grid *g; /* NULL: the boxes are given */

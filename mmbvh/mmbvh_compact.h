@@ -34,24 +34,36 @@ typedef struct mmbvh_compact_node {
 } mmbvh_compact_node;
 
 typedef struct mmbvh_grid {
-    float origin[4]; /* lanes 3: 0 */
-    float step[4];
+    float origin[4];
+    float step[4]; /* powers of two; lane 3 of both: 0 */
 } mmbvh_grid;
 
 typedef float compact_vec4 __attribute__((vector_size(16), may_alias, aligned(4)));
 typedef int32_t compact_ivec4 __attribute__((vector_size(16), may_alias, aligned(4)));
 
-static inline void compact_box(const mmbvh_compact_node *node, const mmbvh_grid *grid, float lower[4], float upper[4])
+/* Lane 3 of both: 0. */
+static inline void compact_decode_words(ivec4 word, const mmbvh_grid *grid, vec4 *lower, vec4 *upper)
 {
-    const ivec4 word = *(const compact_ivec4 *)(const void *)node;
     const vec4 step = *(const compact_vec4 *)(const void *)grid->step;
     const vec4 origin = *(const compact_vec4 *)(const void *)grid->origin;
     const ivec4 bits = (word >> (COMPACT_LOWER_BITS + COMPACT_MANTISSA_BITS - 23)) &
                        (COMPACT_EXTENT_MAX << (23 - COMPACT_MANTISSA_BITS));
     const vec4 extent = (vec4)(bits + COMPACT_ONE) - 16.0f;
-    const vec4 low = vec4_from_int(word & COMPACT_LOWER_MAX) * step + origin;
+    *lower = vec4_from_int(word & COMPACT_LOWER_MAX) * step + origin;
+    *upper = extent * step + *lower;
+}
+
+static inline void compact_decode(const mmbvh_compact_node *node, const mmbvh_grid *grid, vec4 *lower, vec4 *upper)
+{
+    compact_decode_words(*(const compact_ivec4 *)(const void *)node, grid, lower, upper);
+}
+
+static inline void compact_box(const mmbvh_compact_node *node, const mmbvh_grid *grid, float lower[4], float upper[4])
+{
+    vec4 low, high;
+    compact_decode(node, grid, &low, &high);
     *(compact_vec4 *)(void *)lower = low;
-    *(compact_vec4 *)(void *)upper = extent * step + low;
+    *(compact_vec4 *)(void *)upper = high;
 }
 
 #endif

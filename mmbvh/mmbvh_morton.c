@@ -8,8 +8,8 @@
 #include "memory.h"
 
 enum {
-    CODE_BITS_MAX = 40, /* four passes */
-    DIGIT_BITS = 10,
+    CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
+    DIGIT_BITS = 11, /* as many streams as a core's cache can hold the ends of */
     DIGITS = 1 << DIGIT_BITS,
     SORT_CHUNKS_MAX = 64
 };

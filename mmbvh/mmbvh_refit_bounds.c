@@ -4,16 +4,35 @@
 #include "mmbvh_bounds.h"
 #include "mmbvh_store.h"
 
+enum { PREFETCH_CELLS = 24 };
+
+static void decode(const mmbvh *tree, int64_t index, vec4 *lower, vec4 *upper)
+{
+    if (tree->compact) {
+        compact_decode(&tree->compact[index], &tree->grid, lower, upper);
+        return;
+    }
+    const mmbvh_node *node = &tree->nodes[index];
+    *lower = (vec4){node->lower[0], node->lower[1], node->lower[2], 0};
+    *upper = (vec4){node->upper[0], node->upper[1], node->upper[2], 0};
+}
+
 static bool store_union(const mmbvh *tree, int64_t index, int64_t pair)
 {
-    float lower[2][4], upper[2][4];
-    for (int side = 0; side < 2; side++) mmbvh_node_box(tree, pair + side, lower[side], upper[side]);
-    for (int axis = 0; axis < 3; axis++) {
-        lower[0][axis] = lower[0][axis] < lower[1][axis] ? lower[0][axis] : lower[1][axis];
-        upper[0][axis] = upper[0][axis] > upper[1][axis] ? upper[0][axis] : upper[1][axis];
-    }
-    lower[0][3] = upper[0][3] = 0;
-    return store_box(tree, index, lower[0], upper[0]);
+    vec4 lower[2], upper[2];
+    for (int side = 0; side < 2; side++) decode(tree, pair + side, &lower[side], &upper[side]);
+    return store_box(tree, index, vec4_min(lower[0], lower[1]), vec4_max(upper[0], upper[1]));
+}
+
+static bool store_cells(const mmbvh *tree, const bounds_source *source, int64_t index, int64_t first, int count)
+{
+    fetch_box box;
+    float lower[3], upper[3];
+    fetch_box_empty(&box);
+    const uint32_t *cells = tree->cells + first; /* the sweep goes down through them */
+    source->unite(source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
+    fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
+    return store_box(tree, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0});
 }
 
 /* Returns how many nodes' boxes the tree's grid does not hold. */
@@ -24,16 +43,7 @@ static int64_t run_bounds(const sweep *s, int64_t first, int64_t end)
     for (int64_t i = end - 1; i >= first; i--) {
         const int count = mmbvh_node_count(tree, i);
         const int64_t ref = mmbvh_node_ref(tree, i);
-        if (!count) {
-            misfits += !store_union(tree, i, ref);
-            continue;
-        }
-        fetch_box box;
-        fetch_box_empty(&box);
-        s->source->unite(s->source, tree->cells + ref, count, &box);
-        float lower[4] = {0}, upper[4] = {0};
-        fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
-        misfits += !store_box(tree, i, lower, upper);
+        misfits += !(count ? store_cells(tree, s->source, i, ref, count) : store_union(tree, i, ref));
     }
     return misfits;
 }
@@ -56,7 +66,7 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
         for (int64_t begin = 0; begin < tree->cell_count; begin += BOUNDS_BLOCK) {
             const int64_t left = tree->cell_count - begin;
             const int count = (int)(left < BOUNDS_BLOCK ? left : BOUNDS_BLOCK);
-            source->unite(source, tree->cells + begin, count, &own);
+            source->unite(source, tree->cells + begin, count, NULL, &own);
         }
 #pragma omp critical(mmbvh_merge)
         fetch_box_unite(&all, &own);

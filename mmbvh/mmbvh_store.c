@@ -14,7 +14,7 @@ static double power_above(double x)
 mmbvh_grid store_grid(const float lower[3], const float upper[3])
 {
     enum { STEPS = (1 << COMPACT_LOWER_BITS) - (1 << (COMPACT_LOWER_BITS - COMPACT_MANTISSA_BITS)) };
-    mmbvh_grid grid = {.step = {1, 1, 1, 1}};
+    mmbvh_grid grid = {0};
     for (int axis = 0; axis < 3; axis++) {
         const double low = (double)lower[axis], high = (double)upper[axis];
         const double far = fmax(fabs(low), fabs(high));
@@ -26,7 +26,7 @@ mmbvh_grid store_grid(const float lower[3], const float upper[3])
     return grid;
 }
 
-bool store_compact_slowly(const mmbvh *tree, int64_t index, const float lower[4], const float upper[4])
+bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
 {
     for (int axis = 0; axis < 3; axis++) {
         uint32_t *word = &tree->compact[index].axis[axis];
