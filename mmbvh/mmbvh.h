@@ -3,8 +3,8 @@
  *
  * The nodes stand in one array, root first, siblings side by side, so that one reference finds both. A leaf holds
  * at most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32, rounded
- * outward from the double values. A cell that is a ghost is not in the tree; one that has a value that is not
- * finite has the empty range (+inf, -inf) and so is never met.
+ * outward from the double values; the compact layout rounds bounds further outward, to its grid. A cell that is a ghost
+ * is not in the tree; one that has a value that is not finite has the empty range (+inf, -inf) and so is never met.
  *
  * Nodes are numbered depth first by pairs: a pair of siblings, then all below the left one, then all below the right
  * one; the leaves' cells stand in the same order. So children come after parents, and all below a node is one run. */
@@ -13,6 +13,7 @@
 
 #include "error.h"
 #include "grid.h"
+#include "mmbvh_compact.h"
 
 enum {
     MMBVH_MAX_LEAF = 7,
@@ -28,10 +29,23 @@ typedef struct mmbvh_node {
     uint64_t ref : 61;  /* leaf: first entry in cells; inner: the left child's index, the right one follows */
 } mmbvh_node;           /* 40 bytes, as the thesis's figure 4.1 */
 
+typedef enum mmbvh_layout {
+    MMBVH_COMPACT,  /* 24 bytes a node, bounds in steps of a grid (mmbvh_compact.h) */
+    MMBVH_REFERENCE /* 40 bytes a node, bounds in float32; the compact one falls back to it where it cannot hold the
+                       tree: beyond 2^29 cells, or bounds that are not finite */
+} mmbvh_layout;
+
+typedef enum mmbvh_builder {
+    MMBVH_SAH,   /* binned surface area heuristic */
+    MMBVH_MORTON /* along a space-filling curve: several times faster to build, slower to go through */
+} mmbvh_builder;
+
 typedef struct mmbvh {
-    mmbvh_node *nodes;
-    int64_t node_count; /* 0 for no cells at all */
-    uint32_t *cells;    /* cell indices (or mesh indices in a parent tree), leaf by leaf */
+    mmbvh_node *nodes;           /* the reference layout; else NULL */
+    mmbvh_compact_node *compact; /* the compact layout; else NULL */
+    mmbvh_grid grid;             /* of the compact layout */
+    int64_t node_count;          /* 0 for no cells at all */
+    uint32_t *cells;             /* cell indices (or mesh indices in a parent tree), leaf by leaf */
     int64_t cell_count;
     double origin[3]; /* bounds are of (position - origin) * scale */
     double scale;
@@ -43,6 +57,10 @@ typedef struct mmbvh {
  * lanes 0 to 2; lane 3 is scratch, so that a box can be written by whole vectors. */
 static inline void mmbvh_node_box(const mmbvh *tree, int64_t index, float lower[4], float upper[4])
 {
+    if (tree->compact) {
+        compact_box(&tree->compact[index], &tree->grid, lower, upper);
+        return;
+    }
     const mmbvh_node *node = &tree->nodes[index];
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = node->lower[axis];
@@ -53,19 +71,19 @@ static inline void mmbvh_node_box(const mmbvh *tree, int64_t index, float lower[
 /* Cells in a leaf; 0: an inner node. */
 static inline int mmbvh_node_count(const mmbvh *tree, int64_t index)
 {
-    return (int)tree->nodes[index].count;
+    return tree->compact ? (int)(tree->compact[index].link & 7) : (int)tree->nodes[index].count;
 }
 
 /* Of a leaf: its first entry in cells; of an inner node: its left child's index, the right one follows. */
 static inline int64_t mmbvh_node_ref(const mmbvh *tree, int64_t index)
 {
-    return (int64_t)tree->nodes[index].ref;
+    return tree->compact ? (int64_t)(tree->compact[index].link >> 3) : (int64_t)tree->nodes[index].ref;
 }
 
 /* Bytes of nodes and cell indices. */
 int64_t mmbvh_bytes(const mmbvh *tree);
 
-/* Ranges of one field: the nodes' own (stride 40) or an array of pairs beside the tree (stride 8). */
+/* Ranges of one field: the nodes' own (stride 24 or 40) or an array of pairs beside the tree (stride 8). */
 typedef struct mmbvh_ranges {
     const char *low; /* of node 0 */
     const char *high;
@@ -81,10 +99,12 @@ typedef struct mmbvh_selection {
 typedef struct mmbvh_options {
     int threads;                      /* >= 1; 0: as many as OpenMP would take */
     const mmbvh_selection *selection; /* of a build: these cells alone; NULL: all. None may be a ghost. */
+    mmbvh_layout layout;
+    mmbvh_builder builder;
 } mmbvh_options;
 
-/* Build over the grid's cells (ghosts left out) with the ranges of field (NULL: all ranges (-inf, +inf)). Binned SAH,
- * parallel; the same tree for any number of threads. On success *out owns the memory: free it with mmbvh_free(). On
+/* Build over the grid's cells (ghosts left out) with the ranges of field (NULL: all ranges (-inf, +inf)).
+ * Parallel; the same tree for any number of threads. On success *out owns the memory: free it with mmbvh_free(). On
  * an error *out is zeroed. */
 insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
                           const mmbvh_options *options, mmbvh *out, base_error *error);
@@ -128,13 +148,13 @@ insitu_status mmbvh_compute_ranges(const mmbvh *tree, const grid *g, const grid_
 
 static inline mmbvh_ranges mmbvh_own_ranges(const mmbvh *tree)
 {
-    mmbvh_ranges r = {0};
-    if (tree->node_count) {
-        r.low = (const char *)&tree->nodes[0].range_low;
-        r.high = (const char *)&tree->nodes[0].range_high;
-        r.stride = (int64_t)sizeof(mmbvh_node);
+    if (!tree->node_count) return (mmbvh_ranges){0};
+    if (tree->compact) {
+        return (mmbvh_ranges){(const char *)&tree->compact->range_low, (const char *)&tree->compact->range_high,
+                              (int64_t)sizeof *tree->compact};
     }
-    return r;
+    return (mmbvh_ranges){(const char *)&tree->nodes->range_low, (const char *)&tree->nodes->range_high,
+                          (int64_t)sizeof *tree->nodes};
 }
 
 static inline mmbvh_ranges mmbvh_pair_ranges(const float *pairs)

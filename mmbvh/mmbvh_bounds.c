@@ -1,121 +1,155 @@
-/* Bounds of cells and nodes from the vertices: for the builder's boxes, and to refit the bounds of a tree. */
+/* Bounds of cells from their vertices, for the builders. */
 #include "mmbvh_bounds.h"
 
-#include "mmbvh_fetch.h"
+#include <omp.h>
 
-/* A grid's cells' boxes. */
-
-MMBVH_INLINE void fill_boxes(const bounds_source *source, int64_t begin, int64_t end, branch_box *boxes, bin_set *set,
-                             const fetch_shape shape, const bool wide_index, const bool wide_number)
-{
-    for (int64_t i = begin; i < end; i++) {
-        const int64_t cell = source->cells ? (int64_t)source->cells[i] : i;
-        if (grid_is_ghost(source->g, cell)) continue;
-        fetch_box box;
-        fetch_box_empty(&box);
-        fetch_box_cell(&box, source->g, cell, shape, wide_index, wide_number);
-        branch_box *to = &boxes[i];
-        fetch_box_round(&box, source->origin, source->scale, to->lower, to->upper);
-        bin_set_add(set, branch_box_lower(to), branch_box_upper(to));
-    }
-}
-
-#define DEFINE_FILL(name, shape, wide_index, wide_number)                                                              \
-    static void name(const bounds_source *source, int64_t begin, int64_t end, branch_box *boxes, bin_set *set)         \
+#define DEFINE_READ(name, shape, wide_index, wide_number)                                                              \
+    static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)                  \
     {                                                                                                                  \
-        fill_boxes(source, begin, end, boxes, set, shape, wide_index, wide_number);                                    \
+        for (int i = 0; i < count; i++) {                                                                              \
+            fetch_box_empty(&boxes[i]);                                                                                \
+            fetch_box_cells(&boxes[i], source->g, cells + i, 1, shape, wide_index, wide_number);                       \
+        }                                                                                                              \
     }
-FETCH_INSTANCES(DEFINE_FILL, fill)
+FETCH_INSTANCES(DEFINE_READ, read)
 
-static void fill_any(const bounds_source *source, int64_t begin, int64_t end, branch_box *boxes, bin_set *set)
+MMBVH_INLINE void prefetch_cells(const grid *g, const uint32_t *cells, int cell_count, const fetch_shape shape)
 {
-    for (int64_t i = begin; i < end; i++) {
-        const int64_t cell = source->cells ? (int64_t)source->cells[i] : i;
-        if (grid_is_ghost(source->g, cell)) continue;
-        fetch_box box;
-        fetch_box_empty(&box);
-        fetch_box_any_cell(&box, source->g, cell);
-        branch_box *to = &boxes[i];
-        fetch_box_round(&box, source->origin, source->scale, to->lower, to->upper);
-        bin_set_add(set, branch_box_lower(to), branch_box_upper(to));
+    for (int k = 0; k < cell_count; k++) {
+        const int64_t first = fetch_first(g, cells[k], fetch_vertex_count(g, cells[k], shape), shape);
+        __builtin_prefetch(g->connectivity.data + first * g->connectivity.stride);
     }
 }
 
-static void fill_given(const bounds_source *source, int64_t begin, int64_t end, branch_box *boxes, bin_set *set)
+#define DEFINE_UNITE(name, shape, wide_index, wide_number)                                                             \
+    static void name(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,              \
+                     fetch_box *box)                                                                                   \
+    {                                                                                                                  \
+        if (soon) prefetch_cells(source->g, soon, count, shape);                                                       \
+        fetch_box_cells(box, source->g, cells, count, shape, wide_index, wide_number);                                 \
+    }
+FETCH_INSTANCES(DEFINE_UNITE, unite)
+
+static void read_any(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)
 {
-    for (int64_t i = begin; i < end; i++) {
+    for (int i = 0; i < count; i++) {
+        fetch_box_empty(&boxes[i]);
+        fetch_box_any_cell(&boxes[i], source->g, cells[i]);
+    }
+}
+
+static void unite_any(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+                      fetch_box *box)
+{
+    (void)soon;
+    for (int i = 0; i < count; i++) fetch_box_any_cell(box, source->g, cells[i]);
+}
+
+static void read_given(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)
+{
+    for (int i = 0; i < count; i++) {
         for (int axis = 0; axis < 3; axis++) {
-            boxes[i].lower[axis] = source->lower[3 * i + axis] + 0.0f;
-            boxes[i].upper[axis] = source->upper[3 * i + axis] + 0.0f;
+            boxes[i].lower[axis] = (double)source->lower[3 * (int64_t)cells[i] + axis];
+            boxes[i].upper[axis] = (double)source->upper[3 * (int64_t)cells[i] + axis];
         }
-        bin_set_add(set, branch_box_lower(&boxes[i]), branch_box_upper(&boxes[i]));
     }
 }
 
-bounds_fill bounds_choose_fill(const grid *g)
+static void unite_given(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+                        fetch_box *box)
 {
-    static const bounds_fill table[FETCH_SHAPES][2][2] = FETCH_TABLE(fill);
-    if (!g) return fill_given;
-    if (!fetch_is_plain(g)) return fill_any;
-    return table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
+    (void)soon;
+    for (int i = 0; i < count; i++) {
+        fetch_box given;
+        read_given(source, cells + i, 1, &given);
+        fetch_box_unite(box, &given);
+    }
 }
 
-/* A tree's nodes' bounds. */
-
-static void unite_children(mmbvh_node *node, const mmbvh_node *pair)
+bounds_source bounds_source_make(const grid *g, const float *lower, const float *upper, int64_t count,
+                                 const double origin[3], double scale)
 {
+    static bounds_read *const reads[FETCH_SHAPES][2][2] = FETCH_TABLE(read);
+    static bounds_unite *const unites[FETCH_SHAPES][2][2] = FETCH_TABLE(unite);
+    bounds_source s = {.g = g, .scale = scale, .lower = lower, .upper = upper, .box_count = count};
+    s.read = g ? read_any : read_given;
+    s.unite = g ? unite_any : unite_given;
+    for (int axis = 0; axis < 3; axis++) s.origin[axis] = origin[axis];
+    if (!g || !fetch_is_plain(g)) return s;
+    s.read = reads[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
+    s.unite = unites[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
+    return s;
+}
+
+/* The span of the finite numbers of an array. */
+static void span_of(const grid_array *a, int64_t count, int threads, double *least, double *most)
+{
+    double low = INFINITY, high = -INFINITY;
+#pragma omp parallel for num_threads(threads) reduction(min : low) reduction(max : high)
+    for (int64_t i = 0; i < count; i++) {
+        const double x = grid_array_number(a, i);
+        const bool usable = x - x == 0;
+        low = usable && x < low ? x : low;
+        high = usable && x > high ? x : high;
+    }
+    *least = low;
+    *most = high;
+}
+
+fetch_box bounds_guess(const bounds_source *source, int threads)
+{
+    fetch_box box;
+    const int64_t size = (int64_t)sizeof(float);
     for (int axis = 0; axis < 3; axis++) {
-        const float l0 = pair[0].lower[axis], l1 = pair[1].lower[axis];
-        const float u0 = pair[0].upper[axis], u1 = pair[1].upper[axis];
-        node->lower[axis] = l0 < l1 ? l0 : l1;
-        node->upper[axis] = u0 > u1 ? u0 : u1;
-    }
-}
-
-MMBVH_INLINE int64_t run_bounds(const sweep *s, int64_t first, int64_t end, const bool plain, const fetch_shape shape,
-                                const bool wide_index, const bool wide_number)
-{
-    for (int64_t i = end - 1; i >= first; i--) {
-        mmbvh_node *node = s->nodes + i;
-        if (!node->count) {
-            unite_children(node, s->nodes + node->ref);
-            continue;
+        if (source->g) {
+            const grid_array *a = &source->g->coordinates[axis];
+            span_of(a, source->g->vertex_count, threads, &box.lower[axis], &box.upper[axis]);
+        } else {
+            double unused;
+            const grid_array lower = {(const char *)(source->lower + axis), 3 * size, false, false};
+            const grid_array upper = {(const char *)(source->upper + axis), 3 * size, false, false};
+            span_of(&lower, source->box_count, 1, &box.lower[axis], &unused);
+            span_of(&upper, source->box_count, 1, &unused, &box.upper[axis]);
         }
-        fetch_box box;
-        fetch_box_empty(&box);
-        for (uint64_t k = 0; k < node->count; k++) {
-            const int64_t cell = s->tree->cells[node->ref + k];
-            if (plain) {
-                fetch_box_cell(&box, s->g, cell, shape, wide_index, wide_number);
-            } else {
-                fetch_box_any_cell(&box, s->g, cell);
-            }
+    }
+    bounds_transform(source, &box);
+    return box;
+}
+
+item_grid item_grid_make(const double lower[3], const double upper[3])
+{
+    item_grid grid = {.is_finest = true};
+    for (int axis = 0; axis < 3; axis++) {
+        const double extent = upper[axis] - lower[axis], far = fmax(fabs(lower[axis]), fabs(upper[axis]));
+        grid.origin[axis] = lower[axis];
+        grid.step[axis] = extent > 0 && extent < INFINITY ? extent / ITEM_TOP : 0;
+        grid.inverse[axis] = grid.step[axis] > 0 ? 1 / grid.step[axis] : 0;
+        /* Below the floats' own distances nodes cannot tell cells apart. */
+        if (extent > far * 0x1p-22) grid.is_finest = false;
+    }
+    return grid;
+}
+
+static int list_block(const item *items, int64_t count, uint32_t cells[BOUNDS_BLOCK])
+{
+    const int n = (int)(count < BOUNDS_BLOCK ? count : BOUNDS_BLOCK);
+    for (int i = 0; i < n; i++) cells[i] = item_index(items[i]);
+    return n;
+}
+
+void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
+                  fetch_box *exact)
+{
+    uint32_t cells[BOUNDS_BLOCK];
+    fetch_box boxes[BOUNDS_BLOCK];
+    for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
+        const int n = list_block(items + begin, count - begin, cells);
+        source->read(source, cells, n, boxes);
+        for (int i = 0; i < n; i++) {
+            if (exact) fetch_box_unite(exact, &boxes[i]);
+            bounds_transform(source, &boxes[i]);
+            items[begin + i] = item_make(grid, boxes[i].lower, boxes[i].upper, cells[i]);
+            item_set_add(set, items[begin + i]);
         }
-        fetch_box_round(&box, s->tree->origin, s->tree->scale, node->lower, node->upper);
     }
-    return 0;
-}
-
-#define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
-    static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
-    {                                                                                                                  \
-        return run_bounds(s, first, end, true, shape, wide_index, wide_number);                                        \
-    }
-FETCH_INSTANCES(DEFINE_RUN, run_bounds)
-
-static int64_t run_any_bounds(const sweep *s, int64_t first, int64_t end)
-{
-    return run_bounds(s, first, end, false, FETCH_BY_CELL, false, false);
-}
-
-insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options *options)
-{
-    static const sweep_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_bounds);
-    if (!tree || !g) return INSITU_ERROR_ARGUMENT;
-    sweep s = {.tree = tree, .g = g, .nodes = tree->nodes, .run = run_any_bounds};
-    if (fetch_is_plain(g)) {
-        s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
-    }
-    sweep_tree(&s, sweep_threads(options));
-    return INSITU_OK;
 }

@@ -2,20 +2,49 @@
 #ifndef MMBVH_BOUNDS_H
 #define MMBVH_BOUNDS_H
 
-#include "mmbvh_branch.h"
+#include "mmbvh_fetch.h"
+#include "mmbvh_item.h"
 #include "mmbvh_sweep.h"
 
-typedef struct bounds_source {
-    const grid *g;         /* NULL: the boxes are given */
-    const uint32_t *cells; /* boxes are of these cells of the grid; NULL: of all */
+/* The boxes of so many cells, in the source's own coordinates. */
+typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
+
+/* box grows by so many cells. As many after soon, if not NULL, will be asked for later. */
+typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
+                          fetch_box *box);
+
+struct bounds_source {
+    const grid *g; /* NULL: the boxes are given */
     double origin[3];
     double scale;
     const float *lower, *upper; /* given boxes, count x 3 */
-} bounds_source;
+    int64_t box_count;          /* ghosts too */
+    bounds_read *read;
+    bounds_unite *unite;
+};
 
-/* Boxes begin to end, ghosts passed over, each to its own place; set grows by them. */
-typedef void (*bounds_fill)(const bounds_source *source, int64_t begin, int64_t end, branch_box *boxes, bin_set *set);
+enum { BOUNDS_BLOCK = 64 }; /* boxes that are read at a time */
 
-bounds_fill bounds_choose_fill(const grid *g);
+/* g NULL: given boxes. */
+bounds_source bounds_source_make(const grid *g, const float *lower, const float *upper, int64_t count,
+                                 const double origin[3], double scale);
+
+/* From the source's coordinates to the tree's, without rounding outward. */
+static inline void bounds_transform(const bounds_source *source, fetch_box *box)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        box->lower[axis] = (box->lower[axis] - source->origin[axis]) * source->scale;
+        box->upper[axis] = (box->upper[axis] - source->origin[axis]) * source->scale;
+    }
+}
+
+/* A box, in the tree's coordinates, that holds all cells with coordinates that are numbers, cheap to find: that of all
+ * vertices, whether cells have them or not. */
+fetch_box bounds_guess(const bounds_source *source, int threads);
+
+/* The boxes of the items that have only an index so far; set grows by them, and exact, if not NULL, by the boxes as
+ * they are in the source's coordinates. */
+void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
+                  fetch_box *exact);
 
 #endif

@@ -1,165 +1,269 @@
-/* How a tree comes to be: boxes of all cells, the top of the tree by all threads, subtrees by one thread each, all
- * gathered into one array, ranges by the same sweep that refits them.
+/* How a tree comes to be: all cells' boxes in 16 bytes a cell or their keys in 8, twice; the tree without bounds, 4
+ * bytes a node; then the nodes, whose bounds and ranges come from the sweeps that refit them.
  *
- * Memory beside the result while it lasts, bytes a cell: 24 for the box, 4 for the second array of cell indices that
- * a parallel partition needs, and about 20 for the subtrees before they are gathered. */
+ * Memory at its most, bytes a cell: 16 for items or keys, 4 for a node (of which there are 0.35 a tet), 4 for the cell
+ * indices of the result. The items are given back before the nodes are made. */
 #include "mmbvh.h"
 
 #include <string.h>
 
 #include "memory.h"
 #include "mmbvh_bounds.h"
+#include "mmbvh_branch.h"
 #include "mmbvh_cost.h"
+#include "mmbvh_morton.h"
+#include "mmbvh_store.h"
 
 enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096 };
 
 /* What a build holds until it ends. */
 typedef struct build {
     bounds_source source;
-    int64_t box_count; /* with ghosts */
+    const uint32_t *selected; /* cells of the grid, none of them a ghost; NULL: all that are none */
+    int64_t listed;           /* as many, or all with ghosts */
+    mmbvh_options options;
     int threads;
-    branch_box *boxes;
-    branch_builder builder;
-    bin_set set;
+    int64_t starts[FILL_CHUNKS + 1]; /* where the chunks' cells begin: ghosts have no place */
+    int64_t count;
+    item *items;
+    uint64_t *keys, *other_keys;
+    morton_coder *coder;
+    item_grid grid;
+    item_set set;
+    fetch_box exact; /* of all cells, in the source's coordinates */
     mmbvh tree;
 } build;
 
 static int64_t chunk_start(const build *b, int chunk)
 {
-    return b->box_count * chunk / FILL_CHUNKS;
+    return b->listed * chunk / FILL_CHUNKS;
 }
 
-/* The cells that are not ghosts, in order. */
-static int64_t list_chunk(const build *b, int chunk, uint32_t *cells)
+static bool is_left_out(const build *b, int64_t cell)
 {
+    return !b->selected && b->source.g && grid_is_ghost(b->source.g, cell);
+}
+
+static uint32_t listed_cell(const build *b, int64_t i)
+{
+    return b->selected ? b->selected[i] : (uint32_t)i;
+}
+
+static void count_cells(build *b)
+{
+    b->starts[0] = 0;
+#pragma omp parallel for num_threads(b->threads)
+    for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) {
+        int64_t count = 0;
+        for (int64_t cell = chunk_start(b, chunk); cell < chunk_start(b, chunk + 1); cell++)
+            count += !is_left_out(b, cell);
+        b->starts[chunk + 1] = count;
+    }
+    for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) b->starts[chunk + 1] += b->starts[chunk];
+    b->count = b->starts[FILL_CHUNKS];
+}
+
+/* ---- boxes or keys ---------------------------------------------------------------------------------------------- */
+
+static void fill_items(const build *b, int chunk, item_set *set, fetch_box *exact)
+{
+    item *items = b->items + b->starts[chunk];
     int64_t count = 0;
     for (int64_t cell = chunk_start(b, chunk); cell < chunk_start(b, chunk + 1); cell++) {
-        if (b->source.g && !b->source.cells && grid_is_ghost(b->source.g, cell)) continue;
-        if (cells) cells[count] = (uint32_t)cell;
-        count++;
+        if (!is_left_out(b, cell)) items[count++] = item_of_index(listed_cell(b, cell));
     }
-    return count;
+    bounds_place(&b->source, &b->grid, items, count, set, exact);
 }
 
-static void count_cells(const build *b, int64_t starts[FILL_CHUNKS + 1])
+static void fill_keys(const build *b, int chunk, fetch_box *exact)
 {
-    starts[0] = 0;
-#pragma omp parallel for num_threads(b->threads)
-    for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) starts[chunk + 1] = list_chunk(b, chunk, NULL);
-    for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) starts[chunk + 1] += starts[chunk];
+    uint64_t *keys = b->keys + b->starts[chunk];
+    int64_t count = 0;
+    for (int64_t cell = chunk_start(b, chunk); cell < chunk_start(b, chunk + 1); cell++) {
+        if (!is_left_out(b, cell)) keys[count++] = listed_cell(b, cell);
+    }
+    morton_place(&b->source, b->coder, keys, count, exact);
 }
 
-static void fill(build *b, const int64_t starts[FILL_CHUNKS + 1])
+/* All cells by the grid over box, in the tree's coordinates. */
+static void fill(build *b, const fetch_box *box)
 {
-    const bounds_fill fill_boxes = bounds_choose_fill(b->source.g);
-    b->set = bin_set_empty();
+    b->grid = item_grid_make(box->lower, box->upper);
+    b->set = item_set_empty();
+    fetch_box_empty(&b->exact);
+    if (b->coder) morton_coder_init(b->coder, box->lower, box->upper, b->source.box_count);
 #pragma omp parallel num_threads(b->threads)
     {
-        bin_set own = bin_set_empty();
+        item_set set = item_set_empty();
+        fetch_box exact;
+        fetch_box_empty(&exact);
 #pragma omp for schedule(dynamic)
         for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) {
-            list_chunk(b, chunk, b->builder.cells + starts[chunk]);
-            fill_boxes(&b->source, chunk_start(b, chunk), chunk_start(b, chunk + 1), b->boxes, &own);
+            if (b->coder) {
+                fill_keys(b, chunk, &exact);
+            } else {
+                fill_items(b, chunk, &set, &exact);
+            }
         }
 #pragma omp critical(mmbvh_merge)
-        bin_set_merge(&b->set, &own);
+        {
+            item_set_merge(&b->set, &set);
+            fetch_box_unite(&b->exact, &exact);
+        }
     }
 }
 
-static void free_scratch(branch_builder *builder)
+/* Vertices that no cell has, and ghosts', may lie far off. */
+static bool is_loose(const fetch_box *guess, const fetch_box *exact)
 {
-    for (int i = 0; builder->scratch && i < builder->threads; i++) {
-        base_free(builder->scratch[i].items);
-        base_free(builder->scratch[i].nodes);
+    for (int axis = 0; axis < 3; axis++) {
+        const double is = exact->upper[axis] - exact->lower[axis], was = guess->upper[axis] - guess->lower[axis];
+        if (is < 0.5 * was) return true;
     }
-    base_free(builder->scratch);
-    builder->scratch = NULL;
+    return false;
 }
 
-static bool allocate_scratch(branch_builder *builder)
+static void fill_fitting(build *b)
 {
-    builder->scratch = base_calloc((size_t)builder->threads, sizeof *builder->scratch);
-    if (!builder->scratch) return false;
-    const int64_t items = builder->count < SUBTREE_MAX_ITEMS ? builder->count : SUBTREE_MAX_ITEMS;
-    for (int i = 0; i < builder->threads; i++) {
-        subtree *s = &builder->scratch[i];
-        s->items = base_alloc((size_t)items * sizeof *s->items);
-        s->nodes = base_alloc((size_t)(2 * items) * sizeof *s->nodes);
-        if (!s->items || !s->nodes) return false;
+    const fetch_box guess = bounds_guess(&b->source, b->threads);
+    fill(b, &guess);
+    fetch_box exact = b->exact;
+    bounds_transform(&b->source, &exact);
+    if (is_loose(&guess, &exact)) fill(b, &exact);
+}
+
+/* ---- topology --------------------------------------------------------------------------------------------------- */
+
+static void release(build *b)
+{
+    base_free(b->items);
+    base_free(b->keys);
+    base_free(b->other_keys);
+    base_free(b->coder);
+    b->items = NULL;
+    b->keys = b->other_keys = NULL;
+    b->coder = NULL;
+}
+
+static topology *build_sah(build *b, topology_build *t)
+{
+    b->items = base_alloc((size_t)b->count * sizeof *b->items);
+    if (!b->items) return NULL;
+    fill_fitting(b);
+    const branch_builder builder = {.build = t, .source = &b->source, .items = b->items, .count = b->count};
+    return branch_build(&builder, &b->set, &b->grid);
+}
+
+static topology *build_morton(build *b, topology_build *t)
+{
+    b->coder = base_alloc(sizeof *b->coder);
+    b->keys = base_alloc((size_t)b->count * sizeof *b->keys);
+    b->other_keys = base_alloc((size_t)b->count * sizeof *b->other_keys);
+    if (!b->coder || !b->keys || !b->other_keys) return NULL;
+    fill_fitting(b);
+    uint64_t *sorted = morton_sort(b->coder, b->keys, b->other_keys, b->count, t->threads);
+    if (!sorted) return NULL;
+    if (sorted != b->keys) {
+        b->other_keys = b->keys;
+        b->keys = sorted;
+    }
+    base_free(b->other_keys);
+    b->other_keys = NULL;
+    return morton_build(t, b->keys, b->count);
+}
+
+static bool list_cells(build *b)
+{
+    uint32_t *cells = b->tree.cells = base_alloc((size_t)b->count * sizeof *cells);
+    if (!cells) return false;
+    b->tree.cell_count = b->count;
+    const uint64_t mask = b->coder ? (UINT64_C(1) << b->coder->index_bits) - 1 : 0;
+#pragma omp parallel for num_threads(b->threads) schedule(static)
+    for (int64_t i = 0; i < b->count; i++) {
+        cells[i] = b->coder ? (uint32_t)(b->keys[i] & mask) : item_index(b->items[i]);
     }
     return true;
 }
 
-static bool allocate(build *b)
+/* The tree's parts without bounds and with its cells, in the order of the leaves; NULL: out of memory. */
+static topology *build_topology(build *b, int threads)
 {
-    branch_builder *builder = &b->builder;
-    b->boxes = base_alloc((size_t)b->box_count * sizeof *b->boxes);
-    builder->boxes = b->boxes;
-    builder->threads = builder->count < PARALLEL_MIN_CELLS ? 1 : b->threads;
-    builder->cells = b->tree.cells = base_alloc((size_t)builder->count * sizeof *builder->cells);
-    builder->other = base_alloc((size_t)builder->count * sizeof *builder->other);
-    return b->boxes && builder->cells && builder->other && allocate_scratch(builder);
-}
-
-/* Gives back all but the result's cells. */
-static void release(build *b)
-{
-    free_scratch(&b->builder);
-    base_free(b->builder.other);
-    base_free(b->boxes);
-    b->builder.other = NULL;
-    b->boxes = NULL;
-}
-
-/* The tree's cells were places in the selection. */
-static void name_cells(const build *b)
-{
-#pragma omp parallel for num_threads(b->threads) schedule(static)
-    for (int64_t i = 0; i < b->tree.cell_count; i++) b->tree.cells[i] = b->source.cells[b->tree.cells[i]];
-}
-
-/* Cells and nodes without ranges. */
-static bool build_topology(build *b)
-{
-    int64_t starts[FILL_CHUNKS + 1];
-    count_cells(b, starts);
-    b->builder.count = starts[FILL_CHUNKS];
-    if (!b->builder.count) return true;
-    branch *root = NULL;
-    if (allocate(b)) {
-        fill(b, starts);
-        root = branch_build(&b->builder, &b->set);
+    topology_build t;
+    topology *root = NULL;
+    if (topology_begin(&t, b->count, threads)) {
+        root = b->options.builder == MMBVH_MORTON ? build_morton(b, &t) : build_sah(b, &t);
+    }
+    topology_end(&t);
+    if (root && !list_cells(b)) {
+        topology_free(root);
+        root = NULL;
     }
     release(b);
-    if (!root) return false;
-    const int64_t node_count = branch_node_count(root);
-    b->tree.nodes = base_alloc((size_t)node_count * sizeof *b->tree.nodes);
-    if (b->tree.nodes) {
-        branch_gather(root, b->tree.nodes, b->builder.threads);
-        b->tree.node_count = node_count;
-        b->tree.cell_count = b->builder.count;
+    return root;
+}
+
+/* ---- nodes ------------------------------------------------------------------------------------------------------ */
+
+static bool allocate_nodes(build *b, int64_t node_count)
+{
+    mmbvh *tree = &b->tree;
+    float lower[3], upper[3];
+    fetch_box_round(&b->exact, tree->origin, tree->scale, lower, upper);
+    bool is_compact =
+        b->options.layout == MMBVH_COMPACT && b->count < 1 << COMPACT_REF_BITS && node_count < 1 << COMPACT_REF_BITS;
+    for (int axis = 0; axis < 3; axis++) is_compact = is_compact && upper[axis] - lower[axis] < INFINITY;
+    if (is_compact) {
+        tree->grid = store_grid(lower, upper);
+        tree->compact = base_alloc((size_t)node_count * sizeof *tree->compact);
+    } else {
+        tree->nodes = base_alloc((size_t)node_count * sizeof *tree->nodes);
     }
-    branch_free(root);
-    if (b->source.cells) name_cells(b);
-    return b->tree.nodes != NULL;
+    tree->node_count = node_count;
+    return tree->nodes || tree->compact;
+}
+
+static bool build_nodes(build *b)
+{
+    count_cells(b);
+    if (!b->count) return true;
+    const int threads = b->count < PARALLEL_MIN_CELLS ? 1 : b->threads;
+    topology *root = build_topology(b, threads);
+    const bool is_built = root && allocate_nodes(b, topology_node_count(root));
+    if (is_built) topology_write(root, &b->tree, threads);
+    topology_free(root);
+    return is_built;
 }
 
 static insitu_status run(build *b, mmbvh *out, base_error *error)
 {
-    memset(out, 0, sizeof *out);
-    if (b->box_count > UINT32_MAX) {
+    const int64_t count = b->source.box_count;
+    if (count > UINT32_MAX) {
         return base_fail(error, INSITU_ERROR_MESH, "a mesh of %lld cells on one rank: at most 4294967295 are possible",
-                         (long long)b->box_count);
+                         (long long)count);
     }
     memcpy(b->tree.origin, b->source.origin, sizeof b->tree.origin);
     b->tree.scale = b->source.scale;
-    if (!build_topology(b)) {
+    if (!build_nodes(b)) {
         mmbvh_free(&b->tree);
-        return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: a tree over %lld cells", (long long)b->box_count);
+        return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: a tree over %lld cells", (long long)count);
     }
+    const sweep s = sweep_of_bounds(&b->tree, &b->source);
+    sweep_tree(&s, b->threads);
     b->tree.built_cost = cost_of_tree(&b->tree, b->threads);
     *out = b->tree;
     return INSITU_OK;
+}
+
+static build begin(const bounds_source *source, const mmbvh_options *options)
+{
+    build b = {.source = *source, .listed = source->box_count, .threads = sweep_threads(options)};
+    if (!options) return b;
+    b.options = *options;
+    if (source->g && options->selection) {
+        b.selected = options->selection->cells;
+        b.listed = options->selection->count;
+    }
+    return b;
 }
 
 insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
@@ -169,12 +273,8 @@ insitu_status mmbvh_build(const grid *g, const grid_field *field, const double o
     memset(out, 0, sizeof *out);
     if (!g || !origin) return base_fail(error, INSITU_ERROR_ARGUMENT, "a tree needs a grid and an origin");
     if (!(scale > 0)) return base_fail(error, INSITU_ERROR_ARGUMENT, "a tree's scale must be above 0, not %g", scale);
-    build b = {.source = {.g = g, .scale = scale}, .box_count = g->cell_count, .threads = sweep_threads(options)};
-    if (options && options->selection) {
-        b.source.cells = options->selection->cells;
-        b.box_count = options->selection->count;
-    }
-    memcpy(b.source.origin, origin, sizeof b.source.origin);
+    const bounds_source source = bounds_source_make(g, NULL, NULL, g->cell_count, origin, scale);
+    build b = begin(&source, options);
     const insitu_status status = run(&b, out, error);
     return status ? status : mmbvh_refit_ranges(out, g, field, options);
 }
@@ -182,13 +282,14 @@ insitu_status mmbvh_build(const grid *g, const grid_field *field, const double o
 insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const float *ranges, int64_t count,
                                 const mmbvh_options *options, mmbvh *out, base_error *error)
 {
+    static const double no_shift[3] = {0, 0, 0};
     if (!out) return base_fail(error, INSITU_ERROR_ARGUMENT, "no place for the tree");
     memset(out, 0, sizeof *out);
     if (count < 0 || (count > 0 && (!lower || !upper || !ranges))) {
         return base_fail(error, INSITU_ERROR_ARGUMENT, "a parent tree needs boxes and ranges");
     }
-    build b = {.source = {.scale = 1, .lower = lower, .upper = upper}, .box_count = count};
-    b.threads = sweep_threads(options);
+    const bounds_source source = bounds_source_make(NULL, lower, upper, count, no_shift, 1);
+    build b = begin(&source, options);
     const insitu_status status = run(&b, out, error);
     if (status || !count) return status;
     const sweep s = sweep_of_box_ranges(out, ranges);
@@ -198,13 +299,15 @@ insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const fl
 
 int64_t mmbvh_bytes(const mmbvh *tree)
 {
-    return tree->node_count * (int64_t)sizeof *tree->nodes + tree->cell_count * (int64_t)sizeof *tree->cells;
+    const size_t node = tree->compact ? sizeof *tree->compact : sizeof *tree->nodes;
+    return tree->node_count * (int64_t)node + tree->cell_count * (int64_t)sizeof *tree->cells;
 }
 
 void mmbvh_free(mmbvh *tree)
 {
     if (!tree) return;
     base_free(tree->nodes);
+    base_free(tree->compact);
     base_free(tree->cells);
     memset(tree, 0, sizeof *tree);
 }

@@ -3,6 +3,7 @@
 #include "mmbvh.h"
 
 #include <inttypes.h>
+#include <string.h>
 
 #include "memory.h"
 #include "mmbvh_cost.h"
@@ -26,11 +27,12 @@ typedef struct walk {
 
 static insitu_status check_box(const walk *w, int64_t index)
 {
-    const mmbvh_node *node = w->tree->nodes + index;
+    float lower[4], upper[4];
+    mmbvh_node_box(w->tree, index, lower, upper);
     for (int axis = 0; axis < 3; axis++) {
-        if (w->g && !(node->lower[axis] <= node->upper[axis])) {
+        if (w->g && !(lower[axis] <= upper[axis])) {
             return BROKEN(w, "node %" PRId64 ": lower bound %g above upper bound %g on axis %d", index,
-                          (double)node->lower[axis], (double)node->upper[axis], axis);
+                          (double)lower[axis], (double)upper[axis], axis);
         }
     }
     return INSITU_OK;
@@ -38,7 +40,8 @@ static insitu_status check_box(const walk *w, int64_t index)
 
 static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cell)
 {
-    const mmbvh_node *node = w->tree->nodes + index;
+    float lower[4], upper[4];
+    mmbvh_node_box(w->tree, index, lower, upper);
     grid_walk vertices = grid_walk_cell(w->g, cell);
     int64_t vertex;
     while (grid_walk_next(&vertices, &vertex)) {
@@ -46,7 +49,7 @@ static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cel
         grid_vertex(w->g, vertex, p);
         for (int axis = 0; axis < 3; axis++) {
             const double x = (p[axis] - w->tree->origin[axis]) * w->tree->scale;
-            if (!(node->lower[axis] <= x && x <= node->upper[axis])) {
+            if (!(lower[axis] <= x && x <= upper[axis])) {
                 return BROKEN(w, "leaf %" PRId64 ": vertex %" PRId64 " of cell %" PRId64 " lies outside its bounds",
                               index, vertex, cell);
             }
@@ -71,15 +74,23 @@ static bool cell_range(const walk *w, int64_t cell, double *low, double *high)
     return true;
 }
 
+static void node_range(const walk *w, int64_t index, float *low, float *high)
+{
+    const mmbvh_ranges own = mmbvh_own_ranges(w->tree);
+    memcpy(low, own.low + index * own.stride, sizeof *low);
+    memcpy(high, own.high + index * own.stride, sizeof *high);
+}
+
 static insitu_status check_cell_range(walk *w, int64_t index, int64_t cell)
 {
-    const mmbvh_node *node = w->tree->nodes + index;
+    float range_low, range_high;
+    node_range(w, index, &range_low, &range_high);
     double low, high;
     if (!cell_range(w, cell, &low, &high)) {
         w->unusable++;
         return INSITU_OK;
     }
-    if (!(node->range_low <= low && high <= node->range_high)) {
+    if (!(range_low <= low && high <= range_high)) {
         return BROKEN(w, "leaf %" PRId64 ": value %g or %g of cell %" PRId64 " lies outside its range", index, low,
                       high, cell);
     }
@@ -102,8 +113,7 @@ static insitu_status check_cell(walk *w, int64_t index, int64_t cell)
 
 static insitu_status check_leaf(walk *w, int64_t index)
 {
-    const mmbvh_node *node = w->tree->nodes + index;
-    const int64_t first = (int64_t)node->ref, count = (int64_t)node->count;
+    const int64_t first = mmbvh_node_ref(w->tree, index), count = mmbvh_node_count(w->tree, index);
     if (first != w->next_entry || count > w->tree->cell_count - first) {
         return BROKEN(w, "leaf %" PRId64 ": its cells are entries %" PRId64 " on, expected %" PRId64 " of %" PRId64,
                       index, first, w->next_entry, w->tree->cell_count);
@@ -119,32 +129,38 @@ static insitu_status check_leaf(walk *w, int64_t index)
 
 static insitu_status check_contained(const walk *w, int64_t index, int64_t child_index)
 {
-    const mmbvh_node *node = w->tree->nodes + index, *child = w->tree->nodes + child_index;
+    float lower[2][4], upper[2][4], low[2], high[2];
+    mmbvh_node_box(w->tree, index, lower[0], upper[0]);
+    mmbvh_node_box(w->tree, child_index, lower[1], upper[1]);
+    node_range(w, index, &low[0], &high[0]);
+    node_range(w, child_index, &low[1], &high[1]);
     for (int axis = 0; axis < 3; axis++) {
-        if (!(node->lower[axis] <= child->lower[axis] && child->upper[axis] <= node->upper[axis])) {
+        if (!(lower[0][axis] <= lower[1][axis] && upper[1][axis] <= upper[0][axis])) {
             return BROKEN(w, "node %" PRId64 ": child %" PRId64 " lies outside its bounds", index, child_index);
         }
     }
-    if (!(node->range_low <= child->range_low && child->range_high <= node->range_high)) {
+    if (!(low[0] <= low[1] && high[1] <= high[0])) {
         return BROKEN(w, "node %" PRId64 ": child %" PRId64 " lies outside its range", index, child_index);
     }
     return INSITU_OK;
 }
 
-static double pair_overlap(const mmbvh_node *parent, const mmbvh_node *pair)
+static double pair_overlap(const mmbvh *tree, int64_t parent, int64_t pair)
 {
-    float lower[3], upper[3];
+    float lower[3][4], upper[3][4];
+    mmbvh_node_box(tree, parent, lower[2], upper[2]);
+    for (int side = 0; side < 2; side++) mmbvh_node_box(tree, pair + side, lower[side], upper[side]);
     for (int axis = 0; axis < 3; axis++) {
-        lower[axis] = pair[0].lower[axis] > pair[1].lower[axis] ? pair[0].lower[axis] : pair[1].lower[axis];
-        upper[axis] = pair[0].upper[axis] < pair[1].upper[axis] ? pair[0].upper[axis] : pair[1].upper[axis];
+        lower[0][axis] = lower[0][axis] > lower[1][axis] ? lower[0][axis] : lower[1][axis];
+        upper[0][axis] = upper[0][axis] < upper[1][axis] ? upper[0][axis] : upper[1][axis];
     }
-    const double whole = cost_half_area(parent->lower, parent->upper);
-    return whole > 0 ? cost_half_area(lower, upper) / whole : 0;
+    const double whole = cost_half_area(lower[2], upper[2]);
+    return whole > 0 ? cost_half_area(lower[0], upper[0]) / whole : 0;
 }
 
 static insitu_status check_inner(walk *w, int64_t index)
 {
-    const int64_t pair = (int64_t)w->tree->nodes[index].ref;
+    const int64_t pair = mmbvh_node_ref(w->tree, index);
     if (pair != w->next_pair || pair + 2 > w->tree->node_count) {
         return BROKEN(w, "node %" PRId64 ": its children are nodes %" PRId64 " on, expected %" PRId64 " of %" PRId64,
                       index, pair, w->next_pair, w->tree->node_count);
@@ -154,7 +170,7 @@ static insitu_status check_inner(walk *w, int64_t index)
         const insitu_status status = check_contained(w, index, pair + side);
         if (status) return status;
     }
-    w->overlap += pair_overlap(&w->tree->nodes[index], &w->tree->nodes[pair]);
+    w->overlap += pair_overlap(w->tree, index, pair);
     return INSITU_OK;
 }
 
@@ -172,12 +188,12 @@ static insitu_status check_nodes(walk *w)
         if (depth > MMBVH_MAX_DEPTH) return BROKEN(w, "node %" PRId64 ": deeper than %d", index, MMBVH_MAX_DEPTH);
         w->depth = depth > w->depth ? depth : w->depth;
         insitu_status status = check_box(w, index);
-        const mmbvh_node *node = w->tree->nodes + index;
-        if (!status) status = node->count ? check_leaf(w, index) : check_inner(w, index);
+        const bool is_leaf = mmbvh_node_count(w->tree, index) > 0;
+        if (!status) status = is_leaf ? check_leaf(w, index) : check_inner(w, index);
         if (status) return status;
-        if (node->count) continue;
+        if (is_leaf) continue;
         for (int side = 1; side >= 0; side--) {
-            stack[height].index = (int64_t)node->ref + side;
+            stack[height].index = mmbvh_node_ref(w->tree, index) + side;
             stack[height++].depth = depth + 1;
         }
     }

@@ -21,9 +21,11 @@ static double cost_of_nodes(const mmbvh *tree, int64_t begin, int64_t end, doubl
 {
     double sum = 0;
     for (int64_t i = begin; i < end; i++) {
-        const mmbvh_node *node = tree->nodes + i;
-        const double area = root_area > 0 ? cost_half_area(node->lower, node->upper) / root_area : 1;
-        sum += area * (node->count ? (double)node->count : 2.0);
+        float lower[4], upper[4];
+        mmbvh_node_box(tree, i, lower, upper);
+        const double area = root_area > 0 ? cost_half_area(lower, upper) / root_area : 1;
+        const int count = mmbvh_node_count(tree, i);
+        sum += area * (count ? (double)count : 2.0);
     }
     return sum;
 }
@@ -31,7 +33,9 @@ static double cost_of_nodes(const mmbvh *tree, int64_t begin, int64_t end, doubl
 double cost_of_tree(const mmbvh *tree, int threads)
 {
     if (!tree->node_count) return 0;
-    const double root_area = cost_half_area(tree->nodes->lower, tree->nodes->upper);
+    float lower[4], upper[4];
+    mmbvh_node_box(tree, 0, lower, upper);
+    const double root_area = cost_half_area(lower, upper);
     double sums[PARTS];
 #pragma omp parallel for num_threads(threads)
     for (int part = 0; part < PARTS; part++) {

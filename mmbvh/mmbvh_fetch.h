@@ -76,19 +76,42 @@ MMBVH_INLINE void fetch_box_empty(fetch_box *box)
     }
 }
 
-MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
-                                 const bool wide_index, const bool wide_number)
+MMBVH_INLINE void fetch_box_unite(fetch_box *to, const fetch_box *box)
 {
-    const int count = fetch_vertex_count(g, cell, shape);
-    const int64_t first = fetch_first(g, cell, count, shape);
-    for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
-        for (int axis = 0; axis < 3; axis++) {
-            const double x = fetch_number(&g->coordinates[axis], vertex, wide_number);
-            box->lower[axis] = x < box->lower[axis] ? x : box->lower[axis];
-            box->upper[axis] = x > box->upper[axis] ? x : box->upper[axis];
+    for (int axis = 0; axis < 3; axis++) {
+        to->lower[axis] = box->lower[axis] < to->lower[axis] ? box->lower[axis] : to->lower[axis];
+        to->upper[axis] = box->upper[axis] > to->upper[axis] ? box->upper[axis] : to->upper[axis];
+    }
+}
+
+/* The box grows by so many cells. Floats are compared as floats, and only the outcome is widened. */
+MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
+                                  const fetch_shape shape, const bool wide_index, const bool wide_number)
+{
+    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    fetch_box wide = *box;
+    for (int k = 0; k < cell_count; k++) {
+        const int count = fetch_vertex_count(g, cells[k], shape);
+        const int64_t first = fetch_first(g, cells[k], count, shape);
+        for (int i = 0; i < count; i++) {
+            const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
+            for (int axis = 0; axis < 3; axis++) {
+                const double x = fetch_number(&g->coordinates[axis], vertex, wide_number);
+                if (wide_number) {
+                    wide.lower[axis] = x < wide.lower[axis] ? x : wide.lower[axis];
+                    wide.upper[axis] = x > wide.upper[axis] ? x : wide.upper[axis];
+                } else {
+                    low[axis] = (float)x < low[axis] ? (float)x : low[axis];
+                    high[axis] = (float)x > high[axis] ? (float)x : high[axis];
+                }
+            }
         }
     }
+    for (int axis = 0; axis < 3 && !wide_number; axis++) {
+        wide.lower[axis] = (double)low[axis] < wide.lower[axis] ? (double)low[axis] : wide.lower[axis];
+        wide.upper[axis] = (double)high[axis] > wide.upper[axis] ? (double)high[axis] : wide.upper[axis];
+    }
+    *box = wide;
 }
 
 /* To a node's coordinates, outward: rounding is monotonic, so the box of the rounded is the rounded box. */
@@ -101,7 +124,7 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
     }
 }
 
-/* Where the coordinates are not all floats or all doubles, or cells may be polyhedra, fetch_box_cell() will not do. */
+/* Where the coordinates are not all floats or all doubles, or cells may be polyhedra, fetch_box_cells() will not do. */
 static inline bool fetch_is_plain(const grid *g)
 {
     if (grid_has_faces(g)) return false;

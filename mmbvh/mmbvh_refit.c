@@ -1,4 +1,4 @@
-/* New ranges and bounds on an old tree. */
+/* Sweeps, and new ranges on an old tree. */
 #include "mmbvh_sweep.h"
 
 #include <omp.h>
@@ -16,8 +16,7 @@ int sweep_threads(const mmbvh_options *options)
 static int64_t sweep_below(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= RUN_MAX) return s->run(s, first, end);
-    const mmbvh_node *pair = s->tree->nodes + first;
-    const int64_t right_first = pair[1].count ? end : (int64_t)pair[1].ref;
+    const int64_t right_first = mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
     int64_t left = 0, right = 0;
 #pragma omp task default(none) firstprivate(s, first, right_first) shared(left)
     left = sweep_below(s, first + 2, right_first);
@@ -46,14 +45,14 @@ static const range empty_range = {INFINITY, -INFINITY};
 
 static inline range get_range(const sweep *s, int64_t node)
 {
-    return (range){*(const float *)(const void *)(s->low + node * s->stride),
-                   *(const float *)(const void *)(s->high + node * s->stride)};
+    return (range){*(const float *)(const void *)(s->ranges.low + node * s->ranges.stride),
+                   *(const float *)(const void *)(s->ranges.high + node * s->ranges.stride)};
 }
 
 static inline void set_range(const sweep *s, int64_t node, range r)
 {
-    *(float *)(void *)(s->low + node * s->stride) = r.low;
-    *(float *)(void *)(s->high + node * s->stride) = r.high;
+    *(float *)(void *)(uintptr_t)(s->ranges.low + node * s->ranges.stride) = r.low;
+    *(float *)(void *)(uintptr_t)(s->ranges.high + node * s->ranges.stride) = r.high;
 }
 
 static inline range united(range a, range b)
@@ -124,14 +123,13 @@ MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, cons
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
-        const mmbvh_node *node = s->tree->nodes + i;
-        if (!node->count) {
-            set_range(s, i, children_range(s, (int64_t)node->ref));
+        const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
+        if (!count) {
+            set_range(s, i, children_range(s, ref));
             continue;
         }
         span leaf = {INFINITY, -INFINITY, 0};
-        for (int64_t k = node->count - 1; k >= 0; k--) {
-            const int64_t entry = (int64_t)node->ref + k;
+        for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
             prefetch_cell(s, entry, shape, wide_index);
             span_add_cell(&leaf, s, s->tree->cells[entry], shape, wide_index, wide_number);
         }
@@ -156,13 +154,13 @@ MMBVH_INLINE int64_t run_leaves(const sweep *s, int64_t first, int64_t end,
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
-        const mmbvh_node *node = s->tree->nodes + i;
-        if (!node->count) {
-            set_range(s, i, children_range(s, (int64_t)node->ref));
+        const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
+        if (!count) {
+            set_range(s, i, children_range(s, ref));
             continue;
         }
         span leaf = {INFINITY, -INFINITY, 0};
-        for (uint64_t k = 0; k < node->count; k++) add(&leaf, s, s->tree->cells[node->ref + k]);
+        for (int64_t k = 0; k < count; k++) add(&leaf, s, s->tree->cells[ref + k]);
         set_range(s, i, span_range(&leaf));
         unusable += leaf.unusable;
     }
@@ -208,10 +206,10 @@ static int64_t run_infinite(const sweep *s, int64_t first, int64_t end)
 static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
 {
     for (int64_t i = end - 1; i >= first; i--) {
-        const mmbvh_node *node = s->tree->nodes + i;
-        range r = node->count ? empty_range : children_range(s, (int64_t)node->ref);
-        for (uint64_t k = 0; k < node->count; k++) {
-            const float *of_box = s->box_ranges + 2 * (int64_t)s->tree->cells[node->ref + k];
+        const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
+        range r = count ? empty_range : children_range(s, ref);
+        for (int64_t k = 0; k < count; k++) {
+            const float *of_box = s->box_ranges + 2 * (int64_t)s->tree->cells[ref + k];
             r = united((range){of_box[0], of_box[1]}, r);
         }
         set_range(s, i, r);
@@ -227,10 +225,9 @@ static sweep_run choose_run(const grid *g, const grid_field *field)
     return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
 }
 
-sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, float *low, float *high,
-                      int64_t stride)
+sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges)
 {
-    sweep s = {.tree = tree, .g = g, .field = field, .low = (char *)low, .high = (char *)high, .stride = stride};
+    sweep s = {.tree = tree, .g = g, .field = field, .ranges = ranges};
     s.run = choose_run(g, field);
     if (field && field->component >= 0) {
         s.values = field->values;
@@ -241,20 +238,14 @@ sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field,
 
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges)
 {
-    return (sweep){.tree = tree,
-                   .run = run_box_ranges,
-                   .box_ranges = ranges,
-                   .low = (char *)&tree->nodes->range_low,
-                   .high = (char *)&tree->nodes->range_high,
-                   .stride = (int64_t)sizeof(mmbvh_node)};
+    return (sweep){.tree = tree, .run = run_box_ranges, .box_ranges = ranges, .ranges = mmbvh_own_ranges(tree)};
 }
 
 insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *field, const mmbvh_options *options)
 {
     if (!tree || !g) return INSITU_ERROR_ARGUMENT;
     if (!tree->node_count) return INSITU_OK;
-    mmbvh_node *root = tree->nodes;
-    const sweep s = sweep_of_ranges(tree, g, field, &root->range_low, &root->range_high, (int64_t)sizeof *root);
+    const sweep s = sweep_of_ranges(tree, g, field, mmbvh_own_ranges(tree));
     tree->unusable_cells = sweep_tree(&s, sweep_threads(options));
     return INSITU_OK;
 }
@@ -265,7 +256,7 @@ insitu_status mmbvh_compute_ranges(const mmbvh *tree, const grid *g, const grid_
     if (!tree || !g || (!pairs && tree->node_count)) return INSITU_ERROR_ARGUMENT;
     int64_t count = 0;
     if (tree->node_count) {
-        const sweep s = sweep_of_ranges(tree, g, field, pairs, pairs + 1, 2 * (int64_t)sizeof *pairs);
+        const sweep s = sweep_of_ranges(tree, g, field, mmbvh_pair_ranges(pairs));
         count = sweep_tree(&s, sweep_threads(options));
     }
     if (unusable) *unusable = count;

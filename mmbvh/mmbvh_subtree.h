@@ -1,24 +1,26 @@
-/* The serial builder of one subtree in memory that fits a core's cache, and the scratch a thread keeps for it. */
+/* The serial SAH builder of one subtree, in memory that fits a core's cache. */
 #ifndef MMBVH_SUBTREE_H
 #define MMBVH_SUBTREE_H
 
 #include "mmbvh_bins.h"
+#include "mmbvh_bounds.h"
+#include "mmbvh_topology.h"
 
-enum {
-    SUBTREE_MAX_ITEMS = 16384,
-    SUBTREE_MAX_NODES = 2 * SUBTREE_MAX_ITEMS,
-    SUBTREE_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32 /* from here on halves: 2^32 cells end within the depth allowed */
-};
+/* Items on their way to be a node. */
+typedef struct subtree_node {
+    item_set set;
+    item_grid grid; /* that the items are in steps of */
+    int depth;
+} subtree_node;
 
-typedef struct subtree {
-    bin_item *items;   /* given by the caller; left in the order of the leaves */
-    mmbvh_node *nodes; /* written: all below the root, numbered depth first by pairs from 0 */
-    int64_t node_count;
-    uint64_t first_entry; /* where the items will stand in the tree's cells */
-    bins bins;
-} subtree;
+/* Is the grid too coarse for these items? */
+bool subtree_wants_finer_grid(const subtree_node *node);
 
-/* The root of a tree over the first count items; its references count from the start of nodes. */
-mmbvh_node subtree_build(subtree *s, int64_t count, const bin_set *set, int depth);
+/* The grid over the node's own bounds. */
+item_grid subtree_finer_grid(const subtree_node *node);
+
+/* Links of a tree over at most TOPOLOGY_SUBTREE_CELLS items, which are left in the order of the leaves. */
+topology_link subtree_build(topology_scratch *scratch, const bounds_source *source, item *items, int64_t count,
+                            const subtree_node *root);
 
 #endif

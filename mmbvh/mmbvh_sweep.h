@@ -8,8 +8,9 @@
 #include "mmbvh.h"
 
 typedef struct sweep sweep;
+typedef struct bounds_source bounds_source;
 
-/* Nodes end - 1 down to first; returns how many cells were found unusable. */
+/* Nodes end - 1 down to first; returns how many cells were found unusable, or boxes that the nodes do not hold. */
 typedef int64_t (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {
@@ -17,22 +18,23 @@ struct sweep {
     const mmbvh *tree;
     const grid *g;
     const grid_field *field;
-    grid_array values;       /* of the field's component */
-    const float *box_ranges; /* of a parent tree */
-    mmbvh_node *nodes;       /* written by a sweep of bounds */
-    char *low, *high;        /* written by a sweep of ranges, stride bytes from node to node */
-    int64_t stride;
+    grid_array values;           /* of the field's component */
+    const float *box_ranges;     /* of a parent tree */
+    const bounds_source *source; /* of a sweep of bounds */
+    mmbvh_ranges ranges;         /* written by a sweep of ranges */
 };
 
 /* Over the whole tree; returns the sum of what the runs returned. */
 int64_t sweep_tree(const sweep *s, int threads);
 
-/* The sweep that writes ranges of field (NULL: infinite ones) to low and high. */
-sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, float *low, float *high,
-                      int64_t stride);
+/* The sweep that writes ranges of field (NULL: infinite ones). */
+sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges);
 
 /* The same for a parent tree: ranges by mesh, low and high. */
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
+
+/* The sweep that writes the bounds. */
+sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source);
 
 /* How many threads options ask for. */
 int sweep_threads(const mmbvh_options *options);

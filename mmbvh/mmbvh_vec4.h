@@ -3,6 +3,7 @@
 #ifndef MMBVH_VEC4_H
 #define MMBVH_VEC4_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #if defined(__SSE2__)
 #include <emmintrin.h>
@@ -51,6 +52,25 @@ static inline ivec4 vec4_truncate(vec4 a)
     return (ivec4)_mm_cvttps_epi32((__m128)a);
 #else
     return __builtin_convertvector(a, ivec4);
+#endif
+}
+
+static inline vec4 vec4_from_int(ivec4 a)
+{
+#if defined(__SSE2__)
+    return (vec4)_mm_cvtepi32_ps((__m128i)a);
+#else
+    return __builtin_convertvector(a, vec4);
+#endif
+}
+
+/* Are all lanes' sign bits set? */
+static inline bool vec4_all(ivec4 a)
+{
+#if defined(__SSE2__)
+    return _mm_movemask_ps((__m128)a) == 15;
+#else
+    return (a[0] & a[1] & a[2] & a[3]) < 0;
 #endif
 }
 

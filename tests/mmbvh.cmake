@@ -1,9 +1,14 @@
 add_executable(test_mmbvh test_mmbvh.c)
 target_link_libraries(test_mmbvh PRIVATE insitu_internal insitu_flags PkgConfig::CMOCKA)
 add_test(NAME mmbvh COMMAND test_mmbvh)
-set_tests_properties(mmbvh PROPERTIES TIMEOUT 120 PROCESSORS 2)
+set_tests_properties(mmbvh PROPERTIES TIMEOUT 300 PROCESSORS 2)
 
 add_executable(test_mmbvh_check test_mmbvh_check.c)
 target_link_libraries(test_mmbvh_check PRIVATE insitu_internal insitu_flags PkgConfig::CMOCKA)
 add_test(NAME mmbvh_check COMMAND test_mmbvh_check)
 set_tests_properties(mmbvh_check PROPERTIES TIMEOUT 60)
+
+add_executable(test_mmbvh_layout test_mmbvh_layout.c)
+target_link_libraries(test_mmbvh_layout PRIVATE insitu_internal insitu_flags PkgConfig::CMOCKA)
+add_test(NAME mmbvh_layout COMMAND test_mmbvh_layout)
+set_tests_properties(mmbvh_layout PROPERTIES TIMEOUT 120 PROCESSORS 2)

@@ -22,7 +22,8 @@ static int set_up(void **state)
     static fixture f;
     f = (fixture){.l = make_lattice(6, LATTICE_TETS, (lattice_layout){true, false, true, false})};
     const double origin[3] = {0, 0, 0};
-    if (mmbvh_build(&f.l.g, &f.l.field, origin, 1, NULL, &f.tree, NULL)) return 1;
+    if (mmbvh_build(&f.l.g, &f.l.field, origin, 1, &(mmbvh_options){.layout = MMBVH_REFERENCE}, &f.tree, NULL))
+        return 1;
     for (f.leaf = 0; f.tree.nodes[f.leaf].count < 2;) f.leaf++;
     for (f.inner = 1; f.tree.nodes[f.inner].count;) f.inner++;
     *state = &f;

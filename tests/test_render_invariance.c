@@ -347,11 +347,13 @@ static void parent_tree_changes_nothing(void **state)
         mesh_fixture(&f, dealt, 5, 4, scene, CAMERA_OUTSIDE);
         fixture_draw(&f, &without);
         for (int i = 0; i < 5; i++) {
-            const mmbvh_node *root = &f.trees[i].nodes[0];
-            memcpy(lower[i], root->lower, sizeof lower[i]);
-            memcpy(upper[i], root->upper, sizeof upper[i]);
-            ranges[i][0] = root->range_low;
-            ranges[i][1] = root->range_high;
+            float low[4], high[4];
+            const mmbvh_ranges own = mmbvh_own_ranges(&f.trees[i]);
+            mmbvh_node_box(&f.trees[i], 0, low, high);
+            memcpy(lower[i], low, sizeof lower[i]);
+            memcpy(upper[i], high, sizeof upper[i]);
+            memcpy(&ranges[i][0], own.low, sizeof ranges[i][0]);
+            memcpy(&ranges[i][1], own.high, sizeof ranges[i][1]);
         }
         assert_int_equal(
             mmbvh_build_boxes(lower[0], upper[0], ranges[0], 5, &(mmbvh_options){.threads = 1}, &parent, &error),

@@ -1,0 +1,69 @@
+/* The compact node: 24 bytes where the thesis's node has 40.
+ *
+ * The tree has a grid of 2^20 steps an axis, the steps powers of two. Of a box each axis has one 32-bit word: its lower
+ * bound in whole steps, and above that its extent as a small floating-point number, so that a box is known to a
+ * millionth of the tree and to 1/256 of itself, whichever is coarser, and a cell far smaller than the rest keeps its
+ * shape:
+ *
+ *      31    28 27          20 19                                  0
+ *     | exponent | mantissa   | lower bound, steps                  |      extent = 16 (1 + mantissa / 256) 2^exponent
+ * - 16
+ *
+ * All three axes are read by one load and some ten operations on four floats, without a table and without denormals.
+ * Steps being powers of two, products with them are exact: whether multiply and add are fused does not show. */
+#ifndef MMBVH_COMPACT_H
+#define MMBVH_COMPACT_H
+
+#include "mmbvh_vec4.h"
+
+enum {
+    COMPACT_LOWER_BITS = 20,
+    COMPACT_EXTENT_BITS = 32 - COMPACT_LOWER_BITS,
+    COMPACT_MANTISSA_BITS = COMPACT_EXTENT_BITS - 4,
+    COMPACT_LOWER_MAX = (1 << COMPACT_LOWER_BITS) - 1,
+    COMPACT_EXTENT_MAX = (1 << COMPACT_EXTENT_BITS) - 1,
+    COMPACT_ONE = (127 + 4) << 23, /* the bits of 16.0f, an extent's zero */
+    COMPACT_REF_BITS = 29
+};
+
+typedef struct mmbvh_compact_node {
+    uint32_t axis[3];
+    uint32_t link; /* 3 low bits: count, the others: ref, both as in mmbvh_node */
+    float range_low;
+    float range_high;
+} mmbvh_compact_node;
+
+typedef struct mmbvh_grid {
+    float origin[4];
+    float step[4]; /* powers of two; lane 3 of both: 0 */
+} mmbvh_grid;
+
+typedef float compact_vec4 __attribute__((vector_size(16), may_alias, aligned(4)));
+typedef int32_t compact_ivec4 __attribute__((vector_size(16), may_alias, aligned(4)));
+
+/* Lane 3 of both: 0. */
+static inline void compact_decode_words(ivec4 word, const mmbvh_grid *grid, vec4 *lower, vec4 *upper)
+{
+    const vec4 step = *(const compact_vec4 *)(const void *)grid->step;
+    const vec4 origin = *(const compact_vec4 *)(const void *)grid->origin;
+    const ivec4 bits = (word >> (COMPACT_LOWER_BITS + COMPACT_MANTISSA_BITS - 23)) &
+                       (COMPACT_EXTENT_MAX << (23 - COMPACT_MANTISSA_BITS));
+    const vec4 extent = (vec4)(bits + COMPACT_ONE) - 16.0f;
+    *lower = vec4_from_int(word & COMPACT_LOWER_MAX) * step + origin;
+    *upper = extent * step + *lower;
+}
+
+static inline void compact_decode(const mmbvh_compact_node *node, const mmbvh_grid *grid, vec4 *lower, vec4 *upper)
+{
+    compact_decode_words(*(const compact_ivec4 *)(const void *)node, grid, lower, upper);
+}
+
+static inline void compact_box(const mmbvh_compact_node *node, const mmbvh_grid *grid, float lower[4], float upper[4])
+{
+    vec4 low, high;
+    compact_decode(node, grid, &low, &high);
+    *(compact_vec4 *)(void *)lower = low;
+    *(compact_vec4 *)(void *)upper = high;
+}
+
+#endif

@@ -1,0 +1,93 @@
+/* A cell on its way into a SAH tree: 16 bytes, one vector.
+ *
+ *     lane     0   1   2     3       4  5  6     7
+ *           TOP - lower   index    upper      index           lower, upper: 0 .. TOP, in steps of an item_grid
+ *                         (low)               (high)
+ *
+ * The box that holds two boxes is then the lanes' maximum; a vector less itself with its halves exchanged is twice the
+ * centroid less TOP in the upper half and its negative in the lower one, so that bounds of centroids are a maximum too.
+ * Only the choice of planes depends on these boxes, not the bounds that the nodes get. */
+#ifndef MMBVH_ITEM_H
+#define MMBVH_ITEM_H
+
+#include <stdbool.h>
+
+#include "mmbvh_lanes.h"
+
+enum { ITEM_TOP = 32767 };
+
+typedef lanes item;
+
+/* Steps on each axis, in the tree's coordinates. */
+typedef struct item_grid {
+    double origin[3];
+    double step[3];
+    double inverse[3]; /* of the steps; 0 on an axis without extent */
+    bool is_finest;    /* a finer one would not tell more cells apart */
+} item_grid;
+
+/* Bounds of items and of their centroids. */
+typedef struct item_set {
+    lanes bounds;
+    lanes centroids;
+} item_set;
+
+static inline uint32_t item_index(item i)
+{
+    return (uint32_t)(uint16_t)i[3] | (uint32_t)(uint16_t)i[7] << 16;
+}
+
+/* Without a box yet. */
+static inline item item_of_index(uint32_t index)
+{
+    return (item){0, 0, 0, (int16_t)(uint16_t)(index & 0xffff), 0, 0, 0, (int16_t)(uint16_t)(index >> 16)};
+}
+
+/* Twice the centroid, less TOP: negative in lanes 0 to 2, as it is in lanes 4 to 6. */
+static inline lanes item_centroid(item i)
+{
+    return (lanes)((ulanes)i - (ulanes)lanes_swap(i)); /* the index's lanes wrap */
+}
+
+static inline item_set item_set_empty(void)
+{
+    return (item_set){lanes_set1(INT16_MIN), lanes_set1(INT16_MIN)};
+}
+
+static inline void item_set_add(item_set *set, item i)
+{
+    set->bounds = lanes_max(set->bounds, i);
+    set->centroids = lanes_max(set->centroids, item_centroid(i));
+}
+
+static inline void item_set_merge(item_set *set, const item_set *other)
+{
+    set->bounds = lanes_max(set->bounds, other->bounds);
+    set->centroids = lanes_max(set->centroids, other->centroids);
+}
+
+/* Of a box, in steps: lanes 0 to 2. */
+static inline lanes item_extent(lanes box)
+{
+    return (lanes)((ulanes)box + (ulanes)lanes_swap(box) - (ulanes)lanes_set1(ITEM_TOP)); /* an empty one's wraps */
+}
+
+/* The grid that is laid over a box. */
+item_grid item_grid_make(const double lower[3], const double upper[3]);
+
+/* A box of doubles to steps, to the nearest. */
+static inline item item_make(const item_grid *grid, const double lower[3], const double upper[3], uint32_t index)
+{
+    item made;
+    for (int axis = 0; axis < 3; axis++) {
+        const double low = (lower[axis] - grid->origin[axis]) * grid->inverse[axis] + 0.5;
+        const double high = (upper[axis] - grid->origin[axis]) * grid->inverse[axis] + 0.5;
+        made[axis] = (int16_t)(ITEM_TOP - (int)(low > 0 ? low < ITEM_TOP ? low : ITEM_TOP : 0));
+        made[4 + axis] = (int16_t)(high > 0 ? high < ITEM_TOP ? high : ITEM_TOP : 0);
+    }
+    made[3] = (int16_t)(uint16_t)(index & 0xffff);
+    made[7] = (int16_t)(uint16_t)(index >> 16);
+    return made;
+}
+
+#endif

@@ -1,0 +1,236 @@
+/* Bits go to the axes as a box is halved: always across its longest side, so that nodes are as cubic as the mesh
+ * allows, whatever its shape. Where a bit goes is looked up, seven bits at a time. */
+#include "mmbvh_morton.h"
+
+#include <omp.h>
+#include <string.h>
+
+#include "memory.h"
+
+enum {
+    CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
+    DIGIT_BITS = 11, /* as many streams as a core's cache can hold the ends of */
+    DIGITS = 1 << DIGIT_BITS,
+    SORT_CHUNKS_MAX = 64
+};
+
+static int bits_of(uint64_t x)
+{
+    return x ? 64 - __builtin_clzll(x) : 0;
+}
+
+/* Which axis each bit of the code halves, the highest first; counts how many an axis gets. */
+static void choose_axes(const double lower[3], const double upper[3], int code_bits, int axes[], int counts[3])
+{
+    double sides[3];
+    for (int axis = 0; axis < 3; axis++) {
+        sides[axis] = upper[axis] - lower[axis];
+        counts[axis] = 0;
+    }
+    for (int bit = 0; bit < code_bits; bit++) {
+        int longest = -1;
+        for (int axis = 0; axis < 3; axis++) {
+            if (counts[axis] == MORTON_AXIS_BITS) continue;
+            if (longest < 0 || sides[axis] > sides[longest]) longest = axis;
+        }
+        axes[bit] = longest;
+        counts[longest]++;
+        sides[longest] *= 0.5;
+    }
+}
+
+void morton_coder_init(morton_coder *coder, const double lower[3], const double upper[3], int64_t index_count)
+{
+    int axes[CODE_BITS_MAX], counts[3];
+    memset(coder, 0, sizeof *coder);
+    coder->index_bits = bits_of((uint64_t)index_count);
+    coder->code_bits = 64 - coder->index_bits < CODE_BITS_MAX ? 64 - coder->index_bits : CODE_BITS_MAX;
+    choose_axes(lower, upper, coder->code_bits, axes, counts);
+    int left[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const double side = upper[axis] - lower[axis], steps = (double)(1 << counts[axis]);
+        coder->origin[axis] = lower[axis];
+        coder->factor[axis] = side > 0 && side < INFINITY ? steps / side : 0;
+        coder->most[axis] = steps - 1;
+        left[axis] = counts[axis];
+    }
+    for (int bit = 0; bit < coder->code_bits; bit++) {
+        const int axis = axes[bit], place = --left[axis];
+        const uint64_t mask = UINT64_C(1) << (coder->index_bits + coder->code_bits - 1 - bit);
+        uint64_t *part = coder->parts[axis][place / MORTON_PART_BITS];
+        for (int i = 0; i < 1 << MORTON_PART_BITS; i++) {
+            if (i >> place % MORTON_PART_BITS & 1) part[i] |= mask;
+        }
+    }
+}
+
+static inline uint64_t code_of(const morton_coder *coder, const fetch_box *box)
+{
+    uint64_t code = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        const double centre = 0.5 * (box->lower[axis] + box->upper[axis]);
+        const double place = (centre - coder->origin[axis]) * coder->factor[axis];
+        const unsigned step = (unsigned)(place > 0 ? place < coder->most[axis] ? place : coder->most[axis] : 0);
+        for (int part = 0; part < MORTON_PARTS; part++) {
+            const unsigned bits = step >> part * MORTON_PART_BITS & ((1 << MORTON_PART_BITS) - 1);
+            code |= coder->parts[axis][part][bits];
+        }
+    }
+    return code;
+}
+
+void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
+                  fetch_box *exact)
+{
+    const uint64_t mask = (UINT64_C(1) << coder->index_bits) - 1;
+    uint32_t cells[BOUNDS_BLOCK];
+    fetch_box boxes[BOUNDS_BLOCK];
+    for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
+        const int n = (int)(count - begin < BOUNDS_BLOCK ? count - begin : BOUNDS_BLOCK);
+        for (int i = 0; i < n; i++) cells[i] = (uint32_t)(keys[begin + i] & mask);
+        source->read(source, cells, n, boxes);
+        for (int i = 0; i < n; i++) {
+            fetch_box_unite(exact, &boxes[i]);
+            bounds_transform(source, &boxes[i]);
+            keys[begin + i] = code_of(coder, &boxes[i]) | cells[i];
+        }
+    }
+}
+
+/* ---- sorting by the digits of the code, the lowest first -------------------------------------------------------- */
+
+typedef struct digit_counts {
+    int64_t of[SORT_CHUNKS_MAX][DIGITS];
+} digit_counts;
+
+typedef struct sorting {
+    const uint64_t *from;
+    uint64_t *to;
+    int64_t count;
+    int chunks, threads, shift;
+    digit_counts *counts;
+} sorting;
+
+static inline int digit_of(const sorting *s, uint64_t key)
+{
+    return (int)(key >> s->shift & (DIGITS - 1));
+}
+
+static void count_digits(const sorting *s)
+{
+#pragma omp parallel for num_threads(s->threads) schedule(static)
+    for (int chunk = 0; chunk < s->chunks; chunk++) {
+        int64_t *of = s->counts->of[chunk];
+        memset(of, 0, sizeof s->counts->of[chunk]);
+        const int64_t end = s->count * (chunk + 1) / s->chunks;
+        for (int64_t i = s->count * chunk / s->chunks; i < end; i++) of[digit_of(s, s->from[i])]++;
+    }
+}
+
+/* From how many to where they begin. False where all have one digit. */
+static bool sum_digits(const sorting *s)
+{
+    int64_t sum = 0, most = 0;
+    for (int digit = 0; digit < DIGITS; digit++) {
+        const int64_t before = sum;
+        for (int chunk = 0; chunk < s->chunks; chunk++) {
+            const int64_t count = s->counts->of[chunk][digit];
+            s->counts->of[chunk][digit] = sum;
+            sum += count;
+        }
+        most = sum - before > most ? sum - before : most;
+    }
+    return most < s->count;
+}
+
+static void move_digits(const sorting *s)
+{
+#pragma omp parallel for num_threads(s->threads) schedule(static)
+    for (int chunk = 0; chunk < s->chunks; chunk++) {
+        int64_t *places = s->counts->of[chunk];
+        const int64_t end = s->count * (chunk + 1) / s->chunks;
+        for (int64_t i = s->count * chunk / s->chunks; i < end; i++) {
+            s->to[places[digit_of(s, s->from[i])]++] = s->from[i];
+        }
+    }
+}
+
+uint64_t *morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads)
+{
+    sorting s = {.from = keys, .to = other, .count = count, .threads = threads};
+    s.chunks = threads < SORT_CHUNKS_MAX ? threads : SORT_CHUNKS_MAX;
+    s.counts = base_alloc((size_t)s.chunks * sizeof s.counts->of[0]);
+    if (!s.counts) return NULL;
+    for (int bit = 0; bit < coder->code_bits; bit += DIGIT_BITS) {
+        s.shift = coder->index_bits + bit;
+        count_digits(&s);
+        if (!sum_digits(&s)) continue;
+        move_digits(&s);
+        s.to = s.from == keys ? keys : other;
+        s.from = s.from == keys ? other : keys;
+    }
+    base_free(s.counts);
+    return s.from == keys ? keys : other;
+}
+
+/* ---- the tree --------------------------------------------------------------------------------------------------- */
+
+/* How many of so many ascending keys, two or more, lie below the change of their highest bit that changes. */
+static int64_t split_of(const uint64_t *keys, int64_t count)
+{
+    const int bit = bits_of(keys[0] ^ keys[count - 1]) - 1;
+    const uint64_t border = keys[count - 1] >> bit << bit;
+    int64_t low = 0, high = count - 1; /* keys[low] is below the border, keys[high] is not */
+    while (high - low > 1) {
+        const int64_t middle = low + (high - low) / 2;
+        if (keys[middle] < border) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return high;
+}
+
+static topology_link build_subtree(topology_scratch *scratch, const uint64_t *keys, int64_t first, int64_t count)
+{
+    if (count <= MMBVH_MAX_LEAF) return topology_leaf(first, count);
+    const int64_t left_count = split_of(keys + first, count), pair = topology_new_pair(scratch);
+    const topology_link left = build_subtree(scratch, keys, first, left_count);
+    const topology_link right = build_subtree(scratch, keys, first + left_count, count - left_count);
+    scratch->links[pair] = left;
+    scratch->links[pair + 1] = right;
+    return topology_inner(pair);
+}
+
+static void grow(topology_build *build, topology *t, const uint64_t *keys)
+{
+    if (atomic_load(&build->failed)) return;
+    if (t->count <= TOPOLOGY_SUBTREE_CELLS) {
+        topology_scratch *scratch = &build->scratch[omp_get_thread_num()];
+        scratch->count = 0;
+        const topology_link root = build_subtree(scratch, keys + t->first, 0, t->count);
+        topology_keep(build, t, scratch, root);
+        return;
+    }
+    const int64_t left_count = split_of(keys + t->first, t->count);
+    for (int side = 0; side < 2; side++) {
+        const int64_t begin = side ? left_count : 0, end = side ? t->count : left_count;
+        topology *child = t->children[side] = topology_new(build, t->first + begin, end - begin);
+        if (!child) return;
+#pragma omp task default(none) firstprivate(build, child, keys)
+        grow(build, child, keys);
+    }
+}
+
+topology *morton_build(topology_build *build, const uint64_t *keys, int64_t count)
+{
+    topology *root = topology_new(build, 0, count);
+    if (!root) return NULL;
+#pragma omp parallel num_threads(build->threads)
+#pragma omp single
+    grow(build, root, keys);
+    if (!atomic_load(&build->failed)) return root;
+    topology_free(root);
+    return NULL;
+}

@@ -1,0 +1,34 @@
+/* Trees along a space-filling curve: cells sorted by a key that interleaves the bits of their centroids, and halved
+ * where the keys' highest bit changes. */
+#ifndef MMBVH_MORTON_H
+#define MMBVH_MORTON_H
+
+#include "mmbvh_bounds.h"
+#include "mmbvh_topology.h"
+
+enum { MORTON_PART_BITS = 7, MORTON_PARTS = 3, MORTON_AXIS_BITS = MORTON_PART_BITS * MORTON_PARTS };
+
+/* A key: the code in the high bits, the cell's index in the index_bits low ones, so that no two are equal. */
+typedef struct morton_coder {
+    double origin[3];
+    double factor[3]; /* to steps of the axis */
+    double most[3];   /* the last step */
+    int index_bits;
+    int code_bits;
+    uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* where so many bits of an axis go in a key */
+} morton_coder;
+
+/* For cells below index_count, in a box in the tree's coordinates. */
+void morton_coder_init(morton_coder *coder, const double lower[3], const double upper[3], int64_t index_count);
+
+/* The keys of cells, whose indices keys hold so far; exact grows by the cells' boxes in the source's coordinates. */
+void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
+                  fetch_box *exact);
+
+/* By the code; where the indices ascended, keys then ascend. Returns where they are: in keys or in other. */
+uint64_t *morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads);
+
+/* The tree over ascending keys. NULL where an allocation failed. */
+topology *morton_build(topology_build *build, const uint64_t *keys, int64_t count);
+
+#endif

@@ -1,0 +1,45 @@
+#include "mmbvh_store.h"
+
+#include <math.h>
+
+/* The power of two not below x; 0 for 0. */
+static double power_above(double x)
+{
+    int exponent;
+    const double fraction = frexp(x, &exponent);
+    return x > 0 ? ldexp(1, fraction > 0.5 ? exponent : exponent - 1) : 0;
+}
+
+/* An axis's step is at least the distance of floats at the box's far end: then a step is never lost to rounding. */
+mmbvh_grid store_grid(const float lower[3], const float upper[3])
+{
+    enum { STEPS = (1 << COMPACT_LOWER_BITS) - (1 << (COMPACT_LOWER_BITS - COMPACT_MANTISSA_BITS)) };
+    mmbvh_grid grid = {0};
+    for (int axis = 0; axis < 3; axis++) {
+        const double low = (double)lower[axis], high = (double)upper[axis];
+        const double far = fmax(fabs(low), fabs(high));
+        const double step = fmax(power_above(fmax((high - low) / STEPS, far * 0x1p-23)), 0x1p-100);
+        grid.step[axis] = (float)step;
+        grid.origin[axis] = (float)(floor(low / step) * step);
+        if (grid.origin[axis] > lower[axis]) grid.origin[axis] = nextafterf(grid.origin[axis], -INFINITY);
+    }
+    return grid;
+}
+
+bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        uint32_t *word = &tree->compact[index].axis[axis];
+        if (!(tree->grid.origin[axis] <= lower[axis] && lower[axis] <= upper[axis])) return false;
+        for (;;) {
+            float low[4], high[4];
+            compact_box(&tree->compact[index], &tree->grid, low, high);
+            const bool is_low = low[axis] <= lower[axis], is_high = high[axis] >= upper[axis];
+            if (is_low && is_high) break;
+            if (!is_low && !(*word & COMPACT_LOWER_MAX)) return false;
+            if (is_low && *word >> COMPACT_LOWER_BITS == COMPACT_EXTENT_MAX) return false;
+            *word += is_low ? 1u << COMPACT_LOWER_BITS : UINT32_MAX;
+        }
+    }
+    return true;
+}

@@ -1,0 +1,62 @@
+/* Writing nodes, whatever their layout. */
+#ifndef MMBVH_STORE_H
+#define MMBVH_STORE_H
+
+#include "mmbvh.h"
+
+static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int count)
+{
+    if (tree->compact) {
+        tree->compact[index].link = (uint32_t)ref << 3 | (uint32_t)count;
+        return;
+    }
+    tree->nodes[index].ref = (uint64_t)ref & (UINT64_MAX >> 3);
+    tree->nodes[index].count = (unsigned)count & 7;
+}
+
+/* The grid of a compact layout, over a box that must be finite. */
+mmbvh_grid store_grid(const float lower[3], const float upper[3]);
+
+/* Where the quick way rounds the wrong way: a step further at a time. False where the grid ends before. */
+bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
+
+/* Lanes 0 to 2 to the nearest of what the grid has outside the box; lane 3 must be 0. False where it does not reach so
+ * far. */
+static inline bool store_compact(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
+{
+    mmbvh_compact_node *node = &tree->compact[index];
+    const vec4 origin = *(const compact_vec4 *)(const void *)tree->grid.origin;
+    const vec4 step = *(const compact_vec4 *)(const void *)tree->grid.step;
+    const vec4 zero = {0}, inverse = (vec4)(0x7f000000 - (ivec4)step); /* of powers of two: by their exponents */
+    const ivec4 place =
+        vec4_truncate(vec4_min(vec4_max((lower - origin) * inverse, zero), vec4_set1(COMPACT_LOWER_MAX)));
+    const vec4 extent = vec4_max((upper - (vec4_from_int(place) * step + origin)) * inverse, zero) + 16.0f;
+    const int shift = 23 - COMPACT_MANTISSA_BITS;
+    const ivec4 code = ((ivec4)extent + ((1 << shift) - 1) - COMPACT_ONE) >> shift;
+    const ivec4 over = (ivec4)(code > COMPACT_EXTENT_MAX);
+    const ivec4 words = place | ((code & ~over) | (COMPACT_EXTENT_MAX & over)) << COMPACT_LOWER_BITS;
+    for (int axis = 0; axis < 3; axis++) node->axis[axis] = (uint32_t)words[axis];
+    vec4 low, high;
+    compact_decode_words(words, &tree->grid, &low, &high);
+    const ivec4 holds = (ivec4)(low <= lower) & (ivec4)(high >= upper);
+    return vec4_all(holds) || store_compact_slowly(tree, index, lower, upper);
+}
+
+static inline void store_reference(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
+{
+    mmbvh_node *node = &tree->nodes[index];
+    for (int axis = 0; axis < 3; axis++) {
+        node->lower[axis] = lower[axis];
+        node->upper[axis] = upper[axis];
+    }
+}
+
+/* To the node, outward. False where the compact layout's grid does not hold the box. */
+static inline bool store_box(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
+{
+    if (tree->compact) return store_compact(tree, index, lower, upper);
+    store_reference(tree, index, lower, upper);
+    return true;
+}
+
+#endif
