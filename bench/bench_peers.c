@@ -1,0 +1,126 @@
+/* Tracing and building beside VTK and Embree, in turns in one process, on the same mesh, camera and image: Embree
+ * traces the triangles that VTK extracts, and builds trees over the boxes of our cells. Prints CSV. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench_routes.h"
+
+typedef struct peers_series {
+    bench_series build, trace, embree[3];
+} peers_series;
+
+static const char *const builder_names[3] = {"low", "medium", "medium wide"};
+
+static void run(bench_scene *scene, bench_routes *routes, peers_series *series, int number)
+{
+    double began = bench_begin();
+    bench_scene_build(scene);
+    bench_end(began, number, &series->build);
+    began = bench_begin();
+    bench_scene_frame(scene);
+    bench_end(began, number, &series->trace);
+    bench_routes_run(routes, bench_isovalues, 1, number);
+    for (int i = 0; routes->embree && i < 3; i++) {
+        bench_begin();
+        bench_keep(bench_embree_build_cells(routes->embree, (bench_embree_builder)i), number, &series->embree[i]);
+    }
+}
+
+/* After a last build of each kind. */
+static void print_costs(bench_scene *scene, bench_routes *routes)
+{
+    bench_print_number(&scene->subject, "tree cost", "tests/ray", mmbvh_cost(&scene->tree));
+    for (int i = 0; routes->embree && i <= BENCH_EMBREE_MEDIUM; i++) {
+        char measure[64];
+        snprintf(measure, sizeof measure, "embree cells %s cost", builder_names[i]);
+        bench_embree_build_cells(routes->embree, (bench_embree_builder)i);
+        bench_print_number(&scene->subject, measure, "tests/ray", bench_embree_cost(routes->embree));
+    }
+}
+
+static void print(bench_scene *scene, bench_routes *routes, peers_series *series)
+{
+    bench_print_series(&scene->subject, "build", &series->build);
+    bench_print_series(&scene->subject, "isosurface trace", &series->trace);
+    bench_routes_print(routes, "isosurface");
+    for (int i = 0; routes->embree && i < 3; i++) {
+        char measure[64];
+        snprintf(measure, sizeof measure, "embree cells %s", builder_names[i]);
+        bench_print_series(&scene->subject, measure, &series->embree[i]);
+    }
+    print_costs(scene, routes);
+}
+
+static float *frame_depths(const bench_scene *scene)
+{
+    const int64_t count = (int64_t)BENCH_WIDTH * BENCH_HEIGHT;
+    float *depths = malloc((size_t)count * sizeof *depths);
+    if (!depths) abort();
+    for (int64_t i = 0; i < count; i++) depths[i] = INFINITY;
+    for (int64_t i = 0; i < scene->fragments.count; i++) {
+        const fragment *f = &scene->fragments.items[i];
+        const double depth = (double)f->t_in / scene->job.space.scale + scene->job.space.depth_origin;
+        depths[f->pixel] = fminf(depths[f->pixel], (float)depth);
+    }
+    return depths;
+}
+
+static void measure(test_mesh_kind kind, int n, int runs, const char *folder)
+{
+    bench_scene scene;
+    bench_routes routes;
+    peers_series series = {0};
+    bench_scene_create(&scene, "bench_peers", kind, n, BENCH_WIDTH, BENCH_HEIGHT);
+    bench_scene_show_surfaces(&scene, 1);
+    bench_routes_create(&routes, &scene);
+    if (routes.embree) bench_embree_set_cells(routes.embree, &scene.view.cells);
+    for (int i = 0; i <= runs; i++) run(&scene, &routes, &series, i);
+    print(&scene, &routes, &series);
+    float *depths = frame_depths(&scene);
+    bench_routes_compare(&routes, depths, "isosurface", folder);
+    bench_scene_surface_error(&scene, "isosurface");
+    free(depths);
+    bench_routes_free(&routes);
+    bench_scene_free(&scene);
+}
+
+static int usage(int status)
+{
+    fprintf(
+        status ? stderr : stdout,
+        "Usage: bench_peers [--runs N] [--no-head] [--depths FOLDER] MESH:N ...\n\n"
+        "Measures building and tracing of each MESH (tets or hexes) of N^3 cubes beside VTK's extraction and Mesa,\n"
+        "and beside Embree, and prints CSV. Without an X server (xvfb-run) VTK only extracts.\n"
+        "  --runs N         runs of each measure (5)\n"
+        "  --no-head        without the line of column names\n"
+        "  --depths FOLDER  write the depths of all pictures there, as PNG\n\n"
+        "OMP_NUM_THREADS sets the threads, also of VTK and Embree; LP_NUM_THREADS those of Mesa.\n");
+    return status;
+}
+
+int main(int argc, char **argv)
+{
+    int runs = 5, i = 1, n;
+    bool head = true;
+    const char *folder = NULL;
+    test_mesh_kind kind;
+    for (; i < argc && !strncmp(argv[i], "--", 2); i++) {
+        if (!strcmp(argv[i], "--help")) return usage(0);
+        if (!strcmp(argv[i], "--no-head"))
+            head = false;
+        else if (!strcmp(argv[i], "--runs") && i + 1 < argc)
+            runs = atoi(argv[++i]);
+        else if (!strcmp(argv[i], "--depths") && i + 1 < argc)
+            folder = argv[++i];
+        else
+            return usage(2);
+    }
+    if (i == argc || runs < 1 || runs > BENCH_MAX_RUNS) return usage(2);
+    for (int j = i; j < argc; j++)
+        if (!bench_scene_parse(argv[j], &kind, &n) || kind > TEST_HEXES) return usage(2);
+    if (head) bench_print_head();
+    for (; i < argc; i++)
+        if (bench_scene_parse(argv[i], &kind, &n)) measure(kind, n, runs, folder);
+    return 0;
+}
