@@ -2,8 +2,8 @@
  * traces the triangles that VTK extracts, and builds trees over the boxes of our cells. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
+#include "bench_command.h"
 #include "bench_routes.h"
 
 typedef struct peers_series {
@@ -85,42 +85,15 @@ static void measure(test_mesh_kind kind, int n, int runs, const char *folder)
     bench_scene_free(&scene);
 }
 
-static int usage(int status)
-{
-    fprintf(
-        status ? stderr : stdout,
-        "Usage: bench_peers [--runs N] [--no-head] [--depths FOLDER] MESH:N ...\n\n"
-        "Measures building and tracing of each MESH (tets or hexes) of N^3 cubes beside VTK's extraction and Mesa,\n"
-        "and beside Embree, and prints CSV. Without an X server (xvfb-run) VTK only extracts.\n"
-        "  --runs N         runs of each measure (5)\n"
-        "  --no-head        without the line of column names\n"
-        "  --depths FOLDER  write the depths of all pictures there, as PNG\n\n"
-        "OMP_NUM_THREADS sets the threads, also of VTK and Embree; LP_NUM_THREADS those of Mesa.\n");
-    return status;
-}
-
 int main(int argc, char **argv)
 {
-    int runs = 5, i = 1, n;
-    bool head = true;
-    const char *folder = NULL;
-    test_mesh_kind kind;
-    for (; i < argc && !strncmp(argv[i], "--", 2); i++) {
-        if (!strcmp(argv[i], "--help")) return usage(0);
-        if (!strcmp(argv[i], "--no-head"))
-            head = false;
-        else if (!strcmp(argv[i], "--runs") && i + 1 < argc)
-            runs = atoi(argv[++i]);
-        else if (!strcmp(argv[i], "--depths") && i + 1 < argc)
-            folder = argv[++i];
-        else
-            return usage(2);
-    }
-    if (i == argc || runs < 1 || runs > BENCH_MAX_RUNS) return usage(2);
-    for (int j = i; j < argc; j++)
-        if (!bench_scene_parse(argv[j], &kind, &n) || kind > TEST_HEXES) return usage(2);
-    if (head) bench_print_head();
-    for (; i < argc; i++)
-        if (bench_scene_parse(argv[i], &kind, &n)) measure(kind, n, runs, folder);
+    bench_command command;
+    if (!bench_command_parse(argc, argv,
+                             "Measures building and tracing of each MESH (tets or hexes) of N^3 cubes beside VTK's\n"
+                             "extraction and Mesa, and beside Embree.",
+                             TEST_HEXES, &command))
+        return command.status;
+    for (int i = 0; i < command.mesh_count; i++)
+        measure(command.meshes[i].kind, command.meshes[i].n, command.runs, command.depths);
     return 0;
 }

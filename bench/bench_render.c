@@ -3,17 +3,15 @@
  * pixels. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
+#include "bench_command.h"
 #include "bench_scene.h"
 #include "memory.h"
-
-enum { MAX_RUNS = 1000 };
 
 /* How fast is act()? units / seconds, over the runs and one before them that is not counted. */
 static bench_stats speed(bench_scene *scene, int runs, void (*act)(bench_scene *), double units)
 {
-    double speeds[MAX_RUNS];
+    double speeds[BENCH_MAX_RUNS];
     act(scene);
     for (int i = 0; i < runs; i++) {
         const double began = bench_seconds();
@@ -76,37 +74,14 @@ static void measure(test_mesh_kind kind, int n, int runs)
     bench_scene_free(&scene);
 }
 
-static int usage(int status)
-{
-    fprintf(status ? stderr : stdout,
-            "Usage: bench_render [--runs N] [--no-head] MESH:N ...\n\n"
-            "Measures each MESH (tets, hexes, wedges, pyramids or mixed) of N^3 cubes and prints CSV.\n"
-            "  --runs N   runs of each measure (5)\n"
-            "  --no-head  without the line of column names\n\n"
-            "OMP_NUM_THREADS sets the threads, INSITU_ISA the instruction set.\n");
-    return status;
-}
-
 int main(int argc, char **argv)
 {
-    int runs = 5, i = 1, n;
-    bool head = true;
-    test_mesh_kind kind;
-    for (; i < argc && !strncmp(argv[i], "--", 2); i++) {
-        if (!strcmp(argv[i], "--help")) return usage(0);
-        if (!strcmp(argv[i], "--no-head"))
-            head = false;
-        else if (!strcmp(argv[i], "--runs") && i + 1 < argc)
-            runs = atoi(argv[++i]);
-        else
-            return usage(2);
-    }
-    if (i == argc || runs < 1 || runs > MAX_RUNS) return usage(2);
-    for (int j = i; j < argc; j++)
-        if (!bench_scene_parse(argv[j], &kind, &n)) return usage(2);
-    if (render_isa_warning() && *render_isa_warning()) fprintf(stderr, "bench_render: %s\n", render_isa_warning());
-    if (head) bench_print_head();
-    for (; i < argc; i++)
-        if (bench_scene_parse(argv[i], &kind, &n)) measure(kind, n, runs);
+    bench_command command;
+    if (!bench_command_parse(argc, argv,
+                             "Measures building, refitting and drawing of each MESH (tets, hexes, wedges, pyramids,\n"
+                             "polyhedra or mixed) of N^3 cubes.",
+                             TEST_MIXED, &command))
+        return command.status;
+    for (int i = 0; i < command.mesh_count; i++) measure(command.meshes[i].kind, command.meshes[i].n, command.runs);
     return 0;
 }

@@ -79,12 +79,11 @@ void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind
                                  .cells = s->view.cells.cell_count};
     set_job(s, width, height);
     set_layers(s);
-    s->pixels = bench_pixels_create(&s->view.cells, &s->job.camera, BENCH_BLOCK);
 }
 
 void bench_scene_free(bench_scene *s)
 {
-    bench_pixels_destroy(s->pixels);
+    if (s->pixels) bench_pixels_destroy(s->pixels);
     base_free(s->fragments.items);
     mmbvh_free(&s->tree);
     test_view_free(&s->view);
@@ -118,10 +117,17 @@ void bench_scene_frame(bench_scene *s)
     must(s, render_frame(&s->job, &s->fragments, NULL, &s->error));
 }
 
+/* Chosen when first asked for: not every benchmark asks. */
+static const bench_pixels *chosen(bench_scene *s)
+{
+    if (!s->pixels) s->pixels = bench_pixels_create(&s->view.cells, &s->job.camera, BENCH_BLOCK);
+    return s->pixels;
+}
+
 void bench_scene_surface_error(bench_scene *s, const char *name)
 {
     char measure[96];
-    const bench_surface_error e = bench_surface_compare(s->pixels, &s->job, test_wave, &s->fragments);
+    const bench_surface_error e = bench_surface_compare(chosen(s), &s->job, test_wave, &s->fragments);
     const struct {
         const char *what;
         double number;
@@ -140,16 +146,5 @@ void bench_scene_volume_error(bench_scene *s, const char *name)
 {
     char measure[96];
     snprintf(measure, sizeof measure, "%s error", name);
-    bench_print(&s->subject, measure, "linear", bench_volume_compare(s->pixels, &s->job, &s->fragments));
-}
-
-bool bench_scene_parse(const char *text, test_mesh_kind *kind, int *n)
-{
-    const char *colon = strchr(text, ':');
-    *n = colon ? atoi(colon + 1) : 0;
-    for (*kind = 0; colon && *kind < TEST_KIND_COUNT; ++*kind) {
-        const char *name = test_mesh_kind_name(*kind);
-        if (strlen(name) == (size_t)(colon - text) && !strncmp(name, text, strlen(name))) return *n > 0;
-    }
-    return false;
+    bench_print(&s->subject, measure, "linear", bench_volume_compare(chosen(s), &s->job, &s->fragments));
 }

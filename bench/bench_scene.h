@@ -27,8 +27,8 @@ typedef struct bench_scene {
     test_view view;
     mmbvh tree;
     fragment_list fragments;
-    bench_pixels *pixels;
-    render_job job; /* camera, space, light, sampling of half a cube's side; no layer */
+    bench_pixels *pixels; /* NULL until an error is asked for */
+    render_job job;       /* camera, space, light, sampling of half a cube's side; no layer */
     render_part part;
     mmbvh_ranges ranges;
     render_transfer transfer;
@@ -54,8 +54,5 @@ void bench_scene_frame(bench_scene *scene);
 /* Print the error of the frame, of one isosurface or of the volume: measures that begin with name. */
 void bench_scene_surface_error(bench_scene *scene, const char *name);
 void bench_scene_volume_error(bench_scene *scene, const char *name);
-
-/* "tets:31". False where it is no such mesh. */
-bool bench_scene_parse(const char *text, test_mesh_kind *kind, int *n);
 
 #endif

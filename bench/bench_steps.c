@@ -1,0 +1,57 @@
+/* Time to picture: whole steps beside the routes that a user would take instead, in turns in one process. For those it
+ * is all one whether values, vertices or the whole mesh are new: they begin at the mesh. Prints CSV. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <mpi.h>
+
+#include "bench_command.h"
+#include "bench_routes.h"
+#include "bench_session.h"
+
+static void measure_picture(const bench_scene *scene, bench_routes *routes, bench_picture picture, int runs)
+{
+    bench_session session;
+    const int count = picture == BENCH_ISOSURFACES ? BENCH_ISOVALUES : 1;
+    const char *name = bench_picture_name(picture);
+    bench_session_create(&session, scene, picture);
+    for (int number = 0; number <= runs; number++) {
+        for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++)
+            bench_session_step(&session, change, number);
+        bench_routes_set(routes, bench_session_coordinates(&session), scene->view.cells.vertex_count,
+                         bench_session_values(&session));
+        bench_routes_run(routes, bench_isovalues, count, number);
+    }
+    bench_session_print(&session);
+    bench_routes_print(routes, name);
+    float *depths = bench_session_depths(&session);
+    bench_routes_compare(routes, depths, name, NULL);
+    free(depths);
+    bench_session_free(&session);
+}
+
+static void measure(test_mesh_kind kind, int n, int runs)
+{
+    bench_scene scene;
+    bench_routes routes;
+    bench_scene_create(&scene, "bench_steps", kind, n, BENCH_WIDTH, BENCH_HEIGHT);
+    bench_routes_create(&routes, &scene);
+    measure_picture(&scene, &routes, BENCH_ISOSURFACE, runs);
+    measure_picture(&scene, &routes, BENCH_ISOSURFACES, runs);
+    bench_routes_free(&routes);
+    bench_scene_free(&scene);
+}
+
+int main(int argc, char **argv)
+{
+    bench_command command;
+    MPI_Init(&argc, &argv);
+    if (!bench_command_parse(argc, argv,
+                             "Measures whole steps for each MESH (tets or hexes) of N^3 cubes, with new values, moved\n"
+                             "vertices and a new mesh, beside VTK's extraction and Mesa, and beside Embree.",
+                             TEST_HEXES, &command))
+        command.mesh_count = 0;
+    for (int i = 0; i < command.mesh_count; i++) measure(command.meshes[i].kind, command.meshes[i].n, command.runs);
+    MPI_Finalize();
+    return command.status;
+}
