@@ -71,7 +71,7 @@ static void measure(test_mesh_kind kind, int n, int runs, const char *folder)
     bench_scene scene;
     bench_routes routes;
     peers_series series = {0};
-    bench_scene_create(&scene, "bench_peers", kind, n, BENCH_WIDTH, BENCH_HEIGHT);
+    bench_scene_create(&scene, "bench_peers", kind, n);
     bench_scene_show_surfaces(&scene, 1);
     bench_routes_create(&routes, &scene);
     if (routes.embree) bench_embree_set_cells(routes.embree, &scene.view.cells);

@@ -63,14 +63,14 @@ static void measure_frame(bench_scene *s, int runs, const char *layer)
 static void measure(test_mesh_kind kind, int n, int runs)
 {
     bench_scene scene;
-    bench_scene_create(&scene, "bench_render", kind, n, BENCH_WIDTH, BENCH_HEIGHT);
+    bench_scene_create(&scene, "bench_render", kind, n);
     measure_tree(&scene, runs);
     bench_scene_show_surfaces(&scene, 1);
     measure_frame(&scene, runs, "isosurface");
     bench_scene_surface_error(&scene, "isosurface");
     bench_scene_show_volume(&scene);
     measure_frame(&scene, runs, "volume");
-    bench_scene_volume_error(&scene, "volume");
+    bench_scene_volume_error(&scene, "volume", false);
     bench_scene_free(&scene);
 }
 

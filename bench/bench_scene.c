@@ -8,12 +8,18 @@
 
 #include "colour_map.h"
 #include "memory.h"
+#include "reference_integral.h"
 
 const double bench_isovalues[BENCH_ISOVALUES] = {0.3, -0.5, 1.0};
 const double bench_knots[BENCH_KNOTS] = {-0.6, 0, 0.6};
 const float bench_opacities[BENCH_KNOTS] = {0, 0.5f, 0};
 const double bench_unit_distance = 0.5;
 const double bench_eye[3] = {2.4, 1.6, 3.0}, bench_focal[3] = {0, 0, 0}, bench_up[3] = {0, 1, 0}, bench_degrees = 40;
+
+enum { ROWS = 18 /* of chosen pixels */, BIG_MESH = 13000000 };
+
+/* What a cell's stretch of the integral may be off by: a thousand cells sum up to less than float32's rounding. */
+static const double tolerance = 1e-11;
 
 static const double jitter = 0.2;
 static const float colours[BENCH_ISOVALUES][3] = {{0.8f, 0.7f, 0.5f}, {0.3f, 0.5f, 0.8f}, {0.8f, 0.3f, 0.3f}};
@@ -26,7 +32,7 @@ static void must(bench_scene *scene, insitu_status status)
     exit(1);
 }
 
-static void set_job(bench_scene *s, int width, int height)
+static void set_job(bench_scene *s)
 {
     const double distance =
         sqrt(bench_eye[0] * bench_eye[0] + bench_eye[1] * bench_eye[1] + bench_eye[2] * bench_eye[2]);
@@ -42,7 +48,6 @@ static void set_job(bench_scene *s, int width, int height)
                           .jitter = true,
                           .is_alone = true};
     s->job.space = (render_space){.scale = 0.5, .depth_origin = distance};
-    render_camera_look_at(&s->job.camera, bench_eye, bench_focal, bench_up, bench_degrees, width, height);
 }
 
 static void set_layers(bench_scene *s)
@@ -63,7 +68,21 @@ static void set_layers(bench_scene *s)
     s->volume = (render_volume_layer){{&s->view.field, &s->ranges}, &s->transfer};
 }
 
-void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind, int n, int width, int height)
+static void forget_truth(bench_scene *s)
+{
+    if (s->pixels) bench_pixels_destroy(s->pixels);
+    free(s->integrals);
+    s->pixels = NULL;
+    s->integrals = NULL;
+}
+
+void bench_scene_resize(bench_scene *s, int width, int height)
+{
+    forget_truth(s);
+    render_camera_look_at(&s->job.camera, bench_eye, bench_focal, bench_up, bench_degrees, width, height);
+}
+
+void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind, int n)
 {
     test_mesh mesh;
     memset(s, 0, sizeof *s);
@@ -77,13 +96,14 @@ void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind
                                  .threads = omp_get_max_threads(),
                                  .n = n,
                                  .cells = s->view.cells.cell_count};
-    set_job(s, width, height);
+    set_job(s);
     set_layers(s);
+    bench_scene_resize(s, BENCH_WIDTH, BENCH_HEIGHT);
 }
 
 void bench_scene_free(bench_scene *s)
 {
-    if (s->pixels) bench_pixels_destroy(s->pixels);
+    forget_truth(s);
     base_free(s->fragments.items);
     mmbvh_free(&s->tree);
     test_view_free(&s->view);
@@ -117,10 +137,12 @@ void bench_scene_frame(bench_scene *s)
     must(s, render_frame(&s->job, &s->fragments, NULL, &s->error));
 }
 
-/* Chosen when first asked for: not every benchmark asks. */
+/* Chosen when first asked for: not every benchmark asks. Fewer of a big mesh, as the reference tries each pixel's ray
+ * against every cell near any of them. */
 static const bench_pixels *chosen(bench_scene *s)
 {
-    if (!s->pixels) s->pixels = bench_pixels_create(&s->view.cells, &s->job.camera, BENCH_BLOCK);
+    const int block = s->job.camera.height / (s->subject.cells < BIG_MESH ? ROWS : ROWS / 2);
+    if (!s->pixels) s->pixels = bench_pixels_create(&s->view.cells, &s->job.camera, block);
     return s->pixels;
 }
 
@@ -142,9 +164,57 @@ void bench_scene_surface_error(bench_scene *s, const char *name)
     }
 }
 
-void bench_scene_volume_error(bench_scene *s, const char *name)
+/* The volume's integral along the chosen pixels' rays. */
+static const double *integrals(bench_scene *s)
+{
+    const float nothing[4] = {0, 0, 0, 0};
+    const bench_pixels *pixels = chosen(s);
+    const int count = bench_pixels_count(pixels);
+    const render_part kept = {bench_pixels_cells(pixels), NULL};
+    render_job job = s->job;
+    if (s->integrals) return s->integrals;
+    s->integrals = malloc(4 * (size_t)count * sizeof *s->integrals);
+    if (!s->integrals) abort();
+    job.parts = &kept;
+    reference_integral *integral = reference_integral_create(&job, tolerance);
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < count; i++) {
+        int x, y;
+        bench_pixels_place(pixels, i, &x, &y);
+        reference_integral_trace(integral, x, y, nothing, NULL, 0, s->integrals + 4 * i);
+    }
+    reference_integral_free(integral);
+    return s->integrals;
+}
+
+static bench_stats integral_error(bench_scene *s)
+{
+    const double *truth = integrals(s);
+    const int count = bench_pixels_count(s->pixels);
+    float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
+    double *depths = malloc((size_t)count * sizeof *depths), *errors = malloc((size_t)count * sizeof *errors);
+    if (!rgba || !depths || !errors) abort();
+    bench_pixels_merge(s->pixels, &s->job.space, &s->fragments, rgba, depths);
+    int seen = 0;
+    for (int i = 0; i < count; i++) {
+        double error = 0;
+        for (int channel = 0; channel < 4; channel++)
+            error = fmax(error, fabs((double)rgba[4 * i + channel] - truth[4 * i + channel]));
+        if (truth[4 * i + 3] > 0) errors[seen++] = error;
+    }
+    const bench_stats out = bench_stats_of(errors, seen);
+    free(rgba);
+    free(depths);
+    free(errors);
+    return out;
+}
+
+void bench_scene_volume_error(bench_scene *s, const char *name, bool with_integral)
 {
     char measure[96];
     snprintf(measure, sizeof measure, "%s error", name);
     bench_print(&s->subject, measure, "linear", bench_volume_compare(chosen(s), &s->job, &s->fragments));
+    if (!with_integral) return;
+    snprintf(measure, sizeof measure, "%s integral error", name);
+    bench_print(&s->subject, measure, "linear", integral_error(s));
 }

@@ -10,7 +10,7 @@
 #include "bench_error.h"
 #include "test_meshes.h"
 
-enum { BENCH_WIDTH = 1920, BENCH_HEIGHT = 1080, BENCH_BLOCK = 60, BENCH_ISOVALUES = 3, BENCH_KNOTS = 3 };
+enum { BENCH_WIDTH = 1920, BENCH_HEIGHT = 1080, BENCH_ISOVALUES = 3, BENCH_KNOTS = 3 };
 
 /* The first is that of the one isosurface. */
 extern const double bench_isovalues[BENCH_ISOVALUES];
@@ -28,6 +28,7 @@ typedef struct bench_scene {
     mmbvh tree;
     fragment_list fragments;
     bench_pixels *pixels; /* NULL until an error is asked for */
+    double *integrals;    /* of these pixels, × 4; NULL as well */
     render_job job;       /* camera, space, light, sampling of half a cube's side; no layer */
     render_part part;
     mmbvh_ranges ranges;
@@ -37,9 +38,12 @@ typedef struct bench_scene {
     base_error error;
 } bench_scene;
 
-/* Not to be moved. program: for the subject. No tree yet. */
-void bench_scene_create(bench_scene *scene, const char *program, test_mesh_kind kind, int n, int width, int height);
+/* Not to be moved. program: for the subject. No tree yet; pictures of BENCH_WIDTH × BENCH_HEIGHT. */
+void bench_scene_create(bench_scene *scene, const char *program, test_mesh_kind kind, int n);
 void bench_scene_free(bench_scene *scene);
+
+/* Pictures of another size. */
+void bench_scene_resize(bench_scene *scene, int width, int height);
 
 /* The tree anew, as a new mesh makes it necessary. */
 void bench_scene_build(bench_scene *scene);
@@ -51,8 +55,10 @@ void bench_scene_show_volume(bench_scene *scene);
 /* fragments anew. */
 void bench_scene_frame(bench_scene *scene);
 
-/* Print the error of the frame, of one isosurface or of the volume: measures that begin with name. */
+/* Print the error of the frame, of one isosurface or of the volume: measures that begin with name. Beside the volume's
+ * error against the same samples in double stands "integral error" against the integral itself, which is what a step
+ * costs; where with_integral. */
 void bench_scene_surface_error(bench_scene *scene, const char *name);
-void bench_scene_volume_error(bench_scene *scene, const char *name);
+void bench_scene_volume_error(bench_scene *scene, const char *name, bool with_integral);
 
 #endif

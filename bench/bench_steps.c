@@ -34,7 +34,7 @@ static void measure(test_mesh_kind kind, int n, int runs)
 {
     bench_scene scene;
     bench_routes routes;
-    bench_scene_create(&scene, "bench_steps", kind, n, BENCH_WIDTH, BENCH_HEIGHT);
+    bench_scene_create(&scene, "bench_steps", kind, n);
     bench_routes_create(&routes, &scene);
     measure_picture(&scene, &routes, BENCH_ISOSURFACE, runs);
     measure_picture(&scene, &routes, BENCH_ISOSURFACES, runs);
