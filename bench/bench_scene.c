@@ -82,11 +82,16 @@ void bench_scene_resize(bench_scene *s, int width, int height)
     render_camera_look_at(&s->job.camera, bench_eye, bench_focal, bench_up, bench_degrees, width, height);
 }
 
+void bench_scene_mesh(test_mesh_kind kind, int n, test_mesh *out)
+{
+    test_mesh_lattice(kind, n, jitter, test_wave, out);
+}
+
 void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind, int n)
 {
     test_mesh mesh;
     memset(s, 0, sizeof *s);
-    test_mesh_lattice(kind, n, jitter, test_wave, &mesh);
+    bench_scene_mesh(kind, n, &mesh);
     test_view_create(&mesh, (test_layout){0}, &s->view);
     s->view.cells.ghosts = NULL;
     test_mesh_free(&mesh);
@@ -139,7 +144,7 @@ void bench_scene_frame(bench_scene *s)
 
 /* Chosen when first asked for: not every benchmark asks. Fewer of a big mesh, as the reference tries each pixel's ray
  * against every cell near any of them. */
-static const bench_pixels *chosen(bench_scene *s)
+const bench_pixels *bench_scene_pixels(bench_scene *s)
 {
     const int block = s->job.camera.height / (s->subject.cells < BIG_MESH ? ROWS : ROWS / 2);
     if (!s->pixels) s->pixels = bench_pixels_create(&s->view.cells, &s->job.camera, block);
@@ -149,7 +154,7 @@ static const bench_pixels *chosen(bench_scene *s)
 void bench_scene_surface_error(bench_scene *s, const char *name)
 {
     char measure[96];
-    const bench_surface_error e = bench_surface_compare(chosen(s), &s->job, test_wave, &s->fragments);
+    const bench_surface_error e = bench_surface_compare(bench_scene_pixels(s), &s->job, test_wave, &s->fragments);
     const struct {
         const char *what;
         double number;
@@ -164,37 +169,35 @@ void bench_scene_surface_error(bench_scene *s, const char *name)
     }
 }
 
-/* The volume's integral along the chosen pixels' rays. */
-static const double *integrals(bench_scene *s)
+double *bench_scene_integrals(bench_scene *s, const render_transfer *transfer)
 {
     const float nothing[4] = {0, 0, 0, 0};
-    const bench_pixels *pixels = chosen(s);
+    const bench_pixels *pixels = bench_scene_pixels(s);
     const int count = bench_pixels_count(pixels);
     const render_part kept = {bench_pixels_cells(pixels), NULL};
+    const render_volume_layer layer = {s->volume.field, transfer};
     render_job job = s->job;
-    if (s->integrals) return s->integrals;
-    s->integrals = malloc(4 * (size_t)count * sizeof *s->integrals);
-    if (!s->integrals) abort();
+    double *rgba = malloc(4 * (size_t)count * sizeof *rgba);
+    if (!rgba) abort();
     job.parts = &kept;
+    job.volumes = &layer;
+    job.volume_count = 1;
     reference_integral *integral = reference_integral_create(&job, tolerance);
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < count; i++) {
         int x, y;
         bench_pixels_place(pixels, i, &x, &y);
-        reference_integral_trace(integral, x, y, nothing, NULL, 0, s->integrals + 4 * i);
+        reference_integral_trace(integral, x, y, nothing, NULL, 0, rgba + 4 * i);
     }
     reference_integral_free(integral);
-    return s->integrals;
+    return rgba;
 }
 
-static bench_stats integral_error(bench_scene *s)
+bench_stats bench_scene_pixel_error(const bench_scene *s, const double *truth, const float *rgba)
 {
-    const double *truth = integrals(s);
     const int count = bench_pixels_count(s->pixels);
-    float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
-    double *depths = malloc((size_t)count * sizeof *depths), *errors = malloc((size_t)count * sizeof *errors);
-    if (!rgba || !depths || !errors) abort();
-    bench_pixels_merge(s->pixels, &s->job.space, &s->fragments, rgba, depths);
+    double *errors = malloc((size_t)count * sizeof *errors);
+    if (!errors) abort();
     int seen = 0;
     for (int i = 0; i < count; i++) {
         double error = 0;
@@ -203,9 +206,21 @@ static bench_stats integral_error(bench_scene *s)
         if (truth[4 * i + 3] > 0) errors[seen++] = error;
     }
     const bench_stats out = bench_stats_of(errors, seen);
+    free(errors);
+    return out;
+}
+
+static bench_stats integral_error(bench_scene *s)
+{
+    const int count = bench_pixels_count(bench_scene_pixels(s));
+    float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
+    double *depths = malloc((size_t)count * sizeof *depths);
+    if (!rgba || !depths) abort();
+    if (!s->integrals) s->integrals = bench_scene_integrals(s, &s->transfer);
+    bench_pixels_merge(s->pixels, &s->job.space, &s->fragments, rgba, depths);
+    const bench_stats out = bench_scene_pixel_error(s, s->integrals, rgba);
     free(rgba);
     free(depths);
-    free(errors);
     return out;
 }
 
@@ -213,7 +228,7 @@ void bench_scene_volume_error(bench_scene *s, const char *name, bool with_integr
 {
     char measure[96];
     snprintf(measure, sizeof measure, "%s error", name);
-    bench_print(&s->subject, measure, "linear", bench_volume_compare(chosen(s), &s->job, &s->fragments));
+    bench_print(&s->subject, measure, "linear", bench_volume_compare(bench_scene_pixels(s), &s->job, &s->fragments));
     if (!with_integral) return;
     snprintf(measure, sizeof measure, "%s integral error", name);
     bench_print(&s->subject, measure, "linear", integral_error(s));

@@ -22,6 +22,9 @@ extern const double bench_unit_distance;
 
 extern const double bench_eye[3], bench_focal[3], bench_up[3], bench_degrees;
 
+/* The mesh in double, the caller's to free. */
+void bench_scene_mesh(test_mesh_kind kind, int n, test_mesh *out);
+
 typedef struct bench_scene {
     bench_subject subject;
     test_view view;
@@ -60,5 +63,14 @@ void bench_scene_frame(bench_scene *scene);
  * costs; where with_integral. */
 void bench_scene_surface_error(bench_scene *scene, const char *name);
 void bench_scene_volume_error(bench_scene *scene, const char *name, bool with_integral);
+
+/* The pixels at which errors are taken. */
+const bench_pixels *bench_scene_pixels(bench_scene *scene);
+
+/* The volume's integral at these pixels by a transfer function: count × 4, the caller's to free. */
+double *bench_scene_integrals(bench_scene *scene, const render_transfer *transfer);
+
+/* How far such pixels are from the integrals, where these show something: the largest of the four channels. */
+bench_stats bench_scene_pixel_error(const bench_scene *scene, const double *integrals, const float *rgba);
 
 #endif
