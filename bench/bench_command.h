@@ -1,4 +1,5 @@
-/* The command line that the benchmarks have in common: [--runs N] [--no-head] [--depths FOLDER] MESH:N ... */
+/* The command line that the benchmarks have in common: [--runs N] [--shrink N] [--no-head] [--depths FOLDER] MESH:N ...
+ */
 #ifndef BENCH_COMMAND_H
 #define BENCH_COMMAND_H
 
@@ -10,6 +11,7 @@ enum { BENCH_MAX_MESHES = 16 };
 
 typedef struct bench_command {
     int runs;           /* of each measure; 5 by default */
+    int shrink;         /* pictures have so many times fewer pixels a side; 1 by default */
     const char *depths; /* where pictures of depths are to be written; NULL: nowhere */
     int mesh_count;
     struct {

@@ -30,7 +30,7 @@ static void run(bench_scene *scene, bench_routes *routes, peers_series *series, 
 /* After a last build of each kind. */
 static void print_costs(bench_scene *scene, bench_routes *routes)
 {
-    bench_print_number(&scene->subject, "tree cost", "tests/ray", mmbvh_cost(&scene->tree));
+    bench_print_number(&scene->subject, "build sah cost", "tests/ray", mmbvh_cost(&scene->tree));
     for (int i = 0; routes->embree && i <= BENCH_EMBREE_MEDIUM; i++) {
         char measure[64];
         snprintf(measure, sizeof measure, "embree cells %s cost", builder_names[i]);
@@ -41,7 +41,8 @@ static void print_costs(bench_scene *scene, bench_routes *routes)
 
 static void print(bench_scene *scene, bench_routes *routes, peers_series *series)
 {
-    bench_print_series(&scene->subject, "build", &series->build);
+    bench_print_number(&scene->subject, "rays", "Mrays", 1e-6 * scene->job.camera.width * scene->job.camera.height);
+    bench_print_series(&scene->subject, "build sah", &series->build);
     bench_print_series(&scene->subject, "isosurface trace", &series->trace);
     bench_routes_print(routes, "isosurface");
     for (int i = 0; routes->embree && i < 3; i++) {
@@ -54,7 +55,7 @@ static void print(bench_scene *scene, bench_routes *routes, peers_series *series
 
 static float *frame_depths(const bench_scene *scene)
 {
-    const int64_t count = (int64_t)BENCH_WIDTH * BENCH_HEIGHT;
+    const int64_t count = (int64_t)scene->job.camera.width * scene->job.camera.height;
     float *depths = malloc((size_t)count * sizeof *depths);
     if (!depths) abort();
     for (int64_t i = 0; i < count; i++) depths[i] = INFINITY;
@@ -66,19 +67,20 @@ static float *frame_depths(const bench_scene *scene)
     return depths;
 }
 
-static void measure(test_mesh_kind kind, int n, int runs, const char *folder)
+static void measure(const bench_command *command, test_mesh_kind kind, int n)
 {
     bench_scene scene;
     bench_routes routes;
     peers_series series = {0};
     bench_scene_create(&scene, "bench_peers", kind, n);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
     bench_scene_show_surfaces(&scene, 1);
     bench_routes_create(&routes, &scene);
     if (routes.embree) bench_embree_set_cells(routes.embree, &scene.view.cells);
-    for (int i = 0; i <= runs; i++) run(&scene, &routes, &series, i);
+    for (int i = 0; i <= command->runs; i++) run(&scene, &routes, &series, i);
     print(&scene, &routes, &series);
     float *depths = frame_depths(&scene);
-    bench_routes_compare(&routes, depths, "isosurface", folder);
+    bench_routes_compare(&routes, depths, "isosurface", command->depths);
     bench_scene_surface_error(&scene, "isosurface");
     free(depths);
     bench_routes_free(&routes);
@@ -93,7 +95,6 @@ int main(int argc, char **argv)
                              "extraction and Mesa, and beside Embree.",
                              TEST_HEXES, &command))
         return command.status;
-    for (int i = 0; i < command.mesh_count; i++)
-        measure(command.meshes[i].kind, command.meshes[i].n, command.runs, command.depths);
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
     return 0;
 }

@@ -53,24 +53,27 @@ static void measure_tree(bench_scene *s, int runs)
 static void measure_frame(bench_scene *s, int runs, const char *layer)
 {
     char name[64];
+    const double rays = 1e-6 * s->job.camera.width * s->job.camera.height;
     const int64_t held = base_memory_held();
     base_memory_reset_peak();
-    bench_print(&s->subject, layer, "Mrays/s", speed(s, runs, bench_scene_frame, 1e-6 * BENCH_WIDTH * BENCH_HEIGHT));
+    bench_print(&s->subject, layer, "Mrays/s", speed(s, runs, bench_scene_frame, rays));
     snprintf(name, sizeof name, "%s peak", layer);
     bench_print_number(&s->subject, name, "MB", 1e-6 * (double)(base_memory_peak() - held));
 }
 
-static void measure(test_mesh_kind kind, int n, int runs)
+static void measure(const bench_command *command, test_mesh_kind kind, int n)
 {
+    const int runs = command->runs;
     bench_scene scene;
     bench_scene_create(&scene, "bench_render", kind, n);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
     measure_tree(&scene, runs);
     bench_scene_show_surfaces(&scene, 1);
     measure_frame(&scene, runs, "isosurface");
     bench_scene_surface_error(&scene, "isosurface");
     bench_scene_show_volume(&scene);
     measure_frame(&scene, runs, "volume");
-    bench_scene_volume_error(&scene, "volume", false);
+    bench_scene_sample_error(&scene, "volume");
     bench_scene_free(&scene);
 }
 
@@ -82,6 +85,6 @@ int main(int argc, char **argv)
                              "polyhedra or mixed) of N^3 cubes.",
                              TEST_MIXED, &command))
         return command.status;
-    for (int i = 0; i < command.mesh_count; i++) measure(command.meshes[i].kind, command.meshes[i].n, command.runs);
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
     return 0;
 }

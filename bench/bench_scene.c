@@ -210,26 +210,24 @@ bench_stats bench_scene_pixel_error(const bench_scene *s, const double *truth, c
     return out;
 }
 
-static bench_stats integral_error(bench_scene *s)
-{
-    const int count = bench_pixels_count(bench_scene_pixels(s));
-    float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
-    double *depths = malloc((size_t)count * sizeof *depths);
-    if (!rgba || !depths) abort();
-    if (!s->integrals) s->integrals = bench_scene_integrals(s, &s->transfer);
-    bench_pixels_merge(s->pixels, &s->job.space, &s->fragments, rgba, depths);
-    const bench_stats out = bench_scene_pixel_error(s, s->integrals, rgba);
-    free(rgba);
-    free(depths);
-    return out;
-}
-
-void bench_scene_volume_error(bench_scene *s, const char *name, bool with_integral)
+void bench_scene_sample_error(bench_scene *s, const char *name)
 {
     char measure[96];
     snprintf(measure, sizeof measure, "%s error", name);
     bench_print(&s->subject, measure, "linear", bench_volume_compare(bench_scene_pixels(s), &s->job, &s->fragments));
-    if (!with_integral) return;
+}
+
+void bench_scene_integral_error(bench_scene *s, const char *name)
+{
+    const int count = bench_pixels_count(bench_scene_pixels(s));
+    float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
+    double *depths = malloc((size_t)count * sizeof *depths);
+    char measure[96];
+    if (!rgba || !depths) abort();
+    if (!s->integrals) s->integrals = bench_scene_integrals(s, &s->transfer);
+    bench_pixels_merge(s->pixels, &s->job.space, &s->fragments, rgba, depths);
     snprintf(measure, sizeof measure, "%s integral error", name);
-    bench_print(&s->subject, measure, "linear", integral_error(s));
+    bench_print(&s->subject, measure, "linear", bench_scene_pixel_error(s, s->integrals, rgba));
+    free(rgba);
+    free(depths);
 }

@@ -58,11 +58,12 @@ void bench_scene_show_volume(bench_scene *scene);
 /* fragments anew. */
 void bench_scene_frame(bench_scene *scene);
 
-/* Print the error of the frame, of one isosurface or of the volume: measures that begin with name. Beside the volume's
- * error against the same samples in double stands "integral error" against the integral itself, which is what a step
- * costs; where with_integral. */
+/* Print the error of the frame, of one isosurface or of the volume: measures that begin with name. A volume's is
+ * against the same samples in double, which shows rounding and what is missed, or against the integral itself, which
+ * shows what the step costs. */
 void bench_scene_surface_error(bench_scene *scene, const char *name);
-void bench_scene_volume_error(bench_scene *scene, const char *name, bool with_integral);
+void bench_scene_sample_error(bench_scene *scene, const char *name);
+void bench_scene_integral_error(bench_scene *scene, const char *name);
 
 /* The pixels at which errors are taken. */
 const bench_pixels *bench_scene_pixels(bench_scene *scene);

@@ -30,14 +30,15 @@ static void measure_picture(const bench_scene *scene, bench_routes *routes, benc
     bench_session_free(&session);
 }
 
-static void measure(test_mesh_kind kind, int n, int runs)
+static void measure(const bench_command *command, test_mesh_kind kind, int n)
 {
     bench_scene scene;
     bench_routes routes;
     bench_scene_create(&scene, "bench_steps", kind, n);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
     bench_routes_create(&routes, &scene);
-    measure_picture(&scene, &routes, BENCH_ISOSURFACE, runs);
-    measure_picture(&scene, &routes, BENCH_ISOSURFACES, runs);
+    measure_picture(&scene, &routes, BENCH_ISOSURFACE, command->runs);
+    measure_picture(&scene, &routes, BENCH_ISOSURFACES, command->runs);
     bench_routes_free(&routes);
     bench_scene_free(&scene);
 }
@@ -51,7 +52,7 @@ int main(int argc, char **argv)
                              "vertices and a new mesh, beside VTK's extraction and Mesa, and beside Embree.",
                              TEST_HEXES, &command))
         command.mesh_count = 0;
-    for (int i = 0; i < command.mesh_count; i++) measure(command.meshes[i].kind, command.meshes[i].n, command.runs);
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
     MPI_Finalize();
     return command.status;
 }

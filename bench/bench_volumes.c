@@ -88,7 +88,7 @@ static void measure_peers(bench_scene *scene, test_mesh_kind kind, int runs)
     if (!rgba) abort();
     bench_vtk_request request = {.mesh = &mesh,
                                  .degrees = bench_degrees,
-                                 .size = SIZE,
+                                 .size = scene->job.camera.height,
                                  .knot_count = BENCH_KNOTS,
                                  .knots = bench_knots,
                                  .opacities = look.extinctions,
@@ -141,14 +141,15 @@ static void measure_frames(bench_scene *scene, const char *name, render_integrat
     snprintf(measure, sizeof measure, "volume %s frame", name);
     bench_print_series(&scene->subject, measure, &frames);
     snprintf(measure, sizeof measure, "volume %s", name);
-    bench_scene_volume_error(scene, measure, true);
+    bench_scene_integral_error(scene, measure);
 }
 
-static void measure(test_mesh_kind kind, int n, int runs)
+static void measure(const bench_command *command, test_mesh_kind kind, int n)
 {
+    const int runs = command->runs;
     bench_scene scene;
     bench_scene_create(&scene, "bench_volumes", kind, n);
-    bench_scene_resize(&scene, SIZE, SIZE);
+    bench_scene_resize(&scene, SIZE / command->shrink, SIZE / command->shrink);
     bench_scene_build(&scene);
     bench_scene_show_volume(&scene);
     if (bench_vtk_is_there() && kind == TEST_TETS) measure_peers(&scene, kind, runs);
@@ -168,7 +169,7 @@ int main(int argc, char **argv)
             "tets beside VTK's mappers.",
             TEST_HEXES, &command))
         command.mesh_count = 0;
-    for (int i = 0; i < command.mesh_count; i++) measure(command.meshes[i].kind, command.meshes[i].n, command.runs);
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
     MPI_Finalize();
     return command.status;
 }
