@@ -7,6 +7,9 @@
 
 #include "session_image.h"
 
+/* Steps before those that count: partial trees have then cost what the full one does. */
+enum { WARM_UP = 8 };
+
 static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};
 
 /* The depths of the last picture, where it came with them. */
@@ -149,16 +152,18 @@ static insitu_session *open_session(const bench_session *s, const char *ending)
     return session;
 }
 
-void bench_session_create(bench_session *s, const bench_scene *scene, bench_picture picture)
+void bench_session_create(bench_session *s, const bench_scene *scene, bench_picture picture, bench_change change)
 {
     memset(s, 0, sizeof *s);
     s->scene = scene;
     s->picture = picture;
+    s->change = change;
     make_states(s);
     describe(s);
     s->session = open_session(s, ".png");
     set_mesh(s, s->session, INSITU_CHANGED_ALL);
     set_field(s, s->session);
+    for (int i = 0; i < WARM_UP; i++) bench_session_step(s, 0);
 }
 
 void bench_session_free(bench_session *s)
@@ -168,32 +173,31 @@ void bench_session_free(bench_session *s)
     free(s->values[1]);
 }
 
-static void change_state(bench_session *s, bench_change change)
+static void change_state(bench_session *s)
 {
-    if (change != BENCH_NEW_VALUES) {
+    if (s->change != BENCH_NEW_VALUES) {
         s->place = !s->place;
-        set_mesh(s, s->session, change == BENCH_NEW_MESH ? INSITU_CHANGED_ALL : INSITU_CHANGED_GEOMETRY);
+        set_mesh(s, s->session, s->change == BENCH_NEW_MESH ? INSITU_CHANGED_ALL : INSITU_CHANGED_GEOMETRY);
     }
-    if (change != BENCH_MOVED_VERTICES) {
+    if (s->change != BENCH_MOVED_VERTICES) {
         s->phase = !s->phase;
         set_field(s, s->session);
     }
 }
 
-void bench_session_step(bench_session *s, bench_change change, int number)
+void bench_session_step(bench_session *s, int number)
 {
-    bench_steps_taken *taken = &s->taken[change];
-    change_state(s, change);
+    change_state(s);
     const double began = bench_begin();
     const insitu_status status = insitu_step(s->session, s->cycle++, 0);
-    bench_end(began, number, &taken->whole);
+    bench_end(began, number, &s->whole);
     must(s, status);
     const insitu_report *r = insitu_last_report(s->session);
     const double parts[BENCH_PARTS] = {r->prepare_ms, r->build_ms, r->refit_ms, r->surface_ms + r->volume_ms,
                                        r->composite_ms};
-    for (int i = 0; i < BENCH_PARTS; i++) bench_keep(1e-3 * parts[i], number, &taken->parts[i]);
-    taken->bytes_trees = r->bytes_trees;
-    taken->bytes_peak = r->bytes_peak;
+    for (int i = 0; i < BENCH_PARTS; i++) bench_keep(1e-3 * parts[i], number, &s->parts[i]);
+    s->bytes_trees = r->bytes_trees;
+    s->bytes_peak = r->bytes_peak;
 }
 
 const float *const *bench_session_coordinates(const bench_session *s)
@@ -206,29 +210,23 @@ const float *bench_session_values(const bench_session *s)
     return s->values[s->phase];
 }
 
-static void print_change(bench_session *s, bench_change change)
+void bench_session_print(bench_session *s)
 {
     char measure[96];
-    bench_steps_taken *taken = &s->taken[change];
     const int length =
-        snprintf(measure, sizeof measure, "%s %s", bench_picture_name(s->picture), bench_change_name(change));
+        snprintf(measure, sizeof measure, "%s %s", bench_picture_name(s->picture), bench_change_name(s->change));
     char *const end = measure + length;
     const size_t room = sizeof measure - (size_t)length;
     const double cells = (double)s->scene->subject.cells;
-    bench_print_series(&s->scene->subject, measure, &taken->whole);
+    bench_print_series(&s->scene->subject, measure, &s->whole);
     for (int i = 0; i < BENCH_PARTS; i++) {
         snprintf(end, room, " %s", part_names[i]);
-        bench_print_series(&s->scene->subject, measure, &taken->parts[i]);
+        bench_print_series(&s->scene->subject, measure, &s->parts[i]);
     }
     snprintf(end, room, " trees");
-    bench_print_number(&s->scene->subject, measure, "bytes/cell", (double)taken->bytes_trees / cells);
+    bench_print_number(&s->scene->subject, measure, "bytes/cell", (double)s->bytes_trees / cells);
     snprintf(end, room, " peak");
-    bench_print_number(&s->scene->subject, measure, "bytes/cell", (double)taken->bytes_peak / cells);
-}
-
-void bench_session_print(bench_session *s)
-{
-    for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) print_change(s, change);
+    bench_print_number(&s->scene->subject, measure, "bytes/cell", (double)s->bytes_peak / cells);
 }
 
 float *bench_session_depths(const bench_session *s)

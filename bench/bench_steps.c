@@ -11,23 +11,25 @@
 
 static void measure_picture(const bench_scene *scene, bench_routes *routes, bench_picture picture, int runs)
 {
-    bench_session session;
+    bench_session sessions[BENCH_CHANGE_COUNT];
     const int count = picture == BENCH_ISOSURFACES ? BENCH_ISOVALUES : 1;
     const char *name = bench_picture_name(picture);
-    bench_session_create(&session, scene, picture);
+    const bench_session *last = &sessions[BENCH_NEW_MESH]; /* of which everything is new */
+    for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++)
+        bench_session_create(&sessions[change], scene, picture, change);
     for (int number = 0; number <= runs; number++) {
         for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++)
-            bench_session_step(&session, change, number);
-        bench_routes_set(routes, bench_session_coordinates(&session), scene->view.cells.vertex_count,
-                         bench_session_values(&session));
+            bench_session_step(&sessions[change], number);
+        bench_routes_set(routes, bench_session_coordinates(last), scene->view.cells.vertex_count,
+                         bench_session_values(last));
         bench_routes_run(routes, bench_isovalues, count, number);
     }
-    bench_session_print(&session);
+    for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) bench_session_print(&sessions[change]);
     bench_routes_print(routes, name);
-    float *depths = bench_session_depths(&session);
+    float *depths = bench_session_depths(last);
     bench_routes_compare(routes, depths, name, NULL);
     free(depths);
-    bench_session_free(&session);
+    for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) bench_session_free(&sessions[change]);
 }
 
 static void measure(const bench_command *command, test_mesh_kind kind, int n)

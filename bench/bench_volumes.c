@@ -118,13 +118,13 @@ static void measure_peers(bench_scene *scene, test_mesh_kind kind, int runs)
 
 static void measure_steps(bench_scene *scene, int runs)
 {
-    bench_session session;
-    bench_session_create(&session, scene, BENCH_VOLUME);
-    for (int number = 0; number <= runs; number++)
-        for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++)
-            bench_session_step(&session, change, number);
-    bench_session_print(&session);
-    bench_session_free(&session);
+    for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) {
+        bench_session session;
+        bench_session_create(&session, scene, BENCH_VOLUME, change);
+        for (int number = 1; number <= runs; number++) bench_session_step(&session, number);
+        bench_session_print(&session);
+        bench_session_free(&session);
+    }
 }
 
 /* The frame alone, and its error. */

@@ -66,7 +66,7 @@ function faster(program, m, n, a, b) {
 
 # is_least: the ratio is to be at least the bar; else at most. aim: "" for none.
 function claim(what, m, n, ours, theirs, ratio, is_least, bar, aim,    holds) {
-    holds = is_least ? ratio >= bar : ratio <= bar
+    holds = is_least ? ratio >= bar + 0 : ratio <= bar + 0
     claims++
     held += holds
     printf "| %s | %s %d | %s | %s | %.2f | %s %s%s | %s |\n", what, m, n, ours, theirs, ratio,
