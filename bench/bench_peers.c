@@ -6,18 +6,31 @@
 #include "bench_command.h"
 #include "bench_routes.h"
 
+/* The tree of the first is the one that is traced. */
+static const struct {
+    const char *name;
+    mmbvh_options how;
+} builders[] = {{"sah", {0}}};
+
+enum { BUILDERS = sizeof builders / sizeof *builders };
+
 typedef struct peers_series {
-    bench_series build, trace, embree[3];
+    bench_series build[BUILDERS], trace, embree[3];
+    double cost[BUILDERS];
 } peers_series;
 
 static const char *const builder_names[3] = {"low", "medium", "medium wide"};
 
 static void run(bench_scene *scene, bench_routes *routes, peers_series *series, int number)
 {
-    double began = bench_begin();
-    bench_scene_build(scene);
-    bench_end(began, number, &series->build);
-    began = bench_begin();
+    for (int i = BUILDERS - 1; i >= 0; i--) {
+        scene->how = builders[i].how;
+        const double build_began = bench_begin();
+        bench_scene_build(scene);
+        bench_end(build_began, number, &series->build[i]);
+        series->cost[i] = mmbvh_cost(&scene->tree);
+    }
+    const double began = bench_begin();
     bench_scene_frame(scene);
     bench_end(began, number, &series->trace);
     bench_routes_run(routes, bench_isovalues, 1, number);
@@ -30,7 +43,6 @@ static void run(bench_scene *scene, bench_routes *routes, peers_series *series, 
 /* After a last build of each kind. */
 static void print_costs(bench_scene *scene, bench_routes *routes)
 {
-    bench_print_number(&scene->subject, "build sah cost", "tests/ray", mmbvh_cost(&scene->tree));
     for (int i = 0; routes->embree && i <= BENCH_EMBREE_MEDIUM; i++) {
         char measure[64];
         snprintf(measure, sizeof measure, "embree cells %s cost", builder_names[i]);
@@ -42,7 +54,13 @@ static void print_costs(bench_scene *scene, bench_routes *routes)
 static void print(bench_scene *scene, bench_routes *routes, peers_series *series)
 {
     bench_print_number(&scene->subject, "rays", "Mrays", 1e-6 * scene->job.camera.width * scene->job.camera.height);
-    bench_print_series(&scene->subject, "build sah", &series->build);
+    for (int i = 0; i < BUILDERS; i++) {
+        char measure[64];
+        snprintf(measure, sizeof measure, "build %s", builders[i].name);
+        bench_print_series(&scene->subject, measure, &series->build[i]);
+        snprintf(measure, sizeof measure, "build %s cost", builders[i].name);
+        bench_print_number(&scene->subject, measure, "tests/ray", series->cost[i]);
+    }
     bench_print_series(&scene->subject, "isosurface trace", &series->trace);
     bench_routes_print(routes, "isosurface");
     for (int i = 0; routes->embree && i < 3; i++) {

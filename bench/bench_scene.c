@@ -118,8 +118,7 @@ void bench_scene_build(bench_scene *s)
 {
     const double origin[3] = {0, 0, 0};
     mmbvh_free(&s->tree);
-    must(s, mmbvh_build(&s->view.cells, &s->view.field, origin, s->job.space.scale, &(mmbvh_options){0}, &s->tree,
-                        &s->error));
+    must(s, mmbvh_build(&s->view.cells, &s->view.field, origin, s->job.space.scale, &s->how, &s->tree, &s->error));
     s->ranges = mmbvh_own_ranges(&s->tree);
 }
 
