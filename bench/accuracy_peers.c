@@ -1,13 +1,10 @@
-/* The peers, each in a process of its own: one that crashes, or never ends, is a row that says so. */
+/* The peers: one that crashes, or never ends, is a row that says so. */
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "accuracy_rows.h"
-#include "bench_vtk.h"
+#include "bench_apart.h"
 
 typedef struct peer {
     const char *method, *setting;
@@ -67,50 +64,6 @@ static bench_vtk_request request_of(const accuracy_context *context, const peer 
     return r;
 }
 
-/* In the child: draw and write what came of it. */
-static void draw_and_send(const bench_vtk_request *request, float *rgba, size_t bytes, int seconds, int to)
-{
-    bench_vtk_result result = {0};
-    alarm((unsigned)seconds);
-    if (!freopen("/dev/null", "w", stderr)) _exit(1);
-    if (!bench_vtk_draw(request, &result, rgba)) _exit(2);
-    if (write(to, &result, sizeof result) != (ssize_t)sizeof result) _exit(3);
-    for (size_t sent = 0; sent < bytes;) {
-        const ssize_t now = write(to, (char *)rgba + sent, bytes - sent);
-        if (now <= 0) _exit(3);
-        sent += (size_t)now;
-    }
-    _exit(0);
-}
-
-static bool receive(int from, void *block, size_t bytes)
-{
-    for (size_t got = 0; got < bytes;) {
-        const ssize_t now = read(from, (char *)block + got, bytes - got);
-        if (now <= 0) return false;
-        got += (size_t)now;
-    }
-    return true;
-}
-
-/* Returns what the row says of it. */
-static const char *run(const bench_vtk_request *request, int seconds, bench_vtk_result *result, float *rgba)
-{
-    const size_t bytes = 4 * (size_t)request->pixel_count * sizeof *rgba;
-    int ends[2], status;
-    fflush(stdout);
-    if (pipe(ends)) return "no pipe";
-    const pid_t child = fork();
-    if (child < 0) return "no process";
-    if (child == 0) draw_and_send(request, rgba, bytes, seconds, ends[1]);
-    close(ends[1]);
-    const bool is_whole = receive(ends[0], result, sizeof *result) && receive(ends[0], rgba, bytes);
-    close(ends[0]);
-    waitpid(child, &status, 0);
-    if (WIFSIGNALED(status)) return WTERMSIG(status) == SIGALRM ? "too slow" : "crashed";
-    return is_whole && WEXITSTATUS(status) == 0 ? "ok" : "not drawn";
-}
-
 static void peer_row(const accuracy_context *context, const peer *p, const int *pixels, int count, float *rgba)
 {
     double opacities[ACCURACY_KNOTS];
@@ -121,7 +74,7 @@ static void peer_row(const accuracy_context *context, const peer *p, const int *
         snprintf(row.setting, sizeof row.setting, "%s", p->setting);
     else
         snprintf(row.setting, sizeof row.setting, "%d^3", request.resolution);
-    row.status = run(&request, context->effort->peer_seconds, &result, rgba);
+    row.status = bench_apart_draw(&request, context->effort->peer_seconds, &result, rgba);
     if (row.status[0] == 'o') {
         row.first = result.first;
         row.runs = result.runs;

@@ -42,3 +42,28 @@ void bench_print_number(const bench_subject *subject, const char *measure, const
 {
     bench_print(subject, measure, unit, (bench_stats){1, number, number, number});
 }
+
+double bench_begin(void)
+{
+    const struct timespec pause = {.tv_nsec = 20 * 1000 * 1000};
+    nanosleep(&pause, NULL);
+    return bench_seconds();
+}
+
+double bench_end(double began, int number, bench_series *series)
+{
+    const double seconds = bench_seconds() - began;
+    bench_keep(seconds, number, series);
+    return seconds;
+}
+
+void bench_keep(double seconds, int number, bench_series *series)
+{
+    if (number > 0 && series->count < BENCH_MAX_RUNS) series->seconds[series->count++] = seconds;
+}
+
+void bench_print_series(const bench_subject *subject, const char *measure, bench_series *series)
+{
+    for (int i = 0; i < series->count; i++) series->seconds[i] *= 1e3;
+    bench_print(subject, measure, "ms", bench_stats_of(series->seconds, series->count));
+}

@@ -29,4 +29,24 @@ void bench_print(const bench_subject *subject, const char *measure, const char *
 /* A measure that is one number. */
 void bench_print_number(const bench_subject *subject, const char *measure, const char *unit, double number);
 
+/* Times of several acts that are run in turns, so that whatever else the machine does falls on all of them alike. */
+enum { BENCH_MAX_RUNS = 100 };
+
+typedef struct bench_series {
+    int count;
+    double seconds[BENCH_MAX_RUNS];
+} bench_series;
+
+/* Wait until the threads of the last act have stopped looking for work, and begin. */
+double bench_begin(void);
+
+/* Keep a time; of the first, the warm-up with number 0, nothing. */
+void bench_keep(double seconds, int number, bench_series *series);
+
+/* Keep what has passed since began, and return it. */
+double bench_end(double began, int number, bench_series *series);
+
+/* Milliseconds. Sorts. */
+void bench_print_series(const bench_subject *subject, const char *measure, bench_series *series);
+
 #endif

@@ -1,0 +1,28 @@
+/* The command line that the benchmarks have in common: [--runs N] [--shrink N] [--no-head] [--depths FOLDER] MESH:N ...
+ */
+#ifndef BENCH_COMMAND_H
+#define BENCH_COMMAND_H
+
+#include <stdbool.h>
+
+#include "test_meshes.h"
+
+enum { BENCH_MAX_MESHES = 16 };
+
+typedef struct bench_command {
+    int runs;           /* of each measure; 5 by default */
+    int shrink;         /* pictures have so many times fewer pixels a side; 1 by default */
+    const char *depths; /* where pictures of depths are to be written; NULL: nowhere */
+    int mesh_count;
+    struct {
+        test_mesh_kind kind;
+        int n;
+    } meshes[BENCH_MAX_MESHES];
+    int status; /* what main() returns where there is nothing to do */
+} bench_command;
+
+/* Print the CSV's head unless told not to. about: what the program does, for --help. last: the last kind of mesh that
+ * it knows. False with a status where the help was asked for or the line is wrong. */
+bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kind last, bench_command *command);
+
+#endif

@@ -1,0 +1,337 @@
+/* Embree, as its documentation says it is fastest: static scenes of one geometry, coherent packets of 16 rays, the
+ * builder's nodes from its thread-local allocators. Its threads are as many as ours. */
+#include "bench_embree.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <embree3/rtcore.h>
+#include <omp.h>
+
+#include "bench_stats.h"
+
+struct bench_embree {
+    RTCDevice device;
+    RTCScene scene;
+    int threads;
+    uint32_t *iota; /* indices of triangles that share no vertex: 0, 1, 2, ... */
+    int64_t iota_count;
+    struct RTCBuildPrimitive *boxes, *sorted; /* cell_count: as made, and what the builder may work in */
+    int64_t cell_count;
+    RTCBVH bvh;
+    void *root;
+};
+
+enum { WIDE = 8, PACKET = 4 };
+
+/* child_count 0: a leaf of cell_count cells. A leaf stands with the boxes of its parent. */
+typedef struct tree_node {
+    uint32_t child_count, cell_count;
+} tree_node;
+
+typedef struct inner_node {
+    tree_node head;
+    struct RTCBounds bounds[2];
+    tree_node *children[2];
+} inner_node;
+
+typedef struct wide_node {
+    tree_node head;
+    struct RTCBounds bounds[WIDE];
+    tree_node *children[WIDE];
+} wide_node;
+
+typedef struct leaf_node {
+    tree_node head;
+    uint32_t cells[];
+} leaf_node;
+
+static void *must(void *p)
+{
+    if (!p) abort();
+    return p;
+}
+
+static void complain(void *user, enum RTCError code, const char *text)
+{
+    (void)user;
+    fprintf(stderr, "embree: error %d: %s\n", (int)code, text);
+    exit(1);
+}
+
+bool bench_embree_is_there(void)
+{
+    return true;
+}
+
+bench_embree *bench_embree_create(int threads)
+{
+    char options[64];
+    bench_embree *e = must(calloc(1, sizeof *e));
+    snprintf(options, sizeof options, "threads=%d", threads);
+    e->device = must(rtcNewDevice(options));
+    e->threads = threads;
+    rtcSetDeviceErrorFunction(e->device, complain, NULL);
+    return e;
+}
+
+void bench_embree_destroy(bench_embree *e)
+{
+    if (!e) return;
+    if (e->scene) rtcReleaseScene(e->scene);
+    if (e->bvh) rtcReleaseBVH(e->bvh);
+    rtcReleaseDevice(e->device);
+    free(e->iota);
+    free(e->boxes);
+    free(e->sorted);
+    free(e);
+}
+
+static void grow_iota(bench_embree *e, int64_t count)
+{
+    if (count <= e->iota_count) return;
+    e->iota = must(realloc(e->iota, (size_t)count * sizeof *e->iota));
+    for (int64_t i = e->iota_count; i < count; i++) e->iota[i] = (uint32_t)i;
+    e->iota_count = count;
+}
+
+void bench_embree_build(bench_embree *e, const float *xyz, int64_t triangle_count, bool is_fast)
+{
+    const enum RTCBuildQuality quality = is_fast ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM;
+    const size_t triangles = (size_t)triangle_count;
+    if (e->scene) rtcReleaseScene(e->scene);
+    grow_iota(e, 3 * triangle_count);
+    RTCGeometry geometry = rtcNewGeometry(e->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, xyz, 0, 12, 3 * triangles);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, e->iota, 0, 12, triangles);
+    rtcSetGeometryBuildQuality(geometry, quality);
+    rtcCommitGeometry(geometry);
+    e->scene = rtcNewScene(e->device);
+    rtcSetSceneBuildQuality(e->scene, quality);
+    rtcAttachGeometry(e->scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(e->scene);
+}
+
+/* The camera's rays in float32: direction(x, y) = first + x right + y down, of length 1 along the camera's axis, so
+ * that t is the depth. */
+typedef struct pinhole {
+    float eye[3], first[3], right[3], down[3];
+    int width, height;
+} pinhole;
+
+static pinhole pinhole_of(const render_camera *c)
+{
+    pinhole p = {.width = c->width, .height = c->height};
+    double base[3], corner[3], beside[3], below[3];
+    render_camera_ray(c, 0, 0, base, corner);
+    render_camera_ray(c, 1, 0, base, beside);
+    render_camera_ray(c, 0, 1, base, below);
+    for (int axis = 0; axis < 3; axis++) {
+        p.eye[axis] = (float)c->eye[axis];
+        p.first[axis] = (float)corner[axis];
+        p.right[axis] = (float)(beside[axis] - corner[axis]);
+        p.down[axis] = (float)(below[axis] - corner[axis]);
+    }
+    return p;
+}
+
+/* One clone an instruction set, so that making rays costs as little as tracing them deserves. */
+__attribute__((target_clones("avx512f", "avx2", "default"))) static void
+make_packet(const pinhole *p, int x0, int y0, struct RTCRayHit16 *packet, int *valid)
+{
+    struct RTCRay16 *ray = &packet->ray;
+    for (int i = 0; i < 16; i++) {
+        const int x = x0 + (i & 3), y = y0 + (i >> 2);
+        valid[i] = x < p->width && y < p->height ? -1 : 0;
+        ray->org_x[i] = p->eye[0];
+        ray->org_y[i] = p->eye[1];
+        ray->org_z[i] = p->eye[2];
+        ray->dir_x[i] = p->first[0] + (float)x * p->right[0] + (float)y * p->down[0];
+        ray->dir_y[i] = p->first[1] + (float)x * p->right[1] + (float)y * p->down[1];
+        ray->dir_z[i] = p->first[2] + (float)x * p->right[2] + (float)y * p->down[2];
+        ray->tnear[i] = 0;
+        ray->tfar[i] = INFINITY;
+        ray->time[i] = 0;
+        ray->mask[i] = 0xffffffffu;
+        ray->id[i] = 0;
+        ray->flags[i] = 0;
+        packet->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        packet->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+}
+
+static void keep_packet(const pinhole *p, int x0, int y0, const struct RTCRayHit16 *packet, const int *valid,
+                        float *depths, float *normals)
+{
+    for (int i = 0; i < 16; i++) {
+        if (!valid[i]) continue;
+        const int64_t pixel = (int64_t)(y0 + (i >> 2)) * p->width + x0 + (i & 3);
+        const bool is_hit = packet->hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+        depths[pixel] = is_hit ? packet->ray.tfar[i] : INFINITY;
+        normals[3 * pixel] = is_hit ? packet->hit.Ng_x[i] : 0;
+        normals[3 * pixel + 1] = is_hit ? packet->hit.Ng_y[i] : 0;
+        normals[3 * pixel + 2] = is_hit ? packet->hit.Ng_z[i] : 0;
+    }
+}
+
+void bench_embree_trace(bench_embree *e, const render_camera *camera, float *depths, float *normals)
+{
+    const pinhole p = pinhole_of(camera);
+    const int columns = (p.width + PACKET - 1) / PACKET, rows = (p.height + PACKET - 1) / PACKET;
+#pragma omp parallel for schedule(dynamic, 4) num_threads(e->threads)
+    for (int row = 0; row < rows; row++)
+        for (int column = 0; column < columns; column++) {
+            struct RTCRayHit16 packet;
+            struct RTCIntersectContext context;
+            _Alignas(64) int valid[16];
+            rtcInitIntersectContext(&context);
+            context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+            make_packet(&p, PACKET * column, PACKET * row, &packet, valid);
+            rtcIntersect16(valid, e->scene, &context, &packet);
+            keep_packet(&p, PACKET * column, PACKET * row, &packet, valid, depths, normals);
+        }
+}
+
+/* ---- the builder over cells ---- */
+
+static struct RTCBuildPrimitive box_of(const grid *cells, int64_t cell)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    grid_walk walk = grid_walk_cell(cells, cell);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
+        double p[3];
+        grid_vertex(cells, vertex, p);
+        for (int axis = 0; axis < 3; axis++) {
+            low[axis] = fmin(low[axis], p[axis]);
+            high[axis] = fmax(high[axis], p[axis]);
+        }
+    }
+    return (struct RTCBuildPrimitive){.lower_x = (float)low[0],
+                                      .lower_y = (float)low[1],
+                                      .lower_z = (float)low[2],
+                                      .upper_x = (float)high[0],
+                                      .upper_y = (float)high[1],
+                                      .upper_z = (float)high[2],
+                                      .primID = (unsigned)cell};
+}
+
+void bench_embree_set_cells(bench_embree *e, const grid *cells)
+{
+    const size_t bytes = (size_t)cells->cell_count * sizeof *e->boxes;
+    e->cell_count = cells->cell_count;
+    e->boxes = must(aligned_alloc(32, bytes));
+    e->sorted = must(aligned_alloc(32, bytes));
+#pragma omp parallel for schedule(static)
+    for (int64_t cell = 0; cell < cells->cell_count; cell++) e->boxes[cell] = box_of(cells, cell);
+    e->bvh = must(rtcNewBVH(e->device));
+}
+
+static void *create_inner(RTCThreadLocalAllocator allocator, unsigned count, void *user)
+{
+    inner_node *node = rtcThreadLocalAlloc(allocator, sizeof *node, 16);
+    (void)user;
+    node->head = (tree_node){count, 0};
+    return node;
+}
+
+static void *create_wide(RTCThreadLocalAllocator allocator, unsigned count, void *user)
+{
+    wide_node *node = rtcThreadLocalAlloc(allocator, sizeof *node, 16);
+    (void)user;
+    node->head = (tree_node){count, 0};
+    return node;
+}
+
+static void set_inner_children(void *node, void **children, unsigned count, void *user)
+{
+    (void)user;
+    for (unsigned i = 0; i < count; i++) ((inner_node *)node)->children[i] = children[i];
+}
+
+static void set_wide_children(void *node, void **children, unsigned count, void *user)
+{
+    (void)user;
+    for (unsigned i = 0; i < count; i++) ((wide_node *)node)->children[i] = children[i];
+}
+
+static void set_inner_bounds(void *node, const struct RTCBounds **bounds, unsigned count, void *user)
+{
+    (void)user;
+    for (unsigned i = 0; i < count; i++) ((inner_node *)node)->bounds[i] = *bounds[i];
+}
+
+static void set_wide_bounds(void *node, const struct RTCBounds **bounds, unsigned count, void *user)
+{
+    (void)user;
+    for (unsigned i = 0; i < count; i++) ((wide_node *)node)->bounds[i] = *bounds[i];
+}
+
+static void *create_leaf(RTCThreadLocalAllocator allocator, const struct RTCBuildPrimitive *boxes, size_t count,
+                         void *user)
+{
+    leaf_node *leaf = rtcThreadLocalAlloc(allocator, sizeof *leaf + count * sizeof *leaf->cells, 16);
+    (void)user;
+    leaf->head = (tree_node){0, (uint32_t)count};
+    for (size_t i = 0; i < count; i++) leaf->cells[i] = boxes[i].primID;
+    return leaf;
+}
+
+double bench_embree_build_cells(bench_embree *e, bench_embree_builder builder)
+{
+    const bool is_wide = builder == BENCH_EMBREE_MEDIUM_WIDE;
+    struct RTCBuildArguments arguments = rtcDefaultBuildArguments();
+    memcpy(e->sorted, e->boxes, (size_t)e->cell_count * sizeof *e->boxes);
+    arguments.buildQuality = builder == BENCH_EMBREE_LOW ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM;
+    arguments.maxBranchingFactor = is_wide ? WIDE : 2;
+    arguments.maxDepth = 1024;
+    arguments.maxLeafSize = is_wide ? 8 : 7;
+    arguments.bvh = e->bvh;
+    arguments.primitives = e->sorted;
+    arguments.primitiveCount = arguments.primitiveArrayCapacity = (size_t)e->cell_count;
+    arguments.createNode = is_wide ? create_wide : create_inner;
+    arguments.setNodeChildren = is_wide ? set_wide_children : set_inner_children;
+    arguments.setNodeBounds = is_wide ? set_wide_bounds : set_inner_bounds;
+    arguments.createLeaf = create_leaf;
+    const double began = bench_seconds();
+    e->root = must(rtcBuildBVH(&arguments));
+    return bench_seconds() - began;
+}
+
+static double half_area(const struct RTCBounds *b)
+{
+    const double x = (double)b->upper_x - (double)b->lower_x, y = (double)b->upper_y - (double)b->lower_y;
+    const double z = (double)b->upper_z - (double)b->lower_z;
+    return x * y + y * z + z * x;
+}
+
+static struct RTCBounds united(const struct RTCBounds *a, const struct RTCBounds *b)
+{
+    return (struct RTCBounds){.lower_x = fminf(a->lower_x, b->lower_x),
+                              .lower_y = fminf(a->lower_y, b->lower_y),
+                              .lower_z = fminf(a->lower_z, b->lower_z),
+                              .upper_x = fmaxf(a->upper_x, b->upper_x),
+                              .upper_y = fmaxf(a->upper_y, b->upper_y),
+                              .upper_z = fmaxf(a->upper_z, b->upper_z)};
+}
+
+/* What is tested below a node whose own half area is area: two boxes, or the cells; each times its node's half area. */
+static double cost_below(const tree_node *node, double area)
+{
+    if (!node->child_count) return area * node->cell_count;
+    const inner_node *inner = (const inner_node *)node;
+    double sum = 2 * area;
+    for (int i = 0; i < 2; i++) sum += cost_below(inner->children[i], half_area(&inner->bounds[i]));
+    return sum;
+}
+
+double bench_embree_cost(const bench_embree *e)
+{
+    const inner_node *root = e->root;
+    if (!root->head.child_count) return 1 + (double)root->head.cell_count;
+    const struct RTCBounds all = united(&root->bounds[0], &root->bounds[1]);
+    return 1 + cost_below(&root->head, half_area(&all)) / half_area(&all);
+}

@@ -1,0 +1,118 @@
+/* Tracing and building beside VTK and Embree, in turns in one process, on the same mesh, camera and image: Embree
+ * traces the triangles that VTK extracts, and builds trees over the boxes of our cells. Prints CSV. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "bench_command.h"
+#include "bench_routes.h"
+
+/* The tree of the first is the one that is traced. */
+static const struct {
+    const char *name;
+    mmbvh_options how;
+} builders[] = {{"sah", {0}}};
+
+enum { BUILDERS = sizeof builders / sizeof *builders };
+
+typedef struct peers_series {
+    bench_series build[BUILDERS], trace, embree[3];
+    double cost[BUILDERS];
+} peers_series;
+
+static const char *const builder_names[3] = {"low", "medium", "medium wide"};
+
+static void run(bench_scene *scene, bench_routes *routes, peers_series *series, int number)
+{
+    for (int i = BUILDERS - 1; i >= 0; i--) {
+        scene->how = builders[i].how;
+        const double build_began = bench_begin();
+        bench_scene_build(scene);
+        bench_end(build_began, number, &series->build[i]);
+        series->cost[i] = mmbvh_cost(&scene->tree);
+    }
+    const double began = bench_begin();
+    bench_scene_frame(scene);
+    bench_end(began, number, &series->trace);
+    bench_routes_run(routes, bench_isovalues, 1, number);
+    for (int i = 0; routes->embree && i < 3; i++) {
+        bench_begin();
+        bench_keep(bench_embree_build_cells(routes->embree, (bench_embree_builder)i), number, &series->embree[i]);
+    }
+}
+
+/* After a last build of each kind. */
+static void print_costs(bench_scene *scene, bench_routes *routes)
+{
+    for (int i = 0; routes->embree && i <= BENCH_EMBREE_MEDIUM; i++) {
+        char measure[64];
+        snprintf(measure, sizeof measure, "embree cells %s cost", builder_names[i]);
+        bench_embree_build_cells(routes->embree, (bench_embree_builder)i);
+        bench_print_number(&scene->subject, measure, "tests/ray", bench_embree_cost(routes->embree));
+    }
+}
+
+static void print(bench_scene *scene, bench_routes *routes, peers_series *series)
+{
+    bench_print_number(&scene->subject, "rays", "Mrays", 1e-6 * scene->job.camera.width * scene->job.camera.height);
+    for (int i = 0; i < BUILDERS; i++) {
+        char measure[64];
+        snprintf(measure, sizeof measure, "build %s", builders[i].name);
+        bench_print_series(&scene->subject, measure, &series->build[i]);
+        snprintf(measure, sizeof measure, "build %s cost", builders[i].name);
+        bench_print_number(&scene->subject, measure, "tests/ray", series->cost[i]);
+    }
+    bench_print_series(&scene->subject, "isosurface trace", &series->trace);
+    bench_routes_print(routes, "isosurface");
+    for (int i = 0; routes->embree && i < 3; i++) {
+        char measure[64];
+        snprintf(measure, sizeof measure, "embree cells %s", builder_names[i]);
+        bench_print_series(&scene->subject, measure, &series->embree[i]);
+    }
+    print_costs(scene, routes);
+}
+
+static float *frame_depths(const bench_scene *scene)
+{
+    const int64_t count = (int64_t)scene->job.camera.width * scene->job.camera.height;
+    float *depths = malloc((size_t)count * sizeof *depths);
+    if (!depths) abort();
+    for (int64_t i = 0; i < count; i++) depths[i] = INFINITY;
+    for (int64_t i = 0; i < scene->fragments.count; i++) {
+        const fragment *f = &scene->fragments.items[i];
+        const double depth = (double)f->t_in / scene->job.space.scale + scene->job.space.depth_origin;
+        depths[f->pixel] = fminf(depths[f->pixel], (float)depth);
+    }
+    return depths;
+}
+
+static void measure(const bench_command *command, test_mesh_kind kind, int n)
+{
+    bench_scene scene;
+    bench_routes routes;
+    peers_series series = {0};
+    bench_scene_create(&scene, "bench_peers", kind, n);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
+    bench_scene_show_surfaces(&scene, 1);
+    bench_routes_create(&routes, &scene);
+    if (routes.embree) bench_embree_set_cells(routes.embree, &scene.view.cells);
+    for (int i = 0; i <= command->runs; i++) run(&scene, &routes, &series, i);
+    print(&scene, &routes, &series);
+    float *depths = frame_depths(&scene);
+    bench_routes_compare(&routes, depths, "isosurface", command->depths);
+    bench_scene_surface_error(&scene, "isosurface");
+    free(depths);
+    bench_routes_free(&routes);
+    bench_scene_free(&scene);
+}
+
+int main(int argc, char **argv)
+{
+    bench_command command;
+    if (!bench_command_parse(argc, argv,
+                             "Measures building and tracing of each MESH (tets or hexes) of N^3 cubes beside VTK's\n"
+                             "extraction and Mesa, and beside Embree.",
+                             TEST_HEXES, &command))
+        return command.status;
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
+    return 0;
+}

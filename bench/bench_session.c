@@ -1,0 +1,243 @@
+#include "bench_session.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "session_image.h"
+
+/* Steps before those that count: partial trees have then cost what the full one does. */
+enum { WARM_UP = 8 };
+
+static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};
+
+/* The depths of the last picture, where it came with them. */
+static float *caught_depths;
+
+insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
+                                  base_error *error)
+{
+    (void)format, (void)path, (void)error;
+    if (!image->depth) return INSITU_OK;
+    const size_t bytes = (size_t)image->width * (size_t)image->height * sizeof *caught_depths;
+    free(caught_depths);
+    caught_depths = malloc(bytes);
+    if (!caught_depths) abort();
+    memcpy(caught_depths, image->depth, bytes);
+    return INSITU_OK;
+}
+
+const char *bench_change_name(bench_change change)
+{
+    static const char *const names[BENCH_CHANGE_COUNT] = {"new values", "moved vertices", "new mesh"};
+    return names[change];
+}
+
+const char *bench_picture_name(bench_picture picture)
+{
+    static const char *const names[BENCH_PICTURE_COUNT] = {"isosurface", "isosurfaces", "volume"};
+    return names[picture];
+}
+
+static void must(const bench_session *s, insitu_status status)
+{
+    if (status == INSITU_OK) return;
+    fprintf(stderr, "%s: %s\n", s->scene->subject.program, insitu_error(s->session));
+    exit(1);
+}
+
+static float *copy(const float *from, int64_t count)
+{
+    float *to = malloc((size_t)count * sizeof *to);
+    if (!to) abort();
+    memcpy(to, from, (size_t)count * sizeof *to);
+    return to;
+}
+
+/* The second state: the field a little further along, the vertices swayed by less than a cell, so that no cell turns
+ * inside out. */
+static void make_states(bench_session *s)
+{
+    const grid *g = &s->scene->view.cells;
+    const int64_t count = g->vertex_count;
+    const double sway = 0.2 / s->scene->subject.n;
+    for (int axis = 0; axis < 3; axis++) {
+        s->coordinates[0][axis] = (float *)(void *)(uintptr_t)g->coordinates[axis].data;
+        s->coordinates[1][axis] = copy(s->coordinates[0][axis], count);
+    }
+    s->values[0] = (float *)(void *)(uintptr_t)s->scene->view.field.values.data;
+    s->values[1] = copy(s->values[0], count);
+#pragma omp parallel for schedule(static)
+    for (int64_t v = 0; v < count; v++) {
+        double p[3];
+        grid_vertex(g, v, p);
+        for (int axis = 0; axis < 3; axis++)
+            s->coordinates[1][axis][v] = (float)(p[axis] + sway * sin(3 * p[(axis + 1) % 3]));
+        s->values[1][v] = (float)test_wave((const double[]){p[0] + 0.01, p[1] + 0.02, p[2] + 0.03});
+    }
+}
+
+static void describe(bench_session *s)
+{
+    const grid *g = &s->scene->view.cells;
+    insitu_mesh_defaults(&s->mesh);
+    s->mesh.vertex_count = g->vertex_count;
+    s->mesh.cell_count = g->cell_count;
+    s->mesh.cell_type = (insitu_cell_type)g->cell_type;
+    s->mesh.connectivity_count = g->cell_count * grid_type_vertices(g->cell_type);
+    s->mesh.connectivity = (insitu_array){.data = g->connectivity.data, .type = INSITU_INT32};
+    insitu_field_defaults(&s->field);
+    s->field.name = "f";
+    s->field.count = g->vertex_count;
+}
+
+static void set_mesh(bench_session *s, insitu_session *to, unsigned changed)
+{
+    for (int axis = 0; axis < 3; axis++)
+        s->mesh.coordinates[axis] = (insitu_array){.data = s->coordinates[s->place][axis], .type = INSITU_FLOAT32};
+    s->mesh.changed = changed;
+    must(s, insitu_set_mesh(to, "cube", &s->mesh));
+}
+
+static void set_field(bench_session *s, insitu_session *to)
+{
+    s->field.values = (insitu_array){.data = s->values[s->phase], .type = INSITU_FLOAT32};
+    s->field.changed = INSITU_CHANGED_VALUES;
+    must(s, insitu_set_field(to, "cube", &s->field));
+}
+
+static void write_layer(const bench_session *s, FILE *file)
+{
+    if (s->picture == BENCH_VOLUME) {
+        fprintf(file, "      - volume: {field: f, map: viridis, range: [%g, %g], unit_distance: %g, opacity: [",
+                bench_knots[0], bench_knots[BENCH_KNOTS - 1], bench_unit_distance);
+        for (int i = 0; i < BENCH_KNOTS; i++)
+            fprintf(file, "%s[%g, %g]", i ? ", " : "",
+                    (bench_knots[i] - bench_knots[0]) / (bench_knots[BENCH_KNOTS - 1] - bench_knots[0]),
+                    (double)bench_opacities[i]);
+        fprintf(file, "]}\n    sampling: {step: %.9g}\n", s->scene->job.step);
+        return;
+    }
+    fprintf(file, "      - isosurface: {field: f, values: [");
+    for (int i = 0; i < (s->picture == BENCH_ISOSURFACES ? BENCH_ISOVALUES : 1); i++)
+        fprintf(file, "%s%g", i ? ", " : "", bench_isovalues[i]);
+    fprintf(file, "]}\n");
+}
+
+/* A session whose picture ends in ending: .exr comes with its depth. */
+static insitu_session *open_session(const bench_session *s, const char *ending)
+{
+    char path[] = "/tmp/bench_session_XXXXXX";
+    const render_camera *camera = &s->scene->job.camera;
+    insitu_session *session = NULL;
+    const int descriptor = mkstemp(path);
+    FILE *file = descriptor >= 0 ? fdopen(descriptor, "w") : NULL;
+    if (!file) {
+        perror(path);
+        exit(1);
+    }
+    fprintf(file, "threads: %d\nimages:\n  - name: picture\n    size: [%d, %d]\n", s->scene->subject.threads,
+            camera->width, camera->height);
+    fprintf(file, "    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], up: [%g, %g, %g], angle: %g}\n",
+            bench_eye[0], bench_eye[1], bench_eye[2], bench_focal[0], bench_focal[1], bench_focal[2], bench_up[0],
+            bench_up[1], bench_up[2], bench_degrees);
+    fprintf(file, "    layers:\n");
+    write_layer(s, file);
+    fprintf(file, "    outputs: [{path: picture%s}]\n", ending);
+    fclose(file);
+    const insitu_status status = insitu_create(MPI_COMM_WORLD, path, &session);
+    unlink(path);
+    must(s, status);
+    return session;
+}
+
+void bench_session_create(bench_session *s, const bench_scene *scene, bench_picture picture, bench_change change)
+{
+    memset(s, 0, sizeof *s);
+    s->scene = scene;
+    s->picture = picture;
+    s->change = change;
+    make_states(s);
+    describe(s);
+    s->session = open_session(s, ".png");
+    set_mesh(s, s->session, INSITU_CHANGED_ALL);
+    set_field(s, s->session);
+    for (int i = 0; i < WARM_UP; i++) bench_session_step(s, 0);
+}
+
+void bench_session_free(bench_session *s)
+{
+    insitu_destroy(&s->session);
+    for (int axis = 0; axis < 3; axis++) free(s->coordinates[1][axis]);
+    free(s->values[1]);
+}
+
+static void change_state(bench_session *s)
+{
+    if (s->change != BENCH_NEW_VALUES) {
+        s->place = !s->place;
+        set_mesh(s, s->session, s->change == BENCH_NEW_MESH ? INSITU_CHANGED_ALL : INSITU_CHANGED_GEOMETRY);
+    }
+    if (s->change != BENCH_MOVED_VERTICES) {
+        s->phase = !s->phase;
+        set_field(s, s->session);
+    }
+}
+
+void bench_session_step(bench_session *s, int number)
+{
+    change_state(s);
+    const double began = bench_begin();
+    const insitu_status status = insitu_step(s->session, s->cycle++, 0);
+    bench_end(began, number, &s->whole);
+    must(s, status);
+    const insitu_report *r = insitu_last_report(s->session);
+    const double parts[BENCH_PARTS] = {r->prepare_ms, r->build_ms, r->refit_ms, r->surface_ms + r->volume_ms,
+                                       r->composite_ms};
+    for (int i = 0; i < BENCH_PARTS; i++) bench_keep(1e-3 * parts[i], number, &s->parts[i]);
+    s->bytes_trees = r->bytes_trees;
+    s->bytes_peak = r->bytes_peak;
+}
+
+const float *const *bench_session_coordinates(const bench_session *s)
+{
+    return (const float *const *)s->coordinates[s->place];
+}
+
+const float *bench_session_values(const bench_session *s)
+{
+    return s->values[s->phase];
+}
+
+void bench_session_print(bench_session *s)
+{
+    char measure[96];
+    const int length =
+        snprintf(measure, sizeof measure, "%s %s", bench_picture_name(s->picture), bench_change_name(s->change));
+    char *const end = measure + length;
+    const size_t room = sizeof measure - (size_t)length;
+    const double cells = (double)s->scene->subject.cells;
+    bench_print_series(&s->scene->subject, measure, &s->whole);
+    for (int i = 0; i < BENCH_PARTS; i++) {
+        snprintf(end, room, " %s", part_names[i]);
+        bench_print_series(&s->scene->subject, measure, &s->parts[i]);
+    }
+    snprintf(end, room, " trees");
+    bench_print_number(&s->scene->subject, measure, "bytes/cell", (double)s->bytes_trees / cells);
+    snprintf(end, room, " peak");
+    bench_print_number(&s->scene->subject, measure, "bytes/cell", (double)s->bytes_peak / cells);
+}
+
+float *bench_session_depths(const bench_session *s)
+{
+    bench_session again = *s;
+    again.session = open_session(s, ".exr");
+    set_mesh(&again, again.session, INSITU_CHANGED_ALL);
+    set_field(&again, again.session);
+    must(&again, insitu_step(again.session, 0, 0));
+    insitu_destroy(&again.session);
+    float *depths = caught_depths;
+    caught_depths = NULL;
+    return depths;
+}

@@ -1,0 +1,60 @@
+/* Whole steps of a session, through the public interface alone, as a simulation would take them: the bench mesh on this
+ * one rank, of which the same is new at every step. What is timed is insitu_step() from its call to the finished
+ * picture on rank 0; the picture is not written (this defines session_write_image() in place of the library's). */
+#ifndef BENCH_SESSION_H
+#define BENCH_SESSION_H
+
+#include "bench_scene.h"
+#include "insitu/insitu.h"
+
+/* What differs from the step before. */
+typedef enum bench_change {
+    BENCH_NEW_VALUES,
+    BENCH_MOVED_VERTICES,
+    BENCH_NEW_MESH, /* and all that is on it */
+    BENCH_CHANGE_COUNT
+} bench_change;
+
+const char *bench_change_name(bench_change change);
+
+typedef enum bench_picture { BENCH_ISOSURFACE, BENCH_ISOSURFACES, BENCH_VOLUME, BENCH_PICTURE_COUNT } bench_picture;
+
+const char *bench_picture_name(bench_picture picture);
+
+/* Parts of a step, from the report. */
+enum { BENCH_PARTS = 5 };
+
+typedef struct bench_session {
+    const bench_scene *scene;
+    bench_picture picture;
+    bench_change change;
+    insitu_session *session;
+    insitu_mesh mesh;
+    insitu_field field;
+    float *coordinates[2][3], *values[2]; /* [0] the scene's own */
+    int place, phase;                     /* which of them are set */
+    int64_t cycle;
+    bench_series whole, parts[BENCH_PARTS];
+    int64_t bytes_trees, bytes_peak;
+} bench_session;
+
+/* The scene is borrowed; MPI is initialized. Some steps are taken, so that the session has seen what is new and what
+ * stands. */
+void bench_session_create(bench_session *session, const bench_scene *scene, bench_picture picture, bench_change change);
+void bench_session_free(bench_session *session);
+
+/* Change and step. number 0: the warm-up. */
+void bench_session_step(bench_session *session, int number);
+
+/* What is set now. */
+const float *const *bench_session_coordinates(const bench_session *session);
+const float *bench_session_values(const bench_session *session);
+
+/* "isosurface new values" and its parts. */
+void bench_session_print(bench_session *session);
+
+/* Draw what is set now once more and return its depths, width × height, infinity where nothing is; the caller frees
+ * them. In a session of its own. */
+float *bench_session_depths(const bench_session *session);
+
+#endif

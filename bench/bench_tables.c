@@ -1,0 +1,138 @@
+/* The thesis's tables in kind: 4.1 traversals, 4.2 sample groups, 4.3 groups against steps, 5.2 sizes; and how speed
+ * goes with the instruction set and the threads, for which it is started once each. A speed is the median of the runs,
+ * beside it the error. Prints CSV.
+ *
+ * Isosurfaces are of BENCH_WIDTH × BENCH_HEIGHT pixels. Volumes are slower by far, so that their pictures are smaller.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <sys/resource.h>
+
+#include "bench_command.h"
+#include "bench_scene.h"
+
+enum { VOLUME_WIDTH = 640, VOLUME_HEIGHT = 360, GROUPS = 6, STEPS = 6 };
+
+static const int groups[GROUPS] = {1, 4, 8, 16, 24, 32};
+
+/* In sides of a cube. As in table 4.3 from a quarter to one and a half of what other tables use. */
+static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
+
+/* Ways down the tree that isosurfaces can be made to take. */
+static const char *const traversals[] = {"packets"};
+
+static void measure_frames(bench_scene *s, const char *name, const bench_command *command)
+{
+    double speeds[BENCH_MAX_RUNS];
+    const double rays = 1e-6 * s->job.camera.width * s->job.camera.height;
+    bench_scene_frame(s);
+    for (int i = 0; i < command->runs; i++) {
+        const double began = bench_begin();
+        bench_scene_frame(s);
+        speeds[i] = rays / (bench_seconds() - began);
+    }
+    bench_print(&s->subject, name, "Mrays/s", bench_stats_of(speeds, command->runs));
+}
+
+static void measure_surface(bench_scene *s, const char *name, const bench_command *command)
+{
+    bench_scene_show_surfaces(s, 1);
+    measure_frames(s, name, command);
+    bench_scene_surface_error(s, name);
+}
+
+static void measure_volume(bench_scene *s, const char *name, const bench_command *command)
+{
+    bench_scene_show_volume(s);
+    measure_frames(s, name, command);
+    bench_scene_integral_error(s, name);
+}
+
+static void table_groups(bench_scene *s, const bench_command *command)
+{
+    bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
+    for (int i = 0; i < GROUPS; i++) {
+        char name[64];
+        snprintf(name, sizeof name, "volume group %d", groups[i]);
+        s->job.sample_group = groups[i];
+        measure_volume(s, name, command);
+    }
+}
+
+static void table_steps(bench_scene *s, const bench_command *command)
+{
+    bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
+    for (int step = 0; step < STEPS; step++)
+        for (int i = 0; i < GROUPS; i++) {
+            char name[64];
+            snprintf(name, sizeof name, "volume step %g group %d", steps[step], groups[i]);
+            s->job.step = 2 * steps[step] / s->subject.n;
+            s->job.sample_group = groups[i];
+            measure_volume(s, name, command);
+        }
+}
+
+static void table_scaling(bench_scene *s, const bench_command *command)
+{
+    measure_surface(s, "isosurface", command);
+    bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
+    measure_volume(s, "volume", command);
+}
+
+static void measure_traversals(bench_scene *s, const bench_command *command)
+{
+    for (size_t i = 0; i < sizeof traversals / sizeof *traversals; i++) {
+        char name[64];
+        snprintf(name, sizeof name, "isosurface %s", traversals[i]);
+        measure_surface(s, name, command);
+    }
+}
+
+static void table_sizes(bench_scene *s, const bench_command *command)
+{
+    struct rusage usage;
+    measure_traversals(s, command);
+    table_scaling(s, command);
+    getrusage(RUSAGE_SELF, &usage);
+    bench_print_number(&s->subject, "process peak", "GiB", (double)usage.ru_maxrss / (1 << 20));
+}
+
+static const struct {
+    const char *name;
+    void (*measure)(bench_scene *scene, const bench_command *command);
+} tables[] = {{"groups", table_groups}, {"steps", table_steps}, {"sizes", table_sizes}, {"scaling", table_scaling}};
+
+enum { TABLES = sizeof tables / sizeof *tables };
+
+static void measure(const bench_command *command, int table, test_mesh_kind kind, int n)
+{
+    char program[64];
+    bench_scene scene;
+    snprintf(program, sizeof program, "bench_tables %s", tables[table].name);
+    bench_scene_create(&scene, program, kind, n);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
+    const double began = bench_begin();
+    bench_scene_build(&scene);
+    bench_print_number(&scene.subject, "build", "s", bench_seconds() - began);
+    tables[table].measure(&scene, command);
+    bench_scene_free(&scene);
+}
+
+int main(int argc, char **argv)
+{
+    bench_command command;
+    int table = 0;
+    while (argc > 1 && table < TABLES && strcmp(argv[1], tables[table].name) != 0) table++;
+    const bool is_named = argc > 1 && table < TABLES;
+    if (!bench_command_parse(
+            argc - is_named, argv + is_named,
+            "Before all else stands a table's name: traversal (4.1 of the thesis), groups (4.2), steps\n"
+            "(4.3), sizes (5.2) or scaling. Measures it on each MESH of N^3 cubes.",
+            TEST_MIXED, &command))
+        return command.status;
+    if (!is_named) return fprintf(stderr, "bench_tables: no table of that name\n"), 2;
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, table, command.meshes[i].kind, command.meshes[i].n);
+    return 0;
+}

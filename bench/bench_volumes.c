@@ -1,0 +1,175 @@
+/* Volumes: whole steps, and frames, beside VTK's mappers of unstructured grids, which draw in processes of their own,
+ * one after the other in the same run. Pictures are square, samples half a cube's side apart. Prints CSV.
+ *
+ * VTK's mappers take the extinction to be linear between the knots where we take the opacity, and cut cells at the
+ * knots of the colours too; so they get colours at the opacity's knots alone, and are measured against the integral of
+ * that. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <mpi.h>
+
+#include "bench_apart.h"
+#include "bench_command.h"
+#include "bench_session.h"
+
+/* DENSE: opacities between knots, dense enough to be the extinction: off by at most (ln 2 / 256)^2 / 8 = 9.2e-7. */
+enum { SIZE = 1080, DENSE = 256, DENSE_POINTS = (BENCH_KNOTS - 1) * DENSE + 1, FRAMES_SECONDS = 120, PEER_SECONDS = 300 };
+
+typedef struct peer_look {
+    float colours[3 * BENCH_KNOTS];
+    double extinctions[BENCH_KNOTS];
+    double values[DENSE_POINTS];
+    float opacities[DENSE_POINTS];
+    render_transfer transfer;
+} peer_look;
+
+static const struct {
+    const char *name;
+    bench_vtk_mapper mapper;
+} peers[] = {{"vtk ray cast", BENCH_VTK_RAY_PARTIAL}, {"vtk projected tets", BENCH_VTK_PROJECTED}};
+
+static void make_look(const bench_scene *scene, peer_look *look)
+{
+    for (int i = 0; i < BENCH_KNOTS; i++) {
+        const int entry = i * (scene->transfer.colour_count - 1) / (BENCH_KNOTS - 1);
+        memcpy(look->colours + 3 * i, scene->transfer.colours + 3 * entry, 3 * sizeof *look->colours);
+        look->extinctions[i] = -log1p(-(double)bench_opacities[i]);
+    }
+    for (int i = 0; i < DENSE_POINTS; i++) {
+        const int knot = i / DENSE < BENCH_KNOTS - 1 ? i / DENSE : BENCH_KNOTS - 2;
+        const double part = (double)i / DENSE - knot;
+        look->values[i] = bench_knots[knot] + part * (bench_knots[knot + 1] - bench_knots[knot]);
+        look->opacities[i] =
+            (float)-expm1(-(look->extinctions[knot] + part * (look->extinctions[knot + 1] - look->extinctions[knot])));
+    }
+    look->transfer = scene->transfer;
+    look->transfer.colour_count = BENCH_KNOTS;
+    look->transfer.colours = look->colours;
+    look->transfer.opacity_count = DENSE_POINTS;
+    look->transfer.opacity_values = look->values;
+    look->transfer.opacities = look->opacities;
+}
+
+static void print_peer(bench_scene *scene, const char *name, bench_vtk_result *result, const double *truth,
+                       const float *rgba)
+{
+    char measure[96];
+    bench_series frames = {.count = result->runs};
+    memcpy(frames.seconds, result->frames, (size_t)result->runs * sizeof *frames.seconds);
+    snprintf(measure, sizeof measure, "volume %s first", name);
+    bench_print_number(&scene->subject, measure, "ms", 1e3 * result->first);
+    snprintf(measure, sizeof measure, "volume %s frame", name);
+    bench_print_series(&scene->subject, measure, &frames);
+    snprintf(measure, sizeof measure, "volume %s integral error", name);
+    bench_print(&scene->subject, measure, "linear", bench_scene_pixel_error(scene, truth, rgba));
+}
+
+static int *pixel_places(const bench_pixels *pixels)
+{
+    const int count = bench_pixels_count(pixels);
+    int *places = malloc(2 * (size_t)count * sizeof *places);
+    if (!places) abort();
+    for (int i = 0; i < count; i++) bench_pixels_place(pixels, i, &places[2 * i], &places[2 * i + 1]);
+    return places;
+}
+
+static void measure_peers(bench_scene *scene, test_mesh_kind kind, int runs)
+{
+    peer_look look;
+    test_mesh mesh;
+    bench_scene_mesh(kind, scene->subject.n, &mesh);
+    make_look(scene, &look);
+    const int count = bench_pixels_count(bench_scene_pixels(scene));
+    int *places = pixel_places(scene->pixels);
+    double *truth = bench_scene_integrals(scene, &look.transfer);
+    float *rgba = malloc(4 * (size_t)count * sizeof *rgba);
+    if (!rgba) abort();
+    bench_vtk_request request = {.mesh = &mesh,
+                                 .degrees = bench_degrees,
+                                 .size = scene->job.camera.height,
+                                 .knot_count = BENCH_KNOTS,
+                                 .knots = bench_knots,
+                                 .opacities = look.extinctions,
+                                 .colours = look.colours,
+                                 .unit_distance = bench_unit_distance,
+                                 .runs = runs,
+                                 .seconds = FRAMES_SECONDS,
+                                 .pixel_count = count,
+                                 .pixels = places};
+    memcpy(request.eye, bench_eye, sizeof request.eye);
+    memcpy(request.focal, bench_focal, sizeof request.focal);
+    memcpy(request.up, bench_up, sizeof request.up);
+    for (size_t i = 0; i < sizeof peers / sizeof *peers; i++) {
+        bench_vtk_result result = {0};
+        request.mapper = peers[i].mapper;
+        const char *status = bench_apart_draw(&request, PEER_SECONDS, &result, rgba);
+        if (!strcmp(status, "ok"))
+            print_peer(scene, peers[i].name, &result, truth, rgba);
+        else
+            fprintf(stderr, "bench_volumes: %s: %s\n", peers[i].name, status);
+    }
+    free(rgba);
+    free(truth);
+    free(places);
+    test_mesh_free(&mesh);
+}
+
+static void measure_steps(bench_scene *scene, int runs)
+{
+    for (bench_change change = 0; change < BENCH_CHANGE_COUNT; change++) {
+        bench_session session;
+        bench_session_create(&session, scene, BENCH_VOLUME, change);
+        for (int number = 1; number <= runs; number++) bench_session_step(&session, number);
+        bench_session_print(&session);
+        bench_session_free(&session);
+    }
+}
+
+/* The frame alone, and its error. */
+static void measure_frames(bench_scene *scene, const char *name, render_integration integration, int runs)
+{
+    bench_series frames = {0};
+    char measure[64];
+    scene->job.integration = integration;
+    for (int number = 0; number <= runs; number++) {
+        const double began = bench_begin();
+        bench_scene_frame(scene);
+        bench_end(began, number, &frames);
+    }
+    snprintf(measure, sizeof measure, "volume %s frame", name);
+    bench_print_series(&scene->subject, measure, &frames);
+    snprintf(measure, sizeof measure, "volume %s", name);
+    bench_scene_integral_error(scene, measure);
+}
+
+static void measure(const bench_command *command, test_mesh_kind kind, int n)
+{
+    const int runs = command->runs;
+    bench_scene scene;
+    bench_scene_create(&scene, "bench_volumes", kind, n);
+    bench_scene_resize(&scene, SIZE / command->shrink, SIZE / command->shrink);
+    bench_scene_build(&scene);
+    bench_scene_show_volume(&scene);
+    if (bench_vtk_is_there() && kind == TEST_TETS) measure_peers(&scene, kind, runs);
+    measure_steps(&scene, runs);
+    measure_frames(&scene, "samples", RENDER_SAMPLES, runs);
+    measure_frames(&scene, "segments", RENDER_SEGMENTS, runs);
+    bench_scene_free(&scene);
+}
+
+int main(int argc, char **argv)
+{
+    bench_command command;
+    MPI_Init(&argc, &argv);
+    if (!bench_command_parse(
+            argc, argv,
+            "Measures volumes of each MESH (tets or hexes) of N^3 cubes: whole steps and frames, and of\n"
+            "tets beside VTK's mappers.",
+            TEST_HEXES, &command))
+        command.mesh_count = 0;
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);
+    MPI_Finalize();
+    return command.status;
+}

@@ -1,0 +1,48 @@
+#!/bin/sh
+# bench_speed.sh BIN BENCH: the programs of bench/run on tiny pictures of a tiny mesh, without a screen. No time is looked
+# at, but what the comparisons stand on: all see the same surface, whole steps draw it at every kind of change, errors are
+# float32's rounding, and the page has its rows.
+#
+# Depths of two float32 ray tracers differ by what t (up to 6, 2.4e-7 apart) and the vertices are rounded by, times up to 30
+# where 99 % of the rays are concerned that meet the surface at any angle: 1e-5.
+set -eu
+unset DISPLAY
+export OMP_WAIT_POLICY=passive # other tests run beside this one
+export ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}detect_leaks=0" # TBB, VTK and Embree hold theirs to the end
+csv=$(mktemp)
+page=$(mktemp)
+trap 'rm -f "$csv" "$page"' EXIT
+small='--runs 1 --shrink 8'
+"$1/bench_render" $small tets:4 hexes:4 >"$csv"
+"$1/bench_peers" $small tets:4 >>"$csv" 2>/dev/null
+"$1/bench_steps" $small tets:4 >>"$csv" 2>/dev/null
+"$1/bench_volumes" $small hexes:4 >>"$csv" # hexes: VTK's mappers take none
+for table in sizes groups; do "$1/bench_tables" $table $small tets:4 >>"$csv"; done
+LC_ALL=C awk -F, '
+    function bad(why) { print $1 ", " $4 " " $5 ", " $7 ": " why ": " $10 ", at most " $12; failed = 1 }
+    $1 !~ /^bench_/ { next }
+    { rows[$1 ", " $7]++ }
+    $10 == "nan" || $10 == "-nan" { bad("no number") }
+    $8 == "ms" && $7 ~ /new values$|moved vertices$|new mesh$|trace$/ && $10 <= 0 { bad("not timed") }
+    $7 ~ /embree coverage difference/ && $10 > 1e-3 { bad("other pixels than Embree") }
+    $7 ~ /embree depth difference/ && $12 > 1e-5 { bad("another depth than Embree") }
+    $7 ~ /disagreements/ && $10 > 0 { bad("hits where the reference has none, or none where it has") }
+    $7 ~ /depth error/ && $12 > 1e-5 { bad("another depth than the reference") }
+    $7 == "volume error" && $12 > 1e-5 { bad("not the samples of the reference") }
+    $7 == "volume segments integral error" && $4 == "tets" && $12 > 1e-5 { bad("not the integral") }
+    $7 ~ /^volume group .* integral error/ {
+        if (group == "") group = $10
+        if ($10 != group) bad("groups change the picture")
+    }
+    END {
+        count = split("bench_peers, build sah:bench_steps, isosurface new values:bench_steps, isosurfaces moved vertices:" \
+            "bench_steps, isosurface new mesh:bench_volumes, volume new values:bench_tables sizes, process peak:" \
+            "bench_tables groups, volume group 32", wanted, ":")
+        for (i = 1; i <= count; i++)
+            if (!(wanted[i] in rows)) { print "no row: " wanted[i]; failed = 1 }
+        exit failed
+    }' "$csv"
+LC_ALL=C awk -f "$2/performance.awk" "$csv" >"$page"
+for text in '| the full tree with one field | tets 4 |' '### Table 5.2' '### Table 4.2' '| tets 4, isosurfaces new mesh |'; do
+    grep -qF "$text" "$page" || { echo "the page has no \"$text\"" && exit 1; }
+done
