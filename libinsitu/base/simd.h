@@ -3,8 +3,8 @@
  * compiler's generic vectors (4), which is the reference and runs anywhere.
  *
  * Arithmetic (+ - * /) and comparison are the compiler's own on vector types; every one of them is IEEE exact and
- * fused nowhere (-ffp-contract=off), so all instruction sets give the same bits. The one exception is
- * vf_diff_of_products(), whose two forms both err by at most 1.5 units in the last place.
+ * fused nowhere (-ffp-contract=off), so all instruction sets give the same bits. The exceptions are vf_muladd(), fused
+ * where the hardware can, and vf_diff_of_products(), whose two forms both err by at most 1.5 units in the last place.
  *
  * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, integer lanes of 0 and -1
  * elsewhere: always go through vm_*. */
@@ -340,6 +340,28 @@ SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
     const vd difference = __builtin_convertvector(a, vd) * __builtin_convertvector(b, vd) -
                           __builtin_convertvector(c, vd) * __builtin_convertvector(d, vd);
     return __builtin_convertvector(difference, vf);
+#endif
+}
+
+/* a b + c: one rounding where multiply and add are fused, else two. */
+SIMD_INLINE vf vf_muladd(vf a, vf b, vf c)
+{
+#if defined(SIMD_AVX512)
+    return (vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
+#elif defined(SIMD_AVX2)
+    return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+#else
+    return a * b + c;
+#endif
+}
+
+/* Lanes whose sign bit is set, that of -0 too. */
+SIMD_INLINE vm vm_sign(vi a)
+{
+#if defined(SIMD_AVX512)
+    return _mm512_movepi32_mask((__m512i)a);
+#else
+    return (vm)(a >> 31);
 #endif
 }
 
