@@ -28,9 +28,9 @@ typedef struct kernel_cell {
     double world[GRID_MAX_CELL_VERTICES][3];
     double values[GRID_MAX_CELL_VERTICES];
     float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES]; /* tile space */
-    float f[GRID_MAX_CELL_VERTICES];  /* values as the caller wants them */
-    float g[GRID_MAX_CELL_VERTICES];  /* the same of the colour field */
-    int rank[GRID_MAX_CELL_VERTICES]; /* place in the order of coordinates */
+    float f[GRID_MAX_CELL_VERTICES];     /* values as the caller wants them */
+    float g[GRID_MAX_CELL_VERTICES];     /* the same of the colour field */
+    int rank[GRID_MAX_CELL_VERTICES];    /* place in the order of coordinates */
     kernel_line lines[KERNEL_MAX_LINES]; /* of the edges, then of the quads' diagonals */
     float doubt;                         /* of a tet: the largest of its lines' bounds */
 } kernel_cell;

@@ -7,8 +7,8 @@
  *     e = xa yb - xb ya = (Xa Yb - Xb Ya) + u (Db Ya - Da Yb) + v (Da Xb - Db Xa)
  *
  * Its coefficients are computed once a cell and tile, from the edge's two vertices in the order of coordinates, so that
- * all cells of the edge have the same bits; a packet then needs two multiply-adds. On rays where that leaves the sign in
- * doubt, which depends on the edge and the ray alone, e is computed from the projected vertices instead, by
+ * all cells of the edge have the same bits; a packet then needs two multiply-adds. On rays where that leaves the sign
+ * in doubt, which depends on the edge and the ray alone, e is computed from the projected vertices instead, by
  * vf_diff_of_products(), to its exact sign.
  *
  * The bound of doubt. Let r = 2^-24, W the most of |u| and |v| over the tile, reach the eye's distance from the origin
@@ -17,13 +17,13 @@
  * - The affine form errs by r of each coefficient, of u and of v, and, if nothing is fused, of two products and two
  *   sums: by at most r (3 |c| + 5 |cu| W + 4 |cv| W) <= 3.3 r Na Nb.
  * - The projection, (X - origin) - slope Z, errs by r of the origin, of the first difference, twice of slope Z (the
- *   slope and the product), and of x: by at most r (2 |X| + 3 W M) <= r N. What has the exact sign is therefore the edge
- *   function of vertices that are off by r N: by at most 4 r Na Nb / 2.
- * The sum is 5.3 r Na Nb; 6 leaves room for products of errors and for the bound's own roundings.
+ *   slope and the product), and of x: by at most r (2 |X| + 3 W M) <= r N. What has the exact sign is therefore the
+ * edge function of vertices that are off by r N: by at most 4 r Na Nb / 2. The sum is 5.3 r Na Nb; 6 leaves room for
+ * products of errors and for the bound's own roundings.
  *
  * Depths from these weights err as those from projected vertices do, by the roundings of X, Y and x, y, which are r of
- * the tile's size: an affine e is off by 3.3 r Na Nb at the very most, 1 r of that as a rule, so that a weight is off by r
- * times the square of the tile's size over the triangle's area. The placing of the vertices costs as much. */
+ * the tile's size: an affine e is off by 3.3 r Na Nb at the very most, 1 r of that as a rule, so that a weight is off
+ * by r times the square of the tile's size over the triangle's area. The placing of the vertices costs as much. */
 #ifndef RENDER_KERNEL_LINE_H
 #define RENDER_KERNEL_LINE_H
 
@@ -118,8 +118,9 @@ SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
 }
 
 /* Where a crossed triangle is crossed: the sums of its vertices' depths and values, weighted by their opposite edges
- * and not yet divided by the sum of the weights. Depths are relative to the first vertex, whose roundings are then those
- * of the cell's size and not of the scene's; values are not, so that their sum has the sign that all of them have. */
+ * and not yet divided by the sum of the weights. Depths are relative to the first vertex, whose roundings are then
+ * those of the cell's size and not of the scene's; values are not, so that their sum has the sign that all of them
+ * have. */
 SIMD_INLINE vf kernel_weigh_rise(vf ij, vf ik, float rise_j, float rise_k)
 {
     return vf_muladd(ij, vf_set(rise_k), -ik * rise_j);

@@ -21,7 +21,7 @@ typedef struct kernel_tile {
     float shear_x, shear_y;    /* the centre's slope; 0 where orthographic */
     /* Rays in tile space, by the tile's columns and rows. */
     float origin_x[KERNEL_TILE], origin_y[KERNEL_TILE], slope_x[KERNEL_TILE], slope_y[KERNEL_TILE];
-    float radius;              /* |u|, |v| of no ray are more */
+    float radius; /* |u|, |v| of no ray are more */
 } kernel_tile;
 
 typedef struct kernel_packet {

@@ -239,7 +239,8 @@ static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
 
 /* ---- the inside ---- */
 
-static void kernel_passage_sheets(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour, kernel_passage *r)
+static void kernel_passage_sheets(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
+                                  kernel_passage *r)
 {
     const int centre = c->vertex_count, spokes = c->edge_count;
     if (r->has_sheets) return;
@@ -349,7 +350,8 @@ SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const ker
 }
 
 /* Make the sheets ready to be the profile of the stay: their values, and those at its ends, the field's. */
-static void kernel_passage_profile(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour, kernel_passage *r, kernel_stay *stay)
+static void kernel_passage_profile(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
+                                   kernel_passage *r, kernel_stay *stay)
 {
     kernel_interval *i = &stay->interval;
     kernel_passage_sheets(p, c, rays, has_colour, r);
