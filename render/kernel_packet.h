@@ -49,7 +49,7 @@ typedef struct kernel_packet {
     float pad; /* boxes are widened by it: more than all rounding in the box test */
     float centre_direction[3];
     /* samples: at t = sample_base + m * sample_step for whole numbers m >= sample_first */
-    vf sample_base, sample_step;
+    vf sample_base, sample_step, sample_inverse;
     int sample_first;
 } kernel_packet;
 
@@ -212,6 +212,7 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     }
     p->sample_base = vf_load(l->value);
     p->sample_step = vf_load(step);
+    p->sample_inverse = 1.0f / p->sample_step;
 }
 
 /* What rays need in cells: the tile's rays must be there. */

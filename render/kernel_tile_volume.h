@@ -114,30 +114,37 @@ static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uin
 
 /* ---- windows ---- */
 
-/* Blocks that any tree's box may meet. */
-SIMD_INLINE unsigned kernel_tile_reached(const kernel_tile_trace *t)
+/* The blocks that any tree's box may meet, and the depths between which. */
+SIMD_INLINE kernel_lie kernel_tile_reach(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
-    unsigned blocks = 0;
-    for (int i = 0; i < job->part_count; i++)
-        if (job->parts[i].tree->node_count) blocks |= kernel_box_lie(&t->tree_planes, job->parts[i].tree, 0).blocks;
-    return blocks & t->wanted;
+    kernel_lie all = {.near = INFINITY, .far = -INFINITY};
+    for (int i = 0; i < job->part_count; i++) {
+        if (!job->parts[i].tree->node_count) continue;
+        const kernel_lie lie = kernel_box_lie(&t->tree_planes, job->parts[i].tree, 0);
+        all.blocks |= lie.blocks & t->wanted;
+        all.near = fminf(all.near, lie.near);
+        all.far = fmaxf(all.far, lie.far);
+    }
+    return all;
 }
 
-/* Set up the packet; what of sample numbers its rays have is added to first .. last. */
-SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samples *r, int *first, int *last)
+/* Set up the packet; what of sample numbers its rays have between the depths is added to first .. last. */
+SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samples *r, float near, float far,
+                                          int *first, int *last)
 {
-    int from, to;
-    kernel_packet_complete(p);
+    kernel_lanes lanes;
+    kernel_packet_lanes(p, &lanes);
+    kernel_packet_samples(p, &lanes);
     r->active = p->active;
     r->blend = (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
     r->samples.marked = vm_none();
-    if (!kernel_sample_range(p, &from, &to)) {
-        p->active = vm_none();
-        return;
-    }
-    *first = from < *first ? from : *first;
-    *last = to > *last ? to : *last;
+    const vf end = vf_min(p->t_far, vf_set(far));
+    const vf from = (near - p->sample_base) * p->sample_inverse, to = (end - p->sample_base) * p->sample_inverse;
+    const int lowest = (int)floorf(vf_reduce_min(from)) - 1, highest = (int)floorf(vf_reduce_max(to)) + 1;
+    const int begin = lowest < p->sample_first ? p->sample_first : lowest;
+    *first = begin < *first ? begin : *first;
+    *last = highest > *last ? highest : *last;
 }
 
 /* Make the packet ready for the window. Returns how far its rays go in it, and lowers near to where they begin. */
@@ -188,7 +195,8 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = kernel_tile_volume_of(t);
-    const unsigned blocks = kernel_tile_reached(t);
+    const kernel_lie reach = kernel_tile_reach(t);
+    const unsigned blocks = reach.blocks;
     int packets[KERNEL_TILE_PACKETS], count = 0, first = INT_MAX, last = INT_MIN;
     for (unsigned left = blocks; left; left &= left - 1) {
         const int block = __builtin_ctz(left);
@@ -196,7 +204,8 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
     }
     for (int n = 0; n < count; n++)
-        kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], &first, &last);
+        kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
+                                 &last);
     for (int from = first; from <= last; from += KERNEL_MAX_GROUP) {
         const int to = last - from < KERNEL_MAX_GROUP ? last : from + KERNEL_MAX_GROUP - 1;
         if (!kernel_tile_window(t, v, blocks, from, to)) break;

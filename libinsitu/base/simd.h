@@ -323,6 +323,22 @@ SIMD_INLINE float vf_reduce_max(vf a)
 
 #endif
 
+/* base[index] and base[index + 1]. */
+SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *second)
+{
+#if defined(SIMD_AVX512)
+    const __m512i i = (__m512i)index;
+    const __m512 low = _mm512_castpd_ps(_mm512_i32gather_pd(_mm512_castsi512_si256(i), base, 4));
+    const __m512 high = _mm512_castpd_ps(_mm512_i32gather_pd(_mm512_extracti64x4_epi64(i, 1), base, 4));
+    const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    *first = (vf)_mm512_permutex2var_ps(low, even, high);
+    *second = (vf)_mm512_permutex2var_ps(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high);
+#else
+    *first = vf_gather(base, index);
+    *second = vf_gather(base + 1, index);
+#endif
+}
+
 /* a b - c d to 1.5 units in the last place, zero only where it is zero, and of the right sign: Kahan's two fused
  * steps where there are such, else in double, where the products of floats are exact. */
 SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
