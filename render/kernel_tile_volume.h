@@ -78,6 +78,7 @@ static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32
     const grid_field *field = &t->frame->job->volumes[v->volume].field.fields[part];
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = &v->cell;
+    kernel_tile_prefetch(g, field, cells, count);
     for (int n = 0; n < count; n++) {
         kernel_outline outline;
         kernel_cell_fetch(c, g, field, cells[n]);
@@ -86,11 +87,12 @@ static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32
             continue;
         }
         if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
-        kernel_cell_place_in(c, t->frame, &t->tile, g);
+        kernel_cell_move(c, t->frame, &t->tile, g);
         kernel_vertex_outline(c, &outline);
         const kernel_lie lie = kernel_outline_lie(&t->tile_planes, &outline);
         const unsigned meets = blocks & lie.blocks & kernel_blocks_beyond(t, lie.near);
         if (!meets || lie.far < t->t_near) continue;
+        kernel_cell_order(c);
         kernel_cell_domain(c, transfer);
         kernel_cell_lines(c, t->frame, &t->tile);
         if (c->type != GRID_TET && !c->is_constant) kernel_map_setup(&v->map, c);
