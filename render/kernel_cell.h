@@ -315,14 +315,24 @@ static __attribute__((noinline)) void kernel_tet_edges_exactly(const kernel_pack
                            kernel_cell_spot(c, kernel_tet_edge[n][1]));
 }
 
+SIMD_INLINE void kernel_tet_edges_projected(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
+{
+    for (int n = 0; n < KERNEL_TET_EDGES; n++)
+        e[n] = kernel_edge_projected(p, kernel_cell_spot(c, kernel_tet_edge[n][0]),
+                                     kernel_cell_spot(c, kernel_tet_edge[n][1]));
+}
+
 /* All edge functions at once; one by one only where one of them is in doubt. */
 SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
 {
+    if (!p->is_pencil) {
+        kernel_tet_edges_projected(p, c, e);
+        return;
+    }
     for (int n = 0; n < KERNEL_TET_EDGES; n++) e[n] = kernel_line_at(p, &c->lines[n]);
     const vf low = vf_min(vf_min(vf_abs(e[0]), vf_abs(e[1])), vf_abs(e[2]));
     const vf least = vf_min(vf_min(low, vf_min(vf_abs(e[3]), vf_abs(e[4]))), vf_abs(e[5]));
-    if (__builtin_expect(vm_any(vm_not(vf_lt(vf_set(c->doubt), least))) || !p->is_pencil, 0))
-        kernel_tet_edges_exactly(p, c, e);
+    if (__builtin_expect(vm_any(vm_not(vf_lt(vf_set(c->doubt), least))), 0)) kernel_tet_edges_exactly(p, c, e);
 }
 
 /* A crossed triangle's sums (kernel_line.h). */

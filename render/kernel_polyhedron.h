@@ -121,9 +121,10 @@ SIMD_INLINE void kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, i
 SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
 {
     for (int i = 0; i <= c->vertex_count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->is_placed = true;
+    if (!p->is_pencil) return;
     for (int i = 0; i < c->edge_count; i++) kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]);
     for (int i = 0; i < c->vertex_count; i++) kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count);
-    c->is_placed = true;
 }
 
 /* ---- the surface ---- */

@@ -64,10 +64,12 @@ static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int6
 {
     kernel_thread *thread = p->thread;
     const double start = thread->now();
-    if (p->frame->has_segments)
+    if (p->frame->has_segments) {
+        p->is_pencil = false; /* packet by packet, lines would not be used often enough to pay */
         kernel_trace_segments(p, first_fragment);
-    else
+    } else {
         kernel_trace_volumes(p, hits);
+    }
     thread->volume_seconds += thread->now() - start;
 }
 
