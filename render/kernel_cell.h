@@ -15,22 +15,24 @@
 #ifndef RENDER_KERNEL_CELL_H
 #define RENDER_KERNEL_CELL_H
 
-#include "kernel_packet.h"
+#include "kernel_line.h"
 
-enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2 };
+enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2, KERNEL_MAX_LINES = 18 };
 
 typedef struct kernel_cell {
     uint32_t serial, index; /* the cache's key: tile, cell, */
     int part, layer;        /* mesh, and whose values these are */
-    bool is_finite, is_placed, is_constant;
+    bool is_finite, is_placed, is_constant, has_lines;
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
     double values[GRID_MAX_CELL_VERTICES];
     float x[GRID_MAX_CELL_VERTICES], y[GRID_MAX_CELL_VERTICES], z[GRID_MAX_CELL_VERTICES]; /* tile space */
-    float f[GRID_MAX_CELL_VERTICES];  /* values as the caller wants them */
-    float g[GRID_MAX_CELL_VERTICES];  /* the same of the colour field */
-    int rank[GRID_MAX_CELL_VERTICES]; /* place in the order of coordinates */
+    float f[GRID_MAX_CELL_VERTICES];     /* values as the caller wants them */
+    float g[GRID_MAX_CELL_VERTICES];     /* the same of the colour field */
+    int rank[GRID_MAX_CELL_VERTICES];    /* place in the order of coordinates */
+    kernel_line lines[KERNEL_MAX_LINES]; /* of the edges, then of the quads' diagonals */
+    float doubt;                         /* of a tet: the largest of its lines' bounds */
 } kernel_cell;
 
 /* Where rays go through a face: v of f, w of g, at the cell's own coordinates r (for tets not set). */
@@ -255,7 +257,7 @@ SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const k
     memcpy(c->z, &z, sizeof z);
 }
 
-/* Into tile space, but not in order yet. */
+/* Into tile space, but not in order yet, and without lines. */
 SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
@@ -264,6 +266,7 @@ SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const k
     else
         for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_placed = true;
+    c->has_lines = false;
 }
 
 SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)
@@ -272,77 +275,116 @@ SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, con
     kernel_cell_order(c);
 }
 
+/* Of a placed cell, before rays of the tile are to meet it. */
+static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile);
+
 SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
 {
     kernel_cell_place_in(c, p->frame, p->tile, g);
+    if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 
-SIMD_INLINE void kernel_project(const kernel_packet *p, const kernel_cell *c, int i, kernel_projected *out)
+SIMD_INLINE kernel_spot kernel_cell_spot(const kernel_cell *c, int i)
 {
-    out->x[i] = (vf_set(c->x[i]) - p->origin_x) - p->slope_x * c->z[i];
-    out->y[i] = (vf_set(c->y[i]) - p->origin_y) - p->slope_y * c->z[i];
-}
-
-/* The edge function of a, b (a before b in the order) and its sign, ties decided. */
-SIMD_INLINE vf kernel_edge(const kernel_projected *q, int a, int b, vm *positive)
-{
-    const vf e = vf_diff_of_products(q->x[a], q->y[b], q->x[b], q->y[a]);
-    const vf zero = vf_set(0);
-    vm above = vf_lt(zero, e);
-    const vm tie = vf_eq(e, zero);
-    if (__builtin_expect(vm_any(tie), 0)) {
-        const vm level = vm_and(vf_eq(q->y[a], q->y[b]), vf_lt(q->x[a], q->x[b]));
-        above = vm_or(above, vm_and(tie, vm_or(vf_lt(q->y[b], q->y[a]), level)));
-    }
-    *positive = above;
-    return e;
-}
-
-/* The triangle i, j, k (in the order) with its three edges: who crosses it. */
-SIMD_INLINE vm kernel_inside(vm rays, vm ij, vm jk, vm ik)
-{
-    return vm_and(vm_andnot(rays, vm_xor(ij, jk)), vm_xor(ij, ik));
+    return (kernel_spot){c->x[i], c->y[i], c->z[i]};
 }
 
 /* ---- Tets: four triangles, two crossings or none. ---- */
 
-SIMD_INLINE void kernel_tet_face(const kernel_cell *c, vm hit, vf e_ij, vf e_jk, vf e_ik, int i, int j, int k,
-                                 bool has_colour, kernel_interval *out)
+/* Edges 01, 02, 03, 12, 13, 23, and the faces without vertex 3, 2, 1, 0: their edges ij, jk and ik. */
+enum { KERNEL_TET_EDGES = 6 };
+static const signed char kernel_tet_edge[KERNEL_TET_EDGES][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+
+SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    if (!vm_any(hit)) return;
-    const vf inverse = 1.0f / ((e_jk - e_ik) + e_ij);
-    const vf t = ((e_jk * c->z[i] - e_ik * c->z[j]) + e_ij * c->z[k]) * inverse;
-    const vf v = ((e_jk * c->f[i] - e_ik * c->f[j]) + e_ij * c->f[k]) * inverse;
-    const vm first = vm_and(hit, vf_lt(t, out->t_in));
-    const vm last = vm_andnot(hit, vf_lt(t, out->t_out));
-    out->t_in = vf_select(first, t, out->t_in);
-    out->v_in = vf_select(first, v, out->v_in);
-    out->t_out = vf_select(last, t, out->t_out);
-    out->v_out = vf_select(last, v, out->v_out);
-    if (has_colour) {
-        const vf w = ((e_jk * c->g[i] - e_ik * c->g[j]) + e_ij * c->g[k]) * inverse;
-        out->w_in = vf_select(first, w, out->w_in);
-        out->w_out = vf_select(last, w, out->w_out);
+    float size[4], doubt = 0;
+    for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int a = kernel_tet_edge[n][0], b = kernel_tet_edge[n][1];
+        c->lines[n] = kernel_line_between(f, kernel_cell_spot(c, a), kernel_cell_spot(c, b), size[a], size[b]);
+        doubt = doubt < c->lines[n].bound ? c->lines[n].bound : doubt;
     }
-    out->mask = vm_or(out->mask, hit);
+    c->doubt = doubt;
 }
 
+static __attribute__((noinline)) void kernel_tet_edges_exactly(const kernel_packet *p, const kernel_cell *c,
+                                                               vf e[KERNEL_TET_EDGES])
+{
+    for (int n = 0; n < KERNEL_TET_EDGES; n++)
+        e[n] = kernel_edge(p, &c->lines[n], kernel_cell_spot(c, kernel_tet_edge[n][0]),
+                           kernel_cell_spot(c, kernel_tet_edge[n][1]));
+}
+
+SIMD_INLINE void kernel_tet_edges_projected(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
+{
+    for (int n = 0; n < KERNEL_TET_EDGES; n++)
+        e[n] = kernel_edge_projected(p, kernel_cell_spot(c, kernel_tet_edge[n][0]),
+                                     kernel_cell_spot(c, kernel_tet_edge[n][1]));
+}
+
+/* All edge functions at once; one by one only where one of them is in doubt. */
+SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
+{
+    if (!p->is_pencil) {
+        kernel_tet_edges_projected(p, c, e);
+        return;
+    }
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) e[n] = kernel_line_at(p, &c->lines[n]);
+    const vf low = vf_min(vf_min(vf_abs(e[0]), vf_abs(e[1])), vf_abs(e[2]));
+    const vf least = vf_min(vf_min(low, vf_min(vf_abs(e[3]), vf_abs(e[4]))), vf_abs(e[5]));
+    if (__builtin_expect(vm_any(vm_not(vf_lt(vf_set(c->doubt), least))), 0)) kernel_tet_edges_exactly(p, c, e);
+}
+
+/* A crossed triangle's sums (kernel_line.h). */
+typedef struct kernel_sums {
+    vf rise, value, colour, weight;
+} kernel_sums;
+
+SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, int i, int j, int k, vf ij, vf jk, vf ik, bool has_colour)
+{
+    return (kernel_sums){kernel_weigh_rise(ij, ik, c->z[j] - c->z[i], c->z[k] - c->z[i]),
+                         kernel_weigh_value(ij, jk, ik, c->f[i], c->f[j], c->f[k]),
+                         has_colour ? kernel_weigh_value(ij, jk, ik, c->g[i], c->g[j], c->g[k]) : vf_set(0),
+                         kernel_weight(ij, jk, ik)};
+}
+
+SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const kernel_sums *b)
+{
+    return (kernel_sums){vf_select(m, a->rise, b->rise), vf_select(m, a->value, b->value),
+                         vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
+}
+
+/* Without branches: all four faces' sums, of which each ray takes its first and its last crossed face's. */
 SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
                                      kernel_interval *out)
 {
-    kernel_projected q;
-    for (int i = 0; i < 4; i++) kernel_project(p, c, i, &q);
-    vm p01, p02, p03, p12, p13, p23;
-    const vf e01 = kernel_edge(&q, 0, 1, &p01), e02 = kernel_edge(&q, 0, 2, &p02), e03 = kernel_edge(&q, 0, 3, &p03);
-    const vf e12 = kernel_edge(&q, 1, 2, &p12), e13 = kernel_edge(&q, 1, 3, &p13), e23 = kernel_edge(&q, 2, 3, &p23);
-    out->mask = vm_none();
-    out->t_in = vf_set(INFINITY);
-    out->t_out = vf_set(-INFINITY);
-    out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
-    kernel_tet_face(c, kernel_inside(rays, p01, p12, p02), e01, e12, e02, 0, 1, 2, has_colour, out);
-    kernel_tet_face(c, kernel_inside(rays, p01, p13, p03), e01, e13, e03, 0, 1, 3, has_colour, out);
-    kernel_tet_face(c, kernel_inside(rays, p02, p23, p03), e02, e23, e03, 0, 2, 3, has_colour, out);
-    kernel_tet_face(c, kernel_inside(rays, p12, p23, p13), e12, e23, e13, 1, 2, 3, has_colour, out);
+    vf e[KERNEL_TET_EDGES];
+    kernel_tet_edges(p, c, e);
+    const vm m012 = kernel_inside(rays, e[0], e[3], e[1]), m013 = kernel_inside(rays, e[0], e[4], e[2]);
+    const vm m023 = kernel_inside(rays, e[1], e[5], e[2]), m123 = kernel_inside(rays, e[3], e[5], e[4]);
+    out->mask = vm_or(vm_or(m012, m013), vm_or(m023, m123));
+    out->t_in = out->t_out = out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
+    if (!vm_any(out->mask)) return;
+    const kernel_sums s012 = kernel_tet_sums(c, 0, 1, 2, e[0], e[3], e[1], has_colour);
+    const kernel_sums s013 = kernel_tet_sums(c, 0, 1, 3, e[0], e[4], e[2], has_colour);
+    const kernel_sums s023 = kernel_tet_sums(c, 0, 2, 3, e[1], e[5], e[2], has_colour);
+    const kernel_sums s123 = kernel_tet_sums(c, 1, 2, 3, e[3], e[5], e[4], has_colour);
+    kernel_sums a = kernel_sums_select(m013, &s013, &s023), b = kernel_sums_select(m023, &s023, &s013);
+    a = kernel_sums_select(m012, &s012, &a);
+    b = kernel_sums_select(m123, &s123, &b);
+    const vf scale_a = 1.0f / a.weight, scale_b = 1.0f / b.weight;
+    const vf t_a = vf_muladd(a.rise, scale_a, vf_set(c->z[0]));
+    const vf t_b = vf_muladd(b.rise, scale_b, vf_select(m123, vf_set(c->z[1]), vf_set(c->z[0])));
+    const vf v_a = a.value * scale_a, v_b = b.value * scale_b;
+    const vm swap = vf_lt(t_b, t_a);
+    out->t_in = vf_select(swap, t_b, t_a);
+    out->t_out = vf_select(swap, t_a, t_b);
+    out->v_in = vf_select(swap, v_b, v_a);
+    out->v_out = vf_select(swap, v_a, v_b);
+    if (!has_colour) return;
+    const vf w_a = a.colour * scale_a, w_b = b.colour * scale_b;
+    out->w_in = vf_select(swap, w_b, w_a);
+    out->w_out = vf_select(swap, w_a, w_b);
 }
 
 /* ---- Cells with quads. ---- */
@@ -385,13 +427,13 @@ SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
 /* Edge functions by vertex pair: those of the shape and of the quads' diagonals. */
 typedef struct kernel_edges {
     vf e[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES]; /* [a][b] with a before b in the order */
-    vm positive[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES];
 } kernel_edges;
 
-SIMD_INLINE void kernel_poly_edge(const kernel_cell *c, const kernel_projected *q, int i, int j, kernel_edges *out)
+/* Number n of the cell's lines. */
+SIMD_INLINE void kernel_poly_edge(const kernel_packet *p, const kernel_cell *c, int n, int i, int j, kernel_edges *out)
 {
     const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
-    out->e[a][b] = kernel_edge(q, a, b, &out->positive[a][b]);
+    out->e[a][b] = kernel_edge(p, &c->lines[n], kernel_cell_spot(c, a), kernel_cell_spot(c, b));
 }
 
 /* A quad's corners around, from the smallest vertex towards its smaller neighbour. */
@@ -406,6 +448,38 @@ SIMD_INLINE void kernel_quad_corners(const kernel_cell *c, const signed char *lo
     corner[1] = forward ? ahead : behind;
     corner[2] = loop[(first + 2) & 3];
     corner[3] = forward ? behind : ahead;
+}
+
+SIMD_INLINE void kernel_poly_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+{
+    const kernel_shape *shape = kernel_cell_shape(c->type);
+    signed char ends[KERNEL_MAX_LINES][2];
+    float size[GRID_MAX_CELL_VERTICES];
+    const int count = shape->edge_count + shape->face_count;
+    memset(ends, 0, sizeof ends);
+    memcpy(ends, shape->edges, (size_t)shape->edge_count * sizeof ends[0]);
+    for (int face = 0; face < shape->face_count; face++) {
+        int corner[4];
+        if (shape->faces[face].count == 3) continue;
+        kernel_quad_corners(c, shape->faces[face].vertices, corner);
+        ends[shape->edge_count + face][0] = (signed char)corner[0];
+        ends[shape->edge_count + face][1] = (signed char)corner[2];
+    }
+    for (int i = 0; i < c->count; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    for (int n = 0; n < count; n++) {
+        const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
+        c->lines[n] = kernel_line_between(f, kernel_cell_spot(c, a), kernel_cell_spot(c, b), size[a], size[b]);
+    }
+}
+
+static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+{
+    if (c->has_lines) return;
+    c->has_lines = true;
+    if (c->type == GRID_TET)
+        kernel_tet_lines(c, f, tile);
+    else
+        kernel_poly_lines(c, f, tile);
 }
 
 /* A quad with two neighbouring corners in one place is a triangle, and its neighbour may have it as such. */
@@ -563,16 +637,27 @@ SIMD_INLINE vf kernel_bilinear(const float *f, const int corner[4], vf s, vf r)
     return low + r * (high - low);
 }
 
-/* Weights of a crossed triangle's i, j, k in the order, and one over their sum. Tets weigh in the same way
- * (kernel_tet_face): a face's value has the same bits from both its cells. */
+/* Edge functions of a crossed triangle i, j, k in the order, the weights, and one over their sum. Tets weigh in the
+ * same way: a face's depth and value have the same bits from both its cells. */
 typedef struct kernel_weights {
     int i, j, k;
-    vf a, b, c, inverse;
+    vf ij, jk, ik, inverse;
 } kernel_weights;
+
+SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, vf ik)
+{
+    return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
+}
 
 SIMD_INLINE vf kernel_weigh(const kernel_weights *w, float fi, float fj, float fk)
 {
-    return ((w->a * fi + w->b * fj) + w->c * fk) * w->inverse;
+    return kernel_weigh_value(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
+}
+
+SIMD_INLINE vf kernel_weigh_depth(const kernel_weights *w, const float *z)
+{
+    const vf rise = kernel_weigh_rise(w->ij, w->ik, z[w->j] - z[w->i], z[w->k] - z[w->i]);
+    return vf_muladd(rise, w->inverse, vf_set(z[w->i]));
 }
 
 SIMD_INLINE void kernel_triangle_values(const kernel_cell *c, const kernel_shape *shape, const kernel_weights *w,
@@ -620,11 +705,10 @@ SIMD_INLINE vm kernel_triangle(const kernel_cell *c, const kernel_edges *edges, 
     if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
     if (c->rank[k] < c->rank[j]) swap = j, j = k, k = swap;
     if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
-    const vm hit = kernel_inside(rays, edges->positive[i][j], edges->positive[j][k], edges->positive[i][k]);
+    const vm hit = kernel_inside(rays, edges->e[i][j], edges->e[j][k], edges->e[i][k]);
     if (!vm_any(hit)) return hit;
-    const vf e_ij = edges->e[i][j], e_jk = edges->e[j][k], e_ik = edges->e[i][k];
-    *w = (kernel_weights){i, j, k, e_jk, -e_ik, e_ij, 1.0f / ((e_jk - e_ik) + e_ij)};
-    *t = kernel_weigh(w, c->z[i], c->z[j], c->z[k]);
+    *w = kernel_weights_of(i, j, k, edges->e[i][j], edges->e[j][k], edges->e[i][k]);
+    *t = kernel_weigh_depth(w, c->z);
     return hit;
 }
 
@@ -635,8 +719,12 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
     const kernel_shape *shape = kernel_cell_shape(c->type);
     kernel_projected q;
     kernel_edges edges;
-    for (int i = 0; i < c->count; i++) kernel_project(p, c, i, &q);
-    for (int e = 0; e < shape->edge_count; e++) kernel_poly_edge(c, &q, shape->edges[e][0], shape->edges[e][1], &edges);
+    for (int i = 0; i < c->count; i++) {
+        q.x[i] = kernel_project_x(p, kernel_cell_spot(c, i));
+        q.y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
+    }
+    for (int n = 0; n < shape->edge_count; n++)
+        kernel_poly_edge(p, c, n, shape->edges[n][0], shape->edges[n][1], &edges);
     int n = 0;
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
@@ -648,7 +736,7 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
         }
         int corner[4];
         kernel_quad_corners(c, loop, corner);
-        kernel_poly_edge(c, &q, corner[0], corner[2], &edges);
+        kernel_poly_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
         for (int half = 0; half < 2; half++) {
             kernel_crossing *next = &out[n];
             next->mask = kernel_triangle(c, &edges, rays, corner[0], corner[half + 1], corner[half + 2], &w, &next->t);

@@ -55,8 +55,12 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
     p = p * y + 0.5f;
     p = p * y + 1.0f;
     const vf series = -(y * p);
-    const vf power = vf_exp2(x);
     const vm small = vf_lt(vf_set(-0.5f), x);
+    if (!vm_any(vm_not(small))) {
+        *absorbed = series;
+        return 1.0f - series;
+    }
+    const vf power = vf_exp2(x);
     *absorbed = vf_select(small, series, 1.0f - power);
     return vf_select(small, 1.0f - series, power);
 }
@@ -68,10 +72,9 @@ SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
     const vf whole = vf_min(vf_floor(place), vf_set((float)(t->colour_count - 2)));
     const vf part = place - whole;
     const vi index = vi_from_vf(whole) * 3;
-    for (int a = 0; a < 3; a++) {
-        const vf low = vf_gather(t->colours + a, index), high = vf_gather(t->colours + a + 3, index);
-        out[a] = low + part * (high - low);
-    }
+    vf c[6]; /* of two entries */
+    for (int i = 0; i < 6; i += 2) vf_gather_pair(t->colours + i, index, &c[i], &c[i + 1]);
+    for (int a = 0; a < 3; a++) out[a] = c[a] + part * (c[a + 3] - c[a]);
 }
 
 SIMD_INLINE vf kernel_opacity(const kernel_transfer *t, vf x)

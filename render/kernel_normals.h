@@ -83,6 +83,7 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
     const vf zero = vf_set(0);
     kernel_packet points = *p;
     points.active = rays;
+    points.is_pencil = false;
     points.origin_x = (p->origin_x + p->slope_x * t) + offset * (right - p->tile->shear_x * forward);
     points.origin_y = (p->origin_y + p->slope_y * t) + offset * (up - p->tile->shear_y * forward);
     points.slope_x = points.slope_y = zero;

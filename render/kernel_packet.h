@@ -21,6 +21,7 @@ typedef struct kernel_tile {
     float shear_x, shear_y;    /* the centre's slope; 0 where orthographic */
     /* Rays in tile space, by the tile's columns and rows. */
     float origin_x[KERNEL_TILE], origin_y[KERNEL_TILE], slope_x[KERNEL_TILE], slope_y[KERNEL_TILE];
+    float radius; /* |u|, |v| of no ray are more */
 } kernel_tile;
 
 typedef struct kernel_packet {
@@ -33,6 +34,10 @@ typedef struct kernel_packet {
     bool has_view;
     /* tile space */
     vf origin_x, origin_y, slope_x, slope_y;
+    /* Are these rays the tile's own? Then what tells one from another is (u, v), their slopes, or where the camera is
+     * orthographic their origins (kernel_line.h). */
+    bool is_pencil;
+    vf u, v;
     vf t_near; /* the eye's plane */
     vf t_far;  /* nearest opaque hit so far, +inf at first */
     uint32_t pixel[SIMD_WIDTH];
@@ -44,7 +49,7 @@ typedef struct kernel_packet {
     float pad; /* boxes are widened by it: more than all rounding in the box test */
     float centre_direction[3];
     /* samples: at t = sample_base + m * sample_step for whole numbers m >= sample_first */
-    vf sample_base, sample_step;
+    vf sample_base, sample_step, sample_inverse;
     int sample_first;
 } kernel_packet;
 
@@ -69,6 +74,8 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     const bool flat = f->job->camera.is_orthographic;
     tile->shear_x = flat ? 0 : (float)tile->centre_x;
     tile->shear_y = flat ? 0 : (float)tile->centre_y;
+    const double widest = fmax(fabs(f->slope_dx), fabs(f->slope_dy)) * (flat ? f->job->space.scale : 1);
+    tile->radius = (float)(0.5 * KERNEL_TILE * widest);
 }
 
 /* What a slope is multiplied by to make the origin at Z = 0. */
@@ -205,6 +212,7 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     }
     p->sample_base = vf_load(l->value);
     p->sample_step = vf_load(step);
+    p->sample_inverse = 1.0f / p->sample_step;
 }
 
 /* What rays need in cells: the tile's rays must be there. */
@@ -229,6 +237,9 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
         if (bits >> lane & 1 && !pixel_set_has(f->job->pixels, p->pixel[lane])) bits &= ~(1u << lane);
     p->active = vm_from_bits(bits);
     kernel_packet_tile_rays(p);
+    p->is_pencil = true;
+    p->u = camera->is_orthographic ? p->origin_x : p->slope_x;
+    p->v = camera->is_orthographic ? p->origin_y : p->slope_y;
     p->t_near = vf_set((float)-f->depth_shift);
     p->t_far = vf_set(INFINITY);
 }

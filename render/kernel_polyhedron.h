@@ -49,7 +49,6 @@ typedef struct kernel_tet_span {
 typedef struct kernel_passage {
     vf *x, *y;              /* vertices and centre in the rays' planes */
     vf *edge;               /* edge functions: of the edges, then of the spokes, from each vertex to the centre */
-    vm *positive;           /* their signs */
     kernel_meeting *facets; /* by number; only those met are set */
     vm *left;               /* rays whose crossing is not yet taken into an interval */
     int *met;
@@ -85,8 +84,8 @@ SIMD_INLINE void *kernel_carve(char **at, size_t bytes)
 static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, kernel_passage *out)
 {
     const size_t points = (size_t)c->vertex_count + 1, edges = (size_t)c->edge_count, facets = (size_t)c->facet_count;
-    const size_t pieces = 12, spare = 64 * pieces;
-    const size_t bytes = points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(vm) + sizeof(int)) +
+    const size_t pieces = 11, spare = 64 * pieces;
+    const size_t bytes = points * 2 * sizeof(vf) + (edges + points) * (sizeof(vf) + sizeof(int)) +
                          facets * (sizeof(kernel_meeting) + sizeof(vm) + sizeof(int) + sizeof(kernel_tet_span)) +
                          edges * sizeof(kernel_meeting) + spare;
     char *at = p->thread->polyhedron_scratch(p->thread->polyhedra, bytes);
@@ -97,7 +96,6 @@ static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, ker
     out->x = kernel_carve(&at, points * sizeof(vf));
     out->y = kernel_carve(&at, points * sizeof(vf));
     out->edge = kernel_carve(&at, (edges + points) * sizeof(vf));
-    out->positive = kernel_carve(&at, (edges + points) * sizeof(vm));
     out->facets = kernel_carve(&at, facets * sizeof(kernel_meeting));
     out->left = kernel_carve(&at, facets * sizeof(vm));
     out->met = kernel_carve(&at, facets * sizeof(int));
@@ -109,10 +107,24 @@ static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, ker
     return true;
 }
 
+SIMD_INLINE kernel_spot kernel_polyhedron_spot(const polyhedron *c, int i)
+{
+    return (kernel_spot){c->x[i], c->y[i], c->z[i]};
+}
+
+SIMD_INLINE void kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
+{
+    const kernel_line line = kernel_line_of(p, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    memcpy(c->lines[n], &line, sizeof line);
+}
+
 SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
 {
     for (int i = 0; i <= c->vertex_count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_placed = true;
+    if (!p->is_pencil) return;
+    for (int i = 0; i < c->edge_count; i++) kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]);
+    for (int i = 0; i < c->vertex_count; i++) kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count);
 }
 
 /* ---- the surface ---- */
@@ -148,7 +160,7 @@ static void kernel_polyhedron_quad(const polyhedron *c, const kernel_passage *r,
 
 SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool has_colour, kernel_meeting *out)
 {
-    out->t = kernel_weigh(w, c->z[w->i], c->z[w->j], c->z[w->k]);
+    out->t = kernel_weigh_depth(w, c->z);
     out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
     out->w = has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
     out->t_face = out->t;
@@ -156,18 +168,12 @@ SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool 
     out->w_face = out->w;
 }
 
-SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf e_ij, vf e_jk, vf e_ik)
+SIMD_INLINE void kernel_passage_edge(const kernel_packet *p, const polyhedron *c, kernel_passage *r, int number, int a,
+                                     int b)
 {
-    return (kernel_weights){i, j, k, e_jk, -e_ik, e_ij, 1.0f / ((e_jk - e_ik) + e_ij)};
-}
-
-/* kernel_edge() on arrays of any length. */
-SIMD_INLINE void kernel_passage_edge(kernel_passage *r, int number, int a, int b)
-{
-    kernel_projected q;
-    q.x[0] = r->x[a], q.y[0] = r->y[a];
-    q.x[1] = r->x[b], q.y[1] = r->y[b];
-    r->edge[number] = kernel_edge(&q, 0, 1, &r->positive[number]);
+    kernel_line line;
+    memcpy(&line, c->lines[number], sizeof line);
+    r->edge[number] = kernel_edge(p, &line, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
 }
 
 /* All crossings of the surface; false where no ray has any. */
@@ -175,13 +181,13 @@ static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm
                                  kernel_passage *r)
 {
     for (int i = 0; i <= c->vertex_count; i++) {
-        r->x[i] = (vf_set(c->x[i]) - p->origin_x) - p->slope_x * c->z[i];
-        r->y[i] = (vf_set(c->y[i]) - p->origin_y) - p->slope_y * c->z[i];
+        r->x[i] = kernel_project_x(p, kernel_polyhedron_spot(c, i));
+        r->y[i] = kernel_project_y(p, kernel_polyhedron_spot(c, i));
     }
-    for (int i = 0; i < c->edge_count; i++) kernel_passage_edge(r, i, c->edges[i][0], c->edges[i][1]);
+    for (int i = 0; i < c->edge_count; i++) kernel_passage_edge(p, c, r, i, c->edges[i][0], c->edges[i][1]);
     for (int i = 0; i < c->facet_count; i++) {
         const polyhedron_facet *t = &c->facets[i];
-        const vm hit = kernel_inside(rays, r->positive[t->edge[0]], r->positive[t->edge[1]], r->positive[t->edge[2]]);
+        const vm hit = kernel_inside(rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
         if (!vm_any(hit)) continue;
         const kernel_weights w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], r->edge[t->edge[0]],
                                                    r->edge[t->edge[1]], r->edge[t->edge[2]]);
@@ -234,16 +240,17 @@ static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
 
 /* ---- the inside ---- */
 
-static void kernel_passage_sheets(const polyhedron *c, vm rays, bool has_colour, kernel_passage *r)
+static void kernel_passage_sheets(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
+                                  kernel_passage *r)
 {
     const int centre = c->vertex_count, spokes = c->edge_count;
     if (r->has_sheets) return;
     r->has_sheets = true;
-    for (int i = 0; i < centre; i++) kernel_passage_edge(r, spokes + i, i, centre);
+    for (int i = 0; i < centre; i++) kernel_passage_edge(p, c, r, spokes + i, i, centre);
     for (int i = 0; i < c->edge_count; i++) {
         const int a = c->edges[i][0], b = c->edges[i][1];
         kernel_meeting *m = &r->sheets[i];
-        m->mask = kernel_inside(rays, r->positive[i], r->positive[spokes + b], r->positive[spokes + a]);
+        m->mask = kernel_inside(rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         if (!vm_any(m->mask)) continue;
         const kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         kernel_meet(c, &w, has_colour, m);
@@ -279,7 +286,7 @@ static void kernel_passage_segments(const polyhedron *c, vm rays, kernel_passage
             if (vm_any(r->sheets[t->edge[k]].mask))
                 kernel_segment_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
         /* A ray that meets the tet meets a sheet of it; its triangle is met by who is inside all three edges. */
-        const vm hit = kernel_inside(rays, r->positive[t->edge[0]], r->positive[t->edge[1]], r->positive[t->edge[2]]);
+        const vm hit = kernel_inside(rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
         if (vm_any(hit)) kernel_segment_add(s, &r->facets[i], hit);
         if (!vm_any(s->mask)) continue;
         s->sign = t->sign;
@@ -344,10 +351,11 @@ SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const ker
 }
 
 /* Make the sheets ready to be the profile of the stay: their values, and those at its ends, the field's. */
-static void kernel_passage_profile(const polyhedron *c, vm rays, bool has_colour, kernel_passage *r, kernel_stay *stay)
+static void kernel_passage_profile(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
+                                   kernel_passage *r, kernel_stay *stay)
 {
     kernel_interval *i = &stay->interval;
-    kernel_passage_sheets(c, rays, has_colour, r);
+    kernel_passage_sheets(p, c, rays, has_colour, r);
     if (c->is_star) return;
     kernel_passage_segments(c, rays, r);
     kernel_passage_lift(r, i->mask, &stay->in, false, &stay->u_in, &i->w_in);

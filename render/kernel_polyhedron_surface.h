@@ -139,7 +139,7 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
         const vm change = vm_and(kernel_changes_sign(&stay.interval), kernel_is_near(p, &stay.interval));
         if (!vm_any(change)) continue;
         vf normal[3], w = vf_set(0);
-        kernel_passage_profile(c, rays, has_colour, &r, &stay);
+        kernel_passage_profile(p, c, rays, has_colour, &r, &stay);
         const vf t = kernel_polyhedron_root(&r, &stay, change, &w);
         const vm hit = kernel_visible(p, change, t);
         if (!vm_any(hit)) continue;

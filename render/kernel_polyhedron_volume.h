@@ -54,7 +54,7 @@ static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state,
     int begin, end;
     kernel_sample_span(p, state->samples, i, &begin, &end);
     if (begin >= end) return;
-    if (!c->is_constant) kernel_passage_profile(c, rays, false, r, stay);
+    if (!c->is_constant) kernel_passage_profile(p, c, rays, false, r, stay);
     kernel_profile_piece piece = kernel_profile_begin(stay, stay->u_in);
     while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
         kernel_profile_next(r, stay, stay->u_out, &piece);
@@ -95,7 +95,7 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
     kernel_stay stay;
     if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
     while (kernel_passage_next(&r, &stay)) {
-        if (!c->is_constant) kernel_passage_profile(c, rays, false, &r, &stay);
+        if (!c->is_constant) kernel_passage_profile(p, c, rays, false, &r, &stay);
         kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
         vm open = kernel_profile_open(&stay, &piece, stay.interval.mask);
         while (vm_any(open)) {

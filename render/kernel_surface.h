@@ -365,6 +365,7 @@ static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, 
         for (int value = 0; value < layer->value_count; value++) {
             if (!kernel_cell_straddles(c, layer->values[value])) continue;
             kernel_surface_prepare(p->frame, p->tile, state->surface, part, value, c, poly);
+            kernel_cell_lines(c, p->frame, p->tile);
             kernel_cell_surface(p, state, c, poly, value, rays);
         }
     }

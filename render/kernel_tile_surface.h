@@ -128,6 +128,7 @@ SIMD_INLINE void kernel_tile_cell(kernel_tile_trace *t, int part, unsigned block
         if (left && !is_ordered) {
             is_ordered = true;
             kernel_cell_order(c);
+            kernel_cell_lines(c, t->frame, &t->tile);
             if (layer->colour_map) kernel_cell_colours(c, t->surface, part);
         }
         for (; left; left &= left - 1) kernel_block_meet(t, __builtin_ctz(left), part, c->index, c, value);

@@ -52,7 +52,7 @@ typedef struct kernel_frame {
     double scaled_step;                          /* step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
     bool has_transparent;
-    bool by_tiles;      /* surfaces are traced a tile at a time */
+    bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
     bool has_segments;  /* the volume is integrated by segments, else sampled */
     kernel_pieces pieces;

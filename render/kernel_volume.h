@@ -71,7 +71,8 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
 SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
                                     int *begin, int *end)
 {
-    const vf from = (i->t_in - p->sample_base) / p->sample_step, to = (i->t_out - p->sample_base) / p->sample_step;
+    const vf from = (i->t_in - p->sample_base) * p->sample_inverse;
+    const vf to = (i->t_out - p->sample_base) * p->sample_inverse;
     const float low = vf_reduce_min(vf_select(i->mask, from, vf_set(INFINITY)));
     const float high = vf_reduce_max(vf_select(i->mask, to, vf_set(-INFINITY)));
     const float first = fminf(fmaxf(low - (float)s->first - 0.5f, 0), KERNEL_MAX_GROUP);
@@ -107,14 +108,17 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     kernel_samples *s = state->samples;
     int begin, end;
     kernel_sample_span(p, s, i, &begin, &end);
+    if (begin >= end) return;
     const vf length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
     for (int n = begin; n < end; n++) {
         const vf t = kernel_sample_t(p, s->first + n);
         vm own = vm_and(i->mask, vm_andnot(vf_lt(t, i->t_out), vf_lt(t, i->t_in)));
-        if (!vm_any(own)) continue;
         vf value = i->v_in + slope * (t - i->t_in);
-        if (map) value = kernel_value_at(p, map, i, own, t);
+        if (map) {
+            if (!vm_any(own)) continue;
+            value = kernel_value_at(p, map, i, own, t);
+        }
         const vf kept = s->value[state->volume][n];
         const vm apart = vm_and(own, vf_eq(kept, kept));
         if (__builtin_expect(vm_any(apart), 0)) {
@@ -200,8 +204,9 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
         const vf value = s->value[v][n];
         const vm has = vf_eq(value, value);
         vf absorbed, c[3];
-        const vf left = kernel_transmittance(vf_select(has, kernel_opacity(&f->volumes[v], value), vf_set(0)),
-                                             f->volumes[v].exponent, &absorbed);
+        const vf opacity = vf_select(has, kernel_opacity(&f->volumes[v], value), vf_set(0));
+        if (!vm_any(vf_lt(vf_set(0), opacity))) continue;
+        const vf left = kernel_transmittance(opacity, f->volumes[v].exponent, &absorbed);
         kernel_table_colour(&f->volumes[v], value, c);
         for (int a = 0; a < 3; a++) sum[a] += absorbed * c[a];
         weight += absorbed;

@@ -116,8 +116,9 @@ typedef struct render_part {
     const mmbvh *tree; /* over cells; its origin and scale are the space's */
 } render_part;
 
-/* How rays find isosurfaces: the same hits to the last bit, at different speed. By tiles of 16 x 16 rays wherever that
- * can be had; packets are taken instead where volumes are to be cut by transparent surfaces. */
+/* How rays find isosurfaces and the cells of samples: the same picture to the last bit, at different speed. By tiles of
+ * 16 x 16 rays wherever that can be had; packets are taken instead where segments are to be cut by transparent
+ * surfaces. Segments are traced by packets always. */
 typedef enum render_traversal {
     RENDER_TILES,   /* a tile of the picture goes down the tree at once */
     RENDER_PACKETS, /* as many rays as a vector has lanes, together (thesis, 4.3.1) */
@@ -138,7 +139,7 @@ typedef struct render_job {
     const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
     const render_surface_layer *surfaces;
     int surface_count;          /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
-    render_traversal traversal; /* of surfaces */
+    render_traversal traversal; /* of surfaces and samples */
     const render_volume_layer *volumes;
     int volume_count;
     const render_light *lights;
@@ -149,7 +150,7 @@ typedef struct render_job {
                          off by more, in linear light; 0: into parts no longer than step */
     double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
                          ranks, so that all cut alike. 0: of this rank's */
-    int sample_group; /* N of the sample position packets (thesis, 4.4.1), 1 .. 64 */
+    int sample_group; /* N of the sample position packets (thesis, 4.4.1), 1 .. 64; tiles take as many as they can */
     bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
     int frame;        /* 0 .. : which of the accumulated frames this is */
     bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */

@@ -1,6 +1,6 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
- * its surfaces first, so that volumes know where opaque ones end them: all of it in one traversal, or packet by packet.
- * Volumes are traced packet by packet. */
+ * its surfaces first, so that volumes know where opaque ones end them. Surfaces and samples are traced all of it in one
+ * traversal, or packet by packet; segments packet by packet. */
 #include <math.h>
 
 #include "kernel_segments.h"
@@ -8,6 +8,7 @@
 #include "kernel_polyhedron_volume.h"
 #include "kernel_spmd.h"
 #include "kernel_tile_surface.h"
+#include "kernel_tile_volume.h"
 
 /* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
 typedef struct kernel_parent_state {
@@ -51,16 +52,24 @@ SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field,
 typedef struct kernel_memory {
     kernel_surface_cache cache; /* first: kernel_thread's cache is this */
     kernel_tile_trace tile;
+    kernel_tile_volume volume;
 } kernel_memory;
+
+SIMD_INLINE kernel_tile_volume *kernel_tile_volume_of(kernel_tile_trace *t)
+{
+    return &((kernel_memory *)t->thread->cache)->volume;
+}
 
 static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
 {
     kernel_thread *thread = p->thread;
     const double start = thread->now();
-    if (p->frame->has_segments)
+    if (p->frame->has_segments) {
+        p->is_pencil = false; /* packet by packet, lines would not be used often enough to pay */
         kernel_trace_segments(p, first_fragment);
-    else
+    } else {
         kernel_trace_volumes(p, hits);
+    }
     thread->volume_seconds += thread->now() - start;
 }
 
@@ -128,7 +137,7 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
     t->thread->surface_seconds += t->thread->now() - start;
 }
 
-static void trace_tile_volumes(kernel_tile_trace *t)
+static void trace_tile_segments(kernel_tile_trace *t)
 {
     for (unsigned left = t->wanted; left; left &= left - 1) {
         const int block = __builtin_ctz(left);
@@ -139,6 +148,13 @@ static void trace_tile_volumes(kernel_tile_trace *t)
             trace_packet_volumes(&t->packets[i], &t->hits[i], t->thread->out->count);
         }
     }
+}
+
+static void trace_tile_samples(kernel_tile_trace *t)
+{
+    const double start = t->thread->now();
+    kernel_tile_volumes(t);
+    t->thread->volume_seconds += t->thread->now() - start;
 }
 
 static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int y0)
@@ -152,8 +168,12 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
-    trace_tile_surfaces(t);
-    if (f->volume_count) trace_tile_volumes(t);
+    if (f->surface_count) trace_tile_surfaces(t);
+    if (!f->volume_count) return;
+    if (f->has_segments)
+        trace_tile_segments(t);
+    else
+        trace_tile_samples(t);
 }
 
 const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), trace_tile};

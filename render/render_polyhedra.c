@@ -460,6 +460,7 @@ static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
     for (int i = 0; i < 5; i++) *floats[i] = carve(&at, points * sizeof(float));
     c->facets = carve(&at, (size_t)c->facet_count * sizeof *c->facets);
     c->edges = carve(&at, (size_t)c->facet_count * 3 * sizeof *c->edges);
+    c->lines = carve(&at, ((size_t)c->facet_count * 3 + points) * sizeof *c->lines);
     c->quads = carve(&at, (size_t)quads * sizeof *c->quads);
     return at.used;
 }

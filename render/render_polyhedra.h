@@ -28,6 +28,7 @@ typedef struct polyhedron {
     double *values;
     float *x, *y, *z;  /* tile space */
     float *f, *g;      /* values as the kernels want them; of the colour field */
+    float (*lines)[4]; /* kernel_line.h: of the edges, then from each vertex to the centre */
     int64_t *vertices; /* vertex_count */
     int (*edges)[2];
     polyhedron_facet *facets;

@@ -243,10 +243,9 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     frame->volume_count = job->volume_count;
     for (int i = 0; i < job->volume_count; i++)
         prepare_transfer(&frame->volumes[i], job->volumes[i].transfer, job->step);
-    frame->by_tiles =
-        job->traversal == RENDER_TILES && job->surface_count && !(job->volume_count && frame->has_transparent);
     frame->needs_contact = job->volume_count && job->surface_count && !job->is_alone;
     const insitu_status segments = prepare_segments(frame, error);
     if (segments != INSITU_OK) render_unprepare(frame);
+    frame->by_tiles = job->traversal == RENDER_TILES && !(frame->has_segments && frame->has_transparent);
     return segments;
 }

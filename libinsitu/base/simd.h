@@ -3,8 +3,8 @@
  * compiler's generic vectors (4), which is the reference and runs anywhere.
  *
  * Arithmetic (+ - * /) and comparison are the compiler's own on vector types; every one of them is IEEE exact and
- * fused nowhere (-ffp-contract=off), so all instruction sets give the same bits. The one exception is
- * vf_diff_of_products(), whose two forms both err by at most 1.5 units in the last place.
+ * fused nowhere (-ffp-contract=off), so all instruction sets give the same bits. The exceptions are vf_muladd(), fused
+ * where the hardware can, and vf_diff_of_products(), whose two forms both err by at most 1.5 units in the last place.
  *
  * GNU C has no vector ?: outside C++, hence vf_select(). Masks are 16 bits on AVX-512, integer lanes of 0 and -1
  * elsewhere: always go through vm_*. */
@@ -323,6 +323,22 @@ SIMD_INLINE float vf_reduce_max(vf a)
 
 #endif
 
+/* base[index] and base[index + 1]. */
+SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *second)
+{
+#if defined(SIMD_AVX512)
+    const __m512i i = (__m512i)index;
+    const __m512 low = _mm512_castpd_ps(_mm512_i32gather_pd(_mm512_castsi512_si256(i), base, 4));
+    const __m512 high = _mm512_castpd_ps(_mm512_i32gather_pd(_mm512_extracti64x4_epi64(i, 1), base, 4));
+    const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    *first = (vf)_mm512_permutex2var_ps(low, even, high);
+    *second = (vf)_mm512_permutex2var_ps(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high);
+#else
+    *first = vf_gather(base, index);
+    *second = vf_gather(base + 1, index);
+#endif
+}
+
 /* a b - c d to 1.5 units in the last place, zero only where it is zero, and of the right sign: Kahan's two fused
  * steps where there are such, else in double, where the products of floats are exact. */
 SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
@@ -340,6 +356,28 @@ SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
     const vd difference = __builtin_convertvector(a, vd) * __builtin_convertvector(b, vd) -
                           __builtin_convertvector(c, vd) * __builtin_convertvector(d, vd);
     return __builtin_convertvector(difference, vf);
+#endif
+}
+
+/* a b + c: one rounding where multiply and add are fused, else two. */
+SIMD_INLINE vf vf_muladd(vf a, vf b, vf c)
+{
+#if defined(SIMD_AVX512)
+    return (vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
+#elif defined(SIMD_AVX2)
+    return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+#else
+    return a * b + c;
+#endif
+}
+
+/* Lanes whose sign bit is set, that of -0 too. */
+SIMD_INLINE vm vm_sign(vi a)
+{
+#if defined(SIMD_AVX512)
+    return _mm512_movepi32_mask((__m512i)a);
+#else
+    return (vm)(a >> 31);
 #endif
 }
 

@@ -1,0 +1,139 @@
+/* The edge function of a cell's edge, for all rays of a tile.
+ *
+ * In the plane of the ray with parameters u, v (its slopes, or its origin where the camera is orthographic) a vertex
+ * placed at X, Y, Z in tile space is at x = X - u D, y = Y - v D, where D is its depth from the eye, or 1 where the
+ * camera is orthographic. The edge function is then affine in u and v, for the products u v cancel:
+ *
+ *     e = xa yb - xb ya = (Xa Yb - Xb Ya) + u (Db Ya - Da Yb) + v (Da Xb - Db Xa)
+ *
+ * Its coefficients are computed once a cell and tile, from the edge's two vertices in the order of coordinates, so that
+ * all cells of the edge have the same bits; a packet then needs two multiply-adds. On rays where that leaves the sign
+ * in doubt, which depends on the edge and the ray alone, e is computed from the projected vertices instead, by
+ * vf_diff_of_products(), to its exact sign.
+ *
+ * The bound of doubt. Let r = 2^-24, W the most of |u| and |v| over the tile, reach the eye's distance from the origin
+ * of depth (0 where orthographic), M = |Z| + reach >= |D| (1 where orthographic), N = 2 max(|X|, |Y|) + 5 W M; so
+ * |x|, |y| <= N / 2, |c| <= Na Nb / 2 and |cu| W, |cv| W <= Na Nb / 5.
+ * - The affine form errs by r of each coefficient, of u and of v, and, if nothing is fused, of two products and two
+ *   sums: by at most r (3 |c| + 5 |cu| W + 4 |cv| W) <= 3.3 r Na Nb.
+ * - The projection, (X - origin) - slope Z, errs by r of the origin, of the first difference, twice of slope Z (the
+ *   slope and the product), and of x: by at most r (2 |X| + 3 W M) <= r N. What has the exact sign is therefore the
+ * edge function of vertices that are off by r N: by at most 4 r Na Nb / 2. The sum is 5.3 r Na Nb; 6 leaves room for
+ * products of errors and for the bound's own roundings.
+ *
+ * Depths from these weights err as those from projected vertices do, by the roundings of X, Y and x, y, which are r of
+ * the tile's size: an affine e is off by 3.3 r Na Nb at the very most, 1 r of that as a rule, so that a weight is off
+ * by r times the square of the tile's size over the triangle's area. The placing of the vertices costs as much. */
+#ifndef RENDER_KERNEL_LINE_H
+#define RENDER_KERNEL_LINE_H
+
+#include "kernel_packet.h"
+
+/* c + cu u + cv v; its sign is sure where it is beyond +-bound. */
+typedef struct kernel_line {
+    float c, cu, cv, bound;
+} kernel_line;
+
+/* A vertex in tile space. */
+typedef struct kernel_spot {
+    float x, y, z;
+} kernel_spot;
+
+/* N above. */
+SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *tile, kernel_spot a)
+{
+    const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
+    const float x = fabsf(a.x), y = fabsf(a.y);
+    return 2 * (x > y ? x : y) + 5 * tile->radius * depth;
+}
+
+/* Of the edge from a to b, a before b in the order; sizes as above. */
+SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
+                                            float size_b)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const double da = flat ? 1 : (double)a.z + f->depth_shift, db = flat ? 1 : (double)b.z + f->depth_shift;
+    const double ax = (double)a.x, ay = (double)a.y, bx = (double)b.x, by = (double)b.y;
+    return (kernel_line){(float)(ax * by - bx * ay), (float)(db * ay - da * by), (float)(da * bx - db * ax),
+                         6 * 6e-8f * size_a * size_b};
+}
+
+SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_spot a, kernel_spot b)
+{
+    return kernel_line_between(p->frame, a, b, kernel_spot_size(p->frame, p->tile, a),
+                               kernel_spot_size(p->frame, p->tile, b));
+}
+
+SIMD_INLINE vf kernel_project_x(const kernel_packet *p, kernel_spot a)
+{
+    return (vf_set(a.x) - p->origin_x) - p->slope_x * a.z;
+}
+
+SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_spot a)
+{
+    return (vf_set(a.y) - p->origin_y) - p->slope_y * a.z;
+}
+
+/* To the exact sign of what is projected. Where it is zero the tie is decided as kernel_cell.h has it, and the sign of
+ * the zero says how. */
+SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_spot a, kernel_spot b)
+{
+    const vf ax = kernel_project_x(p, a), ay = kernel_project_y(p, a);
+    const vf bx = kernel_project_x(p, b), by = kernel_project_y(p, b);
+    const vf e = vf_diff_of_products(ax, by, bx, ay);
+    const vm tie = vf_eq(e, vf_set(0));
+    if (__builtin_expect(!vm_any(tie), 1)) return e;
+    const vm level = vm_and(vf_eq(ay, by), vf_lt(ax, bx));
+    const vm positive = vm_or(vf_lt(by, ay), level);
+    const vf zero = vf_set(0);
+    return vf_select(tie, vf_select(positive, zero, -zero), e);
+}
+
+static __attribute__((noinline, cold)) vf kernel_edge_doubted(const kernel_packet *p, kernel_spot a, kernel_spot b,
+                                                              vm doubt, vf e)
+{
+    return vf_select(doubt, kernel_edge_projected(p, a, b), e);
+}
+
+SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
+{
+    return vf_muladd(vf_set(l->cv), p->v, vf_muladd(vf_set(l->cu), p->u, vf_set(l->c)));
+}
+
+/* The edge function of the edge from a to b, a before b in the order, whose line is l: of the side where it is positive
+ * the sign bit is clear, ties decided. */
+SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_spot a, kernel_spot b)
+{
+    if (!p->is_pencil) return kernel_edge_projected(p, a, b);
+    const vf e = kernel_line_at(p, l);
+    const vm doubt = vm_not(vf_lt(vf_set(l->bound), vf_abs(e)));
+    return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_doubted(p, a, b, doubt, e) : e;
+}
+
+/* The triangle i, j, k (in the order) with its three edges: who crosses it. */
+SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
+{
+    const vi a = vi_from_bits(ij), b = vi_from_bits(jk), c = vi_from_bits(ik);
+    return vm_and(rays, vm_sign(~(a ^ b) & (a ^ c)));
+}
+
+/* Where a crossed triangle is crossed: the sums of its vertices' depths and values, weighted by their opposite edges
+ * and not yet divided by the sum of the weights. Depths are relative to the first vertex, whose roundings are then
+ * those of the cell's size and not of the scene's; values are not, so that their sum has the sign that all of them
+ * have. */
+SIMD_INLINE vf kernel_weigh_rise(vf ij, vf ik, float rise_j, float rise_k)
+{
+    return vf_muladd(ij, vf_set(rise_k), -ik * rise_j);
+}
+
+SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k)
+{
+    return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
+}
+
+SIMD_INLINE vf kernel_weight(vf ij, vf jk, vf ik)
+{
+    return (jk - ik) + ij;
+}
+
+#endif

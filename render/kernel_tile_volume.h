@@ -1,0 +1,227 @@
+/* Samples of volumes for a whole tile: one traversal a window of samples, for all the tile's blocks. A cell is fetched,
+ * placed and given its lines once a window, and goes to the packets of the blocks that it may meet, whose samples it
+ * owns it fills. A window is so many samples that most rays have one or two:
+ *
+ *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
+ *     block 1  |--s--s--s--s--s--s--|--s--s--x  opaque hit: its far ends here
+ *     block 2  |--s--s--s--s--s--s--|  dark: takes no part in the next window
+ *              ^ t_near of window 1 ^ t_near of window 2
+ *
+ * The traversal is that of surfaces (kernel_tile_surface.h), with the window's begin in the place of the eye and each
+ * block's end of the window in that of its nearest hits. What is in a window does not show in the picture: samples are
+ * numbered along the ray, and owned by cells. */
+#ifndef RENDER_KERNEL_TILE_VOLUME_H
+#define RENDER_KERNEL_TILE_VOLUME_H
+
+#include <limits.h>
+
+#include "kernel_tile_surface.h"
+#include "kernel_volume.h"
+
+typedef struct kernel_tile_ray_samples {
+    kernel_samples samples;
+    kernel_blend blend;
+    vm active; /* of the packet, whose own is narrowed to the rays that are lit */
+} kernel_tile_ray_samples;
+
+typedef struct kernel_tile_volume {
+    kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
+    int volume; /* under way */
+    kernel_cell cell;
+    kernel_map map;
+} kernel_tile_volume;
+
+/* Of the frame's thread memory, which holds both. */
+SIMD_INLINE kernel_tile_volume *kernel_tile_volume_of(kernel_tile_trace *t);
+
+/* ---- cells ---- */
+
+static __attribute__((noinline)) void kernel_tile_tet_samples(kernel_packet *p, kernel_volume_state *state,
+                                                              const kernel_cell *c)
+{
+    kernel_interval i;
+    kernel_tet_interval(p, c, p->active, false, &i);
+    if (vm_any(i.mask)) kernel_fill(p, state, NULL, &i);
+}
+
+static __attribute__((noinline)) void kernel_tile_poly_samples(kernel_packet *p, kernel_volume_state *state,
+                                                               const kernel_cell *c, const kernel_map *map)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
+    for (int k = 0; k < intervals; k++) kernel_fill(p, state, map, &list[k]);
+}
+
+/* The cell's samples on the rays of the blocks; c NULL: a polyhedron. */
+SIMD_INLINE void kernel_tile_samples(kernel_tile_trace *t, kernel_tile_volume *v, int part, uint32_t index,
+                                     const kernel_cell *c, unsigned blocks)
+{
+    for (; blocks; blocks &= blocks - 1) {
+        const int first = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
+        for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
+            kernel_packet *p = &t->packets[i];
+            kernel_volume_state state = {v->volume, &v->packets[i].samples};
+            if (!c)
+                kernel_polyhedron_volume(p, &state, part, index, p->active);
+            else if (c->type == GRID_TET)
+                kernel_tile_tet_samples(p, &state, c);
+            else
+                kernel_tile_poly_samples(p, &state, c, c->is_constant ? NULL : &v->map);
+        }
+    }
+}
+
+static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
+{
+    kernel_tile_volume *v = kernel_tile_volume_of(t);
+    const kernel_transfer *transfer = &t->frame->volumes[v->volume];
+    const grid_field *field = &t->frame->job->volumes[v->volume].field.fields[part];
+    const grid *g = t->frame->job->parts[part].cells;
+    kernel_cell *c = &v->cell;
+    kernel_tile_prefetch(g, field, cells, count);
+    for (int n = 0; n < count; n++) {
+        kernel_outline outline;
+        kernel_cell_fetch(c, g, field, cells[n]);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_tile_samples(t, v, part, cells[n], NULL, blocks);
+            continue;
+        }
+        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
+        kernel_cell_move(c, t->frame, &t->tile, g);
+        kernel_vertex_outline(c, &outline);
+        const kernel_lie lie = kernel_outline_lie(&t->tile_planes, &outline);
+        const unsigned meets = blocks & lie.blocks & kernel_blocks_beyond(t, lie.near);
+        if (!meets || lie.far < t->t_near) continue;
+        kernel_cell_order(c);
+        kernel_cell_domain(c, transfer);
+        kernel_cell_lines(c, t->frame, &t->tile);
+        if (c->type != GRID_TET && !c->is_constant) kernel_map_setup(&v->map, c);
+        kernel_tile_samples(t, v, part, cells[n], c, meets);
+    }
+}
+
+static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
+                                     unsigned blocks)
+{
+    const int volume = kernel_tile_volume_of(t)->volume;
+    const render_field *field = &t->frame->job->volumes[volume].field;
+    (void)unused;
+    for (int n = 0; n < count; n++) {
+        const int part = (int)parts[n];
+        if (field->ranges[part].low)
+            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
+                                 &t->frame->volumes[volume].interest, blocks, part, kernel_tile_volume_leaf);
+    }
+}
+
+/* ---- windows ---- */
+
+/* The blocks that any tree's box may meet, and the depths between which. */
+SIMD_INLINE kernel_lie kernel_tile_reach(const kernel_tile_trace *t)
+{
+    const render_job *job = t->frame->job;
+    kernel_lie all = {.near = INFINITY, .far = -INFINITY};
+    for (int i = 0; i < job->part_count; i++) {
+        if (!job->parts[i].tree->node_count) continue;
+        const kernel_lie lie = kernel_box_lie(&t->tree_planes, job->parts[i].tree, 0);
+        all.blocks |= lie.blocks & t->wanted;
+        all.near = fminf(all.near, lie.near);
+        all.far = fmaxf(all.far, lie.far);
+    }
+    return all;
+}
+
+/* Set up the packet; what of sample numbers its rays have between the depths is added to first .. last. */
+SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samples *r, float near, float far,
+                                          int *first, int *last)
+{
+    kernel_lanes lanes;
+    kernel_packet_lanes(p, &lanes);
+    kernel_packet_samples(p, &lanes);
+    r->active = p->active;
+    r->blend = (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
+    r->samples.marked = vm_none();
+    const vf end = vf_min(p->t_far, vf_set(far));
+    const vf from = (near - p->sample_base) * p->sample_inverse, to = (end - p->sample_base) * p->sample_inverse;
+    const int lowest = (int)floorf(vf_reduce_min(from)) - 1, highest = (int)floorf(vf_reduce_max(to)) + 1;
+    const int begin = lowest < p->sample_first ? p->sample_first : lowest;
+    *first = begin < *first ? begin : *first;
+    *last = highest > *last ? highest : *last;
+}
+
+/* Make the packet ready for the window. Returns how far its rays go in it, and lowers near to where they begin. */
+SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r, int volumes, float *near)
+{
+    kernel_samples *s = &r->samples;
+    const vf t_first = kernel_sample_t(p, s->first), t_last = kernel_sample_t(p, s->first + s->count - 1);
+    const vf t_end = vf_min(t_last, p->t_far);
+    const vf nothing = vf_set(p->frame->job->separate_samples ? 0 : NAN);
+    p->active = vm_and(p->active, vm_and(vf_lt(vf_set(KERNEL_DARK), r->blend.light), vf_le(t_first, t_end)));
+    if (!vm_any(p->active)) return -INFINITY;
+    for (int v = 0; v < volumes; v++)
+        for (int n = 0; n < s->count; n++) s->value[v][n] = nothing;
+    *near = fminf(*near, vf_reduce_min(vf_select(p->active, t_first, vf_set(INFINITY))));
+    return vf_reduce_max(vf_select(p->active, t_end, vf_set(-INFINITY)));
+}
+
+/* Samples first .. last of all blocks; false where no ray is left. */
+SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks, int first, int last)
+{
+    const render_job *job = t->frame->job;
+    bool is_lit = false;
+    t->t_near = INFINITY;
+    for (int b = 0; b < KERNEL_BLOCKS; b++) {
+        float far = -INFINITY;
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
+            const int i = b * KERNEL_BLOCK_PACKETS + n;
+            v->packets[i].samples.first = first;
+            v->packets[i].samples.count = last - first + 1;
+            far = fmaxf(far, kernel_ray_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near));
+        }
+        t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
+        is_lit = is_lit || far > -INFINITY;
+    }
+    if (!is_lit) return false;
+    for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
+        if (job->parent) {
+            kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, kernel_tile_volume_parts);
+            continue;
+        }
+        for (uint32_t part = 0; part < (uint32_t)job->part_count; part++)
+            kernel_tile_volume_parts(t, 0, &part, 1, blocks);
+    }
+    return true;
+}
+
+/* Behind the tile's opaque surfaces, whose hits are in the packets. */
+static void kernel_tile_volumes(kernel_tile_trace *t)
+{
+    kernel_tile_volume *v = kernel_tile_volume_of(t);
+    const kernel_lie reach = kernel_tile_reach(t);
+    const unsigned blocks = reach.blocks;
+    int packets[KERNEL_TILE_PACKETS], count = 0, first = INT_MAX, last = INT_MIN;
+    for (unsigned left = blocks; left; left &= left - 1) {
+        const int block = __builtin_ctz(left);
+        kernel_block_begin(t, block);
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
+    }
+    for (int n = 0; n < count; n++)
+        kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
+                                 &last);
+    for (int from = first; from <= last; from += KERNEL_MAX_GROUP) {
+        const int to = last - from < KERNEL_MAX_GROUP ? last : from + KERNEL_MAX_GROUP - 1;
+        if (!kernel_tile_window(t, v, blocks, from, to)) break;
+        if (t->frame->job->separate_samples) continue;
+        for (int n = 0; n < count; n++) {
+            const int i = packets[n];
+            if (vm_any(t->packets[i].active))
+                kernel_blend_window(&t->packets[i], &v->packets[i].blend, &v->packets[i].samples, &t->hits[i]);
+        }
+    }
+    for (int n = 0; n < count; n++) {
+        t->packets[packets[n]].active = v->packets[packets[n]].active;
+        kernel_blend_close(&t->packets[packets[n]], &v->packets[packets[n]].blend, t->packets[packets[n]].active);
+    }
+}
+
+#endif
