@@ -23,5 +23,14 @@ target_link_libraries(test_vtk_images PRIVATE
   insitu_flags PkgConfig::CMOCKA ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
 add_test(NAME vtk_images COMMAND test_vtk_images $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
 
-set_tests_properties(vtk_tool vtk_images PROPERTIES
+# Real grids as the renderer's tests have their meshes. The C headers are not C++'s style, hence SYSTEM.
+add_library(test_data_mesh STATIC test_data_mesh.cpp test_vtk_session_stub.cpp)
+target_include_directories(test_data_mesh SYSTEM PRIVATE ${PROJECT_SOURCE_DIR}/libinsitu/base)
+target_link_libraries(test_data_mesh PRIVATE insitu_vtk_objects insitu_flags VTK::IOXML)
+
+add_executable(test_data_volumes test_data_volumes.c)
+target_link_libraries(test_data_volumes PRIVATE test_data_mesh test_render_support insitu_flags)
+add_test(NAME data_volumes COMMAND test_data_volumes)
+
+set_tests_properties(vtk_tool vtk_images data_volumes PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
