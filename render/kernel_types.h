@@ -52,9 +52,9 @@ typedef struct kernel_frame {
     double scaled_step;                          /* step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
     bool has_transparent;
-    bool has_segments; /* the volume is integrated by segments, else sampled */
-    kernel_pieces pieces;
-    float allowance, reach; /* kernel_segments.h */
+    bool has_segments; /* volumes are integrated by segments, else sampled */
+    kernel_pieces pieces[RENDER_MAX_VOLUMES];
+    float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_segments.h */
     bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there
                          */
 } kernel_frame;

@@ -62,7 +62,9 @@ static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_
     }
     if (f->volume_count) {
         const double start = thread->now();
-        if (f->has_segments)
+        if (f->has_segments && f->job->separate_samples)
+            kernel_trace_apart(&p);
+        else if (f->has_segments)
             kernel_trace_segments(&p, first_fragment);
         else
             kernel_trace_volumes(&p, &hits);

@@ -101,6 +101,7 @@ static void merge_matches_double_reference(void **context)
         for (int i = 0; i < count; i++) {
             items[i] = random_fragment();
             items[i].t_in = (float)(i * 37 % 101) + 0.5f * next_unit(); /* all distinct: 101 is prime */
+            items[i].t_out = items[i].t_in + (items[i].kind < FRAGMENT_SURFACE ? 0.4f : 0);
             if (items[i].kind >= FRAGMENT_SURFACE) nearest = fminf(nearest, items[i].t_in);
         }
         reference(items, count, blue, expected);

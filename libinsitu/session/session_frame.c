@@ -5,7 +5,7 @@
  * with every sample on its own (render.h), composited beside the picture, and take their place in it. In a mesh whose
  * cells overlap here and there that is a few pixels more. Two meshes that fill the same space may make a thousand
  * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as all ranks together hold the
- * fragments of. */
+ * fragments of. Segments of several volumes are drawn so on all pixels from the first. */
 #include "session_frame.h"
 
 #include <string.h>
@@ -46,11 +46,14 @@ static insitu_status draw(const frame_target *t, const render_job *job, image *o
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Samples that a ray may have: the scene's extent is near 1 in scaled units, and at most sqrt(3) times that long. */
+/* Fragments that a ray may have: of samples, by the scene's extent, which is near 1 in scaled units, and at most
+ * sqrt(3) times that; of segments by experience. */
 static int64_t turn_pixels(const render_job *job, int64_t fragment_limit)
 {
-    const double samples = 2 * job->volume_count / (job->step * job->space.scale) + 1;
-    const double pixels = (double)fragment_limit / samples;
+    enum { SEGMENTS = 1000 };
+    const bool is_sampled = job->integration == RENDER_SAMPLES;
+    const double ray = is_sampled ? 2 / (job->step * job->space.scale) : SEGMENTS;
+    const double pixels = (double)fragment_limit / (job->volume_count * ray + 1);
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
@@ -117,14 +120,35 @@ static insitu_status draw_overlaps(const frame_target *t, const render_job *job,
     return status;
 }
 
+/* Segments of several volumes are at one place on every pixel: there is no first picture to put right. */
+static bool is_mixed_throughout(const render_job *job)
+{
+    return job->integration == RENDER_SEGMENTS && job->volume_count > 1;
+}
+
+static insitu_status take_all(const frame_target *t, const image *out, comp_overlaps *all, base_error *error)
+{
+    all->count = (int64_t)out->width * out->height;
+    all->pixels = base_calloc(pixel_set_bytes(all->count), 1);
+    for (int64_t p = 0; p < all->count && all->pixels; p++) pixel_set_add(all->pixels, p);
+    if (!all->pixels)
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for a set of %lld pixels", (long long)all->count);
+    return session_agree(t->comm, error);
+}
+
 insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render_job *job, const float background[4],
                                  int64_t fragment_limit, image *out, session_frame *frame, base_error *error)
 {
     *frame = (session_frame){0};
     const frame_target t = {comm, comp_comm, background, frame};
     comp_overlaps overlaps = {0};
-    insitu_status status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
-    frame->overlaps = overlaps.count;
+    insitu_status status = INSITU_OK;
+    if (is_mixed_throughout(job)) {
+        status = take_all(&t, out, &overlaps, error);
+    } else {
+        status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
+        frame->overlaps = overlaps.count;
+    }
     if (!status && overlaps.count) status = draw_overlaps(&t, job, fragment_limit, &overlaps, out, error);
     base_free(overlaps.pixels);
     return status;
