@@ -32,5 +32,6 @@ add_executable(test_data_volumes test_data_volumes.c)
 target_link_libraries(test_data_volumes PRIVATE test_data_mesh test_render_support insitu_flags)
 add_test(NAME data_volumes COMMAND test_data_volumes)
 
-set_tests_properties(vtk_tool vtk_images data_volumes PROPERTIES
+set_tests_properties(data_volumes PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
+set_tests_properties(vtk_tool vtk_images PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
