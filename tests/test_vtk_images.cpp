@@ -45,9 +45,13 @@ struct subject {
     std::vector<std::string> volumes = {"volume"}; // pictures of the volume: names of volume_pictures
 };
 
-/* A picture of the volume by each way to integrate it: name and sampling. */
-const std::vector<std::pair<std::string, std::string>> volume_pictures = {
-    {"volume", "{}"}, {"segments", "{method: segments}"}, {"bounded", "{max_error: 1e-3}"}};
+/* A picture of the volume by each way to integrate it, one of them with a second volume. */
+const struct volume_picture {
+    std::string name, sampling, second;
+} volume_pictures[] = {{"volume", "{}", ""},
+                       {"segments", "{method: segments}", ""},
+                       {"bounded", "{max_error: 1e-3}", ""},
+                       {"both", "{max_error: 1e-2}", "f_cell"}};
 
 struct picture {
     std::vector<float> rgba, depth; // depth: empty where the file has no channel Z
@@ -102,9 +106,12 @@ std::string scene_of(const subject &s)
         "images:\n" + image("iso", "isosurface: " + field + "values: [" + std::to_string(s.value) + "]}", "{}");
     const std::string layer = "volume: " + field + "range: [" + std::to_string(s.low) + ", " + std::to_string(s.high) +
                               "], opacity: [[0, 0], [1, 0.9]]}";
-    for (const auto &[name, sampling] : volume_pictures)
-        if (std::find(s.volumes.begin(), s.volumes.end(), name) != s.volumes.end())
-            text += image(name, layer, sampling);
+    for (const volume_picture &p : volume_pictures) {
+        if (std::find(s.volumes.begin(), s.volumes.end(), p.name) == s.volumes.end()) continue;
+        const std::string second =
+            p.second.empty() ? "" : "\n      - volume: {field: " + p.second + ", opacity: [[0, 0.3], [0.4, 0]]}";
+        text += image(p.name, layer + second, p.sampling);
+    }
     return text;
 }
 
@@ -194,7 +201,8 @@ void post_is_the_same_on_ranks(void **)
 /* Each of 8,000 cells on any of seven ranks. */
 void polyhedra_are_the_same_on_seven_ranks(void **)
 {
-    const subject s = {"voronoi", {"poly_voronoi.vtu"}, "f", 0.2, -1.5, 1.5, 0, {"volume", "segments", "bounded"}};
+    const subject s = {
+        "voronoi", {"poly_voronoi.vtu"}, "f", 0.2, -1.5, 1.5, 0, {"volume", "segments", "bounded", "both"}};
     const std::string alone = draw(s, 0, "block");
     expect_something_to_see(s, alone);
     expect_same_pictures(s, alone, draw(s, 7, "random"));
@@ -229,6 +237,23 @@ void every_kind_of_cell_is_drawn(void **)
     draws_alone({"wedges", {"mesh_fs8_wedge.vtu"}, "synthetic", 0.2, -2, 1.8, 0});
     draws_alone({"notch", {"notch_stress.vtu"}, "Nodal Stress-normed", 1500000, 0, 8000000, 0});
     draws_the_same_on_ranks({"prisms", {"pentahexa.vtu"}, "synthetic", 0.3, -1, 1.6, 0});
+}
+
+/* Quadratic cells are linear ones of their corners, and that is said where the pictures are made. */
+void quadratic_cells_are_told_of(void **)
+{
+    const std::pair<const char *, const char *> files[] = {
+        {"cylinder_quadratic", "1522 "}, {"tiny_QuadraticTetra", "96 "}, {"tiny_QuadraticWedge", "16 "}};
+    for (const auto &[name, count] : files) {
+        const std::string folder = fresh_folder(std::string("vtk_images/told_") + name);
+        const bool is_cylinder = name == files[0].first;
+        const subject s = {name, {}, is_cylinder ? "velocity_norm" : "DistanceToCenter", 0.5, 0, 1, 0};
+        write_file(folder + "/scene.yaml", scene_of(s));
+        const run_result r =
+            run_in(folder, shell_word(tool) + " scene.yaml " + shell_word(data_folder + "/" + name + ".vtu"));
+        assert_int_equal(r.status, 0);
+        assert_true(r.says(std::string(count) + "higher-order cells drawn by their corners as linear ones"));
+    }
 }
 
 void info_counts_the_mixed_lattice(void **)
@@ -278,6 +303,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(exodus_cut_short_is_refused),
         cmocka_unit_test(mixed_lattice_is_the_same_on_ranks),
         cmocka_unit_test(every_kind_of_cell_is_drawn),
+        cmocka_unit_test(quadratic_cells_are_told_of),
         cmocka_unit_test(polyhedra_are_the_same_on_seven_ranks),
         cmocka_unit_test(bluntfin_is_the_same_on_ranks),
         cmocka_unit_test(post_is_the_same_on_ranks),

@@ -28,10 +28,13 @@ add_library(test_data_mesh STATIC test_data_mesh.cpp test_vtk_session_stub.cpp)
 target_include_directories(test_data_mesh SYSTEM PRIVATE ${PROJECT_SOURCE_DIR}/libinsitu/base)
 target_link_libraries(test_data_mesh PRIVATE insitu_vtk_objects insitu_flags VTK::IOXML)
 
-add_executable(test_data_volumes test_data_volumes.c)
-target_link_libraries(test_data_volumes PRIVATE test_data_mesh test_render_support insitu_flags)
-add_test(NAME data_volumes COMMAND test_data_volumes)
+foreach(noun volumes polyhedra)
+  add_executable(test_data_${noun} test_data_${noun}.c)
+  target_link_libraries(test_data_${noun} PRIVATE test_data_mesh test_render_support insitu_flags)
+  add_test(NAME data_${noun} COMMAND test_data_${noun})
+  set_tests_properties(data_${noun} PROPERTIES
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
+endforeach()
 
-set_tests_properties(data_volumes PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
 set_tests_properties(vtk_tool vtk_images PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
