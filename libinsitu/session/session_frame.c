@@ -50,22 +50,35 @@ static insitu_status draw(const frame_target *t, const render_job *job, image *o
  * sqrt(3) times that; of segments by experience. */
 static int64_t turn_pixels(const render_job *job, int64_t fragment_limit)
 {
-    enum { SEGMENTS = 1000 };
+    enum { SEGMENTS = 500 };
     const bool is_sampled = job->integration == RENDER_SAMPLES;
     const double ray = is_sampled ? 2 / (job->step * job->space.scale) : SEGMENTS;
     const double pixels = (double)fragment_limit / (job->volume_count * ray + 1);
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* The next pixels of a set, at most so many; returns where to go on. */
-static int64_t take_pixels(const unsigned char *from, int64_t first, int64_t end, int64_t most, unsigned char *taken)
+/* The k-th pixel of an image in bands of rows, each taken column by column, so that the pixels of a turn are
+ * neighbours, as rays of a packet are. */
+static int64_t banded_pixel(const image *out, int64_t k)
 {
+    enum { BAND = 16 };
+    const int64_t top = k / ((int64_t)BAND * out->width) * BAND, within = k - top * out->width;
+    const int64_t rows = out->height - top < BAND ? out->height - top : BAND;
+    return (top + within % rows) * out->width + within / rows;
+}
+
+/* The next pixels of a set, at most so many; returns where to go on. */
+static int64_t take_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
+                           unsigned char *taken)
+{
+    const int64_t end = (int64_t)out->width * out->height;
     memset(taken, 0, pixel_set_bytes(end));
-    for (; first < end && most > 0; first++)
-        if (pixel_set_has(from, first)) {
-            pixel_set_add(taken, first);
-            most--;
-        }
+    for (; first < end && most > 0; first++) {
+        const int64_t pixel = banded_pixel(out, first);
+        if (!pixel_set_has(from, pixel)) continue;
+        pixel_set_add(taken, pixel);
+        most--;
+    }
     return first;
 }
 
@@ -83,12 +96,12 @@ static insitu_status redraw(const frame_target *t, const render_job *job, int64_
                             const comp_overlaps *overlaps, unsigned char *turn, image *beside, image *out,
                             base_error *error)
 {
-    const int64_t end = (int64_t)out->width * out->height, most = turn_pixels(job, fragment_limit);
+    const int64_t most = turn_pixels(job, fragment_limit);
     render_job again = *job;
     again.pixels = turn;
     again.separate_samples = true;
     for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
-        at = take_pixels(overlaps->pixels, at, end, most, turn);
+        at = take_pixels(out, overlaps->pixels, at, most, turn);
         const insitu_status status = draw(t, &again, beside, NULL, error);
         if (status) return status;
         if (beside->rgba) copy_pixels(turn, beside, out);
