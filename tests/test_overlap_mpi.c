@@ -306,7 +306,7 @@ static void segments_in_one_another_are_as_integrated(void **state)
         interpenetrating(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
             const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY,
-                               pow(10, -2 - (int)(kind + scene) % 3)};
+                               pow(10, -2 - ((int)kind + (int)scene) % 3)};
             compare(&mesh, &d, true, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
