@@ -50,9 +50,11 @@ static insitu_status draw(const frame_target *t, const render_job *job, image *o
  * sqrt(3) times that; of segments by experience. */
 static int64_t turn_pixels(const render_job *job, int64_t fragment_limit)
 {
-    enum { SEGMENTS = 500 };
+    enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
     const bool is_sampled = job->integration == RENDER_SAMPLES;
-    const double ray = is_sampled ? 2 / (job->step * job->space.scale) : SEGMENTS;
+    const double ray = is_sampled           ? 2 / (job->step * job->space.scale)
+                       : job->surface_count ? CUT_BY_SURFACES
+                                            : SEGMENTS;
     const double pixels = (double)fragment_limit / (job->volume_count * ray + 1);
     return pixels > 1 ? (int64_t)pixels : 1;
 }
