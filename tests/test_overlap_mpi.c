@@ -169,8 +169,8 @@ static void assert_everywhere(bool is_well)
 /* ---- comparisons --------------------------------------------------------------------------------------------- */
 
 /* Samples of one place mix alike whoever made them; elsewhere "over" rounds in other groups, to 1e-6. An open end: by
- * segments, whether a pixel whose overlap is clear in front of a surface is drawn twice depends on the partition, and
- * the thousands of fragments of the second drawing round to more: 2.3e-6 was measured. */
+ * segments, whether a pixel whose overlap is clear is drawn twice depends on the partition, and the second drawing cuts
+ * otherwise: both are within max_error. Measured: 2.7e-6 for 1e-3. */
 static bool same_images(const image *whole, const image *other, const drawing *d, const char *what)
 {
     int depths = 0;
@@ -182,8 +182,7 @@ static bool same_images(const image *whole, const image *other, const drawing *d
             if (!(off <= colour)) colour = off;
         }
     }
-    const bool is_cut = d->max_error > 0 && (d->scene == OPAQUE_VOLUME || d->scene == TRANSPARENT_VOLUME);
-    const double bound = is_cut ? 5e-6 : 1e-6;
+    const double bound = d->max_error > 0 && d->scene != TWO_VOLUMES ? d->max_error : 1e-6;
     if (depths || !(colour <= bound))
         fprintf(stderr, "%s, %d ranks, scene %d: %d depths differ, colour by %g\n", what, rank_count, (int)d->scene,
                 depths, colour);
