@@ -8,7 +8,8 @@
  * Sorting by t makes the picture where fragments do not overlap. Volume fragments that do, because cells do, can be put
  * right only by who made them: comp_composite_overlaps() tells the pixels in which they overlap. Volume fragments of no
  * length at one t are samples of one place and may be any number: they share what all of them absorb in proportion to
- * what each would, in whatever order. */
+ * what each would, in whatever order. Volume fragments that overlap over a length are mixed, each as a medium that is the
+ * same throughout: the picture where they are short enough for that to be so. */
 #ifndef COMP_COMP_H
 #define COMP_COMP_H
 

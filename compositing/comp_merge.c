@@ -6,7 +6,16 @@
  *
  * Samples of one place have no order: their media are mixed there. What each absorbs adds up to more than what they
  * absorb together, 1 - T1 T2 ... Tn, which they share in proportion. In double, so that the shares are no less exact
- * than the samples. */
+ * than the samples.
+ *
+ * Stretches that overlap are mixed where they do. The ray is cut wherever one begins or ends; between cuts each counts
+ * as a medium that is the same throughout, whose depths and light add:
+ *
+ *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... in the cut
+ *            |-- b -------------|    colour = (1 - T) times the mean of theirs, weighed by these
+ *     |  a   |  a and b |   b   |
+ *
+ * Whoever makes them sees to it that they are short enough for that (render/kernel_segments.h). */
 #include "comp.h"
 
 #include <math.h>
@@ -133,12 +142,87 @@ static fragment mix_samples(const fragment *samples, int64_t count)
     return mixed;
 }
 
+/* Colour and transmittance so far. */
+typedef struct blend {
+    double colour[3], transmittance;
+} blend;
+
+static void blend_over(blend *b, const fragment *f)
+{
+    for (int c = 0; c < 3; c++) b->colour[c] += b->transmittance * (double)f->colour[c];
+    b->transmittance *= (double)f->transmittance;
+}
+
+static bool has_length(const fragment *f)
+{
+    return f->kind < FRAGMENT_SURFACE && f->t_out > f->t_in;
+}
+
+/* The depth of what lets nothing through. */
+static const double opaque_depth = 1e6;
+
+/* What the fragments, all begun at from, do from there to the next cut. */
+static void blend_mixed(blend *b, const fragment *items, int64_t count, float from, float to)
+{
+    double colour[3] = {0, 0, 0}, depth = 0;
+    for (int64_t i = 0; i < count; i++) {
+        const fragment *f = &items[i];
+        const double absorbed = 1 - (double)f->transmittance;
+        if (!has_length(f) || !(f->t_out >= to && absorbed > 0)) continue;
+        const double share = ((double)to - (double)from) / ((double)f->t_out - (double)f->t_in);
+        const double own = share * (absorbed < 1 ? -log((double)f->transmittance) : opaque_depth);
+        for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] / absorbed * own;
+        depth += own;
+    }
+    if (!(depth > 0)) return;
+    const double light = -expm1(-depth) / depth;
+    for (int c = 0; c < 3; c++) b->colour[c] += b->transmittance * light * colour[c];
+    b->transmittance *= exp(-depth);
+}
+
+static float next_cut(const fragment *items, int64_t count, float from)
+{
+    float to = INFINITY;
+    for (int64_t i = 0; i < count; i++)
+        if (has_length(&items[i]) && items[i].t_out > from && items[i].t_out < to) to = items[i].t_out;
+    return to;
+}
+
+/* Does something begin before the first of these ends? */
+static bool is_overlapped(const fragment *sorted, int64_t count)
+{
+    return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
+}
+
+/* The fragments from the first on to where none goes on; returns how many they are. */
+static int64_t blend_run(blend *b, const fragment *sorted, int64_t count)
+{
+    float at = sorted[0].t_in;
+    for (int64_t first = 0, end = 0;;) {
+        for (; end < count && sorted[end].t_in <= at; end++)
+            if (!has_length(&sorted[end])) blend_over(b, &sorted[end]);
+        while (first < end && !(has_length(&sorted[first]) && sorted[first].t_out > at)) first++;
+        if (first == end || b->transmittance == 0) return end;
+        float to = next_cut(sorted + first, end - first, at);
+        if (end < count && sorted[end].t_in < to) to = sorted[end].t_in;
+        blend_mixed(b, sorted + first, end - first, at, to);
+        at = to;
+    }
+}
+
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
 {
     if (count > 1) sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
+        if (is_overlapped(items + i, count - i)) {
+            blend run = {{0, 0, 0}, 1};
+            n = blend_run(&run, items + i, count - i);
+            for (int c = 0; c < 3; c++) colour[c] += transmittance * (float)run.colour[c];
+            transmittance *= (float)run.transmittance;
+            continue;
+        }
         n = samples_at(items + i, count - i);
         const fragment f = n == 1 ? items[i] : mix_samples(items + i, n);
         for (int c = 0; c < 3; c++) colour[c] += transmittance * f.colour[c];

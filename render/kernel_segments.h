@@ -15,7 +15,10 @@
  *
  * A segment belongs to the window that holds its t_in and is never cut by the window, so what a ray sees does not
  * depend on where windows end, nor on the other rays of its packet. Surfaces do cut segments. Fragments join segments
- * whose t_out and t_in are the same bits, as neighbours' are; a gap ends them, for it may belong to another rank. */
+ * whose t_out and t_in are the same bits, as neighbours' are; a gap ends them, for it may belong to another rank.
+ *
+ * Where several volumes share a ray, or cells overlap, no rank knows all that is at one place: with separate_samples
+ * (render.h) every segment goes out as it is met, cut finely enough for compositing to mix them. */
 #ifndef RENDER_KERNEL_SEGMENTS_H
 #define RENDER_KERNEL_SEGMENTS_H
 
@@ -183,7 +186,9 @@ SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segment
 typedef struct kernel_segment_state {
     kernel_segments *list;
     const kernel_pieces *pieces;
+    int volume;
     float allowance; /* the error a unit distance, and a unit of optical depth, may make; 0: parts by step */
+    float mixing;    /* > 0: segments go out as they are met, to be mixed with others: see kernel_course_mixed() */
     float reach;     /* no ray is longer in the cells, unit distances */
 } kernel_segment_state;
 
@@ -191,19 +196,19 @@ typedef struct kernel_segment_state {
 typedef struct kernel_course {
     const kernel_map *map; /* NULL: linear */
     const kernel_interval *interval;
-    float cost; /* what light changes by a unit distance for a field off by one; < 0: parts by step */
+    float cost; /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
 } kernel_course;
 
 /* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
  * unit distance (docs/decisions.md): the most of that over the cell's values. */
-SIMD_INLINE float kernel_course_cost(const kernel_segment_state *state, const kernel_cell *c)
+SIMD_INLINE float kernel_course_cost(const kernel_segment_state *state, const float *values, int count)
 {
     const kernel_pieces *t = state->pieces;
-    float low = c->f[0], high = low;
-    if (!(state->allowance > 0)) return -1;
-    for (int i = 1; i < c->count; i++) {
-        low = fminf(low, c->f[i]);
-        high = fmaxf(high, c->f[i]);
+    float low = values[0], high = low;
+    if (!(state->allowance > 0) && !(state->mixing > 0)) return 0;
+    for (int i = 1; i < count; i++) {
+        low = fminf(low, values[i]);
+        high = fmaxf(high, values[i]);
     }
     const float last = KERNEL_BOUND_BINS - 1;
     const int from = (int)fminf(fmaxf((low - t->bin_low) * t->bound_inverse, 0), last);
@@ -226,17 +231,16 @@ SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course
     return i->v_in + along * (i->v_out - i->v_in);
 }
 
-/* Into how many parts to cut the stretch from t0 to t1, with values v0 and v1 there. By error: the deviation from the
+/* Into how many parts, as a real number, to cut the stretch from t0 to t1, with values v0 and v1 there, and how far its
+ * field is off the line between them. By error: the deviation from the
  * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
  * square of a part, and its mean is two thirds of it. Allowed is the stretch's share of the ray's length and of its
  * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. */
-SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
-                                   vm rays, vf t0, vf t1, vf v0, vf v1)
+SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
+                                    vm rays, vf t0, vf t1, vf v0, vf v1, vf *deviation)
 {
-    const vf most = vf_set(KERNEL_MAX_PARTS), length = t1 - t0;
-    if (!course->map) return vf_set(1);
-    if (course->cost < 0) return vf_clamp(-vf_floor(-(length / p->sample_step)), vf_set(1), most);
-    const kernel_transfer *transfer = &p->frame->volumes[0];
+    const vf length = t1 - t0;
+    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
     vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
     for (int quarter = 1; quarter < 4; quarter++) {
         const float share = 0.25f * (float)quarter;
@@ -247,8 +251,42 @@ SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state 
     const vf distance = length * state->list->per_t, depth = distance * opacity * 0.25f;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
     const vf made = off * course->cost * distance; /* 3/2 of 2/3 */
-    const vf ratio = vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f));
-    return vf_clamp(-vf_floor(-vf_sqrt(ratio)), vf_set(1), most);
+    *deviation = off;
+    return vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
+}
+
+/* The same for a stretch that others are mixed with, who take it for a medium that is the same throughout (comp.h). Of
+ * a stretch of depth d whose extinction and colour vary by the share v, no more than d v / 4 is elsewhere than it is
+ * said to be, and what that does to light is attenuated by the others' depth in it. That depth, times the light that
+ * gets there, sums to 1 over a ray; so d v / 4 may be the whole error allowed. */
+SIMD_INLINE vf kernel_course_mixed(const kernel_segment_state *state, const kernel_course *course, vf length, vf change)
+{
+    const vf moved = change * course->cost * (length * state->list->per_t) * 0.25f;
+    return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
+}
+
+SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
+                                   vm rays, vf t0, vf t1, vf v0, vf v1)
+{
+    const vf length = t1 - t0;
+    vf parts = vf_set(1), off = vf_set(0);
+    if (course->map && state->allowance > 0)
+        parts = kernel_course_curved(p, state, course, rays, t0, t1, v0, v1, &off);
+    else if (course->map)
+        parts = length / p->sample_step;
+    if (state->mixing > 0)
+        parts = vf_max(parts, kernel_course_mixed(state, course, length, vf_abs(v1 - v0) + 2.0f * off));
+    return vf_clamp(-vf_floor(-parts), vf_set(1), vf_set(KERNEL_MAX_PARTS));
+}
+
+/* A segment as a fragment of its own. */
+static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
+                                vf v_in, vf v_out)
+{
+    kernel_light light = kernel_clear();
+    kernel_integrate(state->pieces, rays, (t_out - t_in) * state->list->per_t, v_in, v_out, &light);
+    kernel_emit(p, vm_and(rays, vf_lt(light.transmittance, vf_set(1))), FRAGMENT_VOLUME, vf_set(0), t_in, t_out,
+                light.colour, light.transmittance);
 }
 
 /* A stretch in equal parts: the field at three of their ends in turn. */
@@ -299,7 +337,10 @@ SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *
         s.next_bend = (s.before - s.after) + (s.ahead - s.after);
         const vf lift = kernel_parts_lift(&s, n == 1 ? rays : vm_none(), vm_not(inner));
         const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
-        kernel_segments_add(state->pieces, list, vm_and(open, mine), s.from, s.to, s.before + lift, s.after + lift);
+        if (!(state->mixing > 0))
+            kernel_segments_add(state->pieces, list, vm_and(open, mine), s.from, s.to, s.before + lift, s.after + lift);
+        else if (vm_any(vm_and(open, mine)))
+            kernel_emit_segment(p, state, vm_and(open, mine), s.from, s.to, s.before + lift, s.after + lift);
         s.from = s.to;
         s.to = next;
         s.before = s.after;
@@ -315,8 +356,9 @@ SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state
     const kernel_interval *i = course->interval;
     const kernel_segments *list = state->list;
     vf from = vf_max(i->t_in, p->t_near);
-    const vf end = vf_min(i->t_out, p->t_far);
-    vm open = vm_and(i->mask, vm_and(p->active, vf_lt(from, end)));
+    /* To be mixed, segments are whole, whatever surfaces this rank knows of: the same on any partition. */
+    const vf end = state->mixing > 0 ? i->t_out : vf_min(i->t_out, p->t_far);
+    vm open = vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(from, end), vf_lt(from, p->t_far))));
     while (vm_any(open)) {
         vf to = end;
         if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
@@ -335,11 +377,11 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
                                 vm rays)
 {
     kernel_segment_state *state = opaque_state;
-    const kernel_transfer *transfer = &p->frame->volumes[0];
-    const grid_field *field = &p->frame->job->volumes[0].field.fields[part];
+    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    const grid_field *field = &p->frame->job->volumes[state->volume].field.fields[part];
     const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
-        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count, part, field, cells[n]);
+        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count + state->volume, part, field, cells[n]);
         if (c->type == GRID_POLYHEDRON) {
             kernel_polyhedron_segments(p, state, part, cells[n], rays);
             continue;
@@ -350,7 +392,7 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
             kernel_cell_domain(c, transfer);
         }
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-        kernel_course course = {.cost = -1};
+        kernel_course course = {.cost = state->mixing > 0 ? kernel_course_cost(state, c->f, c->count) : 0};
         kernel_map map;
         int intervals = 1;
         if (c->type == GRID_TET) {
@@ -360,7 +402,7 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
             if (intervals && !c->is_constant) {
                 kernel_map_setup(&map, c);
                 course.map = &map;
-                course.cost = kernel_course_cost(state, c);
+                course.cost = kernel_course_cost(state, c->f, c->count);
             }
         }
         for (int k = 0; k < intervals; k++) {
@@ -435,6 +477,22 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
     if (vm_any(heaped)) kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
 }
 
+/* All segments of all volumes, each as a fragment of its own. */
+SIMD_INLINE void kernel_trace_apart(kernel_packet *p)
+{
+    const kernel_frame *f = p->frame;
+    kernel_segments list;
+    list.t_begin = p->t_near;
+    list.t_end = vf_set(INFINITY);
+    list.cuts.row_count = 0;
+    for (int v = 0; v < f->volume_count; v++) {
+        kernel_segment_state state = {&list, &f->pieces[v], v, f->allowance, f->mixing, f->reach[v]};
+        list.per_t = f->volumes[v].exponent / p->sample_step;
+        kernel_trace_parts(p, &f->job->volumes[v].field, &f->volumes[v].interest, p->t_near, &p->t_far,
+                           kernel_segment_leaf, &state);
+    }
+}
+
 /* One window from list->t_begin on; t_end is lowered to where it ended. */
 SIMD_INLINE void kernel_trace_window(kernel_packet *p, kernel_segment_state *state)
 {
@@ -451,7 +509,7 @@ SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
 {
     const kernel_frame *f = p->frame;
     kernel_segments list;
-    kernel_segment_state state = {&list, &f->pieces, f->allowance, f->reach};
+    kernel_segment_state state = {&list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
     kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
     b.lost[0] = b.lost[1] = b.lost[2] = b.depth = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] =
         vf_set(0);

@@ -54,9 +54,9 @@ typedef struct kernel_frame {
     bool has_transparent;
     bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
-    bool has_segments;  /* the volume is integrated by segments, else sampled */
-    kernel_pieces pieces;
-    float allowance, reach; /* kernel_segments.h */
+    bool has_segments;  /* volumes are integrated by segments, else sampled */
+    kernel_pieces pieces[RENDER_MAX_VOLUMES];
+    float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_segments.h */
     bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there
                          */
 } kernel_frame;

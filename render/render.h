@@ -13,7 +13,8 @@
  * its own. So a frame keeps one cell's sample and marks the ray, by a further one as a fragment of its own at the same
  * depth; compositing finds the pixels in which fragments overlap (comp.h), whoever made them; and these are traced
  * again with separate_samples, which leaves the sharing to compositing. What a frame makes of such pixels otherwise is
- * not the picture. */
+ * not the picture. Volumes by segments are made the same way: of overlaps each cell's segments become fragments of
+ * their own, and so do the segments of several volumes, on all pixels. */
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 
@@ -125,11 +126,13 @@ typedef enum render_traversal {
     RENDER_SPMD     /* every lane on its own */
 } render_traversal;
 
-/* How a volume is integrated: by samples (thesis, 4.4), whose error goes with the step, or by segments, exact where the
- * field is linear along the ray (tets) and of second order in the parts of cells elsewhere. Several volumes are
- * sampled, and so are rays on which cells overlap.
- */
+/* How volumes are integrated: by samples (thesis, 4.4), whose error goes with the step, or by segments, exact where the
+ * field is linear along the ray (tets) and of second order in the parts of cells elsewhere. Segments of several volumes
+ * are made with separate_samples alone: without it several volumes are sampled. */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
+
+/* What segments that are mixed may be off by where no max_error is given. */
+#define RENDER_MIXING_ERROR 1e-4
 
 typedef struct render_job {
     render_camera camera;
@@ -156,7 +159,8 @@ typedef struct render_job {
     bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */
     /* The pixels to trace (pixel_set.h); NULL: all. */
     const unsigned char *pixels;
-    bool separate_samples; /* every cell's every sample of every volume becomes a fragment, of no length */
+    bool separate_samples; /* every cell's every sample of every volume becomes a fragment, of no length; every segment
+                              one of its length, in parts that compositing may mix */
     int threads;           /* >= 1; 0: as many as OpenMP would take */
 } render_job;
 

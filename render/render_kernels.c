@@ -66,7 +66,10 @@ static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int6
     const double start = thread->now();
     if (p->frame->has_segments) {
         p->is_pencil = false; /* packet by packet, lines would not be used often enough to pay */
-        kernel_trace_segments(p, first_fragment);
+        if (p->frame->job->separate_samples)
+            kernel_trace_apart(p);
+        else
+            kernel_trace_segments(p, first_fragment);
     } else {
         kernel_trace_volumes(p, hits);
     }

@@ -211,23 +211,34 @@ static double scene_reach(const render_job *job)
 }
 
 /* Of max_error an eighth goes to the colours' table, and four fifths to the field (docs/decisions.md): half of them
- * over the length of the ray, half over what is absorbed. */
+ * over the length of the ray, half over what is absorbed. Segments that are mixed with others take a half of that for
+ * their mixing. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)
 {
     const render_job *job = f->job;
-    f->has_segments = job->integration == RENDER_SEGMENTS && job->volume_count == 1 && !job->separate_samples;
+    const bool is_apart = job->separate_samples;
+    insitu_status status = INSITU_OK;
+    f->has_segments = job->integration == RENDER_SEGMENTS && (job->volume_count == 1 || is_apart);
     if (!f->has_segments) return INSITU_OK;
-    const double unit = job->volumes[0].transfer->unit_distance * job->space.scale;
-    f->allowance = (float)(0.4 * job->max_error);
+    const double error_of_each = job->max_error / job->volume_count;
+    f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
+    if (is_apart) f->mixing = (float)(0.4 * (error_of_each > 0 ? error_of_each : RENDER_MIXING_ERROR));
+    /* Whether overlaps that are clear in front of a surface are found depends on the partition: where compositing cuts
+     * at the surface must then agree with where a rank does, to 1e-6. Of several volumes compositing cuts always. */
+    if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
-    f->reach = (float)fmax(reach / unit, 1e-30);
-    return render_pieces_build(&f->pieces, job->volumes[0].transfer, job->max_error / 8, error);
+    for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {
+        const render_transfer *t = job->volumes[i].transfer;
+        f->reach[i] = (float)fmax(reach / (t->unit_distance * job->space.scale), 1e-30);
+        status = render_pieces_build(&f->pieces[i], t, error_of_each / 8, error);
+    }
+    return status;
 }
 
 void render_unprepare(kernel_frame *frame)
 {
     base_free(frame->surfaces);
-    render_pieces_free(&frame->pieces);
+    for (int i = 0; i < RENDER_MAX_VOLUMES; i++) render_pieces_free(&frame->pieces[i]);
 }
 
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error)

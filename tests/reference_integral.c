@@ -1,6 +1,7 @@
-/* Adaptive integration. An interval is integrated by Simpson's rule whole and in halves; where the two differ by more
- * than the tolerance each half is taken in turn. Kinks and steps of the transfer function are not known here: they
- * are found by halving. */
+/* Adaptive integration. The ray is cut wherever a cell begins or ends; between cuts all cells that are there, of all
+ * volume layers, emit and absorb together: extinctions add, and so does what is emitted. An interval is integrated by
+ * Simpson's rule whole and in halves; where the two differ by more than the tolerance each half is taken in turn. Kinks
+ * and steps of the transfer function are not known here: they are found by halving. */
 #include "reference_integral.h"
 
 #include "reference_polyhedron.h"
@@ -14,6 +15,7 @@
 typedef struct placed_cell {
     reference_cell cell;
     double values[REFERENCE_MAX_VERTICES];
+    const render_transfer *transfer;
 } placed_cell;
 
 struct reference_integral {
@@ -23,7 +25,7 @@ struct reference_integral {
     placed_cell *cells;
 };
 
-/* Where the ray is in a cell. */
+/* Where the ray is in a cell of a layer. */
 typedef struct stretch {
     const placed_cell *cell;
     double z_in, z_out;
@@ -37,15 +39,15 @@ typedef struct light {
 
 /* The integrand at a place. */
 typedef struct sample {
-    double extinction, colour[3]; /* per z */
+    double extinction, emission[3]; /* per z */
 } sample;
 
 typedef struct course {
     const reference_integral *scene;
-    const placed_cell *cell;
-    const reference_crossing *ends;
+    int64_t count;
+    const stretch **active; /* the stretches that go on at the place, count */
     reference_line line;
-    double units; /* unit distances per z */
+    double length; /* per z */
 } course;
 
 static void *reserve(void *block, size_t bytes)
@@ -87,20 +89,22 @@ void reference_colour(const render_transfer *t, double value, double colour[3])
     }
 }
 
-static void add_cell(reference_integral *scene, int part, int64_t index)
+static void add_cell(reference_integral *scene, int volume, int part, int64_t index)
 {
     const render_job *job = scene->job;
     const grid *g = job->parts[part].cells;
+    const render_field *field = &job->volumes[volume].field;
     const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
     int64_t vertices[REFERENCE_MAX_VERTICES];
     placed_cell *c = &scene->cells[scene->count];
-    if (grid_is_ghost(g, index) || !job->volumes[0].field.ranges[part].low) return;
+    if (grid_is_ghost(g, index) || !field->ranges[part].low) return;
+    c->transfer = job->volumes[volume].transfer;
     c->cell.type = grid_cell_type(g, index);
     if (c->cell.type == GRID_POLYHEDRON)
         reference_polyhedron_read(g, index, &c->cell, vertices);
     else
         c->cell.count = grid_cell_vertices(g, index, vertices);
-    if (!grid_cell_values(&job->volumes[0].field.fields[part], index, vertices, c->cell.count, c->values)) return;
+    if (!grid_cell_values(&field->fields[part], index, vertices, c->cell.count, c->values)) return;
     for (int i = 0; i < c->cell.count; i++) {
         double from_eye[3];
         grid_vertex(g, vertices[i], c->cell.world[i]);
@@ -111,14 +115,24 @@ static void add_cell(reference_integral *scene, int part, int64_t index)
     scene->count++;
 }
 
+static int64_t count_drawn(const render_job *job)
+{
+    int64_t count = 0;
+    for (int part = 0; part < job->part_count; part++)
+        for (int64_t cell = 0; cell < job->parts[part].cells->cell_count; cell++)
+            count += !grid_is_ghost(job->parts[part].cells, cell);
+    return count;
+}
+
 reference_integral *reference_integral_create(const render_job *job, double tolerance)
 {
     reference_integral *scene = reserve(NULL, sizeof *scene);
-    int64_t most = 0;
-    for (int part = 0; part < job->part_count; part++) most += job->parts[part].cells->cell_count;
-    *scene = (reference_integral){job, tolerance, 0, reserve(NULL, (size_t)most * sizeof(placed_cell))};
-    for (int part = 0; part < job->part_count; part++)
-        for (int64_t cell = 0; cell < job->parts[part].cells->cell_count; cell++) add_cell(scene, part, cell);
+    const size_t most = (size_t)count_drawn(job) * (size_t)job->volume_count;
+    *scene = (reference_integral){job, tolerance, 0, reserve(NULL, most * sizeof(placed_cell))};
+    for (int volume = 0; volume < job->volume_count; volume++)
+        for (int part = 0; part < job->part_count; part++)
+            for (int64_t cell = 0; cell < job->parts[part].cells->cell_count; cell++)
+                add_cell(scene, volume, part, cell);
     return scene;
 }
 
@@ -128,19 +142,27 @@ void reference_integral_free(reference_integral *scene)
     free(scene);
 }
 
+static void add_sample(const course *c, const stretch *s, double z, sample *sum)
+{
+    const placed_cell *placed = s->cell;
+    const double point[3] = {c->line.base[0] + c->line.slope[0] * z, c->line.base[1] + c->line.slope[1] * z, z};
+    double value, colour[3];
+    if (placed->cell.type == GRID_POLYHEDRON)
+        reference_profile_value(&placed->cell, &c->line, s->ends, placed->values, z, &value);
+    else
+        reference_interpolate(&placed->cell, point, placed->values, &value, NULL);
+    const double clear = -log1p(-fmin(reference_opacity(placed->transfer, value), 1 - 1e-15));
+    const double extinction = clear * c->length / placed->transfer->unit_distance;
+    reference_colour(placed->transfer, value, colour);
+    sum->extinction += extinction;
+    for (int k = 0; k < 3; k++) sum->emission[k] += extinction * colour[k];
+}
+
 static sample sample_at(const course *c, double z)
 {
-    const render_transfer *t = c->scene->job->volumes[0].transfer;
-    const double point[3] = {c->line.base[0] + c->line.slope[0] * z, c->line.base[1] + c->line.slope[1] * z, z};
-    double value;
-    sample s;
-    if (c->cell->cell.type == GRID_POLYHEDRON)
-        reference_profile_value(&c->cell->cell, &c->line, c->ends, c->cell->values, z, &value);
-    else
-        reference_interpolate(&c->cell->cell, point, c->cell->values, &value, NULL);
-    s.extinction = -log1p(-fmin(reference_opacity(t, value), 1 - 1e-15)) * c->units;
-    reference_colour(t, value, s.colour);
-    return s;
+    sample sum = {0};
+    for (int64_t i = 0; i < c->count; i++) add_sample(c, c->active[i], z, &sum);
+    return sum;
 }
 
 /* Simpson's rule on five samples for the transmittance, and on three for the colour: up to the middle the optical depth
@@ -151,9 +173,8 @@ static light simpson(const sample s[5], double width)
     const double whole = half + width / 12 * (s[2].extinction + 4 * s[3].extinction + s[4].extinction);
     light out = {{0, 0, 0}, exp(-whole)};
     for (int c = 0; c < 3; c++)
-        out.colour[c] = width / 6 *
-                        (s[0].extinction * s[0].colour[c] + 4 * s[2].extinction * s[2].colour[c] * exp(-half) +
-                         s[4].extinction * s[4].colour[c] * exp(-whole));
+        out.colour[c] =
+            width / 6 * (s[0].emission[c] + 4 * s[2].emission[c] * exp(-half) + s[4].emission[c] * exp(-whole));
     return out;
 }
 
@@ -207,13 +228,7 @@ static bool is_near(const reference_cell *cell, const reference_line *line)
     return true;
 }
 
-static int compare_stretches(const void *left, const void *right)
-{
-    const stretch *a = left, *b = right;
-    return a->z_in != b->z_in ? (a->z_in < b->z_in ? -1 : 1) : (a->z_out > b->z_out) - (a->z_out < b->z_out);
-}
-
-/* The cells on the ray in front of the eye, sorted. */
+/* The cells on the ray in front of the eye. */
 static stretch *collect(const reference_integral *scene, const reference_line *line, int64_t *count)
 {
     stretch *list = NULL;
@@ -230,7 +245,6 @@ static stretch *collect(const reference_integral *scene, const reference_line *l
                 &scene->cells[i], fmax(crossings[k].z, 0), crossings[k + 1].z, {crossings[k], crossings[k + 1]}};
         }
     }
-    if (*count) qsort(list, (size_t)*count, sizeof *list, compare_stretches);
     return list;
 }
 
@@ -246,8 +260,7 @@ static course begin_ray(const reference_integral *scene, int x, int y)
         c.line.base[axis] = dot(axes[axis], from_eye);
         c.line.slope[axis] = dot(axes[axis], direction);
     }
-    c.units = (camera->is_orthographic ? 1 : sqrt(dot(direction, direction))) /
-              scene->job->volumes[0].transfer->unit_distance;
+    c.length = camera->is_orthographic ? 1 : sqrt(dot(direction, direction));
     return c;
 }
 
@@ -258,32 +271,54 @@ static void blend_hit(light *sum, const reference_hit *hit)
     *sum = over(sum, &surface);
 }
 
+static int compare_numbers(const void *left, const void *right)
+{
+    const double a = *(const double *)left, b = *(const double *)right;
+    return (a > b) - (a < b);
+}
+
+/* Where something begins or ends, sorted. */
+static double *find_cuts(const stretch *list, int64_t count, const reference_hit *hits, int hit_count, int64_t *cuts)
+{
+    double *z = reserve(NULL, (size_t)(2 * count + hit_count) * sizeof *z);
+    *cuts = 0;
+    for (int64_t i = 0; i < count; i++) {
+        z[(*cuts)++] = list[i].z_in;
+        z[(*cuts)++] = list[i].z_out;
+    }
+    for (int i = 0; i < hit_count; i++) z[(*cuts)++] = hits[i].depth;
+    if (*cuts) qsort(z, (size_t)*cuts, sizeof *z, compare_numbers);
+    return z;
+}
+
+static void find_active(course *c, const stretch *list, int64_t count, double from, double to)
+{
+    c->count = 0;
+    for (int64_t i = 0; i < count; i++)
+        if (list[i].z_in <= from && list[i].z_out >= to) c->active[c->count++] = &list[i];
+}
+
 void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
                               const reference_hit *hits, int hit_count, double rgba[4])
 {
     course c = begin_ray(scene, x, y);
     light sum = {{0, 0, 0}, 1};
-    int64_t count;
+    int64_t count, cuts;
     int next = 0;
     stretch *list = collect(scene, &c.line, &count);
-    for (int64_t i = 0; i < count; i++) {
-        double from = list[i].z_in;
-        c.cell = list[i].cell;
-        c.ends = list[i].ends;
-        for (; next < hit_count && hits[next].depth < list[i].z_out; next++) {
-            if (hits[next].depth > from && sum.transmittance > 0) {
-                const light part = integrate(&c, from, hits[next].depth);
-                sum = over(&sum, &part);
-                from = hits[next].depth;
-            }
-            blend_hit(&sum, &hits[next]);
-        }
-        if (!(sum.transmittance > 0)) break;
-        const light part = integrate(&c, from, list[i].z_out);
+    double *z = find_cuts(list, count, hits, hit_count, &cuts);
+    c.active = reserve(NULL, (size_t)count * sizeof *c.active);
+    for (int64_t i = 0; i < cuts && sum.transmittance > 0; i++) {
+        for (; next < hit_count && hits[next].depth <= z[i]; next++) blend_hit(&sum, &hits[next]);
+        if (i + 1 == cuts || !(z[i] < z[i + 1])) continue;
+        find_active(&c, list, count, z[i], z[i + 1]);
+        if (!c.count) continue;
+        const light part = integrate(&c, z[i], z[i + 1]);
         sum = over(&sum, &part);
     }
-    for (; next < hit_count; next++) blend_hit(&sum, &hits[next]);
     for (int k = 0; k < 3; k++) rgba[k] = sum.colour[k] + sum.transmittance * (double)background[k];
     rgba[3] = 1 - sum.transmittance * (1 - (double)background[3]);
+    free(z);
+    free(c.active);
     free(list);
 }

@@ -1,5 +1,6 @@
-/* The truth of a volume: emission and absorption integrated along a ray through every cell, adaptively, in double, no
- * tree. One volume layer, with the surfaces' hits that reference_trace() found. */
+/* The truth of volumes: emission and absorption integrated along a ray through every cell, adaptively, in double, no
+ * tree. Where there are several layers, or cells overlap, all of them emit and absorb together. With the surfaces'
+ * hits that reference_trace() found. */
 #ifndef REFERENCE_INTEGRAL_H
 #define REFERENCE_INTEGRAL_H
 

@@ -7,6 +7,9 @@ endfunction()
 insitu_session_program(test_session_input)
 insitu_add_mpi_test(session_input test_session_input 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_faces)
+insitu_add_mpi_test(session_faces test_session_faces 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_recentre)
 insitu_add_mpi_test(session_recentre test_session_recentre 1 2 3 4 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -101,6 +101,7 @@ static void merge_matches_double_reference(void **context)
         for (int i = 0; i < count; i++) {
             items[i] = random_fragment();
             items[i].t_in = (float)(i * 37 % 101) + 0.5f * next_unit(); /* all distinct: 101 is prime */
+            items[i].t_out = items[i].t_in + (items[i].kind < FRAGMENT_SURFACE ? 0.4f : 0);
             if (items[i].kind >= FRAGMENT_SURFACE) nearest = fminf(nearest, items[i].t_in);
         }
         reference(items, count, blue, expected);
@@ -400,6 +401,67 @@ static void samples_of_one_place_share_what_they_absorb(void **context)
     }
 }
 
+/* A medium that is the same throughout. */
+typedef struct medium {
+    double begin, end, extinction, colour[3];
+} medium;
+
+static fragment fragment_of(const medium *m)
+{
+    const double clear = exp(-m->extinction * (m->end - m->begin));
+    fragment f = {.t_in = (float)m->begin, .t_out = (float)m->end, .transmittance = (float)clear};
+    for (int c = 0; c < 3; c++) f.colour[c] = (float)(m->colour[c] * (1 - clear));
+    return f;
+}
+
+/* All media together, in small steps between whole eighths, where all begin and end; a surface at 4. */
+static void mix_media(const medium *media, int count, const fragment *surface, double rgba[4])
+{
+    double through = 1;
+    rgba[0] = rgba[1] = rgba[2] = 0;
+    for (int i = 0; i < 64; i++) {
+        double depth = 0, colour[3] = {0, 0, 0};
+        for (int c = 0; c < 3 && i == 32; c++) rgba[c] += through * (double)surface->colour[c];
+        if (i == 32) through *= (double)surface->transmittance;
+        for (int k = 0; k < count; k++) {
+            if (media[k].begin > i / 8.0 || media[k].end < (i + 1) / 8.0) continue;
+            depth += media[k].extinction / 8;
+            for (int c = 0; c < 3; c++) colour[c] += media[k].extinction / 8 * media[k].colour[c];
+        }
+        for (int c = 0; c < 3 && depth > 0; c++) rgba[c] += through * colour[c] / depth * -expm1(-depth);
+        through *= exp(-depth);
+    }
+    rgba[3] = 1 - through;
+}
+
+/* Roundings of T and C to float are 3e-8, that of the depth then up to e^2 times that for the depth of 2 that a medium
+ * has at most: 3e-7 a medium. */
+static void stretches_that_overlap_are_mixed(void **context)
+{
+    (void)context;
+    state = 12;
+    for (int trial = 0; trial < 500; trial++) {
+        medium media[12];
+        fragment items[13];
+        double expected[4];
+        float rgba[4], depth;
+        const int count = 1 + trial % 12;
+        for (int k = 0; k < count; k++) {
+            const double begin = (double)(next_random() % 60) / 8, most = 8 - begin;
+            media[k] = (medium){begin, begin + fmin(most, (double)(1 + next_random() % 30) / 8), 0, {0, 0, 0}};
+            media[k].extinction = 2 * (double)next_unit() / (media[k].end - begin);
+            for (int c = 0; c < 3; c++) media[k].colour[c] = (double)next_unit();
+            items[k] = fragment_of(&media[k]);
+        }
+        items[count] = (fragment){.t_in = 4, .t_out = 4, .colour = {0.25f, 0, 0.125f}, .transmittance = 0.5f};
+        items[count].kind = FRAGMENT_SURFACE;
+        mix_media(media, count, &items[count], expected);
+        comp_merge_pixel(items, count + 1, black, rgba, &depth);
+        for (int c = 0; c < 4; c++) assert_true(fabs((double)rgba[c] - expected[c]) <= 3e-7 * (count + 1));
+        assert_true(depth == 4);
+    }
+}
+
 static bool do_overlap(const fragment *given, int count)
 {
     fragment items[4];
@@ -458,6 +520,7 @@ int main(void)
         cmocka_unit_test(joining_neighbours_changes_rounding_alone),
         cmocka_unit_test(permutations_give_the_same_bits),
         cmocka_unit_test(samples_of_one_place_share_what_they_absorb),
+        cmocka_unit_test(stretches_that_overlap_are_mixed),
         cmocka_unit_test(overlaps_are_where_a_volume_has_not_ended),
         cmocka_unit_test(owners_share_all_pixels_evenly),
         cmocka_unit_test(owners_of_the_largest_image_add_up),

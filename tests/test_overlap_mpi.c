@@ -4,6 +4,7 @@
  * that do not overlap must not have a single pixel that is drawn twice.
  *
  * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
+#include "reference_integral.h"
 #include "session_frame.h"
 #include "test_render_fixture.h"
 
@@ -89,6 +90,7 @@ typedef struct drawing {
     fixture_camera camera;
     int frame;
     int64_t fragment_limit;
+    double max_error; /* > 0: by segments */
 } drawing;
 
 static const double surface_values[2] = {-0.2, 0.3};
@@ -110,6 +112,9 @@ static void stage(staged *s, const test_mesh *mesh, const drawing *d)
         fixture_add_surface(&s->f, surface_values, 2, d->scene == OPAQUE_VOLUME ? 1 : 0.4f);
     fixture_set_volume(&s->f, 0.3);
     s->f.job.frame = d->frame;
+    s->f.job.integration = d->max_error > 0 ? RENDER_SEGMENTS : RENDER_SAMPLES;
+    s->f.job.max_error = d->max_error;
+    s->f.job.extent = 2 * sqrt(3);
     if (d->scene != TWO_VOLUMES) return;
     s->second = s->f.transfer;
     s->second.opacity_count = 2;
@@ -163,7 +168,9 @@ static void assert_everywhere(bool is_well)
 
 /* ---- comparisons --------------------------------------------------------------------------------------------- */
 
-/* Samples of one place mix alike whoever made them; elsewhere "over" rounds in other groups, to 1e-6. */
+/* Samples of one place mix alike whoever made them; elsewhere "over" rounds in other groups, to 1e-6. An open end: by
+ * segments, whether a pixel whose overlap is clear is drawn twice depends on the partition, and the second drawing cuts
+ * otherwise: both are within max_error. Measured: 2.7e-6 for 1e-3. */
 static bool same_images(const image *whole, const image *other, const drawing *d, const char *what)
 {
     int depths = 0;
@@ -175,10 +182,11 @@ static bool same_images(const image *whole, const image *other, const drawing *d
             if (!(off <= colour)) colour = off;
         }
     }
-    if (depths || !(colour <= 1e-6))
+    const double bound = d->max_error > 0 && d->scene != TWO_VOLUMES ? d->max_error : 1e-6;
+    if (depths || !(colour <= bound))
         fprintf(stderr, "%s, %d ranks, scene %d: %d depths differ, colour by %g\n", what, rank_count, (int)d->scene,
                 depths, colour);
-    return !depths && colour <= 1e-6;
+    return !depths && colour <= bound;
 }
 
 /* May rounding turn one of the ray's decisions, or has its root finder more than one answer? */
@@ -222,6 +230,37 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
     return !wrong && doubtful <= PIXELS / 10;
 }
 
+/* Every seventeenth pixel against the integral: max_error holds in each where the truth is not in doubt. */
+static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
+{
+    staged s;
+    stage(&s, mesh, d);
+    reference_scene *surfaces = reference_create(&s.f.job);
+    reference_integral *scene = reference_integral_create(&s.f.job, 1e-8);
+    int doubtful = 0, count = 0;
+    double worst = 0;
+    for (int p = 0; p < PIXELS; p += 17, count++) {
+        reference_ray ray;
+        double rgba[4];
+        reference_trace(surfaces, p % WIDTH, p / WIDTH, fixture_background, &ray);
+        const bool has_surfaces = s.f.job.surface_count > 0;
+        if (ray.ambiguous || ray.map_failed || (has_surfaces && is_doubtful(&ray))) {
+            doubtful++;
+            continue;
+        }
+        reference_integral_trace(scene, p % WIDTH, p / WIDTH, fixture_background, ray.hits, ray.hit_count, rgba);
+        for (int c = 0; c < 4; c++) worst = fmax(worst, fabs((double)drawn->rgba[4 * p + c] - rgba[c]));
+    }
+    reference_integral_free(scene);
+    reference_free(surfaces);
+    fixture_free(&s.f);
+    const bool is_well = worst <= d->max_error && doubtful <= count / 5;
+    if (getenv("INSITU_TEST_VERBOSE") || !is_well)
+        fprintf(stderr, "%s, %d ranks, scene %d: max_error %g: off by %g; %d of %d in doubt\n", what, rank_count,
+                (int)d->scene, d->max_error, worst, doubtful, count);
+    return is_well;
+}
+
 /* Where opaque surfaces hide most of a mesh some 50 pixels overlap, elsewhere hundreds and more. */
 enum { FEWEST = 30 };
 
@@ -235,8 +274,13 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
         if (overlaps < FEWEST || alone < FEWEST)
             fprintf(stderr, "%s, scene %d: %d pixels overlap, %d alone\n", what, (int)d->scene, (int)overlaps,
                     (int)alone);
-        good = overlaps >= FEWEST && alone >= FEWEST && same_images(&whole, &ours, d, what);
-        if (with_reference) good = is_as_counted(mesh, d, &ours, what) && good;
+        /* Segments of several volumes are not first drawn as if nothing overlapped. */
+        const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
+        good = is_found && same_images(&whole, &ours, d, what);
+        /* Slow, and once is enough: on any ranks the picture is that of one. */
+        if (with_reference && d->max_error > 0 && rank_count == 1)
+            good = is_as_integrated(mesh, d, &ours, what) && good;
+        if (with_reference && !(d->max_error > 0)) good = is_as_counted(mesh, d, &ours, what) && good;
         free_image(&whole);
     }
     free_image(&ours);
@@ -250,9 +294,37 @@ static void lattices_in_one_another_are_as_counted(void **state)
         test_mesh mesh;
         interpenetrating(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
-            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY};
+            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY, 0};
             compare(&mesh, &d, true, test_mesh_kind_name(kind));
         }
+        test_mesh_free(&mesh);
+    }
+}
+
+static void segments_in_one_another_are_as_integrated(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        interpenetrating(kind, &mesh);
+        for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
+            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY,
+                               pow(10, -2 - ((int)kind + (int)scene) % 3)};
+            compare(&mesh, &d, true, test_mesh_kind_name(kind));
+        }
+        test_mesh_free(&mesh);
+    }
+}
+
+/* Two fields in the cells of one mesh. */
+static void segments_of_two_volumes_are_as_integrated(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+        const drawing d = {TWO_VOLUMES, CAMERA_INSIDE, 0, MANY / 40, pow(10, -2 - (int)kind % 3)};
+        compare(&mesh, &d, true, test_mesh_kind_name(kind));
         test_mesh_free(&mesh);
     }
 }
@@ -265,7 +337,7 @@ static void tangled_lattices_are_the_same_everywhere(void **state)
         test_mesh mesh;
         tangled(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
-            const drawing d = {scene, scene == VOLUME ? CAMERA_INSIDE : CAMERA_OUTSIDE, 3, MANY};
+            const drawing d = {scene, scene == VOLUME ? CAMERA_INSIDE : CAMERA_OUTSIDE, 3, MANY, 0};
             compare(&mesh, &d, kind == TEST_TETS, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
@@ -279,7 +351,7 @@ static void turns_make_the_same_bits(void **state)
     test_mesh mesh;
     interpenetrating(TEST_MIXED, &mesh);
     image at_once, in_turns;
-    drawing d = {TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY};
+    drawing d = {TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0};
     draw_shares(&mesh, TEST_RANDOM, &d, &at_once);
     d.fragment_limit = 3000; /* of a step of 0.15 in an extent of 2: 100 pixels and more */
     const int64_t overlaps = draw_shares(&mesh, TEST_RANDOM, &d, &in_turns);
@@ -298,7 +370,7 @@ static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partitio
     for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             image drawn;
-            const drawing d = {scene, camera, (int)camera, MANY};
+            const drawing d = {scene, camera, (int)camera, MANY, 0};
             const int64_t overlaps = draw_shares(mesh, partition, &d, &drawn);
             free_image(&drawn);
             if (overlaps)
@@ -336,6 +408,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lattices_in_one_another_are_as_counted),
+        cmocka_unit_test(segments_in_one_another_are_as_integrated),
+        cmocka_unit_test(segments_of_two_volumes_are_as_integrated),
         cmocka_unit_test(tangled_lattices_are_the_same_everywhere),
         cmocka_unit_test(turns_make_the_same_bits),
         cmocka_unit_test(conforming_meshes_have_no_overlap),

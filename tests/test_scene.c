@@ -89,7 +89,7 @@ static const char every_key[] = "threads: 3\n"
                                 "    sampling: {step: 0.125}\n"
                                 "    outputs: [{path: b.png, bits: 8}]\n"
                                 "  - name: third\n"
-                                "    layers: [{volume: {field: p}}]\n"
+                                "    layers: [{volume: {field: p}}, {volume: {field: q}}]\n"
                                 "    sampling: {max_error: 1e-3}\n"
                                 "    outputs: [{path: c.png}]\n";
 
@@ -136,7 +136,7 @@ static void scene_image_keys_are_read(void **state)
     assert_false(image->jitter);
     assert_int_equal(image->frames, 4);
     assert_true(image->method == SCENE_SEGMENTS && image->max_error == 0);
-    assert_true(s.images[2].method == SCENE_SEGMENTS && s.images[2].max_error == 1e-3);
+    assert_true(s.images[2].method == SCENE_SEGMENTS && s.images[2].max_error == 1e-3 && s.images[2].volume_count == 2);
     assert_int_equal(image->output_count, 2);
     assert_string_equal(image->outputs[0].path, "out/{name}_{cycle:06}.png");
     assert_int_equal(image->outputs[0].format, SCENE_PNG16);

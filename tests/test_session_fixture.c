@@ -103,6 +103,11 @@ void input_describe(session_input *in)
 void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count)
 {
     test_mesh whole;
+    in->kind = kind;
+    in->side = side;
+    in->dealt = dealt;
+    in->rank = rank;
+    in->count = count;
     test_mesh_lattice(kind, side, 0.2, test_wave, &whole);
     int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
     assert_non_null(owners);
@@ -111,6 +116,12 @@ void input_create(session_input *in, test_mesh_kind kind, int side, test_partiti
     free(owners);
     test_mesh_free(&whole);
     input_describe(in);
+}
+
+void input_renew(session_input *in)
+{
+    input_free(in);
+    input_create(in, in->kind, in->side, in->dealt, in->rank, in->count);
 }
 
 void input_free(session_input *in)
@@ -122,6 +133,37 @@ insitu_status hand_over(insitu_session *session, const session_input *in)
 {
     const insitu_status status = insitu_set_mesh(session, "m", &in->mesh);
     return status ? status : insitu_set_field(session, "m", &in->field);
+}
+
+void step_is_good(insitu_session *session, int cycle)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    told_everywhere(session, status, INSITU_OK, "");
+    everywhere(insitu_last_report(session)->images == 1);
+    everywhere(caught_count == (own_rank == 0));
+}
+
+void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spoilt_case *c)
+{
+    const int bad_rank = rank_count - 1;
+    const bool is_bad = own_rank == bad_rank;
+    char rank_words[32];
+    snprintf(rank_words, sizeof rank_words, "rank %d: ", bad_rank);
+    if (is_bad) c->spoil(in);
+    const insitu_status at_once = hand_over(session, in);
+    everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
+    everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
+    for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
+        forget_pictures();
+        const insitu_status status = insitu_step(session, 1, 0);
+        told_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
+                        c->words[1] ? c->words[1] : "");
+        everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
+    }
+    input_renew(in);
+    everywhere(hand_over(session, in) == INSITU_OK);
+    step_is_good(session, 2);
 }
 
 void forget_pictures(void)

@@ -39,16 +39,39 @@ typedef struct session_input {
     test_mesh part;
     insitu_mesh mesh;
     insitu_field field; /* "f", at vertices */
+    test_mesh_kind kind;
+    int side, rank, count;
+    test_partition_kind dealt;
 } session_input;
 
 /* Hexes or any kind, side^3 cubes, dealt to count ranks; the part of rank. */
 void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count);
 /* Describe the part again, after it was spoilt. */
 void input_describe(session_input *in);
+/* As it was created. */
+void input_renew(session_input *in);
 void input_free(session_input *in);
 
 /* Set the mesh "m" and its field; the first status that is not OK. */
 insitu_status hand_over(insitu_session *session, const session_input *in);
+
+/* The step is well on every rank, and its one picture is drawn. */
+void step_is_good(insitu_session *session, int cycle);
+
+typedef void spoil_function(session_input *in);
+
+/* A thing that a user gets wrong. */
+typedef struct spoilt_case {
+    const char *name;
+    spoil_function *spoil;
+    insitu_status status;
+    bool at_once;         /* the set call fails too */
+    const char *words[2]; /* of the message */
+} spoilt_case;
+
+/* Spoilt on the last rank alone, at every step all ranks are told the same, with the rank and the words in it, and no
+ * picture is drawn; once the input is renewed the next step draws. */
+void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spoilt_case *c);
 
 /* Pictures caught on rank 0 since the last forget_pictures(). */
 typedef struct caught_picture {

@@ -17,8 +17,6 @@ static const char scene_text[] = "images:\n"
 static insitu_session *session;
 static session_input input;
 
-typedef void spoil_function(session_input *in);
-
 /* ---- spoilt meshes ------------------------------------------------------------------------------------------- */
 
 static void index_too_large(session_input *in)
@@ -152,14 +150,6 @@ static void field_without_name(session_input *in)
     in->field.name = NULL;
 }
 
-typedef struct spoilt_case {
-    const char *name;
-    spoil_function *spoil;
-    insitu_status status;
-    bool at_once; /* the set call fails too */
-    const char *words[2];
-} spoilt_case;
-
 static const spoilt_case cases[] = {
     {"index too large", index_too_large, INSITU_ERROR_MESH, false, {"cell 2 (hex): vertex index ", " is outside 0.."}},
     {"index negative", index_negative, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index -3 is outside 0.."}},
@@ -197,45 +187,10 @@ static const spoilt_case cases[] = {
     {"odd components", component_stride_odd, INSITU_ERROR_FIELD, true, {"component stride of 3 bytes"}},
 };
 
-static void step_is_good(int cycle)
-{
-    forget_pictures();
-    const insitu_status status = insitu_step(session, cycle, 0);
-    told_everywhere(session, status, INSITU_OK, "");
-    everywhere(insitu_last_report(session)->images == 1);
-    everywhere(caught_count == (own_rank == 0));
-}
-
-static void input_is_renewed(void)
-{
-    input_free(&input);
-    input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);
-}
-
 static void spoilt_input_is_told_to_all(void **context)
 {
     (void)context;
-    const int bad_rank = rank_count - 1;
-    char rank_words[32];
-    snprintf(rank_words, sizeof rank_words, "rank %d: ", bad_rank);
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        const spoilt_case *c = &cases[i];
-        const bool is_bad = own_rank == bad_rank;
-        if (is_bad) c->spoil(&input);
-        const insitu_status at_once = hand_over(session, &input);
-        everywhere(at_once == (is_bad && c->at_once ? c->status : INSITU_OK));
-        everywhere(!is_bad || !c->at_once || strstr(insitu_error(session), c->words[0]) != NULL);
-        for (int again = 0; again < 2; again++) { /* it stays wrong until it is mended */
-            forget_pictures();
-            const insitu_status status = insitu_step(session, 1, 0);
-            told_everywhere(session, status, c->status, rank_words, "mesh \"m\"", c->words[0],
-                            c->words[1] ? c->words[1] : "");
-            everywhere(insitu_last_report(session)->images == 0 && caught_count == 0);
-        }
-        input_is_renewed();
-        everywhere(hand_over(session, &input) == INSITU_OK);
-        step_is_good(2);
-    }
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &input, &cases[i]);
 }
 
 static void call_without_a_mesh_is_told_once(void **context)
@@ -245,18 +200,18 @@ static void call_without_a_mesh_is_told_once(void **context)
     everywhere(!is_bad || insitu_set_field(session, "nowhere", &input.field) == INSITU_ERROR_FIELD);
     insitu_status status = insitu_step(session, 3, 0);
     told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 0: ", "\"nowhere\" is not set");
-    step_is_good(4);
+    step_is_good(session, 4);
     everywhere(!is_bad || insitu_set_mesh(session, NULL, &input.mesh) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 5, 0);
     told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "no name");
-    step_is_good(6);
+    step_is_good(session, 6);
     if (is_bad) field_without_name(&input);
     everywhere(!is_bad || insitu_set_field(session, "m", &input.field) == INSITU_ERROR_ARGUMENT);
     status = insitu_step(session, 7, 0);
     told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: ", "without a name");
-    input_is_renewed();
+    input_renew(&input);
     everywhere(hand_over(session, &input) == INSITU_OK);
-    step_is_good(8);
+    step_is_good(session, 8);
 }
 
 static void field_missing_on_one_rank_names_it(void **context)
@@ -270,7 +225,7 @@ static void field_missing_on_one_rank_names_it(void **context)
     insitu_status status = insitu_step(session, 9, 0);
     told_everywhere(session, status, INSITU_ERROR_FIELD, words);
     everywhere(hand_over(session, &input) == INSITU_OK);
-    step_is_good(10);
+    step_is_good(session, 10);
 }
 
 static void field_of_two_centrings_is_refused(void **context)
@@ -285,7 +240,7 @@ static void field_of_two_centrings_is_refused(void **context)
     const insitu_status status = insitu_step(session, 11, 0);
     told_everywhere(session, status, INSITU_ERROR_FIELD, "rank 1: mesh \"m\": field \"f\"", "another centring");
     everywhere(hand_over(session, &input) == INSITU_OK);
-    step_is_good(12);
+    step_is_good(session, 12);
 }
 
 static void nan_where_no_drawn_cell_is_is_fine(void **context)
@@ -303,7 +258,7 @@ static void nan_where_no_drawn_cell_is_is_fine(void **context)
     insitu_mesh_interleaved(&more.mesh, coordinates, INSITU_FLOAT64);
     more.field.values.data = values;
     everywhere(hand_over(session, &more) == INSITU_OK);
-    step_is_good(13);
+    step_is_good(session, 13);
     everywhere(insitu_last_report(session)->cells_unusable == 0);
     everywhere(hand_over(session, &input) == INSITU_OK);
     test_free(coordinates);
@@ -322,11 +277,11 @@ static void value_that_is_not_finite_is_counted(void **context)
         expected += is_hit;
     }
     everywhere(hand_over(session, &input) == INSITU_OK);
-    step_is_good(14);
+    step_is_good(session, 14);
     const insitu_report *report = insitu_last_report(session);
     everywhere(report->cells_unusable == expected);
     everywhere(!is_bad || strstr(report->warnings, "values of field \"f\" are not finite"));
-    input_is_renewed();
+    input_renew(&input);
     everywhere(hand_over(session, &input) == INSITU_OK);
 }
 

@@ -404,14 +404,21 @@ void every_higher_order_type_has_its_linear_one(void **)
 {
     const struct {
         int type, points, linear;
-    } cases[] = {{24, 10, 10}, {25, 20, 12}, {26, 15, 13}, {27, 13, 14}, {29, 27, 12}, {31, 12, 13}, {32, 18, 13},
-                 {33, 24, 12}, {37, 19, 14}, {71, 10, 10}, {72, 27, 12}, {73, 18, 13}, {74, 14, 14}};
+    } cases[] = {{24, 10, 10}, {25, 20, 12}, {26, 15, 13}, {27, 13, 14}, {29, 27, 12}, {31, 12, 13},
+                 {32, 18, 13}, {33, 24, 12}, {37, 19, 14}, {71, 10, 10}, {72, 27, 12}, {73, 18, 13},
+                 {74, 14, 14}, {78, 10, 10}, {79, 27, 12}, {80, 18, 13}, {81, 14, 14}};
+    const std::map<int, std::pair<const std::vector<point> *, double>> shapes = {
+        {10, {&corner, 1.0 / 6}}, {12, {&cube, 1}}, {13, {&roof, 0.5}}, {14, {&pyramid, 1.0 / 3}}};
     for (const auto &c : cases) {
+        const auto &[corners, volume] = shapes.at(c.linear);
+        std::vector<point> points = *corners;
+        points.resize(static_cast<size_t>(c.points), point{9, 9, 9}); // no corner
         vtkNew<vtkUnstructuredGrid> grid;
-        add_cell(grid, c.type, std::vector<point>(static_cast<size_t>(c.points), point{0, 0, 0}));
+        add_cell(grid, c.type, points);
         fixture f;
         assert_int_equal(f.set(grid), INSITU_OK);
         assert_int_equal(integer_at(f.mesh().mesh.cell_types, 0), c.linear);
+        assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - volume) < rounding);
         assert_int_equal(f.report.cells_linear, 1);
     }
 }

@@ -5,6 +5,7 @@
  *
  *     test_vtk_images <insitu-render> <mpiexec>, with the data's folder in INSITU_TEST_DATA; 77 where that is not set
  */
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -40,8 +41,17 @@ struct subject {
     std::vector<std::string> files;
     std::string field;
     double value, low, high;
-    int shown_in; // step in which there is something to see
+    int shown_in;                                  // step in which there is something to see
+    std::vector<std::string> volumes = {"volume"}; // pictures of the volume: names of volume_pictures
 };
+
+/* A picture of the volume by each way to integrate it, one of them with a second volume. */
+const struct volume_picture {
+    std::string name, sampling, second;
+} volume_pictures[] = {{"volume", "{}", ""},
+                       {"segments", "{method: segments}", ""},
+                       {"bounded", "{max_error: 1e-3}", ""},
+                       {"both", "{max_error: 1e-2}", "f_cell"}};
 
 struct picture {
     std::vector<float> rgba, depth; // depth: empty where the file has no channel Z
@@ -86,15 +96,23 @@ int covered(const picture &p)
 
 std::string scene_of(const subject &s)
 {
-    auto image = [](const std::string &name, const std::string &layer) {
+    auto image = [](const std::string &name, const std::string &layer, const std::string &sampling) {
         return "  - name: " + name + "\n    size: [" + std::to_string(width) + ", " + std::to_string(height) +
-               "]\n    background: [0, 0, 0, 0]\n    layers:\n      - " + layer + "\n    outputs:\n      - path: \"" +
-               name + "_{cycle}.exr\"\n";
+               "]\n    background: [0, 0, 0, 0]\n    layers:\n      - " + layer + "\n    sampling: " + sampling +
+               "\n    outputs:\n      - path: \"" + name + "_{cycle}.exr\"\n";
     };
     const std::string field = "{field: \"" + s.field + "\", ";
-    return "images:\n" + image("iso", "isosurface: " + field + "values: [" + std::to_string(s.value) + "]}") +
-           image("volume", "volume: " + field + "range: [" + std::to_string(s.low) + ", " + std::to_string(s.high) +
-                               "], opacity: [[0, 0], [1, 0.9]]}");
+    std::string text =
+        "images:\n" + image("iso", "isosurface: " + field + "values: [" + std::to_string(s.value) + "]}", "{}");
+    const std::string layer = "volume: " + field + "range: [" + std::to_string(s.low) + ", " + std::to_string(s.high) +
+                              "], opacity: [[0, 0], [1, 0.9]]}";
+    for (const volume_picture &p : volume_pictures) {
+        if (std::find(s.volumes.begin(), s.volumes.end(), p.name) == s.volumes.end()) continue;
+        const std::string second =
+            p.second.empty() ? "" : "\n      - volume: {field: " + p.second + ", opacity: [[0, 0.3], [0.4, 0]]}";
+        text += image(p.name, layer + second, p.sampling);
+    }
+    return text;
 }
 
 /* Draw into a folder of its own, with no rank launcher where ranks is 0. */
@@ -111,7 +129,7 @@ std::string draw(const subject &s, int ranks, const std::string &partition)
     return folder;
 }
 
-std::string file_of(const std::string &folder, const char *image, size_t step)
+std::string file_of(const std::string &folder, const std::string &image, size_t step)
 {
     return folder + "/" + image + "_" + std::to_string(step) + ".exr";
 }
@@ -138,10 +156,13 @@ void expect_same_pictures(const subject &s, const std::string &alone, const std:
                       iso2 = read_picture(file_of(others, "iso", step));
         assert_true(is_bitwise(iso.depth, iso2.depth));
         assert_true(is_bitwise(iso.rgba, iso2.rgba));
-        const picture volume = read_picture(file_of(alone, "volume", step));
-        const int count = differing(volume, read_picture(file_of(others, "volume", step)));
-        if (count > 0) print_error("%s: step %zu: %d pixels of the volume differ\n", others.c_str(), step, count);
-        assert_int_equal(count, 0);
+        for (const std::string &name : s.volumes) {
+            const picture volume = read_picture(file_of(alone, name, step));
+            const int count = differing(volume, read_picture(file_of(others, name, step)));
+            if (count > 0)
+                print_error("%s: %s of step %zu: %d pixels differ\n", others.c_str(), name.c_str(), step, count);
+            assert_int_equal(count, 0);
+        }
     }
 }
 
@@ -174,6 +195,17 @@ void bluntfin_is_the_same_on_ranks(void **)
 void post_is_the_same_on_ranks(void **)
 {
     draws_the_same_on_ranks({"post_hex", {"post_hex.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
+    draws_the_same_on_ranks({"post_tet", {"post_tet.vtu"}, "VelocityMagnitude", 0.8, 0, 1.4, 0});
+}
+
+/* Each of 8,000 cells on any of seven ranks. */
+void polyhedra_are_the_same_on_seven_ranks(void **)
+{
+    const subject s = {
+        "voronoi", {"poly_voronoi.vtu"}, "f", 0.2, -1.5, 1.5, 0, {"volume", "segments", "bounded", "both"}};
+    const std::string alone = draw(s, 0, "block");
+    expect_something_to_see(s, alone);
+    expect_same_pictures(s, alone, draw(s, 7, "random"));
 }
 
 void disk_is_the_same_on_ranks(void **)
@@ -205,6 +237,23 @@ void every_kind_of_cell_is_drawn(void **)
     draws_alone({"wedges", {"mesh_fs8_wedge.vtu"}, "synthetic", 0.2, -2, 1.8, 0});
     draws_alone({"notch", {"notch_stress.vtu"}, "Nodal Stress-normed", 1500000, 0, 8000000, 0});
     draws_the_same_on_ranks({"prisms", {"pentahexa.vtu"}, "synthetic", 0.3, -1, 1.6, 0});
+}
+
+/* Quadratic cells are linear ones of their corners, and that is said where the pictures are made. */
+void quadratic_cells_are_told_of(void **)
+{
+    const std::pair<const char *, const char *> files[] = {
+        {"cylinder_quadratic", "1522 "}, {"tiny_QuadraticTetra", "96 "}, {"tiny_QuadraticWedge", "16 "}};
+    for (const auto &[name, count] : files) {
+        const std::string folder = fresh_folder(std::string("vtk_images/told_") + name);
+        const bool is_cylinder = name == files[0].first;
+        const subject s = {name, {}, is_cylinder ? "velocity_norm" : "DistanceToCenter", 0.5, 0, 1, 0};
+        write_file(folder + "/scene.yaml", scene_of(s));
+        const run_result r =
+            run_in(folder, shell_word(tool) + " scene.yaml " + shell_word(data_folder + "/" + name + ".vtu"));
+        assert_int_equal(r.status, 0);
+        assert_true(r.says(std::string(count) + "higher-order cells drawn by their corners as linear ones"));
+    }
 }
 
 void info_counts_the_mixed_lattice(void **)
@@ -254,6 +303,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(exodus_cut_short_is_refused),
         cmocka_unit_test(mixed_lattice_is_the_same_on_ranks),
         cmocka_unit_test(every_kind_of_cell_is_drawn),
+        cmocka_unit_test(quadratic_cells_are_told_of),
+        cmocka_unit_test(polyhedra_are_the_same_on_seven_ranks),
         cmocka_unit_test(bluntfin_is_the_same_on_ranks),
         cmocka_unit_test(post_is_the_same_on_ranks),
         cmocka_unit_test(disk_is_the_same_on_ranks),

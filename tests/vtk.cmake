@@ -23,5 +23,18 @@ target_link_libraries(test_vtk_images PRIVATE
   insitu_flags PkgConfig::CMOCKA ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
 add_test(NAME vtk_images COMMAND test_vtk_images $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
 
+# Real grids as the renderer's tests have their meshes. The C headers are not C++'s style, hence SYSTEM.
+add_library(test_data_mesh STATIC test_data_mesh.cpp test_vtk_session_stub.cpp)
+target_include_directories(test_data_mesh SYSTEM PRIVATE ${PROJECT_SOURCE_DIR}/libinsitu/base)
+target_link_libraries(test_data_mesh PRIVATE insitu_vtk_objects insitu_flags VTK::IOXML)
+
+foreach(noun volumes polyhedra)
+  add_executable(test_data_${noun} test_data_${noun}.c)
+  target_link_libraries(test_data_${noun} PRIVATE test_data_mesh test_render_support insitu_flags)
+  add_test(NAME data_${noun} COMMAND test_data_${noun})
+  set_tests_properties(data_${noun} PROPERTIES
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
+endforeach()
+
 set_tests_properties(vtk_tool vtk_images PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)

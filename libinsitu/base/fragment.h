@@ -3,7 +3,7 @@
  * A volume fragment covers the samples of one rank between t_in and t_out, both included; a surface fragment has t_in
  * == t_out, the hit. Fragments of one pixel, from any ranks, do not overlap, so sorting by t_in and blending front to
  * back gives the picture. Where cells overlap, fragments may: either all volume fragments of the pixel are then single
- * samples, or the pixel is not a picture yet (comp.h). Colours are linear and premultiplied: over(front, back) = (C1 +
+ * samples, or short stretches of one cell each, or the pixel is not a picture yet (comp.h). Colours are linear and premultiplied: over(front, back) = (C1 +
  * T1 C2, T1 T2). */
 #ifndef BASE_FRAGMENT_H
 #define BASE_FRAGMENT_H

@@ -107,8 +107,6 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
         return scene_bad(d, path, "sampling.max_error", "given beside a step, expected one of the two");
     if (in->max_error && out->method == SCENE_SAMPLES)
         return scene_bad(d, path, "sampling.max_error", "given with method: samples, expected segments");
-    if (out->method == SCENE_SEGMENTS && out->volume_count > 1)
-        return scene_bad(d, path, "sampling", "segments of %d volumes, expected one volume", out->volume_count);
     return INSITU_OK;
 }
 

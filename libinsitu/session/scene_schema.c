@@ -160,7 +160,7 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
 #define SAMPLING_KEYS(X)                                                                                               \
     X(CHOICE("method", scene_file_sampling, method, method_words),                                                     \
       .help = "How a volume is integrated: by samples, or by segments, exact on tetrahedra and of second order in "    \
-              "the step elsewhere. `segments` takes one volume an image.",                                             \
+              "the step elsewhere. Segments of several volumes are mixed pixel by pixel, slower than samples.",        \
       .by_default = "`samples`, with `max_error` `segments`")                                                          \
     X(CYAML_FIELD_FLOAT_PTR("max_error", OPTIONAL, scene_file_sampling, max_error),                                    \
       .help = "No channel of a pixel is off by more, in linear light: cells are cut as finely as that takes. Not "     \

@@ -86,6 +86,11 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
                                       base_error *error)
 {
     const long long first = place->first, next = place->next;
+    if (place->type == GRID_POLYHEDRON && next < first)
+        return base_fail(
+            error, INSITU_ERROR_MESH,
+            "mesh \"%s\": cell %lld (polyhedron): offsets fall from %lld to %lld; a polyhedron has at least 4 faces",
+            mesh->name, (long long)cell, first, next);
     const char *format =
         place->next < place->first
             ? "mesh \"%s\": cell %lld (%s): offsets fall from %lld to %lld; a cell of its type has %d vertices"

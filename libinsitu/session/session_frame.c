@@ -5,7 +5,7 @@
  * with every sample on its own (render.h), composited beside the picture, and take their place in it. In a mesh whose
  * cells overlap here and there that is a few pixels more. Two meshes that fill the same space may make a thousand
  * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as all ranks together hold the
- * fragments of. */
+ * fragments of. Segments of several volumes are drawn so on all pixels from the first. */
 #include "session_frame.h"
 
 #include <string.h>
@@ -46,23 +46,41 @@ static insitu_status draw(const frame_target *t, const render_job *job, image *o
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Samples that a ray may have: the scene's extent is near 1 in scaled units, and at most sqrt(3) times that long. */
+/* Fragments that a ray may have: of samples, by the scene's extent, which is near 1 in scaled units, and at most
+ * sqrt(3) times that; of segments by experience. */
 static int64_t turn_pixels(const render_job *job, int64_t fragment_limit)
 {
-    const double samples = 2 * job->volume_count / (job->step * job->space.scale) + 1;
-    const double pixels = (double)fragment_limit / samples;
+    enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
+    const bool is_sampled = job->integration == RENDER_SAMPLES;
+    const double ray = is_sampled           ? 2 / (job->step * job->space.scale)
+                       : job->surface_count ? CUT_BY_SURFACES
+                                            : SEGMENTS;
+    const double pixels = (double)fragment_limit / (job->volume_count * ray + 1);
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* The next pixels of a set, at most so many; returns where to go on. */
-static int64_t take_pixels(const unsigned char *from, int64_t first, int64_t end, int64_t most, unsigned char *taken)
+/* The k-th pixel of an image in bands of rows, each taken column by column, so that the pixels of a turn are
+ * neighbours, as rays of a packet are. */
+static int64_t banded_pixel(const image *out, int64_t k)
 {
+    enum { BAND = 16 };
+    const int64_t top = k / ((int64_t)BAND * out->width) * BAND, within = k - top * out->width;
+    const int64_t rows = out->height - top < BAND ? out->height - top : BAND;
+    return (top + within % rows) * out->width + within / rows;
+}
+
+/* The next pixels of a set, at most so many; returns where to go on. */
+static int64_t take_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
+                           unsigned char *taken)
+{
+    const int64_t end = (int64_t)out->width * out->height;
     memset(taken, 0, pixel_set_bytes(end));
-    for (; first < end && most > 0; first++)
-        if (pixel_set_has(from, first)) {
-            pixel_set_add(taken, first);
-            most--;
-        }
+    for (; first < end && most > 0; first++) {
+        const int64_t pixel = banded_pixel(out, first);
+        if (!pixel_set_has(from, pixel)) continue;
+        pixel_set_add(taken, pixel);
+        most--;
+    }
     return first;
 }
 
@@ -80,12 +98,12 @@ static insitu_status redraw(const frame_target *t, const render_job *job, int64_
                             const comp_overlaps *overlaps, unsigned char *turn, image *beside, image *out,
                             base_error *error)
 {
-    const int64_t end = (int64_t)out->width * out->height, most = turn_pixels(job, fragment_limit);
+    const int64_t most = turn_pixels(job, fragment_limit);
     render_job again = *job;
     again.pixels = turn;
     again.separate_samples = true;
     for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
-        at = take_pixels(overlaps->pixels, at, end, most, turn);
+        at = take_pixels(out, overlaps->pixels, at, most, turn);
         const insitu_status status = draw(t, &again, beside, NULL, error);
         if (status) return status;
         if (beside->rgba) copy_pixels(turn, beside, out);
@@ -117,14 +135,35 @@ static insitu_status draw_overlaps(const frame_target *t, const render_job *job,
     return status;
 }
 
+/* Segments of several volumes are at one place on every pixel: there is no first picture to put right. */
+static bool is_mixed_throughout(const render_job *job)
+{
+    return job->integration == RENDER_SEGMENTS && job->volume_count > 1;
+}
+
+static insitu_status take_all(const frame_target *t, const image *out, comp_overlaps *all, base_error *error)
+{
+    all->count = (int64_t)out->width * out->height;
+    all->pixels = base_calloc(pixel_set_bytes(all->count), 1);
+    for (int64_t p = 0; p < all->count && all->pixels; p++) pixel_set_add(all->pixels, p);
+    if (!all->pixels)
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for a set of %lld pixels", (long long)all->count);
+    return session_agree(t->comm, error);
+}
+
 insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render_job *job, const float background[4],
                                  int64_t fragment_limit, image *out, session_frame *frame, base_error *error)
 {
     *frame = (session_frame){0};
     const frame_target t = {comm, comp_comm, background, frame};
     comp_overlaps overlaps = {0};
-    insitu_status status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
-    frame->overlaps = overlaps.count;
+    insitu_status status = INSITU_OK;
+    if (is_mixed_throughout(job)) {
+        status = take_all(&t, out, &overlaps, error);
+    } else {
+        status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
+        frame->overlaps = overlaps.count;
+    }
     if (!status && overlaps.count) status = draw_overlaps(&t, job, fragment_limit, &overlaps, out, error);
     base_free(overlaps.pixels);
     return status;

@@ -1,0 +1,19 @@
+/* Real grids for the tests: a VTU file through the VTK adaptor, as a test_mesh. */
+#ifndef TEST_DATA_MESH_H
+#define TEST_DATA_MESH_H
+
+#include "test_meshes.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The cells that the adaptor hands over of the file, and the named field of one component at its vertices. False, with
+ * a message on stderr, where there is no such file or field. Free with test_mesh_free(). */
+bool test_data_mesh(const char *path, const char *field, test_mesh *out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,84 @@
+/* The Voronoi cells of INSITU_TEST_DATA, 8,000 polyhedra of up to 21 faces, against the brute-force renderer: surfaces,
+ * samples and segments. 77 where INSITU_TEST_DATA is not set. */
+#include "reference_integral.h"
+#include "test_data_mesh.h"
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+enum { WIDTH = 23, HEIGHT = 19 };
+
+static test_mesh mesh;
+
+static void cells_fixture(render_fixture *f)
+{
+    fixture_create(f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 0.1, 1,
+                   (const double[]){0, 0, 0});
+    fixture_look(f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
+}
+
+static void surfaces_and_samples_are_the_reference(void **state)
+{
+    static const double opaque[1] = {0.2}, clear[2] = {-0.6, 0.9};
+    (void)state;
+    for (int pass = 0; pass < 2; pass++) {
+        render_fixture f;
+        cells_fixture(&f);
+        fixture_add_surface(&f, pass ? clear : opaque, pass ? 2 : 1, pass ? 0.4f : 1);
+        f.surfaces[0].root = pass ? RENDER_NEUBAUER : RENDER_ROBUST;
+        fixture_set_volume(&f, 1);
+        const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, pass ? "clear" : "opaque");
+        fprintf(stderr, "%d rays, %d hits, %d excluded: depth %.2g cells, colour %.2g\n", (int)o.rays, (int)o.hits,
+                (int)o.excluded, o.worst_depth, o.worst_colour);
+        assert_true(o.hits > WIDTH * HEIGHT / 5);
+        fixture_free(&f);
+    }
+}
+
+/* Exact on tets, and so on polyhedra: 3e-6 as in test_segments.c, whose rays meet as many cells. */
+static void segments_are_the_integral(void **state)
+{
+    (void)state;
+    render_fixture f;
+    drawn_frame drawn;
+    double worst = 0;
+    cells_fixture(&f);
+    fixture_set_volume(&f, 1);
+    f.job.integration = RENDER_SEGMENTS;
+    fixture_draw(&f, &drawn);
+    reference_integral *scene = reference_integral_create(&f.job, 1e-9);
+    for (int p = 0; p < WIDTH * HEIGHT; p += 3) {
+        double rgba[4];
+        reference_integral_trace(scene, p % WIDTH, p / WIDTH, fixture_background, NULL, 0, rgba);
+        for (int c = 0; c < 4; c++) worst = fmax(worst, fabs((double)drawn.picture.rgba[4 * p + c] - rgba[c]));
+    }
+    reference_integral_free(scene);
+    fprintf(stderr, "segments: %.2g\n", worst);
+    assert_true(worst < 3e-6);
+    drawn_free(&drawn);
+    fixture_free(&f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(surfaces_and_samples_are_the_reference),
+        cmocka_unit_test(segments_are_the_integral),
+    };
+    char path[4096];
+    const char *folder = getenv("INSITU_TEST_DATA");
+    if (!folder || !folder[0]) {
+        print_message("skipped: INSITU_TEST_DATA is not set\n");
+        return 77;
+    }
+    snprintf(path, sizeof path, "%s/poly_voronoi.vtu", folder);
+    if (!test_data_mesh(path, "f", &mesh)) return 1;
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    test_mesh_free(&mesh);
+    return failed;
+}

@@ -1,0 +1,254 @@
+/* What a user gets wrong in the faces of polyhedra, on one rank alone: every rank is told the same, with the rank, the
+ * mesh, the cell, the face and the value; nothing is drawn; and once the thing is right the next step draws.
+ *
+ * A rank's faces and vertices are numbered in the order in which its cells first use them: cell 0 has face 0 first, and
+ * no cell before it. */
+#include <math.h>
+
+#include "test_session_fixture.h"
+
+static const char scene_text[] = "images:\n"
+                                 "  - name: a\n"
+                                 "    size: [24, 16]\n"
+                                 "    layers:\n"
+                                 "      - volume: {field: f}\n"
+                                 "      - isosurface: {field: f, values: [0.1]}\n"
+                                 "    outputs:\n"
+                                 "      - path: a_{cycle}.exr\n";
+
+static insitu_session *session;
+static session_input input;
+
+/* ---- told by the set call already ---------------------------------------------------------------------------- */
+
+static void no_face_offsets(session_input *in)
+{
+    in->mesh.face_offsets.data = NULL;
+}
+static void no_face_vertices(session_input *in)
+{
+    in->mesh.face_connectivity.data = NULL;
+}
+static void face_count_negative(session_input *in)
+{
+    in->mesh.face_count = -5;
+}
+static void face_vertex_count_negative(session_input *in)
+{
+    in->mesh.face_connectivity_count = -1;
+}
+static void float_face_vertices(session_input *in)
+{
+    in->mesh.face_connectivity.type = INSITU_FLOAT32;
+}
+static void byte_face_offsets(session_input *in)
+{
+    in->mesh.face_offsets.type = INSITU_UINT8;
+}
+static void face_stride_odd(session_input *in)
+{
+    in->mesh.face_offsets.stride_bytes = 12;
+}
+static void one_type_without_offsets(session_input *in)
+{
+    in->mesh.cell_types.data = in->mesh.offsets.data = NULL;
+    in->mesh.cell_type = INSITU_POLYHEDRON;
+}
+
+/* ---- told by the step ---------------------------------------------------------------------------------------- */
+
+static void no_faces_at_all(session_input *in)
+{
+    in->mesh.face_count = in->mesh.face_connectivity_count = 0;
+    in->mesh.face_offsets.data = in->mesh.face_connectivity.data = NULL;
+}
+static void faces_too_few(session_input *in)
+{
+    in->mesh.face_count = 2;
+}
+static void cell_offsets_fall(session_input *in)
+{
+    in->part.offsets[2] = 1;
+}
+static void cell_offsets_far(session_input *in)
+{
+    in->part.offsets[1] = 1 << 30;
+}
+static void face_offsets_fall(session_input *in)
+{
+    in->part.face_offsets[1] = -2;
+}
+static void face_offsets_far(session_input *in)
+{
+    in->part.face_offsets[1] = 1 << 30;
+}
+static void face_connectivity_short(session_input *in)
+{
+    in->mesh.face_connectivity_count = 2;
+}
+static void face_too_small(session_input *in)
+{
+    in->part.face_offsets[1] = 2;
+}
+static void face_index_large(session_input *in)
+{
+    in->part.connectivity[in->part.offsets[1] + 1] = in->part.face_count + 3;
+}
+static void face_index_negative(session_input *in)
+{
+    in->part.connectivity[in->part.offsets[3]] = -7;
+}
+static void face_vertex_large(session_input *in)
+{
+    in->part.face_connectivity[1] = 1000000;
+}
+static void face_vertex_negative(session_input *in)
+{
+    in->part.face_connectivity[2] = -1;
+}
+static void three_faces(session_input *in)
+{
+    in->part.offsets[1] = in->part.offsets[0] + 3;
+}
+static void face_left_out(session_input *in)
+{
+    in->part.connectivity[0] = in->part.connectivity[1];
+}
+static void face_of_another_cell(session_input *in)
+{
+    in->part.connectivity[0] = in->part.connectivity[in->part.connectivity_count - 1];
+}
+static void coordinate_nan(session_input *in)
+{
+    in->part.coordinates[3 * in->part.face_connectivity[0] + 2] = NAN;
+}
+
+#define CELL_0 "cell 0 (polyhedron): "
+
+static const spoilt_case at_once[] = {
+    {"no face offsets", no_face_offsets, INSITU_ERROR_MESH, true, {"face offsets are not given"}},
+    {"no face vertices", no_face_vertices, INSITU_ERROR_MESH, true, {"face vertex indices are not given"}},
+    {"face count", face_count_negative, INSITU_ERROR_ARGUMENT, true, {"face_count is -5"}},
+    {"vertex count", face_vertex_count_negative, INSITU_ERROR_ARGUMENT, true, {"face_connectivity_count is -1"}},
+    {"float vertices",
+     float_face_vertices,
+     INSITU_ERROR_ARGUMENT,
+     true,
+     {"face vertex indices are of element type", "not int32 or int64"}},
+    {"byte offsets",
+     byte_face_offsets,
+     INSITU_ERROR_ARGUMENT,
+     true,
+     {"face offsets are of element type", "not int32 or int64"}},
+    {"odd stride", face_stride_odd, INSITU_ERROR_MESH, true, {"face offsets have a stride of 12 bytes"}},
+    {"no cell offsets",
+     one_type_without_offsets,
+     INSITU_ERROR_MESH,
+     true,
+     {"offsets are not given: polyhedra need them"}},
+};
+
+static const spoilt_case at_the_step[] = {
+    {"no faces at all",
+     no_faces_at_all,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 0 is a polyhedron, and face_offsets are not given"}},
+    {"too few faces", faces_too_few, INSITU_ERROR_MESH, false, {CELL_0 "face index 2 is outside 0..1"}},
+    {"cell offsets fall",
+     cell_offsets_fall,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 1 (polyhedron): offsets fall from ", " to 1; a polyhedron has at least 4 faces"}},
+    {"cell offsets far",
+     cell_offsets_far,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "offsets 0 and 1073741824 are outside 0.."}},
+    {"face offsets fall",
+     face_offsets_fall,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "face 0: offsets 0 and -2 do not rise within 0.."}},
+    {"face offsets far",
+     face_offsets_far,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "face 0: offsets 0 and 1073741824 do not rise within 0.."}},
+    {"face connectivity short",
+     face_connectivity_short,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "face 0: offsets 0 and 3 do not rise within 0..2"}},
+    {"face too small",
+     face_too_small,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "face 0 has 2 vertices, at least 3 are needed"}},
+    {"face index large",
+     face_index_large,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 1 (polyhedron): face index ", " is outside 0.."}},
+    {"face index negative",
+     face_index_negative,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 3 (polyhedron): face index -7 is outside 0.."}},
+    {"vertex large",
+     face_vertex_large,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "face 0: vertex index 1000000 is outside 0.."}},
+    {"vertex negative", face_vertex_negative, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex index -1 is outside"}},
+    {"three faces", three_faces, INSITU_ERROR_MESH, false, {CELL_0 "3 faces, a closed surface has at least 4"}},
+    {"face twice", face_left_out, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
+    {"another's face", face_of_another_cell, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
+    {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex 0 has a coordinate that is not finite"}},
+};
+
+static void spoilt_arrays_are_told_at_once(void **context)
+{
+    (void)context;
+    for (size_t i = 0; i < sizeof at_once / sizeof at_once[0]; i++) spoilt_is_told_to_all(session, &input, &at_once[i]);
+}
+
+static void spoilt_faces_are_told_at_the_step(void **context)
+{
+    (void)context;
+    for (size_t i = 0; i < sizeof at_the_step / sizeof at_the_step[0]; i++)
+        spoilt_is_told_to_all(session, &input, &at_the_step[i]);
+}
+
+/* A ghost is not drawn: its vertices may be anywhere, its faces must be faces all the same. */
+static void ghosts_are_proved_but_for_coordinates(void **context)
+{
+    (void)context;
+    static const spoilt_case ghost = {
+        "ghost", face_vertex_large, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex index 1000000 is outside 0.."}};
+    for (int64_t cell = 0; cell < input.part.cell_count; cell++) input.part.ghosts[cell] = 1;
+    coordinate_nan(&input);
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    everywhere(insitu_step(session, 3, 0) == INSITU_OK);
+    spoilt_is_told_to_all(session, &input, &ghost);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(spoilt_arrays_are_told_at_once),
+        cmocka_unit_test(spoilt_faces_are_told_at_the_step),
+        cmocka_unit_test(ghosts_are_proved_but_for_coordinates),
+    };
+    session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    input_create(&input, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    insitu_destroy(&session);
+    input_free(&input);
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
