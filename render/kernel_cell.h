@@ -337,12 +337,12 @@ SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, 
 
 /* A crossed triangle's sums (kernel_line.h). */
 typedef struct kernel_sums {
-    vf rise, value, colour, weight;
+    vf depth, value, colour, weight;
 } kernel_sums;
 
 SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, int i, int j, int k, vf ij, vf jk, vf ik, bool has_colour)
 {
-    return (kernel_sums){kernel_weigh_rise(ij, ik, c->z[j] - c->z[i], c->z[k] - c->z[i]),
+    return (kernel_sums){kernel_weigh_value(ij, jk, ik, c->z[i], c->z[j], c->z[k]),
                          kernel_weigh_value(ij, jk, ik, c->f[i], c->f[j], c->f[k]),
                          has_colour ? kernel_weigh_value(ij, jk, ik, c->g[i], c->g[j], c->g[k]) : vf_set(0),
                          kernel_weight(ij, jk, ik)};
@@ -350,7 +350,7 @@ SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, int i, int j, int 
 
 SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const kernel_sums *b)
 {
-    return (kernel_sums){vf_select(m, a->rise, b->rise), vf_select(m, a->value, b->value),
+    return (kernel_sums){vf_select(m, a->depth, b->depth), vf_select(m, a->value, b->value),
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
@@ -373,8 +373,7 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
     a = kernel_sums_select(m012, &s012, &a);
     b = kernel_sums_select(m123, &s123, &b);
     const vf scale_a = 1.0f / a.weight, scale_b = 1.0f / b.weight;
-    const vf t_a = vf_muladd(a.rise, scale_a, vf_set(c->z[0]));
-    const vf t_b = vf_muladd(b.rise, scale_b, vf_select(m123, vf_set(c->z[1]), vf_set(c->z[0])));
+    const vf t_a = a.depth * scale_a, t_b = b.depth * scale_b;
     const vf v_a = a.value * scale_a, v_b = b.value * scale_b;
     const vm swap = vf_lt(t_b, t_a);
     out->t_in = vf_select(swap, t_b, t_a);
@@ -656,8 +655,7 @@ SIMD_INLINE vf kernel_weigh(const kernel_weights *w, float fi, float fj, float f
 
 SIMD_INLINE vf kernel_weigh_depth(const kernel_weights *w, const float *z)
 {
-    const vf rise = kernel_weigh_rise(w->ij, w->ik, z[w->j] - z[w->i], z[w->k] - z[w->i]);
-    return vf_muladd(rise, w->inverse, vf_set(z[w->i]));
+    return kernel_weigh(w, z[w->i], z[w->j], z[w->k]);
 }
 
 SIMD_INLINE void kernel_triangle_values(const kernel_cell *c, const kernel_shape *shape, const kernel_weights *w,

@@ -117,15 +117,8 @@ SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
     return vm_and(rays, vm_sign(~(a ^ b) & (a ^ c)));
 }
 
-/* Where a crossed triangle is crossed: the sums of its vertices' depths and values, weighted by their opposite edges
- * and not yet divided by the sum of the weights. Depths are relative to the first vertex, whose roundings are then
- * those of the cell's size and not of the scene's; values are not, so that their sum has the sign that all of them
- * have. */
-SIMD_INLINE vf kernel_weigh_rise(vf ij, vf ik, float rise_j, float rise_k)
-{
-    return vf_muladd(ij, vf_set(rise_k), -ik * rise_j);
-}
-
+/* Where a crossed triangle is crossed: the sums of its vertices' depths or values, weighted by their opposite edges and
+ * not yet divided by the sum of the weights. A sum has the sign that all its terms have. */
 SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
