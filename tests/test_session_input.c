@@ -289,14 +289,14 @@ static void value_that_is_not_finite_is_counted(void **context)
 static void inverse_maps_that_fail_are_counted(void **context)
 {
     (void)context;
-    step_is_good(15);
+    step_is_good(session, 15);
     everywhere(insitu_last_report(session)->map_failures == 0);
     for (int64_t i = 0; i < 3 * input.part.vertex_count; i++)
         input.part.coordinates[i] = 2 * test_uniform((uint64_t)i, 21 + (uint64_t)own_rank) - 1;
     everywhere(hand_over(session, &input) == INSITU_OK);
-    step_is_good(16);
+    step_is_good(session, 16);
     everywhere(insitu_last_report(session)->map_failures > 0);
-    input_is_renewed();
+    input_renew(&input);
     everywhere(hand_over(session, &input) == INSITU_OK);
 }
 
