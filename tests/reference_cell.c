@@ -173,32 +173,24 @@ static int find_patch_points(const reference_cell *cell, const reference_line *l
     return solve_bilinear(a, b, c, d, points);
 }
 
-static void move_to_point(const reference_cell *cell, const int *face, const patch_point *point,
-                          reference_crossing *crossing)
-{
-    double z[4];
-    for (int i = 0; i < 4; i++) z[i] = cell->position[face[i]][2];
-    crossing->u = clamp_unit(point->u);
-    crossing->w = clamp_unit(point->w);
-    if (!crossing->is_folded) crossing->z = bilinear(z, crossing->u, crossing->w);
-}
-
 /* From a quad's triangles that are crossed to its patch. A ray through one of them meets the patch once. A ray through
  * both has one of them from behind: it meets the patch twice or, the patch being smooth where the triangles have a
- * fold, not at all. Returns how many crossings are left. Where rounding makes it none of these, the nearest point, or
- * the triangle's place, is marked as folded. */
-static int move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
-                         reference_crossing *crossings, int count)
+ * fold, not at all; then both crossings are put in one place, and nothing is between them. */
+static void move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
+                          reference_crossing *crossings, int count)
 {
     patch_point points[2];
     const int inside = find_patch_points(cell, line, face, points);
     const int nearest = points[1].beyond < points[0].beyond;
-    if (count == 2 && inside == 0) return 0;
+    double z[4];
+    for (int i = 0; i < 4; i++) z[i] = cell->position[face[i]][2];
     for (int i = 0; i < count; i++) {
-        crossings[i].is_folded = inside != count;
-        move_to_point(cell, face, &points[inside == 2 ? i : nearest], &crossings[i]);
+        const patch_point *point = &points[inside == 2 ? i : nearest];
+        crossings[i].is_folded = count != 1 || inside != 1;
+        crossings[i].u = clamp_unit(point->u);
+        crossings[i].w = clamp_unit(point->w);
+        if (count == 2 || inside == 1) crossings[i].z = bilinear(z, crossings[i].u, crossings[i].w);
     }
-    return count;
 }
 
 static int insert_crossing(reference_crossing *crossings, int count, const reference_crossing *found)
@@ -222,7 +214,7 @@ static int polyhedron_crossings(const reference_cell *cell, const reference_line
             found[of_face].face = face;
             found[of_face++].triangle = next;
         }
-        if (of_face && p->face_size[face] == 4) of_face = move_to_patch(cell, line, p->faces[face], found, of_face);
+        if (of_face && p->face_size[face] == 4) move_to_patch(cell, line, p->faces[face], found, of_face);
         for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
     return count;
@@ -243,7 +235,7 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
             if (!triangle_crossed(cell, line, triangles[half], &found[of_face])) continue;
             found[of_face++].face = face;
         }
-        if (of_face && halves == 2) of_face = move_to_patch(cell, line, faces->vertices[face], found, of_face);
+        if (of_face && halves == 2) move_to_patch(cell, line, faces->vertices[face], found, of_face);
         for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
     return count;

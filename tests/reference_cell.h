@@ -40,7 +40,7 @@ typedef struct reference_crossing {
     int triangle;      /* of a polyhedron */
     double z_triangle; /* where the triangle is met */
     double u, w;
-    bool is_folded; /* the patch has no or no single such point: z is the triangle's */
+    bool is_folded; /* the ray meets the patch twice, or its triangles and not the patch */
 } reference_crossing;
 
 enum { REFERENCE_MAX_CROSSINGS = REFERENCE_MAX_TRIANGLES };
