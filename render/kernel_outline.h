@@ -79,10 +79,11 @@ SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
  *
  * Let L be linear in the point, and E its largest difference from the field at a vertex. The field less L is the
  * vertices' differences weighed by the shape functions, which in the cell are not negative and sum to 1: so |F - L| <=
- * E in all of it, however distorted it is, and at most 2 E on the eighth around that kernel_roots.h counts with. Where
- * a face's patch is not found its triangle is taken: the values differ by at most a quarter of L's alternating sum over
- * the quad. A hit is a zero of F, or between two values of opposite signs, so L is no larger there than these sums: the
- * hit is in a slab of the cell's hull, thin where the field is smooth. */
+ * E in all of it, however distorted it is, and at most 3.4 E (1.5³) on the quarter around in which solutions of a
+ * folded map count (kernel_map.h). Where a ray meets a quad's triangles but not its patch, the face's value is that of
+ * a place beside the ray: off by a part of the quad's alternating sum of corners, along which L changes by at most the
+ * sum of its three parts' sizes. A hit is a zero of F, or between two values of opposite signs, so L is no larger there
+ * than these sums: the hit is in a slab of the cell's hull, thin where the field is smooth. */
 
 /* Sums over the edges along each of the cell's coordinates: a mean edge times their number. */
 static inline int kernel_cell_edges(int type, signed char edges[3][4][2], int count[3])
@@ -136,11 +137,13 @@ static inline bool kernel_linear_part(const kernel_cell *c, float at[GRID_MAX_CE
     for (int i = 0; i < shape->face_count; i++) {
         const signed char *v = shape->faces[i].vertices;
         if (shape->faces[i].count == 3) continue;
-        const float sum = fabsf((at[v[0]] - at[v[1]]) + (at[v[2]] - at[v[3]]));
+        float sum = 0;
+        for (int a = 0; a < 3; a++)
+            sum += fabsf(g[a] * ((places[a][v[0]] - places[a][v[1]]) + (places[a][v[2]] - places[a][v[3]])));
         bend = sum > bend ? sum : bend;
     }
     /* f is at most about 1; places are known to a rounding of their distance from the tile, see KERNEL_OUTLINE_PAD. */
-    *thickness = 2 * error + 0.25f * bend + KERNEL_OUTLINE_PAD * (1 + size);
+    *thickness = 3.4f * error + bend + KERNEL_OUTLINE_PAD * (1 + size);
     return *thickness < 1;
 }
 
