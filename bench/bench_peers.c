@@ -10,7 +10,7 @@
 static const struct {
     const char *name;
     mmbvh_options how;
-} builders[] = {{"sah", {0}}};
+} builders[] = {{"sah", {0}}, {"morton", {.builder = MMBVH_MORTON}}};
 
 enum { BUILDERS = sizeof builders / sizeof *builders };
 

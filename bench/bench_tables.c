@@ -20,8 +20,10 @@ static const int groups[GROUPS] = {1, 4, 8, 16, 24, 32};
 /* In sides of a cube. As in table 4.3 from a quarter to one and a half of what other tables use. */
 static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
 
-/* Ways down the tree that isosurfaces can be made to take. */
-static const char *const traversals[] = {"packets"};
+static const struct {
+    const char *name;
+    render_traversal traversal;
+} traversals[] = {{"tiles", RENDER_TILES}, {"packets", RENDER_PACKETS}, {"spmd", RENDER_SPMD}};
 
 static void measure_frames(bench_scene *s, const char *name, const bench_command *command)
 {
@@ -50,28 +52,36 @@ static void measure_volume(bench_scene *s, const char *name, const bench_command
     bench_scene_integral_error(s, name);
 }
 
-static void table_groups(bench_scene *s, const bench_command *command)
+/* Tiles look up as many samples as they can, whatever the group. */
+static void measure_groups(bench_scene *s, const char *prefix, const bench_command *command)
 {
-    bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
+    char name[64];
+    s->job.traversal = RENDER_TILES;
+    snprintf(name, sizeof name, "%s tiles", prefix);
+    measure_volume(s, name, command);
+    s->job.traversal = RENDER_PACKETS;
     for (int i = 0; i < GROUPS; i++) {
-        char name[64];
-        snprintf(name, sizeof name, "volume group %d", groups[i]);
+        snprintf(name, sizeof name, "%s group %d", prefix, groups[i]);
         s->job.sample_group = groups[i];
         measure_volume(s, name, command);
     }
 }
 
+static void table_groups(bench_scene *s, const bench_command *command)
+{
+    bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
+    measure_groups(s, "volume", command);
+}
+
 static void table_steps(bench_scene *s, const bench_command *command)
 {
     bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
-    for (int step = 0; step < STEPS; step++)
-        for (int i = 0; i < GROUPS; i++) {
-            char name[64];
-            snprintf(name, sizeof name, "volume step %g group %d", steps[step], groups[i]);
-            s->job.step = 2 * steps[step] / s->subject.n;
-            s->job.sample_group = groups[i];
-            measure_volume(s, name, command);
-        }
+    for (int step = 0; step < STEPS; step++) {
+        char prefix[64];
+        snprintf(prefix, sizeof prefix, "volume step %g", steps[step]);
+        s->job.step = 2 * steps[step] / s->subject.n;
+        measure_groups(s, prefix, command);
+    }
 }
 
 static void table_scaling(bench_scene *s, const bench_command *command)
@@ -85,9 +95,11 @@ static void measure_traversals(bench_scene *s, const bench_command *command)
 {
     for (size_t i = 0; i < sizeof traversals / sizeof *traversals; i++) {
         char name[64];
-        snprintf(name, sizeof name, "isosurface %s", traversals[i]);
+        snprintf(name, sizeof name, "isosurface %s", traversals[i].name);
+        s->job.traversal = traversals[i].traversal;
         measure_surface(s, name, command);
     }
+    s->job.traversal = RENDER_TILES;
 }
 
 static void table_sizes(bench_scene *s, const bench_command *command)

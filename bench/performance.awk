@@ -358,13 +358,14 @@ function section_groups(    p, i, g, m, n, line) {
     if (!meshes[p]) return
     split("1 4 8 16 24 32", group, " ")
     print "\n### Table 4.2: samples looked up together, Mrays/s\n"
-    print "| mesh | n | cells | 1 | 4 | 8 | 16 | 24 | 32 | error |"
-    print "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
+    print "| mesh | n | cells | 1 | 4 | 8 | 16 | 24 | 32 | error | by tiles |"
+    print "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
     for (i = 1; i <= meshes[p]; i++) {
         m = mesh[p, i]; n = side[p, i]
         line = ""
         for (g = 1; g <= 6; g++) line = line " | " milliseconds(p, m, n, "volume group " group[g])
-        printf "| %s | %d | %d%s | %s |\n", m, n, cells[p, m, n], line, most(p, m, n, "volume group 16 integral error", 1)
+        printf "| %s | %d | %d%s | %s | %s |\n", m, n, cells[p, m, n], line, most(p, m, n, "volume group 16 integral error", 1),
+            milliseconds(p, m, n, "volume tiles")
     }
 }
 
@@ -375,12 +376,13 @@ function section_step_sizes(    p, i, g, m, n, line) {
     split("0.125 0.25 0.375 0.5 0.625 0.75", step, " ")
     print "\n### Table 4.3: steps and groups, Mrays/s\n"
     print "On " m " " n ". A step in sides of a cube; other tables take 0.5.\n"
-    print "| step | 1 | 4 | 8 | 16 | 24 | 32 | error |"
-    print "|--:|--:|--:|--:|--:|--:|--:|--:|"
+    print "| step | 1 | 4 | 8 | 16 | 24 | 32 | error | by tiles |"
+    print "|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
     for (i = 1; i <= 6; i++) {
         line = ""
         for (g = 1; g <= 6; g++) line = line " | " milliseconds(p, m, n, "volume step " step[i] " group " group[g])
-        printf "| %s%s | %s |\n", step[i], line, most(p, m, n, "volume step " step[i] " group 16 integral error", 1)
+        printf "| %s%s | %s | %s |\n", step[i], line, most(p, m, n, "volume step " step[i] " group 16 integral error", 1),
+            milliseconds(p, m, n, "volume step " step[i] " tiles")
     }
 }
 
