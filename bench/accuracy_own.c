@@ -168,7 +168,7 @@ static void group_rows(studio *s)
         snprintf(row.setting, sizeof row.setting, "%d", group);
         measure(s, &row);
     }
-    s->scene.job.sample_group = 16;
+    s->scene.job.sample_group = 64;
 }
 
 /* The mean of frames of different jitter: their times add up. */

@@ -248,7 +248,7 @@ static void begin_scene(accuracy_scene *scene, const accuracy_subject *s)
                               .parts = &scene->part,
                               .part_count = 1,
                               .step = s->cell_size,
-                              .sample_group = 16,
+                              .sample_group = 64,
                               .jitter = true,
                               .is_alone = true};
 }

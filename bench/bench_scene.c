@@ -44,7 +44,7 @@ static void set_job(bench_scene *s)
                           .lights = &light,
                           .light_count = 1,
                           .step = 1.0 / s->subject.n,
-                          .sample_group = 16,
+                          .sample_group = 64,
                           .jitter = true,
                           .is_alone = true};
     s->job.space = (render_space){.scale = 0.5, .depth_origin = distance};

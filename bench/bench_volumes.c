@@ -15,7 +15,13 @@
 #include "bench_session.h"
 
 /* DENSE: opacities between knots, dense enough to be the extinction: off by at most (ln 2 / 256)^2 / 8 = 9.2e-7. */
-enum { SIZE = 1080, DENSE = 256, DENSE_POINTS = (BENCH_KNOTS - 1) * DENSE + 1, FRAMES_SECONDS = 120, PEER_SECONDS = 300 };
+enum {
+    SIZE = 1080,
+    DENSE = 256,
+    DENSE_POINTS = (BENCH_KNOTS - 1) * DENSE + 1,
+    FRAMES_SECONDS = 120,
+    PEER_SECONDS = 300
+};
 
 typedef struct peer_look {
     float colours[3 * BENCH_KNOTS];

@@ -208,8 +208,9 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
     for (int n = 0; n < count; n++)
         kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
                                  &last);
-    for (int from = first; from <= last; from += KERNEL_MAX_GROUP) {
-        const int to = last - from < KERNEL_MAX_GROUP ? last : from + KERNEL_MAX_GROUP - 1;
+    const int group = t->frame->job->sample_group;
+    for (int from = first; from <= last; from += group) {
+        const int to = last - from < group ? last : from + group - 1;
         if (!kernel_tile_window(t, v, blocks, from, to)) break;
         if (t->frame->job->separate_samples) continue;
         for (int n = 0; n < count; n++) {

@@ -153,7 +153,7 @@ typedef struct render_job {
                          off by more, in linear light; 0: into parts no longer than step */
     double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
                          ranks, so that all cut alike. 0: of this rank's */
-    int sample_group; /* N of the sample position packets (thesis, 4.4.1), 1 .. 64; tiles take as many as they can */
+    int sample_group; /* samples of a ray looked up together, 1 .. 64: N of the sample position packets (thesis, 4.4.1) */
     bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
     int frame;        /* 0 .. : which of the accumulated frames this is */
     bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */

@@ -6,7 +6,7 @@
  * Lengths are in sides of the hull, 1 in the kernels' scaled units, and may be off by 1e-6; of rays aimed at edges one
  * in ten thousand, on a warped quad, by 1e-4. A ray that grazes the hull has no chord to that accuracy in float32:
  * positions are rounded by half a unit of 1 (6e-8) and so is the ray, and the chord is that of a hull whose planes lie
- * up to 1.2e-7 off. Where that changes the chord by more than 1e-6, what it changes is allowed as well; such a ray may
+ * up to 2.4e-7 off, a rounding on either side. Where that changes the chord by more than 1e-6, what it changes is allowed as well; such a ray may
  * also enter and leave the hull more than once. */
 #include "chord_aim.h"
 #include "cpu.h"

@@ -234,7 +234,7 @@ static void scene_image_defaults_hold(void **state)
     assert_true(image->width == 1280 && image->height == 720 && image->every == 1);
     check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
     assert_true(image->background[3] == 1);
-    assert_true(image->step == 0 && image->step_cells == 0.5 && image->sample_group == 16);
+    assert_true(image->step == 0 && image->step_cells == 0.5 && image->sample_group == 64);
     assert_true(image->jitter && image->frames == 1);
     assert_true(image->method == SCENE_SAMPLES && image->max_error == 0);
     assert_true(image->camera.is_automatic && image->camera.angle == 40 && image->camera.zoom == 1);

@@ -98,7 +98,7 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     out->method = in->method ? (scene_sampling_method)*in->method : in->max_error ? SCENE_SEGMENTS : SCENE_SAMPLES;
     out->step = in->step ? *in->step : 0;
     out->step_cells = in->step_cells ? *in->step_cells : 0.5;
-    out->sample_group = in->group ? *in->group : 16;
+    out->sample_group = in->group ? *in->group : 64;
     out->jitter = in->jitter ? *in->jitter : true;
     out->frames = in->frames ? *in->frames : 1;
     if (in->step && in->step_cells)

@@ -101,7 +101,7 @@ typedef struct scene_image {
     double max_error;             /* of segments: of a channel, linear; 0: by step */
     double step;                  /* sample distance in scene units; 0: by step_cells */
     double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
-    int sample_group;             /* 1 .. 64; 16 by default */
+    int sample_group;             /* 1 .. 64; 64 by default */
     bool jitter;                  /* true by default */
     int frames;                   /* accumulated; 1 by default, 1 .. 4096 */
     int output_count;             /* >= 1 */

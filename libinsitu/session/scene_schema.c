@@ -174,7 +174,7 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
               "is finer and slower.",                                                                                  \
       .by_default = "`0.5`", .low = 0, .is_low_excluded = true, .high = 1000)                                          \
     X(CYAML_FIELD_INT_PTR("group", OPTIONAL, scene_file_sampling, group),                                              \
-      .help = "Samples of a ray that are looked up together. Changes the speed, not the image.", .by_default = "`16`", \
+      .help = "Samples of a ray that are looked up together. Changes the speed, not the image.", .by_default = "`64`", \
       .low = 1, .high = 64)                                                                                            \
     X(CYAML_FIELD_BOOL_PTR("jitter", OPTIONAL, scene_file_sampling, jitter),                                           \
       .help = "Shift each pixel's samples by a part of a step of its own: fine noise instead of rings.",               \
