@@ -23,7 +23,8 @@
  *
  * Depths from these weights err as those from projected vertices do, by the roundings of X, Y and x, y, which are r of
  * the tile's size: an affine e is off by 3.3 r Na Nb at the very most, 1 r of that as a rule, so that a weight is off
- * by r times the square of the tile's size over the triangle's area. The placing of the vertices costs as much. */
+ * by r times the square of the tile's size over the triangle's area: too much where cells are smaller than tiles, so
+ * that short edges are always in doubt, and projected. */
 #ifndef RENDER_KERNEL_LINE_H
 #define RENDER_KERNEL_LINE_H
 
@@ -47,15 +48,21 @@ SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *til
     return 2 * (x > y ? x : y) + 5 * tile->radius * depth;
 }
 
-/* Of the edge from a to b, a before b in the order; sizes as above. */
+/* The most that Na Nb may be in squares of the edge's length: a weight is then off by 1 r of that as a rule, 2e-6. */
+#define KERNEL_SHORT_EDGE 32
+
+/* Of the edge from a to b, a before b in the order; sizes as above. An edge that is short beside the tile is in doubt
+ * on every ray. */
 SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
                                             float size_b)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double da = flat ? 1 : (double)a.z + f->depth_shift, db = flat ? 1 : (double)b.z + f->depth_shift;
     const double ax = (double)a.x, ay = (double)a.y, bx = (double)b.x, by = (double)b.y;
+    const float product = size_a * size_b, x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
+    const bool is_short = product > KERNEL_SHORT_EDGE * (x * x + y * y + z * z);
     return (kernel_line){(float)(ax * by - bx * ay), (float)(db * ay - da * by), (float)(da * bx - db * ax),
-                         6 * 6e-8f * size_a * size_b};
+                         is_short ? (float)INFINITY : 6 * 6e-8f * product};
 }
 
 SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_spot a, kernel_spot b)
