@@ -18,7 +18,7 @@ typedef struct kernel_samples {
     int first, count;
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* of the owning interval; only where contact is asked for */
-    vm marked; /* rays of which a sample, in this window or before, has two owners */
+    vf marked; /* where the rays' nearest sample with two owners is, of those of this window and before */
 } kernel_samples;
 
 /* A fragment under way on each ray. */
@@ -81,8 +81,9 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
     *end = (int)last;
 }
 
-/* A sample as a fragment of its own, in front of what is opaque. Of a sample that another cell owns too, which marks
- * its ray (render.h), one a ray is enough, and a clear one beside it makes sure that it overlaps something. */
+/* A sample as a fragment of its own, in front of what is opaque. Of those that another cell owns too, which mark their
+ * ray (render.h), the nearest counts, for others may be behind what is opaque on another rank; a clear one beside it
+ * makes sure that it overlaps something. */
 static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state, vm mask,
                                                                vf t, vf value)
 {
@@ -94,8 +95,8 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     for (int a = 0; a < 3; a++) colour[a] *= absorbed;
     mask = vm_and(mask, vm_and(vf_lt(t, p->t_far), vf_lt(zero, absorbed)));
     if (!p->frame->job->separate_samples) {
-        mask = vm_andnot(mask, state->samples->marked);
-        state->samples->marked = vm_or(state->samples->marked, mask);
+        mask = vm_and(mask, vf_lt(t, state->samples->marked));
+        state->samples->marked = vf_select(mask, t, state->samples->marked);
         kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, clear, vf_set(1));
     }
     kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, colour, left);
@@ -282,7 +283,7 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
     if (!kernel_sample_range(p, &first, &last)) return;
     /* Where samples are separate, all places count as taken, and what is there is not looked at. */
     const vf nothing = vf_set(f->job->separate_samples ? 0 : NAN);
-    s.marked = vm_none();
+    s.marked = vf_set(INFINITY);
     b.contact_in = b.contact_out = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] = vf_set(0);
     for (; first <= last; first += f->job->sample_group) {
         s.first = first;
