@@ -44,6 +44,46 @@ MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const f
     return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
 }
 
+/* A cell's values: their range, and whether all are finite. */
+typedef struct fetch_range {
+    double low, high;
+    bool is_finite;
+} fetch_range;
+
+MMBVH_INLINE fetch_range fetch_cell_range(const grid *g, const grid_array *values, int64_t cell,
+                                          const fetch_shape shape, const bool wide_index, const bool wide_number)
+{
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    double low = INFINITY, high = -INFINITY, poison = 0;
+    for (int i = 0; i < count; i++) {
+        const double v = fetch_number(values, fetch_index(&g->connectivity, first + i, wide_index), wide_number);
+        low = v < low ? v : low;
+        high = v > high ? v : high;
+        poison += v - v; /* 0 while all are finite, then not a number */
+    }
+    return (fetch_range){low, high, poison == 0};
+}
+
+/* The same of any cell and any field. */
+static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *field, int64_t cell)
+{
+    fetch_range range = {INFINITY, -INFINITY, true};
+    if (field->is_cell_centred) {
+        const double v = grid_field_value(field, cell);
+        return (fetch_range){v, v, isfinite(v)};
+    }
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
+        const double v = grid_field_value(field, vertex);
+        range.is_finite = range.is_finite && isfinite(v);
+        range.low = v < range.low ? v : range.low;
+        range.high = v > range.high ? v : range.high;
+    }
+    return range;
+}
+
 /* The largest float not above x, and the smallest not below it. A double beyond the floats' range goes to the largest
  * finite float or to infinity, whichever lies outward. Zero comes out positive, so that equal bounds are equal bits. */
 static inline float round_down(double x)

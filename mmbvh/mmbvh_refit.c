@@ -71,34 +71,19 @@ typedef struct span {
     int64_t unusable;
 } span;
 
-static inline void span_add(span *to, double low, double high, bool finite)
+static inline void span_add(span *to, fetch_range cell)
 {
-    if (!finite) {
+    if (!cell.is_finite) {
         to->unusable++;
         return;
     }
-    to->low = low < to->low ? low : to->low;
-    to->high = high > to->high ? high : to->high;
+    to->low = cell.low < to->low ? cell.low : to->low;
+    to->high = cell.high > to->high ? cell.high : to->high;
 }
 
 static inline range span_range(const span *s)
 {
     return s->low <= s->high ? (range){round_down(s->low), round_up(s->high)} : empty_range;
-}
-
-MMBVH_INLINE void span_add_cell(span *to, const sweep *s, int64_t cell, const fetch_shape shape, const bool wide_index,
-                                const bool wide_number)
-{
-    const int count = fetch_vertex_count(s->g, cell, shape);
-    const int64_t first = fetch_first(s->g, cell, count, shape);
-    double low = INFINITY, high = -INFINITY, poison = 0;
-    for (int i = 0; i < count; i++) {
-        const double v = fetch_number(&s->values, fetch_index(&s->g->connectivity, first + i, wide_index), wide_number);
-        low = v < low ? v : low;
-        high = v > high ? v : high;
-        poison += v - v; /* 0 while all are finite, then not a number */
-    }
-    span_add(to, low, high, poison == 0);
 }
 
 /* The sweep goes down through the cells too: fetch what later leaves will ask for, connectivity first, values after. */
@@ -131,7 +116,7 @@ MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, cons
         span leaf = {INFINITY, -INFINITY, 0};
         for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
             prefetch_cell(s, entry, shape, wide_index);
-            span_add_cell(&leaf, s, s->tree->cells[entry], shape, wide_index, wide_number);
+            span_add(&leaf, fetch_cell_range(s->g, &s->values, s->tree->cells[entry], shape, wide_index, wide_number));
         }
         set_range(s, i, span_range(&leaf));
         unusable += leaf.unusable;
@@ -148,9 +133,8 @@ FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 
 static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
 
-/* Leaves by a function a cell, for whatever the instances above do not read. */
-MMBVH_INLINE int64_t run_leaves(const sweep *s, int64_t first, int64_t end,
-                                void (*const add)(span *, const sweep *, int64_t))
+/* For whatever the instances above do not read. */
+static int64_t run_any(const sweep *s, int64_t first, int64_t end)
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
@@ -160,41 +144,12 @@ MMBVH_INLINE int64_t run_leaves(const sweep *s, int64_t first, int64_t end,
             continue;
         }
         span leaf = {INFINITY, -INFINITY, 0};
-        for (int64_t k = 0; k < count; k++) add(&leaf, s, s->tree->cells[ref + k]);
+        for (int64_t k = 0; k < count; k++)
+            span_add(&leaf, fetch_any_cell_range(s->g, s->field, s->tree->cells[ref + k]));
         set_range(s, i, span_range(&leaf));
         unusable += leaf.unusable;
     }
     return unusable;
-}
-
-static void add_any_cell(span *to, const sweep *s, int64_t cell)
-{
-    grid_walk walk = grid_walk_cell(s->g, cell);
-    double low = INFINITY, high = -INFINITY;
-    bool finite = true;
-    int64_t vertex;
-    while (grid_walk_next(&walk, &vertex)) {
-        const double v = grid_field_value(s->field, vertex);
-        finite = finite && isfinite(v);
-        low = v < low ? v : low;
-        high = v > high ? v : high;
-    }
-    span_add(to, low, high, finite);
-}
-
-static void add_cell_value(span *to, const sweep *s, int64_t cell)
-{
-    const double v = grid_field_value(s->field, cell);
-    span_add(to, v, v, isfinite(v));
-}
-
-static int64_t run_any(const sweep *s, int64_t first, int64_t end)
-{
-    return run_leaves(s, first, end, add_any_cell);
-}
-static int64_t run_by_cell(const sweep *s, int64_t first, int64_t end)
-{
-    return run_leaves(s, first, end, add_cell_value);
 }
 
 static int64_t run_infinite(const sweep *s, int64_t first, int64_t end)
@@ -220,8 +175,7 @@ static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
 static sweep_run choose_run(const grid *g, const grid_field *field)
 {
     if (!field) return run_infinite;
-    if (field->is_cell_centred) return run_by_cell;
-    if (field->component < 0 || field->values.is_integer || grid_has_faces(g)) return run_any;
+    if (field->is_cell_centred || field->component < 0 || field->values.is_integer || grid_has_faces(g)) return run_any;
     return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
 }
 

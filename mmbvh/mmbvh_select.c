@@ -25,12 +25,7 @@ struct selector {
     uint64_t *bits;
 };
 
-typedef struct extent {
-    double low, high;
-    bool is_finite;
-} extent;
-
-MMBVH_INLINE bool meets(const mmbvh_wish *wish, const extent *e)
+MMBVH_INLINE bool meets(const mmbvh_wish *wish, const fetch_range *e)
 {
     const float low = (float)e->low, high = (float)e->high;
     bool any = false;
@@ -41,7 +36,7 @@ MMBVH_INLINE bool meets(const mmbvh_wish *wish, const extent *e)
 
 /* Ghosts are passed over. */
 MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
-                          extent (*const find)(const selector *, int64_t))
+                          fetch_range (*const find)(const selector *, int64_t))
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
@@ -49,7 +44,7 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
         uint64_t word = s->bits[first / WORD_CELLS];
         for (int64_t i = 0; i < count; i++) {
             if (grid_is_ghost(s->g, first + i)) continue;
-            const extent e = find(s, first + i);
+            const fetch_range e = find(s, first + i);
             unusable += !e.is_finite;
             word |= (uint64_t)(e.is_finite & meets(s->wish, &e)) << i;
         }
@@ -58,60 +53,25 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
     return unusable;
 }
 
-MMBVH_INLINE extent extent_of(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
-                              const bool wide_number)
-{
-    const int count = fetch_vertex_count(s->g, cell, shape);
-    const int64_t first = fetch_first(s->g, cell, count, shape);
-    double low = INFINITY, high = -INFINITY, poison = 0;
-    for (int i = 0; i < count; i++) {
-        const double v = fetch_number(&s->values, fetch_index(&s->g->connectivity, first + i, wide_index), wide_number);
-        low = v < low ? v : low;
-        high = v > high ? v : high;
-        poison += v - v; /* 0 while all are finite, then not a number */
-    }
-    return (extent){low, high, poison == 0};
-}
-
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
-    MMBVH_INLINE extent name##_extent(const selector *s, int64_t cell)                                                 \
+    MMBVH_INLINE fetch_range name##_range(const selector *s, int64_t cell)                                             \
     {                                                                                                                  \
-        return extent_of(s, cell, shape, wide_index, wide_number);                                                     \
+        return fetch_cell_range(s->g, &s->values, cell, shape, wide_index, wide_number);                               \
     }                                                                                                                  \
     static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
     {                                                                                                                  \
-        return mark(s, begin, end, name##_extent);                                                                     \
+        return mark(s, begin, end, name##_range);                                                                      \
     }
 FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 
-static extent any_extent(const selector *s, int64_t cell)
+MMBVH_INLINE fetch_range any_range(const selector *s, int64_t cell)
 {
-    extent e = {INFINITY, -INFINITY, true};
-    grid_walk walk = grid_walk_cell(s->g, cell);
-    int64_t vertex;
-    while (grid_walk_next(&walk, &vertex)) {
-        const double v = grid_field_value(s->wish->field, vertex);
-        e.is_finite = e.is_finite && isfinite(v);
-        e.low = v < e.low ? v : e.low;
-        e.high = v > e.high ? v : e.high;
-    }
-    return e;
+    return fetch_any_cell_range(s->g, s->wish->field, cell);
 }
 
 static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
 {
-    return mark(s, begin, end, any_extent);
-}
-
-static extent cell_extent(const selector *s, int64_t cell)
-{
-    const double v = grid_field_value(s->wish->field, cell);
-    return (extent){v, v, isfinite(v)};
-}
-
-static int64_t mark_by_cell(const selector *s, int64_t begin, int64_t end)
-{
-    return mark(s, begin, end, cell_extent);
+    return mark(s, begin, end, any_range);
 }
 
 static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *bits)
@@ -119,9 +79,7 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
     static const selector_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(mark_vertices);
     const grid_field *field = wish->field;
     selector s = {.run = mark_any, .g = g, .wish = wish, .values = field->values, .bits = bits};
-    if (field->is_cell_centred)
-        s.run = mark_by_cell;
-    else if (field->component >= 0 && !field->values.is_integer && !grid_has_faces(g))
+    if (!field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !grid_has_faces(g))
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
     if (field->component > 0) s.values.data += field->component * field->component_stride;
     return s;

@@ -10,6 +10,7 @@
 #include "session_tree.h"
 
 #include "memory.h"
+#include "mmbvh_fetch.h"
 #include "session_shown.h"
 #include "session_values.h"
 
@@ -274,33 +275,16 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
-/* False where one of the cell's values is not finite. */
-static bool cell_extent(const grid *g, const grid_field *field, int64_t cell, double *low, double *high)
-{
-    grid_walk walk = grid_walk_cell(g, cell);
-    int64_t vertex;
-    *low = INFINITY;
-    *high = -INFINITY;
-    while (grid_walk_next(&walk, &vertex)) {
-        const double v = grid_field_value(field, field->is_cell_centred ? cell : vertex);
-        if (!isfinite(v)) return false;
-        *low = fmin(*low, v);
-        *high = fmax(*high, v);
-        if (field->is_cell_centred) break;
-    }
-    return true;
-}
-
 static void find_extent(const grid *g, const grid_field *field, int threads, double *low, double *high)
 {
     double least = INFINITY, most = -INFINITY;
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
         if (grid_is_ghost(g, cell)) continue;
-        double lowest, highest;
-        if (!cell_extent(g, field, cell, &lowest, &highest)) continue;
-        least = fmin(least, lowest);
-        most = fmax(most, highest);
+        const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
+        if (!of_cell.is_finite) continue;
+        least = fmin(least, of_cell.low);
+        most = fmax(most, of_cell.high);
     }
     *low = least;
     *high = most;
