@@ -149,9 +149,12 @@ static bool add_scalar(session_mesh *mesh, int field, int component, bool is_rec
     return true;
 }
 
-static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_vertices, bool wants_ranges)
+/* *marked: NULL where the mesh does not have the field. */
+static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_vertices, bool wants_ranges,
+                        session_scalar **marked)
 {
     const int index = session_find_field(mesh, field->name);
+    *marked = NULL;
     if (index < 0) return true;
     const insitu_field *given = &mesh->fields[index].given;
     session_scalar *scalar = session_find_scalar(mesh, field, at_vertices);
@@ -164,25 +167,32 @@ static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_ve
     scalar->is_used = true;
     scalar->wants_ranges = scalar->wants_ranges || wants_ranges;
     mesh->is_needed = mesh->is_needed || wants_ranges;
+    *marked = scalar;
     return true;
+}
+
+static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)
+{
+    session_scalar *scalar;
+    if (!mark_scalar(mesh, &layer->field, true, true, &scalar)) return false;
+    if (scalar && !session_shown_surface(scalar, layer)) return false;
+    return !layer->has_colour_by || mark_scalar(mesh, &layer->colour_by, false, false, &scalar);
+}
+
+static bool mark_volume(const insitu_session *session, session_mesh *mesh, const scene_volume *layer)
+{
+    session_scalar *scalar;
+    if (!mark_scalar(mesh, &layer->field, false, true, &scalar)) return false;
+    return !scalar || session_shown_volume(session, scalar, layer);
 }
 
 static bool mark_image(const insitu_session *session, session_mesh *mesh, const scene_image *image)
 {
     bool is_marked = true;
-    for (int i = 0; i < image->isosurface_count && is_marked; i++) {
-        const scene_isosurface *layer = &image->isosurfaces[i];
-        is_marked = mark_scalar(mesh, &layer->field, true, true);
-        session_scalar *scalar = is_marked ? session_find_scalar(mesh, &layer->field, true) : NULL;
-        if (scalar) is_marked = session_shown_surface(scalar, layer);
-        if (is_marked && layer->has_colour_by) is_marked = mark_scalar(mesh, &layer->colour_by, false, false);
-    }
-    for (int i = 0; i < image->volume_count && is_marked; i++) {
-        const scene_volume *layer = &image->volumes[i];
-        is_marked = mark_scalar(mesh, &layer->field, false, true);
-        session_scalar *scalar = is_marked ? session_find_scalar(mesh, &layer->field, false) : NULL;
-        if (scalar) is_marked = session_shown_volume(session, scalar, layer);
-    }
+    for (int i = 0; i < image->isosurface_count && is_marked; i++)
+        is_marked = mark_surface(mesh, &image->isosurfaces[i]);
+    for (int i = 0; i < image->volume_count && is_marked; i++)
+        is_marked = mark_volume(session, mesh, &image->volumes[i]);
     return is_marked;
 }
 

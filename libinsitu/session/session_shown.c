@@ -37,15 +37,13 @@ bool session_shown_surface(session_scalar *scalar, const scene_isosurface *layer
 
 bool session_shown_volume(const insitu_session *session, session_scalar *scalar, const scene_volume *layer)
 {
-    if (!layer->range.is_fixed) {
-        /* The values that show are known when all ranks have told theirs. */
-        scalar->shows_all = true;
-        return true;
-    }
+    const scene_range *range = &layer->range;
     session_transfer t;
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
     base_error error = {0};
-    if (session_make_transfer(session, layer->colour_map, layer->range.low, layer->range.high, layer, &t, &error)) {
+    /* A range from the data is known when all ranks have told theirs. */
+    if (!range->is_fixed ||
+        session_make_transfer(session, layer->colour_map, range->low, range->high, layer, &t, &error)) {
         scalar->shows_all = true;
         return true;
     }
