@@ -89,9 +89,8 @@ static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32
         if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
         kernel_cell_move(c, t->frame, &t->tile, g);
         kernel_vertex_outline(c, &outline);
-        const kernel_lie lie = kernel_outline_lie(&t->tile_planes, &outline);
-        const unsigned meets = blocks & lie.blocks & kernel_blocks_beyond(t, lie.near);
-        if (!meets || lie.far < t->t_near) continue;
+        const unsigned meets = kernel_tile_keep(t, &outline, blocks);
+        if (!meets) continue;
         kernel_cell_order(c);
         kernel_cell_domain(c, transfer);
         kernel_cell_lines(c, t->frame, &t->tile);

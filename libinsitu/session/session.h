@@ -177,6 +177,13 @@ static inline int64_t session_type_size(insitu_type type)
     return 0;
 }
 
+/* FNV-1a: *hash, SESSION_HASH_BEGIN at first, takes the bytes in. */
+#define SESSION_HASH_BEGIN 0xcbf29ce484222325u
+static inline void session_hash_bytes(uint64_t *hash, const void *data, size_t size)
+{
+    for (size_t i = 0; i < size; i++) *hash = (*hash ^ ((const unsigned char *)data)[i]) * 0x100000001b3u;
+}
+
 static inline insitu_status session_no_memory(base_error *error, int64_t bytes, const char *what)
 {
     return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of %s", (long long)bytes, what);

@@ -43,25 +43,20 @@ static size_t write_table(const insitu_session *session, char *text, size_t capa
     return at;
 }
 
-static void hash_bytes(uint64_t *hash, const void *data, size_t size)
-{
-    for (size_t i = 0; i < size; i++) *hash = (*hash ^ ((const unsigned char *)data)[i]) * 0x100000001b3u;
-}
-
 uint64_t session_table_hash(const insitu_session *session)
 {
-    uint64_t hash = 0xcbf29ce484222325u;
+    uint64_t hash = SESSION_HASH_BEGIN;
     for (int i = 0; i < session->mesh_count; i++) {
         const session_mesh *mesh = session->meshes[i];
         if (!mesh->is_given) continue;
         const int head[] = {mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL, mesh->field_count};
-        hash_bytes(&hash, head, sizeof head);
-        hash_bytes(&hash, mesh->name, strlen(mesh->name) + 1);
+        session_hash_bytes(&hash, head, sizeof head);
+        session_hash_bytes(&hash, mesh->name, strlen(mesh->name) + 1);
         for (int f = 0; f < mesh->field_count; f++) {
             const insitu_field *field = &mesh->fields[f].given;
             const int tail[] = {field->component_count, (int)field->centring};
-            hash_bytes(&hash, tail, sizeof tail);
-            hash_bytes(&hash, field->name, strlen(field->name) + 1);
+            session_hash_bytes(&hash, tail, sizeof tail);
+            session_hash_bytes(&hash, field->name, strlen(field->name) + 1);
         }
     }
     return hash;

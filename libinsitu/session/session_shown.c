@@ -57,23 +57,15 @@ bool session_shown_is_bounded(const session_mesh *mesh)
     return true;
 }
 
-/* FNV-1a. */
-static uint64_t mix(uint64_t key, const void *data, size_t size)
-{
-    const unsigned char *bytes = data;
-    for (size_t i = 0; i < size; i++) key = (key ^ bytes[i]) * 0x100000001b3u;
-    return key;
-}
-
 uint64_t session_shown_key(const session_mesh *mesh)
 {
-    uint64_t key = 0xcbf29ce484222325u;
+    uint64_t key = SESSION_HASH_BEGIN;
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *s = &mesh->scalars[i];
         if (!s->wants_ranges) continue;
         const int names[4] = {s->field, s->component, s->is_recentred, s->interval_count};
-        key = mix(key, names, sizeof names);
-        key = mix(key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);
+        session_hash_bytes(&key, names, sizeof names);
+        session_hash_bytes(&key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);
     }
     return key;
 }
