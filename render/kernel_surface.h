@@ -293,7 +293,9 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm near = kernel_is_near(p, i);
-        const vm wanted = layer->root == RENDER_ROBUST ? near : vm_and(near, kernel_changes_sign(i));
+        /* Where a ray crosses both halves of a quad, but not its patch, in and out are one place, beside the ray. */
+        const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        const vm wanted = vm_and(near, layer->root == RENDER_ROBUST ? room : kernel_changes_sign(i));
         if (!vm_any(wanted)) continue;
         kernel_poly_setup(poly, layer, c, value);
         if (layer->root == RENDER_ROBUST) {
