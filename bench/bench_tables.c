@@ -23,7 +23,8 @@ static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
 static const struct {
     const char *name;
     render_traversal traversal;
-} traversals[] = {{"tiles", RENDER_TILES}, {"packets", RENDER_PACKETS}, {"spmd", RENDER_SPMD}};
+} traversals[] = {
+    {"binned", RENDER_BINNED}, {"tiles", RENDER_TILES}, {"packets", RENDER_PACKETS}, {"spmd", RENDER_SPMD}};
 
 static void measure_frames(bench_scene *s, const char *name, const bench_command *command)
 {
@@ -99,7 +100,7 @@ static void measure_traversals(bench_scene *s, const bench_command *command)
         s->job.traversal = traversals[i].traversal;
         measure_surface(s, name, command);
     }
-    s->job.traversal = RENDER_TILES;
+    s->job.traversal = RENDER_BINNED;
 }
 
 static void table_sizes(bench_scene *s, const bench_command *command)

@@ -229,7 +229,7 @@ SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile,
     const double depth = f->job->camera.is_orthographic ? f->job->space.scale : z;
     *out_x = (float)(x - tile->centre_x * depth);
     *out_y = (float)(y - tile->centre_y * depth);
-    *out_z = (float)(z - f->depth_shift);
+    *out_z = (float)(z - tile->depth_shift);
 }
 
 SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
@@ -251,7 +251,7 @@ SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const k
     const kernel_doubles depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * place[2] : place[2];
     const floats x = __builtin_convertvector(place[0] - tile->centre_x * depth, floats);
     const floats y = __builtin_convertvector(place[1] - tile->centre_y * depth, floats);
-    const floats z = __builtin_convertvector(place[2] - f->depth_shift, floats);
+    const floats z = __builtin_convertvector(place[2] - tile->depth_shift, floats);
     memcpy(c->x, &x, sizeof x);
     memcpy(c->y, &y, sizeof y);
     memcpy(c->z, &z, sizeof z);

@@ -142,8 +142,10 @@ static inline bool kernel_linear_part(const kernel_cell *c, float at[GRID_MAX_CE
             sum += fabsf(g[a] * ((places[a][v[0]] - places[a][v[1]]) + (places[a][v[2]] - places[a][v[3]])));
         bend = sum > bend ? sum : bend;
     }
-    /* f is at most about 1; places are known to a rounding of their distance from the tile, see KERNEL_OUTLINE_PAD. */
-    *thickness = 3.4f * error + bend + KERNEL_OUTLINE_PAD * (1 + size);
+    /* f is at most about 1. Places are known to a rounding of where they are: X, Y and Z to r, their middle to 8 r. */
+    float blur = 0;
+    for (int a = 0; a < 3; a++) blur += fabsf(g[a]) * kernel_largest(places[a], c->count);
+    *thickness = 3.4f * error + bend + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * blur;
     return *thickness < 1;
 }
 

@@ -18,6 +18,7 @@
 typedef struct kernel_tile {
     int x0, y0;                /* the upper left pixel */
     double centre_x, centre_y; /* slope (perspective) or offset (orthographic) of the centre */
+    double depth_shift;        /* the frame's */
     float shear_x, shear_y;    /* the centre's slope; 0 where orthographic */
     /* Rays in tile space, by the tile's columns and rows. */
     float origin_x[KERNEL_TILE], origin_y[KERNEL_TILE], slope_x[KERNEL_TILE], slope_y[KERNEL_TILE];
@@ -69,6 +70,7 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
 {
     tile->x0 = x0;
     tile->y0 = y0;
+    tile->depth_shift = f->depth_shift;
     tile->centre_x = kernel_column(f, x0 + 0.5 * (KERNEL_TILE - 1));
     tile->centre_y = kernel_row(f, y0 + 0.5 * (KERNEL_TILE - 1));
     const bool flat = f->job->camera.is_orthographic;

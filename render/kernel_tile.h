@@ -19,7 +19,6 @@
 #include "kernel_packet.h"
 
 enum {
-    KERNEL_BLOCK = 4, /* pixels along its side */
     KERNEL_BLOCKS_ACROSS = KERNEL_TILE / KERNEL_BLOCK,
     KERNEL_BLOCKS = KERNEL_BLOCKS_ACROSS * KERNEL_BLOCKS_ACROSS,
     KERNEL_BLOCK_PACKETS = KERNEL_BLOCK * KERNEL_BLOCK / SIMD_WIDTH,
@@ -65,38 +64,63 @@ static inline double kernel_border_y(const kernel_frame *f, const kernel_tile *t
     return kernel_row(f, tile->y0 + n * KERNEL_BLOCK - 0.5) - tile->centre_y;
 }
 
+/* Slopes or offsets of all borders, and of the direction along the rays. */
+typedef struct kernel_borders {
+    double x[KERNEL_BLOCKS_ACROSS + 1], y[KERNEL_BLOCKS_ACROSS + 1];
+    double centre_x, centre_y;
+} kernel_borders;
+
+static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f, const kernel_tile *tile)
+{
+    for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
+        b->x[n] = kernel_border_x(f, tile, n) + tile->centre_x;
+        b->y[n] = kernel_border_y(f, tile, n) + tile->centre_y;
+    }
+    b->centre_x = tile->centre_x;
+    b->centre_y = tile->centre_y;
+}
+
+/* Those of the picture: what lies in its first block lies in it. */
+static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame *f)
+{
+    for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
+        b->x[n] = kernel_column(f, n ? f->job->camera.width - 0.5 : -0.5);
+        b->y[n] = kernel_row(f, n ? f->job->camera.height - 0.5 : -0.5);
+    }
+    b->centre_x = b->centre_y = 0;
+}
+
 /* The planes relative to the eye: positive on the side of greater columns and rows. */
-static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_frame *f, const kernel_tile *tile)
+static inline void kernel_plane_lanes_setup(kernel_plane_lanes *l, const kernel_frame *f, const kernel_borders *b)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double scale = f->job->space.scale;
     memset(l, 0, sizeof *l);
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
-        const double x = kernel_border_x(f, tile, n) + tile->centre_x, y = kernel_border_y(f, tile, n) + tile->centre_y;
         const int row = KERNEL_ROWS_LANE + n;
         l->right[n] = 1;
         l->up[row] = -1;
-        l->forward[n] = flat ? 0 : -x;
-        l->forward[row] = flat ? 0 : y;
-        l->offset[n] = flat ? -x * scale : 0;
-        l->offset[row] = flat ? y * scale : 0;
+        l->forward[n] = flat ? 0 : -b->x[n];
+        l->forward[row] = flat ? 0 : b->y[n];
+        l->offset[n] = flat ? -b->x[n] * scale : 0;
+        l->offset[row] = flat ? b->y[n] * scale : 0;
     }
     l->forward[KERNEL_DEPTH_LANE] = l->forward[KERNEL_ALONG_LANE] = 1;
     l->offset[KERNEL_DEPTH_LANE] = -f->depth_shift;
-    l->right[KERNEL_ALONG_LANE] = flat ? 0 : tile->centre_x;
-    l->up[KERNEL_ALONG_LANE] = flat ? 0 : tile->centre_y;
+    l->right[KERNEL_ALONG_LANE] = flat ? 0 : b->centre_x;
+    l->up[KERNEL_ALONG_LANE] = flat ? 0 : b->centre_y;
 }
 
 /* Planes in tree space, for boxes. Normals are rounded before the plane is put through the eye, so that it goes
  * through it: what is left is a turn by one rounding, at a distance of no more than the eye's and the scene's. */
-static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_tile *tile)
+static inline void kernel_tree_planes(kernel_planes *q, const kernel_frame *f, const kernel_borders *b)
 {
     const render_camera *c = &f->job->camera;
     const render_space *s = &f->job->space;
     kernel_plane_lanes l;
     float normal[3][KERNEL_LANES], offset[KERNEL_LANES], error[KERNEL_LANES];
     double size = 0;
-    kernel_plane_lanes_setup(&l, f, tile);
+    kernel_plane_lanes_setup(&l, f, b);
     for (int i = 0; i < KERNEL_LANES; i++) error[i] = 0;
     for (int a = 0; a < 3; a++) {
         const double eye = (c->eye[a] - s->origin[a]) * s->scale;

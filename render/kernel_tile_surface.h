@@ -239,6 +239,14 @@ SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
     for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) kernel_tile_parts(t, 0, &part, 1, t->wanted);
 }
 
+SIMD_INLINE void kernel_tile_surfaces(kernel_tile_trace *t)
+{
+    for (t->layer = 0; t->layer < t->frame->surface_count; t->layer++) {
+        t->surface = &t->frame->surfaces[t->layer];
+        kernel_tile_surface(t);
+    }
+}
+
 SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, kernel_thread *thread, int x0, int y0,
                                    unsigned wanted)
 {
@@ -249,7 +257,9 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     t->t_near = (float)-f->depth_shift;
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);
-    kernel_tree_planes(&t->tree_planes, f, &t->tile);
+    kernel_borders borders;
+    kernel_tile_borders(&borders, f, &t->tile);
+    kernel_tree_planes(&t->tree_planes, f, &borders);
     kernel_tile_planes(&t->tile_planes, f, &t->tile);
 }
 

@@ -9,7 +9,12 @@
 #include "render.h"
 #include "render_polyhedra.h"
 
-enum { KERNEL_TILE = 16, KERNEL_MAX_GROUP = 64, KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS };
+enum {
+    KERNEL_TILE = 16,
+    KERNEL_BLOCK = 4, /* pixels along its side */
+    KERNEL_MAX_GROUP = 64,
+    KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS
+};
 
 /* Values that show: a node whose range meets none of these intervals is skipped. Rounded outward. */
 typedef struct kernel_interest {
@@ -39,11 +44,45 @@ typedef struct kernel_surface {
     double value_scale;       /* a power of two that brings the field's range near 1: for differences */
 } kernel_surface;
 
+/* Where a cell's surface of an isovalue may show: its least depth, and blocks of the picture, ends included. */
+typedef struct kernel_shown {
+    uint32_t cell;
+    uint32_t source; /* part * RENDER_MAX_ISOVALUES + index into the frame's isovalues */
+    float near;
+    uint16_t x0, x1, y0, y1;
+} kernel_shown;
+
+/* The same for one tile: a bit a block. */
+typedef struct kernel_tile_shown {
+    float near;
+    uint32_t cell, source, blocks;
+} kernel_tile_shown;
+
+typedef struct kernel_shown_list {
+    kernel_shown *items;
+    int64_t count, capacity;
+    bool is_full;   /* no more are wanted: memory ran out, or the bound is reached */
+    int64_t *bound; /* how many more all lists together may have room for */
+} kernel_shown_list;
+
+/* A subtree to look for them in. */
+typedef struct kernel_subtree {
+    int surface, part;
+    int64_t node;
+} kernel_subtree;
+
+typedef struct kernel_isovalue {
+    int surface, value;
+} kernel_isovalue;
+
 typedef struct kernel_frame {
     const render_job *job;
     int surface_count, volume_count;
     kernel_surface *surfaces; /* opaque ones first */
     int opaque_count;
+    kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
+    kernel_tile_shown *shown; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
+    uint32_t *shown_starts;
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3];  /* right, up, forward, each times the space's scale */
     double depth_shift;        /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */
@@ -52,6 +91,7 @@ typedef struct kernel_frame {
     double scaled_step;                          /* step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
     bool has_transparent;
+    bool is_binned;     /* surfaces' cells are binned by tile, where that pays */
     bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
     bool has_segments;  /* volumes are integrated by segments, else sampled */
@@ -84,6 +124,9 @@ typedef struct kernel_table {
     size_t cache_bytes;
     /* Trace the tile of pixels whose upper left one is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
+    /* What may show of the subtree is added to the list; grow() makes room for more, or the list full. */
+    void (*find_shown)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
+                       kernel_shown_list *list, bool (*grow)(kernel_shown_list *list));
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

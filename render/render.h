@@ -121,7 +121,9 @@ typedef struct render_part {
  * 16 x 16 rays wherever that can be had; packets are taken instead where segments are to be cut by transparent
  * surfaces. Segments are traced by packets always. */
 typedef enum render_traversal {
-    RENDER_TILES,   /* a tile of the picture goes down the tree at once */
+    RENDER_BINNED,  /* isosurfaces: the picture goes down the trees at once, and cells are binned by tile, unless more
+                      show than pay; samples as by RENDER_TILES */
+    RENDER_TILES,   /* a tile of the picture goes down the trees at once */
     RENDER_PACKETS, /* as many rays as a vector has lanes, together (thesis, 4.3.1) */
     RENDER_SPMD     /* every lane on its own */
 } render_traversal;
@@ -153,7 +155,8 @@ typedef struct render_job {
                          off by more, in linear light; 0: into parts no longer than step */
     double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
                          ranks, so that all cut alike. 0: of this rank's */
-    int sample_group; /* samples of a ray looked up together, 1 .. 64: N of the sample position packets (thesis, 4.4.1) */
+    int sample_group; /* samples of a ray looked up together, 1 .. 64: N of the sample position packets (thesis, 4.4.1)
+                       */
     bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
     int frame;        /* 0 .. : which of the accumulated frames this is */
     bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */

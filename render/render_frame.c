@@ -9,6 +9,7 @@
 #include "render_isa.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
+#include "render_shown.h"
 
 static double now(void)
 {
@@ -34,42 +35,67 @@ static void trace_tiles(const kernel_frame *frame, kernel_thread *thread, fragme
     }
 }
 
-static bool trace_frame(const kernel_frame *frame, fragment_writer *writers, int threads, render_statistics *statistics)
+/* Threads' states; false where memory ran out. */
+static bool begin_threads(const kernel_frame *frame, fragment_writer *writers, kernel_thread *states, int threads)
 {
     const size_t cache_bytes = render_kernels()->cache_bytes;
-    bool has_polyhedra = false;
+    bool has_polyhedra = false, has_memory = true;
     for (int i = 0; i < frame->job->part_count; i++)
         has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
-    int failed = 0;
-    int64_t failures = 0;
-    double surface = 0, volume = 0;
-#pragma omp parallel num_threads(threads) reduction(+ : failed, failures) reduction(max : surface, volume)
+#pragma omp parallel num_threads(threads) reduction(&& : has_memory)
     {
-        fragment_writer *writer = &writers[omp_get_thread_num()];
-        kernel_thread thread = {.cache = base_calloc(1, cache_bytes),
-                                .out = &writer->list,
-                                .reserve = fragment_reserve,
-                                .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
-                                .find_polyhedron = polyhedra_find,
-                                .polyhedron_scratch = polyhedra_scratch,
-                                .now = now};
-        thread.out_of_memory = !thread.cache || (has_polyhedra && !thread.polyhedra);
-        trace_tiles(frame, &thread, writer);
-        polyhedra_free(thread.polyhedra);
-        base_free(thread.cache);
-        failed += thread.out_of_memory;
-        failures += thread.map_failures;
-        surface = thread.surface_seconds;
-        volume = thread.volume_seconds;
+        /* By the thread that will use it: first touch. */
+        const int me = omp_get_thread_num();
+        states[me] = (kernel_thread){.cache = base_calloc(1, cache_bytes),
+                                     .out = &writers[me].list,
+                                     .reserve = fragment_reserve,
+                                     .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
+                                     .find_polyhedron = polyhedra_find,
+                                     .polyhedron_scratch = polyhedra_scratch,
+                                     .now = now};
+        has_memory = states[me].cache && (!has_polyhedra || states[me].polyhedra);
     }
-    if (statistics) {
-        const int64_t pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
-        statistics->rays = frame->job->pixels ? pixel_set_count(frame->job->pixels, pixels) : pixels;
-        statistics->map_failures = failures;
-        statistics->surface_ms = 1e3 * surface;
-        statistics->volume_ms = 1e3 * volume;
+    return has_memory;
+}
+
+static bool end_threads(kernel_thread *states, int threads, render_statistics *statistics)
+{
+    bool has_memory = true;
+    double surface = 0, volume = 0;
+    for (int i = 0; i < threads; i++) {
+        polyhedra_free(states[i].polyhedra);
+        base_free(states[i].cache);
+        has_memory = has_memory && !states[i].out_of_memory;
+        surface = fmax(surface, states[i].surface_seconds);
+        volume = fmax(volume, states[i].volume_seconds);
+        statistics->map_failures += states[i].map_failures;
     }
-    return failed == 0;
+    statistics->surface_ms += 1e3 * surface;
+    statistics->volume_ms += 1e3 * volume;
+    return has_memory;
+}
+
+static bool trace_frame(kernel_frame *frame, fragment_writer *writers, int threads, render_statistics *statistics)
+{
+    const render_job *job = frame->job;
+    const int64_t pixels = (int64_t)job->camera.width * job->camera.height;
+    kernel_thread *states = base_calloc((size_t)threads, sizeof *states);
+    if (!states) return false;
+    bool has_memory = begin_threads(frame, writers, states, threads);
+    *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
+    if (has_memory && frame->is_binned) {
+        const double start = now();
+        render_shown_find(frame, states, threads);
+        statistics->surface_ms = 1e3 * (now() - start);
+    }
+    if (has_memory) {
+#pragma omp parallel num_threads(threads)
+        trace_tiles(frame, &states[omp_get_thread_num()], &writers[omp_get_thread_num()]);
+    }
+    render_shown_free(frame);
+    has_memory = end_threads(states, threads, statistics) && has_memory;
+    base_free(states);
+    return has_memory;
 }
 
 /* One at every other pixel, where most of them are traced: memory that is not written to is none. */
@@ -81,6 +107,7 @@ static int64_t expected_fragments(const render_job *job)
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error)
 {
     kernel_frame frame;
+    render_statistics unwanted;
     insitu_status status = render_prepare(job, &frame, error);
     if (status != INSITU_OK) return status;
     const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
@@ -90,7 +117,7 @@ insitu_status render_frame(const render_job *job, fragment_list *out, render_sta
     bool has_memory = writers && fragment_pieces_begin(&pieces, out, expected_fragments(job));
     if (has_memory) {
         for (int i = 0; i < threads; i++) writers[i] = (fragment_writer){.pieces = &pieces, .piece = -1};
-        has_memory = trace_frame(&frame, writers, threads, statistics);
+        has_memory = trace_frame(&frame, writers, threads, statistics ? statistics : &unwanted);
         has_memory = fragment_pieces_end(&pieces, writers, threads) && has_memory;
     }
     base_free(writers);

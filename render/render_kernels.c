@@ -6,6 +6,7 @@
 #include "kernel_segments.h"
 #include "kernel_polyhedron_surface.h"
 #include "kernel_polyhedron_volume.h"
+#include "kernel_shown.h"
 #include "kernel_spmd.h"
 #include "kernel_tile_surface.h"
 #include "kernel_tile_volume.h"
@@ -53,6 +54,7 @@ typedef struct kernel_memory {
     kernel_surface_cache cache; /* first: kernel_thread's cache is this */
     kernel_tile_trace tile;
     kernel_tile_volume volume;
+    kernel_finder finder;
 } kernel_memory;
 
 SIMD_INLINE kernel_tile_volume *kernel_tile_volume_of(kernel_tile_trace *t)
@@ -128,10 +130,10 @@ static unsigned wanted_blocks(const render_job *job, int x0, int y0)
 static void trace_tile_surfaces(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    for (t->layer = 0; t->layer < t->frame->surface_count; t->layer++) {
-        t->surface = &t->frame->surfaces[t->layer];
-        kernel_tile_surface(t);
-    }
+    if (t->frame->shown)
+        kernel_tile_surfaces_shown(t);
+    else
+        kernel_tile_surfaces(t);
     for (unsigned begun = t->begun; begun; begun &= begun - 1)
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
             const int i = __builtin_ctz(begun) * KERNEL_BLOCK_PACKETS + n;
@@ -179,4 +181,14 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
         trace_tile_samples(t);
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), trace_tile};
+static void find_shown(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
+                       kernel_shown_list *list, bool (*grow)(kernel_shown_list *list))
+{
+    kernel_finder *finder = &((kernel_memory *)thread->cache)->finder;
+    kernel_finder_begin(finder, f, subtree);
+    finder->list = list;
+    finder->grow = grow;
+    kernel_find_shown(finder, subtree->node);
+}
+
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), trace_tile, find_shown};

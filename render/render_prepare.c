@@ -127,6 +127,7 @@ static double value_scale(const render_job *job, const render_surface_layer *lay
 static void prepare_surfaces(kernel_frame *f)
 {
     const render_job *job = f->job;
+    int isovalues = 0;
     for (int pass = 0; pass < 2; pass++) {
         uint32_t kind = FRAGMENT_SURFACE;
         for (int i = 0; i < job->surface_count; i++) {
@@ -141,6 +142,8 @@ static void prepare_surfaces(kernel_frame *f)
                 f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 f->opaque_count += is_opaque;
+                for (int value = 0; value < layer->value_count; value++)
+                    f->isovalues[isovalues++] = (kernel_isovalue){f->surface_count - 1, value};
                 f->has_transparent = f->has_transparent || !is_opaque;
             }
             kind += (uint32_t)layer->value_count;
@@ -257,6 +260,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     frame->needs_contact = job->volume_count && job->surface_count && !job->is_alone;
     const insitu_status segments = prepare_segments(frame, error);
     if (segments != INSITU_OK) render_unprepare(frame);
-    frame->by_tiles = job->traversal == RENDER_TILES && !(frame->has_segments && frame->has_transparent);
+    frame->by_tiles = job->traversal <= RENDER_TILES && !(frame->has_segments && frame->has_transparent);
+    frame->is_binned = frame->by_tiles && job->traversal == RENDER_BINNED && frame->surface_count && !job->pixels;
     return segments;
 }

@@ -58,11 +58,11 @@ static void threads_do_not_change_a_bit(void **state)
     }
 }
 
-/* A tile at once, a packet, each ray on its own: the same cells are met, or at least those that have a hit. Cells are
- * of ten pixels and of three, and some of the pixels are left out. */
+/* The picture at once, a tile, a packet, each ray on its own: the same cells are met, or at least those that have a
+ * hit. Cells are of ten pixels and of three, and some of the pixels are left out. */
 static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fixture_camera camera, bool all)
 {
-    enum { WIDTH = 61, HEIGHT = 47, TRAVERSALS = 3 };
+    enum { WIDTH = 61, HEIGHT = 47, TRAVERSALS = 4 };
     render_fixture f;
     drawn_frame drawn[TRAVERSALS];
     unsigned char pixels[(WIDTH * HEIGHT + 7) / 8] = {0};

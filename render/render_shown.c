@@ -1,0 +1,191 @@
+/* Subtrees are dealt to threads, each of which lists the cells it finds; then cells are counted tile by tile, room is
+ * made for each tile, and every thread bins its own cells. The bound on cells is a bound on memory and on time lost:
+ * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. */
+#include "render_shown.h"
+
+#include <omp.h>
+#include <string.h>
+
+#include "memory.h"
+#include "render_isa.h"
+
+enum { SUBTREES = 128, ITEMS = 1024, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
+
+/* ---- subtrees ------------------------------------------------------------------------------------------------- */
+
+typedef struct subtree_list {
+    kernel_subtree *items;
+    int64_t count;
+} subtree_list;
+
+/* The tree cut below its top, some SUBTREES of it, added to the list; which has room. */
+static void cut_tree(const mmbvh *tree, int surface, int part, subtree_list *list)
+{
+    const int64_t first = list->count;
+    list->items[list->count++] = (kernel_subtree){surface, part, 0};
+    for (int64_t next = first; next < list->count && list->count - first < SUBTREES;) {
+        const int64_t node = list->items[next].node;
+        if (mmbvh_node_count(tree, node)) {
+            next++;
+            continue;
+        }
+        const int64_t left = mmbvh_node_ref(tree, node);
+        memmove(list->items + next, list->items + next + 1, (size_t)(list->count - next - 1) * sizeof *list->items);
+        list->items[list->count - 1] = (kernel_subtree){surface, part, left};
+        list->items[list->count++] = (kernel_subtree){surface, part, left + 1};
+    }
+}
+
+static bool cut_trees(const kernel_frame *f, subtree_list *list)
+{
+    const render_job *job = f->job;
+    const int64_t trees = (int64_t)f->surface_count * job->part_count;
+    *list = (subtree_list){base_alloc((size_t)(trees * SUBTREES) * sizeof *list->items), 0};
+    if (!list->items) return false;
+    for (int s = 0; s < f->surface_count; s++)
+        for (int part = 0; part < job->part_count; part++)
+            if (f->surfaces[s].layer->field.ranges[part].low && job->parts[part].tree->node_count)
+                cut_tree(job->parts[part].tree, s, part, list);
+    return true;
+}
+
+/* ---- cells ---------------------------------------------------------------------------------------------------- */
+
+static bool grow(kernel_shown_list *list)
+{
+    const int64_t capacity = list->capacity + list->capacity / 2 + ITEMS;
+    int64_t left;
+#pragma omp atomic capture
+    left = *list->bound -= capacity - list->capacity;
+    kernel_shown *items = left < 0 ? NULL : base_realloc(list->items, (size_t)capacity * sizeof *items);
+    list->is_full = !items;
+    if (!items) return false;
+    list->items = items;
+    list->capacity = capacity;
+    return true;
+}
+
+/* ---- tiles ---------------------------------------------------------------------------------------------------- */
+
+static int64_t tiles_across(const kernel_frame *f)
+{
+    return (f->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
+}
+
+static int64_t tile_count(const kernel_frame *f)
+{
+    return tiles_across(f) * ((f->job->camera.height + KERNEL_TILE - 1) / KERNEL_TILE);
+}
+
+/* Blocks first .. last of a row or column, as bits of those of its n-th tile. */
+static unsigned bits_of(int first, int last, int tile)
+{
+    const int from = first - tile * BLOCKS, to = last - tile * BLOCKS;
+    const unsigned not_before = ~0u << (from > 0 ? from : 0);
+    return not_before & ((1u << BLOCKS) - 1) >> (to < BLOCKS - 1 ? BLOCKS - 1 - to : 0);
+}
+
+static void count_tiles(const kernel_shown_list *list, int64_t across, uint32_t *counts)
+{
+    for (const kernel_shown *s = list->items, *end = s + list->count; s < end; s++)
+        for (int y = s->y0 / BLOCKS; y <= s->y1 / BLOCKS; y++)
+            for (int x = s->x0 / BLOCKS; x <= s->x1 / BLOCKS; x++) counts[y * across + x]++;
+}
+
+/* at: where each tile's next one goes. */
+static void bin_tiles(const kernel_shown_list *list, int64_t across, uint32_t *at, kernel_tile_shown *out)
+{
+    for (const kernel_shown *s = list->items, *end = s + list->count; s < end; s++)
+        for (int y = s->y0 / BLOCKS; y <= s->y1 / BLOCKS; y++) {
+            const unsigned rows = bits_of(s->y0, s->y1, y);
+            for (int x = s->x0 / BLOCKS; x <= s->x1 / BLOCKS; x++) {
+                const unsigned columns = bits_of(s->x0, s->x1, x);
+                unsigned blocks = 0;
+                for (unsigned row = 0; row < BLOCKS; row++) blocks |= (rows >> row & 1 ? columns : 0) << BLOCKS * row;
+                out[at[y * across + x]++] = (kernel_tile_shown){s->near, s->cell, s->source, blocks};
+            }
+        }
+}
+
+/* counts: threads × tiles, to where each thread's ones of each tile go. Returns how many they are in all. */
+static uint64_t place_tiles(uint32_t *counts, int threads, int64_t tiles, uint32_t *starts)
+{
+    uint64_t sum = 0;
+    for (int64_t tile = 0; tile < tiles; tile++) {
+        starts[tile] = (uint32_t)sum;
+        for (int t = 0; t < threads; t++) {
+            const uint32_t count = counts[t * tiles + tile];
+            counts[t * tiles + tile] = (uint32_t)sum;
+            sum += count;
+        }
+    }
+    starts[tiles] = (uint32_t)sum;
+    return sum;
+}
+
+/* ---- all of it ------------------------------------------------------------------------------------------------ */
+
+typedef struct search {
+    kernel_frame *frame;
+    subtree_list subtrees;
+    kernel_shown_list *lists; /* one a thread */
+    uint32_t *counts, *starts;
+    kernel_tile_shown *shown;
+    int64_t bound;
+} search;
+
+static void run(search *s, kernel_thread *thread_of, int threads)
+{
+    const kernel_table *kernels = render_kernels();
+    const int64_t tiles = tile_count(s->frame), across = tiles_across(s->frame), most = 2 * s->bound;
+    bool is_full = false;
+#pragma omp parallel num_threads(threads)
+    {
+        const int me = omp_get_thread_num();
+        kernel_shown_list *list = &s->lists[me];
+#pragma omp for schedule(dynamic, 1)
+        for (int64_t i = 0; i < s->subtrees.count; i++)
+            if (!list->is_full) kernels->find_shown(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
+        count_tiles(list, across, s->counts + me * tiles);
+#pragma omp barrier
+#pragma omp single
+        {
+            for (int t = 0; t < threads; t++) is_full = is_full || s->lists[t].is_full;
+            const uint64_t count = is_full ? 0 : place_tiles(s->counts, threads, tiles, s->starts);
+            is_full = is_full || count > (uint64_t)most;
+            if (!is_full) s->shown = base_alloc(count * sizeof *s->shown);
+        }
+        if (s->shown) bin_tiles(list, across, s->counts + me * tiles, s->shown);
+    }
+}
+
+void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
+{
+    const int64_t tiles = tile_count(frame), pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
+    search s = {.frame = frame, .bound = pixels + ITEMS * (int64_t)threads};
+    s.lists = base_calloc((size_t)threads, sizeof *s.lists);
+    s.counts = base_calloc((size_t)(threads * tiles), sizeof *s.counts);
+    s.starts = base_alloc((size_t)(tiles + 1) * sizeof *s.starts);
+    if (s.lists && s.counts && s.starts && cut_trees(frame, &s.subtrees)) {
+        for (int t = 0; t < threads; t++) s.lists[t].bound = &s.bound;
+        run(&s, thread_of, threads);
+    }
+    for (int t = 0; s.lists && t < threads; t++) base_free(s.lists[t].items);
+    base_free(s.lists);
+    base_free(s.counts);
+    base_free(s.subtrees.items);
+    if (!s.shown) {
+        base_free(s.starts);
+        return;
+    }
+    frame->shown = s.shown;
+    frame->shown_starts = s.starts;
+}
+
+void render_shown_free(kernel_frame *frame)
+{
+    base_free(frame->shown);
+    base_free(frame->shown_starts);
+    frame->shown = NULL;
+    frame->shown_starts = NULL;
+}

@@ -1,0 +1,12 @@
+/* The cells whose isosurfaces may show, binned by tile of the picture (kernel_shown.h). */
+#ifndef RENDER_RENDER_SHOWN_H
+#define RENDER_RENDER_SHOWN_H
+
+#include "kernel_types.h"
+
+/* Fill frame->shown, which render_shown_free() frees; thread_of is one state a thread. Where more cells show than pay,
+ * or there is no memory for them, it stays NULL, and tiles go down the trees themselves. */
+void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
+void render_shown_free(kernel_frame *frame);
+
+#endif
