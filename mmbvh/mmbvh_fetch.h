@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "mmbvh_vec4.h"
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
@@ -124,34 +125,84 @@ MMBVH_INLINE void fetch_box_unite(fetch_box *to, const fetch_box *box)
     }
 }
 
+/* A box of floats that grows: lanes 0 to 2. */
+typedef struct fetch_span {
+    vec4 lower, upper;
+} fetch_span;
+
+static inline fetch_span fetch_span_empty(void)
+{
+    return (fetch_span){vec4_set1(INFINITY), vec4_set1(-INFINITY)};
+}
+
+static inline fetch_box fetch_span_box(const fetch_span *span)
+{
+    fetch_box box;
+    for (int axis = 0; axis < 3; axis++) {
+        box.lower[axis] = (double)span->lower[axis];
+        box.upper[axis] = (double)span->upper[axis];
+    }
+    return box;
+}
+
+/* Where a vertex's coordinates are: the axes' arrays have one stride. */
+MMBVH_INLINE const char *fetch_vertex(const grid *g, int64_t entry, const bool wide_index)
+{
+    return g->coordinates[0].data + fetch_index(&g->connectivity, entry, wide_index) * g->coordinates[0].stride;
+}
+
+/* The box grows by a cell whose coordinates are floats. */
+MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell, const fetch_shape shape,
+                                  const bool wide_index)
+{
+    const int64_t y = g->coordinates[1].data - g->coordinates[0].data;
+    const int64_t z = g->coordinates[2].data - g->coordinates[0].data;
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    for (int i = 0; i < count; i++) {
+        const char *at = fetch_vertex(g, first + i, wide_index);
+        const vec4 p = {*(const float *)(const void *)at, *(const float *)(const void *)(at + y),
+                        *(const float *)(const void *)(at + z), 0};
+        span->lower = vec4_min(p, span->lower);
+        span->upper = vec4_max(p, span->upper);
+    }
+}
+
+/* The box grows by a cell whose coordinates are doubles. */
+MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
+                                 const bool wide_index)
+{
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    for (int i = 0; i < count; i++) {
+        const char *at = fetch_vertex(g, first + i, wide_index);
+        for (int axis = 0; axis < 3; axis++) {
+            const int64_t offset = g->coordinates[axis].data - g->coordinates[0].data;
+            const double x = *(const double *)(const void *)(at + offset);
+            box->lower[axis] = x < box->lower[axis] ? x : box->lower[axis];
+            box->upper[axis] = x > box->upper[axis] ? x : box->upper[axis];
+        }
+    }
+}
+
 /* The box grows by so many cells. Floats are compared as floats, and only the outcome is widened. */
 MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
                                   const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
-    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    fetch_box wide = *box;
+    fetch_box all = *box;
+    fetch_span span = fetch_span_empty();
     for (int k = 0; k < cell_count; k++) {
-        const int count = fetch_vertex_count(g, cells[k], shape);
-        const int64_t first = fetch_first(g, cells[k], count, shape);
-        for (int i = 0; i < count; i++) {
-            const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
-            for (int axis = 0; axis < 3; axis++) {
-                const double x = fetch_number(&g->coordinates[axis], vertex, wide_number);
-                if (wide_number) {
-                    wide.lower[axis] = x < wide.lower[axis] ? x : wide.lower[axis];
-                    wide.upper[axis] = x > wide.upper[axis] ? x : wide.upper[axis];
-                } else {
-                    low[axis] = (float)x < low[axis] ? (float)x : low[axis];
-                    high[axis] = (float)x > high[axis] ? (float)x : high[axis];
-                }
-            }
+        if (wide_number) {
+            fetch_box_cell(&all, g, cells[k], shape, wide_index);
+        } else {
+            fetch_span_cell(&span, g, cells[k], shape, wide_index);
         }
     }
-    for (int axis = 0; axis < 3 && !wide_number; axis++) {
-        wide.lower[axis] = (double)low[axis] < wide.lower[axis] ? (double)low[axis] : wide.lower[axis];
-        wide.upper[axis] = (double)high[axis] > wide.upper[axis] ? (double)high[axis] : wide.upper[axis];
+    if (!wide_number) {
+        const fetch_box floats = fetch_span_box(&span);
+        fetch_box_unite(&all, &floats);
     }
-    *box = wide;
+    *box = all;
 }
 
 /* To a node's coordinates, outward: rounding is monotonic, so the box of the rounded is the rounded box. */
@@ -164,13 +215,15 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
     }
 }
 
-/* Where the coordinates are not all floats or all doubles, or cells may be polyhedra, fetch_box_cells() will not do. */
+/* Where the coordinates are not all floats or all doubles, or not of one stride, or cells may be polyhedra,
+ * fetch_box_cells() will not do. */
 static inline bool fetch_is_plain(const grid *g)
 {
     if (grid_has_faces(g)) return false;
     const grid_array *c = g->coordinates;
     const bool integer = c[0].is_integer || c[1].is_integer || c[2].is_integer;
-    return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide;
+    return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide && c[0].stride == c[1].stride &&
+           c[0].stride == c[2].stride;
 }
 
 static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cell)
@@ -202,6 +255,23 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
     DEFINE(prefix##_by_cell_48, FETCH_BY_CELL, false, true)                                                            \
     DEFINE(prefix##_by_cell_84, FETCH_BY_CELL, true, false)                                                            \
     DEFINE(prefix##_by_cell_88, FETCH_BY_CELL, true, true)
+
+/* The same of floats alone; the table is by [shape][wide_index]. */
+#define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
+    DEFINE(prefix##_tets_4, FETCH_TETS, false, false)                                                                  \
+    DEFINE(prefix##_tets_8, FETCH_TETS, true, false)                                                                   \
+    DEFINE(prefix##_uniform_4, FETCH_UNIFORM, false, false)                                                            \
+    DEFINE(prefix##_uniform_8, FETCH_UNIFORM, true, false)                                                             \
+    DEFINE(prefix##_by_cell_4, FETCH_BY_CELL, false, false)                                                            \
+    DEFINE(prefix##_by_cell_8, FETCH_BY_CELL, true, false)
+
+#define FETCH_FLOAT_TABLE(prefix)                                                                                      \
+    {                                                                                                                  \
+        {prefix##_tets_4, prefix##_tets_8}, {prefix##_uniform_4, prefix##_uniform_8},                                  \
+        {                                                                                                              \
+            prefix##_by_cell_4, prefix##_by_cell_8                                                                     \
+        }                                                                                                              \
+    }
 
 #define FETCH_TABLE(prefix)                                                                                            \
     {                                                                                                                  \
