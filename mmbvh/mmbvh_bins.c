@@ -169,17 +169,20 @@ float bins_least_cost(const item *items, int64_t count)
  * depends on it. No branch is there to be mispredicted. */
 int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count)
 {
+    enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
     const int factor = (uint16_t)m->factor[split.axis];
     const int first =
         (int16_t)m->origin[split.axis] + (split.border * 65536 + factor - 1) / factor; /* of the right ones */
     const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
-    int64_t left = 0;
+    char *base = (char *)items;
+    int64_t left = 0; /* bytes */
     for (int64_t i = 0; i < count; i++) {
-        const int centroid = upper[8 * i] - lower[8 * i];
+        const int before = upper[8 * i] - lower[8 * i] - first; /* negative: a left one */
         const item moved = items[i];
-        items[i] = items[left];
-        items[left] = moved;
-        left += centroid < first;
+        item *place = (item *)(void *)(base + left);
+        items[i] = *place;
+        *place = moved;
+        left += before >> SIGN_TO_SIZE & SIZE;
     }
-    return left;
+    return left / SIZE;
 }
