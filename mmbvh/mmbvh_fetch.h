@@ -11,13 +11,15 @@
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* How a cell's vertices are found: all cells are tets one after the other, all of one type, or each says its own. */
-typedef enum fetch_shape { FETCH_TETS, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
+/* How a cell's vertices are found: all cells are tets one after the other, or hexes, all of one type, or each says its
+ * own. */
+typedef enum fetch_shape { FETCH_TETS, FETCH_HEXES, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
 
 static inline fetch_shape fetch_grid_shape(const grid *g)
 {
     if (g->cell_types || g->offsets.data) return FETCH_BY_CELL;
-    return g->cell_type == GRID_TET ? FETCH_TETS : FETCH_UNIFORM;
+    if (g->cell_type == GRID_TET) return FETCH_TETS;
+    return g->cell_type == GRID_HEX ? FETCH_HEXES : FETCH_UNIFORM;
 }
 
 MMBVH_INLINE int64_t fetch_index(const grid_array *a, int64_t i, const bool wide)
@@ -36,6 +38,7 @@ MMBVH_INLINE double fetch_number(const grid_array *a, int64_t i, const bool wide
 MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_shape shape)
 {
     if (shape == FETCH_TETS) return 4;
+    if (shape == FETCH_HEXES) return 8;
     return grid_type_vertices(shape == FETCH_UNIFORM ? g->cell_type : grid_cell_type(g, cell));
 }
 
@@ -57,13 +60,23 @@ MMBVH_INLINE fetch_range fetch_cell_range(const grid *g, const grid_array *value
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
     double low = INFINITY, high = -INFINITY, poison = 0;
+    float float_low = INFINITY, float_high = -INFINITY, float_poison = 0;
     for (int i = 0; i < count; i++) {
-        const double v = fetch_number(values, fetch_index(&g->connectivity, first + i, wide_index), wide_number);
-        low = v < low ? v : low;
-        high = v > high ? v : high;
-        poison += v - v; /* 0 while all are finite, then not a number */
+        const char *at = values->data + fetch_index(&g->connectivity, first + i, wide_index) * values->stride;
+        if (wide_number) {
+            const double v = *(const double *)(const void *)at;
+            low = v < low ? v : low;
+            high = v > high ? v : high;
+            poison += v - v; /* 0 while all are finite, then not a number */
+        } else {
+            const float v = *(const float *)(const void *)at;
+            float_low = v < float_low ? v : float_low;
+            float_high = v > float_high ? v : float_high;
+            float_poison += v - v;
+        }
     }
-    return (fetch_range){low, high, poison == 0};
+    if (wide_number) return (fetch_range){low, high, poison == 0};
+    return (fetch_range){(double)float_low, (double)float_high, float_poison == 0};
 }
 
 /* The same of any cell and any field. */
@@ -243,46 +256,45 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
 /* One instance of a pass for each way an array can be laid out: DEFINE(name, shape, wide_index, wide_number) makes a
  * function, and FETCH_TABLE(prefix) is the table of them, by [shape][wide_index][wide_number]. */
 #define FETCH_INSTANCES(DEFINE, prefix)                                                                                \
-    DEFINE(prefix##_tets_44, FETCH_TETS, false, false)                                                                 \
-    DEFINE(prefix##_tets_48, FETCH_TETS, false, true)                                                                  \
-    DEFINE(prefix##_tets_84, FETCH_TETS, true, false)                                                                  \
-    DEFINE(prefix##_tets_88, FETCH_TETS, true, true)                                                                   \
-    DEFINE(prefix##_uniform_44, FETCH_UNIFORM, false, false)                                                           \
-    DEFINE(prefix##_uniform_48, FETCH_UNIFORM, false, true)                                                            \
-    DEFINE(prefix##_uniform_84, FETCH_UNIFORM, true, false)                                                            \
-    DEFINE(prefix##_uniform_88, FETCH_UNIFORM, true, true)                                                             \
-    DEFINE(prefix##_by_cell_44, FETCH_BY_CELL, false, false)                                                           \
-    DEFINE(prefix##_by_cell_48, FETCH_BY_CELL, false, true)                                                            \
-    DEFINE(prefix##_by_cell_84, FETCH_BY_CELL, true, false)                                                            \
-    DEFINE(prefix##_by_cell_88, FETCH_BY_CELL, true, true)
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                           \
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_hexes, FETCH_HEXES)                                                         \
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_uniform, FETCH_UNIFORM)                                                     \
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_by_cell, FETCH_BY_CELL)
 
-/* The same of floats alone; the table is by [shape][wide_index]. */
-#define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
-    DEFINE(prefix##_tets_4, FETCH_TETS, false, false)                                                                  \
-    DEFINE(prefix##_tets_8, FETCH_TETS, true, false)                                                                   \
-    DEFINE(prefix##_uniform_4, FETCH_UNIFORM, false, false)                                                            \
-    DEFINE(prefix##_uniform_8, FETCH_UNIFORM, true, false)                                                             \
-    DEFINE(prefix##_by_cell_4, FETCH_BY_CELL, false, false)                                                            \
-    DEFINE(prefix##_by_cell_8, FETCH_BY_CELL, true, false)
+#define FETCH_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                                   \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                                 \
+    DEFINE(prefix##_48, shape, false, true)                                                                            \
+    DEFINE(prefix##_88, shape, true, true)
 
-#define FETCH_FLOAT_TABLE(prefix)                                                                                      \
-    {                                                                                                                  \
-        {prefix##_tets_4, prefix##_tets_8}, {prefix##_uniform_4, prefix##_uniform_8},                                  \
-        {                                                                                                              \
-            prefix##_by_cell_4, prefix##_by_cell_8                                                                     \
-        }                                                                                                              \
-    }
-
+/* clang-format off */
 #define FETCH_TABLE(prefix)                                                                                            \
     {                                                                                                                  \
         {{prefix##_tets_44, prefix##_tets_48}, {prefix##_tets_84, prefix##_tets_88}},                                  \
-            {{prefix##_uniform_44, prefix##_uniform_48}, {prefix##_uniform_84, prefix##_uniform_88}},                  \
-        {                                                                                                              \
-            {prefix##_by_cell_44, prefix##_by_cell_48},                                                                \
-            {                                                                                                          \
-                prefix##_by_cell_84, prefix##_by_cell_88                                                               \
-            }                                                                                                          \
-        }                                                                                                              \
+        {{prefix##_hexes_44, prefix##_hexes_48}, {prefix##_hexes_84, prefix##_hexes_88}},                              \
+        {{prefix##_uniform_44, prefix##_uniform_48}, {prefix##_uniform_84, prefix##_uniform_88}},                      \
+        {{prefix##_by_cell_44, prefix##_by_cell_48}, {prefix##_by_cell_84, prefix##_by_cell_88}},                      \
     }
+/* clang-format on */
+
+/* The same of floats alone; the table is by [shape][wide_index]. */
+#define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                     \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_hexes, FETCH_HEXES)                                                   \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_uniform, FETCH_UNIFORM)                                               \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_by_cell, FETCH_BY_CELL)
+
+#define FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                             \
+    DEFINE(prefix##_44, shape, false, false)                                                                           \
+    DEFINE(prefix##_84, shape, true, false)
+
+/* clang-format off */
+#define FETCH_FLOAT_TABLE(prefix)                                                                                      \
+    {                                                                                                                  \
+        {prefix##_tets_44, prefix##_tets_84},                                                                          \
+        {prefix##_hexes_44, prefix##_hexes_84},                                                                        \
+        {prefix##_uniform_44, prefix##_uniform_84},                                                                    \
+        {prefix##_by_cell_44, prefix##_by_cell_84},                                                                    \
+    }
+/* clang-format on */
 
 #endif
