@@ -193,8 +193,7 @@ static void place_spans(const bounds_source *source, const item_grid *grid, item
         const int n = list_block(items + begin, count - begin, cells);
         source->read_spans(source, cells, n, spans);
         for (int i = 0; i < n; i++) {
-            exact->lower = vec4_min(spans[i].lower, exact->lower);
-            exact->upper = vec4_max(spans[i].upper, exact->upper);
+            fetch_span_unite(exact, &spans[i]);
             items[begin + i] = item_of_span(&m, &spans[i], cells[i]);
             item_set_add(set, items[begin + i]);
         }

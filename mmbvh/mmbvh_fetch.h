@@ -148,6 +148,12 @@ static inline fetch_span fetch_span_empty(void)
     return (fetch_span){vec4_set1(INFINITY), vec4_set1(-INFINITY)};
 }
 
+static inline void fetch_span_unite(fetch_span *to, const fetch_span *span)
+{
+    to->lower = vec4_min(span->lower, to->lower);
+    to->upper = vec4_max(span->upper, to->upper);
+}
+
 static inline fetch_box fetch_span_box(const fetch_span *span)
 {
     fetch_box box;
@@ -198,24 +204,26 @@ MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, co
     }
 }
 
-/* The box grows by so many cells. Floats are compared as floats, and only the outcome is widened. */
+/* The box grows by so many cells. Floats are compared as floats, and only the outcome is widened; two boxes of them
+ * grow in turns, as each comparison waits for the last of its box. */
 MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
                                   const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
-    fetch_box all = *box;
-    fetch_span span = fetch_span_empty();
-    for (int k = 0; k < cell_count; k++) {
-        if (wide_number) {
-            fetch_box_cell(&all, g, cells[k], shape, wide_index);
-        } else {
-            fetch_span_cell(&span, g, cells[k], shape, wide_index);
-        }
+    if (wide_number) {
+        fetch_box all = *box;
+        for (int k = 0; k < cell_count; k++) fetch_box_cell(&all, g, cells[k], shape, wide_index);
+        *box = all;
+        return;
     }
-    if (!wide_number) {
-        const fetch_box floats = fetch_span_box(&span);
-        fetch_box_unite(&all, &floats);
+    fetch_span even = fetch_span_empty(), odd = even;
+    for (int k = 0; k < cell_count / 2; k++) {
+        fetch_span_cell(&even, g, cells[2 * k], shape, wide_index);
+        fetch_span_cell(&odd, g, cells[2 * k + 1], shape, wide_index);
     }
-    *box = all;
+    if (cell_count & 1) fetch_span_cell(&even, g, cells[cell_count - 1], shape, wide_index);
+    fetch_span_unite(&even, &odd);
+    const fetch_box floats = fetch_span_box(&even);
+    fetch_box_unite(box, &floats);
 }
 
 /* To a node's coordinates, outward: rounding is monotonic, so the box of the rounded is the rounded box. */
