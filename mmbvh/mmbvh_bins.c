@@ -2,25 +2,28 @@
  * turns three boxes' extents into one product sum for three surface areas. */
 #include "mmbvh_bins.h"
 
+enum { RUN_MAX = INT16_MAX }; /* items that a lane can count */
+
 /* Few items need few bins: the bins' own cost is most of a small node's. */
 bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
 {
-    const int wanted = (int)(4 + (item_count < 4 * BINS_MAX ? item_count / 4 : BINS_MAX));
-    bin_mapping m = {.count = wanted < BINS_MAX ? wanted : BINS_MAX};
-    for (int axis = 0; axis < 3; axis++) {
-        const int least = -centroids[axis], extent = centroids[4 + axis] - least;
-        const int factor = m.count * 65536 / (extent + 1);
-        m.origin[4 + axis] = (int16_t)least;
-        m.factor[4 + axis] = (int16_t)(uint16_t)(factor < 32768 ? factor : 32768); /* so that 2 steps part */
-    }
-    return m;
+    const int wanted = (int)(4 + (item_count < 8 * BINS_MAX ? item_count / 8 : BINS_MAX));
+    const int count = wanted < BINS_MAX ? wanted : BINS_MAX;
+    const lanes used = centroids & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
+    const ivec4 least = -lanes_lower(used), extent = lanes_upper(used) - least;
+    /* Below 2^15, where it matters, a quotient is further from the next integer than rounding goes. */
+    const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
+    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* so that 2 steps part */
+    return (bin_mapping){(ulanes)lanes_pack(least, least),
+                         lanes_pack(factor - 32768, factor - 32768) ^ lanes_set1(INT16_MIN), count};
 }
 
 void bins_clear(bins *b, int count)
 {
+    const lanes none = {INT16_MIN, INT16_MIN, INT16_MIN, 0, INT16_MIN, INT16_MIN, INT16_MIN, 0};
     for (int bin = 0; bin < count; bin++) {
-        for (int axis = 0; axis < 3; axis++) b->of[bin].boxes[axis] = lanes_set1(INT16_MIN);
-        for (int axis = 0; axis < 4; axis++) b->of[bin].counts[axis] = 0;
+        for (int axis = 0; axis < 3; axis++) b->of[bin].boxes[axis] = none;
+        *(ivec4 *)b->of[bin].counts = (ivec4){0};
     }
 }
 
@@ -34,65 +37,80 @@ void bins_merge(bins *b, const bins *other, int count)
     }
 }
 
-void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count)
+/* Offsets of the bins on each axis: of one item in lanes 0 to 2, of another in lanes 4 to 6. */
+static inline ulanes offsets_of(const bin_mapping *m, item a, item b)
 {
-    for (int64_t i = 0; i < count; i++) {
-        const lanes places = bin_of(m, items[i]);
-        for (int axis = 0; axis < 3; axis++) {
-            bin *to = &b->of[places[4 + axis]];
-            to->boxes[axis] = lanes_max(to->boxes[axis], items[i]);
-            to->counts[axis]++;
-        }
-    }
+    const lanes upper = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
+    const lanes lower = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); /* negative */
+    const ulanes places = (ulanes)lanes_scale((lanes)((ulanes)upper - (ulanes)lower - m->origin), m->factor);
+    return places * (uint16_t)sizeof(bin);
 }
 
-/* Steps to lengths of which the box's longest is 1, so that no area leaves the floats' range. */
-static vec4 lengths_of(lanes bounds, const item_grid *grid)
+/* In lane 3 of the boxes items are counted on the way, so that an item takes one load and one store a bin. */
+static inline void add(bins *b, const uint16_t offsets[3], item i)
 {
-    const lanes extent = item_extent(bounds);
-    double longest = 0;
+    const lanes counted = i & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
     for (int axis = 0; axis < 3; axis++) {
-        const double length = extent[axis] * grid->step[axis];
-        longest = length > longest ? length : longest;
+        lanes *box = (lanes *)(void *)((char *)b->of + offsets[axis]) + axis;
+        *box = lanes_max(*box, counted) + (lanes){0, 0, 0, 1};
     }
-    vec4 lengths = {0};
-    for (int axis = 0; axis < 3; axis++) lengths[axis] = longest > 0 ? (float)(grid->step[axis] / longest) : 0;
-    return lengths;
 }
 
-static inline float half_area(lanes box, vec4 lengths)
+/* From lane 3, which is then 0, to the bins' counts. */
+static void keep_counts(bins *b, int count)
 {
-    const vec4 d = lanes_to_vec4(item_extent(box)) * lengths;
-    return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+    for (int i = 0; i < count; i++) {
+        bin *of = &b->of[i];
+        const ivec4 x = (ivec4)of->boxes[0], y = (ivec4)of->boxes[1], z = (ivec4)of->boxes[2];
+        const ivec4 xy = __builtin_shufflevector(x, y, 1, 1, 5, 5);
+        *(ivec4 *)of->counts += __builtin_shufflevector(xy, z, 0, 2, 5, 5) >> 16;
+        for (int axis = 0; axis < 3; axis++) of->boxes[axis] &= (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
+    }
+}
+
+/* Every stride-th of count items, two at a time: neighbours often go to the same bin, and would wait for each other's
+ * store. */
+static void fill_run(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
+{
+    const int64_t half = count / 2;
+    const item *halves = items + half * stride;
+    const bin_mapping m = *mapping; /* in registers */
+    uint16_t offsets[8];
+    for (int64_t i = 0; i < half; i++) {
+        const item first = items[i * stride], second = halves[i * stride];
+        *(ulanes *)(void *)offsets = offsets_of(&m, first, second);
+        add(b, offsets, first);
+        add(b, offsets + 4, second);
+    }
+    if (!(count & 1)) return;
+    const item last = items[(count - 1) * stride];
+    *(ulanes *)(void *)offsets = offsets_of(&m, last, last);
+    add(b, offsets, last);
+}
+
+void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, int64_t stride)
+{
+    const int64_t samples = (count + stride - 1) / stride;
+    for (int64_t begin = 0; begin < samples; begin += RUN_MAX) {
+        const int64_t n = samples - begin < RUN_MAX ? samples - begin : RUN_MAX;
+        fill_run(b, m, items + begin * stride, n, stride);
+        keep_counts(b, m->count);
+    }
 }
 
 /* Half the surface areas of three boxes, in lanes 0 to 2. */
-static inline vec4 half_areas(const lanes boxes[3], vec4 lengths)
+static inline vec4 half_areas(const lanes boxes[3])
 {
-    const vec4 a = lanes_to_vec4(item_extent(boxes[0])) * lengths;
-    const vec4 b = lanes_to_vec4(item_extent(boxes[1])) * lengths;
-    const vec4 c = lanes_to_vec4(item_extent(boxes[2])) * lengths;
-    const vec4 ab_xy = __builtin_shufflevector(a, b, 0, 4, 1, 5), cc_xy = __builtin_shufflevector(c, c, 0, 4, 1, 5);
-    const vec4 ab_zz = __builtin_shufflevector(a, b, 2, 6, 2, 6), cc_zz = __builtin_shufflevector(c, c, 2, 6, 2, 6);
-    const vec4 x = __builtin_shufflevector(ab_xy, cc_xy, 0, 1, 4, 5);
-    const vec4 y = __builtin_shufflevector(ab_xy, cc_xy, 2, 3, 6, 7);
-    const vec4 z = __builtin_shufflevector(ab_zz, cc_zz, 0, 1, 4, 5);
-    return x * y + y * z + z * x;
+    const lanes x = item_extent(boxes[0]), y = item_extent(boxes[1]), z = item_extent(boxes[2]);
+    const ivec4 xy = item_area_terms(__builtin_shufflevector(x, y, 0, 1, 2, 3, 8, 9, 10, 11)), zz = item_area_terms(z);
+    return vec4_from_int(__builtin_shufflevector(xy, zz, 0, 2, 4, 6)) +
+           vec4_from_int(__builtin_shufflevector(xy, zz, 1, 3, 5, 7));
 }
 
-/* As floats, though the counts use all 32 bits. */
-static inline vec4 counts_to_float(ivec4 counts)
+/* An empty side's cost is not a number, whatever its box says, and so never the least. */
+static inline vec4 side_cost(const lanes boxes[3], ivec4 counts)
 {
-    const ivec4 half = (counts >> 1) & 0x7fffffff;
-    return vec4_from_int(half) * 2.0f + vec4_from_int(counts & 1);
-}
-
-/* An empty side costs without end, whatever its box says. */
-static inline vec4 side_cost(const lanes boxes[3], ivec4 counts, vec4 lengths)
-{
-    const vec4 cost = half_areas(boxes, lengths) * counts_to_float(counts);
-    const ivec4 empty = (ivec4)(counts == 0);
-    return (vec4)(((ivec4)cost & ~empty) | ((ivec4)vec4_set1(INFINITY) & empty));
+    return (vec4)((ivec4)(half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));
 }
 
 static inline void grow(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
@@ -101,16 +119,29 @@ static inline void grow(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
     *counts += *(const ivec4 *)b->of[bin].counts;
 }
 
-bin_split bins_choose(const bins *b, const bin_mapping *m, lanes bounds, const item_grid *grid)
+/* Of the axes' best; without a branch, as nothing tells which axis it will be. */
+static bin_split least(vec4 costs, ivec4 borders)
 {
-    const vec4 lengths = lengths_of(bounds, grid);
+    float cost = costs[0];
+    int axis = 0, border = borders[0];
+    for (int other = 1; other < 3; other++) {
+        const bool is_less = costs[other] < cost;
+        cost = is_less ? costs[other] : cost;
+        axis = is_less ? other : axis;
+        border = is_less ? borders[other] : border;
+    }
+    return (bin_split){cost < INFINITY ? axis : -1, border, cost};
+}
+
+bin_split bins_choose(const bins *b, const bin_mapping *m)
+{
     const lanes none = lanes_set1(INT16_MIN);
     vec4 right_cost[BINS_MAX];
     lanes boxes[3] = {none, none, none};
     ivec4 counts = {0};
     for (int border = m->count - 1; border > 0; border--) {
         grow(boxes, &counts, b, border);
-        right_cost[border] = side_cost(boxes, counts, lengths);
+        right_cost[border] = side_cost(boxes, counts);
     }
     for (int axis = 0; axis < 3; axis++) boxes[axis] = none;
     counts = (ivec4){0};
@@ -118,41 +149,40 @@ bin_split bins_choose(const bins *b, const bin_mapping *m, lanes bounds, const i
     ivec4 best_border = {0};
     for (int border = 1; border < m->count; border++) {
         grow(boxes, &counts, b, border - 1);
-        const vec4 cost = side_cost(boxes, counts, lengths) + right_cost[border];
+        const vec4 cost = side_cost(boxes, counts) + right_cost[border];
         const ivec4 better = (ivec4)(cost < best);
         best = (vec4)(((ivec4)cost & better) | ((ivec4)best & ~better));
         best_border = (border & better) | (best_border & ~better);
     }
-    bin_split split = {.axis = -1, .cost = INFINITY};
-    for (int axis = 0; axis < 3; axis++) {
-        if (best[axis] < split.cost) split = (bin_split){axis, best_border[axis], best[axis]};
-    }
-    const float area = half_area(bounds, lengths);
-    if (split.axis >= 0) split.cost = area > 0 ? split.cost / area : INFINITY;
-    return split;
+    return least(best, best_border);
 }
 
-void bins_split_bounds(const bins *b, const bin_mapping *m, bin_split split, lanes sides[2])
+/* A side's box is as large as each of its items' at least, so a plane costs as much as the items' own areas. */
+float bins_least_cost(const item *items, int64_t count)
 {
-    sides[0] = sides[1] = lanes_set1(INT16_MIN);
-    for (int bin = 0; bin < m->count; bin++) {
-        lanes *side = &sides[bin >= split.border];
-        *side = lanes_max(*side, b->of[bin].boxes[split.axis]);
-    }
+    vec4 terms = {0};
+    for (int64_t i = 0; i < count; i++) terms += vec4_from_int(item_area_terms(item_extent(items[i])));
+    return terms[0] + terms[1];
 }
 
 /* Whichever side it is of, an item changes places with the first right one so far; only how far the left ones reach
  * depends on it. No branch is there to be mispredicted. */
-int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count, lanes centroids[2])
+int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count)
 {
-    int64_t left = 0;
+    enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
+    const int factor = (uint16_t)m->factor[split.axis];
+    const int first =
+        (int16_t)m->origin[split.axis] + (split.border * 65536 + factor - 1) / factor; /* of the right ones */
+    const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
+    char *base = (char *)items;
+    int64_t left = 0; /* bytes */
     for (int64_t i = 0; i < count; i++) {
+        const int before = upper[8 * i] - lower[8 * i] - first; /* negative: a left one */
         const item moved = items[i];
-        const int side = bin_side(m, split, moved);
-        centroids[side] = lanes_max(centroids[side], item_centroid(moved));
-        items[i] = items[left];
-        items[left] = moved;
-        left += !side;
+        item *place = (item *)(void *)(base + left);
+        items[i] = *place;
+        *place = moved;
+        left += before >> SIGN_TO_SIZE & SIZE;
     }
-    return left;
+    return left / SIZE;
 }

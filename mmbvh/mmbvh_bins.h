@@ -11,40 +11,31 @@
 #include "mmbvh.h"
 #include "mmbvh_item.h"
 
-enum { BINS_MAX = 16 };
+enum {
+    BINS_MAX = 16,
+    BINS_SAMPLED = 2048, /* from so many items on, */
+    BINS_STRIDE = 7      /* one of so many tells where to split as well as all of them */
+};
 
-/* From an item to a bin on each axis, in lanes 4 to 6. */
+/* From twice the centroid, less TOP, to a bin on each axis; for two items at a time, lanes 4 to 6 are as 0 to 2. */
 typedef struct bin_mapping {
-    lanes origin;
+    ulanes origin;
     lanes factor;
     int count;
 } bin_mapping;
 
 bin_mapping bin_mapping_make(lanes centroids, int64_t item_count);
 
-static inline lanes bin_of(const bin_mapping *m, item i)
-{
-    return lanes_scale((lanes)((ulanes)item_centroid(i) - (ulanes)m->origin), m->factor);
-}
-
 /* A side of a plane: left where the bin on the split's axis is below its border. */
 typedef struct bin_split {
     int axis; /* -1: no plane leaves items on both sides */
     int border;
-    float cost; /* Σ surface area × items of both sides, in units of the node's surface area */
+    float cost; /* Σ half the surface area, in square steps, × items of both sides */
 } bin_split;
-
-/* An item's side: 0 left, 1 right. lane is of the split's axis in bin_of()'s order; callers keep it in a register. */
-static inline int bin_side(const bin_mapping *m, bin_split split, item i)
-{
-    int16_t bins[8];
-    *(lanes *)(void *)bins = bin_of(m, i);
-    return bins[4 + split.axis] >= split.border;
-}
 
 /* One cache line a bin. */
 typedef struct bin {
-    lanes boxes[3];
+    lanes boxes[3]; /* lanes 3 and 7 are scratch */
     uint32_t counts[4];
 } bin;
 
@@ -54,23 +45,30 @@ typedef struct bins {
 
 void bins_clear(bins *b, int count);
 void bins_merge(bins *b, const bins *other, int count);
-void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count);
 
-/* The plane of least cost; the first of equals. */
-bin_split bins_choose(const bins *b, const bin_mapping *m, lanes bounds, const item_grid *grid);
-
-/* The bounds on the split's two sides. */
-void bins_split_bounds(const bins *b, const bin_mapping *m, bin_split split, lanes sides[2]);
-
-/* Whether count items are better parted than kept in a leaf: two boxes to test against the cells. More than a leaf
- * can hold always are. */
-static inline bool bins_worth_splitting(bin_split split, int64_t count)
+/* How many items of a node one stands for. */
+static inline int64_t bins_stride(int64_t count)
 {
-    return count > MMBVH_MAX_LEAF || (split.axis >= 0 && 2 + split.cost < (float)count);
+    return count < BINS_SAMPLED ? 1 : BINS_STRIDE;
 }
 
-/* Left items to the front; returns how many, and what the sides' centroids span. The order depends on the order
- * before alone. */
-int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count, lanes centroids[2]);
+/* Every stride-th of the items, from the first on. */
+void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, int64_t stride);
+
+/* The plane of least cost for the items in the bins; the first of equals. */
+bin_split bins_choose(const bins *b, const bin_mapping *m);
+
+/* No plane between the items costs less. */
+float bins_least_cost(const item *items, int64_t count);
+
+/* Whether count items are better parted at this cost than kept in a leaf: two boxes to test against the cells. More
+ * than a leaf can hold always are. */
+static inline bool bins_worth_splitting(float cost, int64_t count, lanes bounds)
+{
+    return count > MMBVH_MAX_LEAF || cost < (float)(count - 2) * item_half_area(bounds);
+}
+
+/* Left items to the front; returns how many. The order depends on the order before alone. */
+int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count);
 
 #endif

@@ -13,6 +13,16 @@
     }
 FETCH_INSTANCES(DEFINE_READ, read)
 
+#define DEFINE_READ_SPANS(name, shape, wide_index, wide_number)                                                        \
+    static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans)                 \
+    {                                                                                                                  \
+        for (int i = 0; i < count; i++) {                                                                              \
+            spans[i] = fetch_span_empty();                                                                             \
+            fetch_span_cell(&spans[i], source->g, cells[i], shape, wide_index);                                        \
+        }                                                                                                              \
+    }
+FETCH_FLOAT_INSTANCES(DEFINE_READ_SPANS, read_spans)
+
 MMBVH_INLINE void prefetch_cells(const grid *g, const uint32_t *cells, int cell_count, const fetch_shape shape)
 {
     for (int k = 0; k < cell_count; k++) {
@@ -70,6 +80,7 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
                                  const double origin[3], double scale)
 {
     static bounds_read *const reads[FETCH_SHAPES][2][2] = FETCH_TABLE(read);
+    static bounds_read_spans *const reads_spans[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(read_spans);
     static bounds_unite *const unites[FETCH_SHAPES][2][2] = FETCH_TABLE(unite);
     bounds_source s = {.g = g, .scale = scale, .lower = lower, .upper = upper, .box_count = count};
     s.read = g ? read_any : read_given;
@@ -77,6 +88,7 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
     for (int axis = 0; axis < 3; axis++) s.origin[axis] = origin[axis];
     if (!g || !fetch_is_plain(g)) return s;
     s.read = reads[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
+    if (!g->coordinates[0].is_wide) s.read_spans = reads_spans[fetch_grid_shape(g)][g->connectivity.is_wide];
     s.unite = unites[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
     return s;
 }
@@ -119,14 +131,18 @@ fetch_box bounds_guess(const bounds_source *source, int threads)
 item_grid item_grid_make(const double lower[3], const double upper[3])
 {
     item_grid grid = {.is_finest = true};
+    bool has_extent[3];
+    double longest = 0;
     for (int axis = 0; axis < 3; axis++) {
         const double extent = upper[axis] - lower[axis], far = fmax(fabs(lower[axis]), fabs(upper[axis]));
+        has_extent[axis] = extent > 0 && extent < INFINITY;
+        longest = has_extent[axis] && extent > longest ? extent : longest;
         grid.origin[axis] = lower[axis];
-        grid.step[axis] = extent > 0 && extent < INFINITY ? extent / ITEM_TOP : 0;
-        grid.inverse[axis] = grid.step[axis] > 0 ? 1 / grid.step[axis] : 0;
         /* Below the floats' own distances nodes cannot tell cells apart. */
         if (extent > far * 0x1p-22) grid.is_finest = false;
     }
+    grid.step = longest / ITEM_TOP;
+    for (int axis = 0; axis < 3; axis++) grid.inverse[axis] = has_extent[axis] && grid.step > 0 ? 1 / grid.step : 0;
     return grid;
 }
 
@@ -137,8 +153,55 @@ static int list_block(const item *items, int64_t count, uint32_t cells[BOUNDS_BL
     return n;
 }
 
-void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
-                  fetch_box *exact)
+/* From floats in the source's coordinates to steps. The origin is a float too: the difference of a coordinate and one
+ * near it is exact, and of one far from it off by a 2^24th of itself. */
+typedef struct span_mapping {
+    vec4 origin;
+    vec4 factor;
+} span_mapping;
+
+static span_mapping span_mapping_make(const bounds_source *source, const item_grid *grid)
+{
+    span_mapping m = {.factor = {0}};
+    for (int axis = 0; axis < 3; axis++) {
+        m.origin[axis] = (float)(source->origin[axis] + grid->origin[axis] / source->scale);
+        m.factor[axis] = (float)(source->scale * grid->inverse[axis]);
+    }
+    return m;
+}
+
+/* To the nearest step; what is not a number to 0. */
+static inline ivec4 steps_of(const span_mapping *m, vec4 x)
+{
+    const vec4 steps = (x - m->origin) * m->factor + 0.5f;
+    return vec4_truncate(vec4_min(vec4_max(steps, (vec4){0}), vec4_set1(ITEM_TOP)));
+}
+
+static inline item item_of_span(const span_mapping *m, const fetch_span *span, uint32_t index)
+{
+    const lanes box = lanes_pack(ITEM_TOP - steps_of(m, span->lower), steps_of(m, span->upper));
+    return (box & (lanes){-1, -1, -1, 0, -1, -1, -1, 0}) | item_of_index(index);
+}
+
+static void place_spans(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
+                        fetch_span *exact)
+{
+    uint32_t cells[BOUNDS_BLOCK];
+    fetch_span spans[BOUNDS_BLOCK];
+    const span_mapping m = span_mapping_make(source, grid);
+    for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
+        const int n = list_block(items + begin, count - begin, cells);
+        source->read_spans(source, cells, n, spans);
+        for (int i = 0; i < n; i++) {
+            fetch_span_unite(exact, &spans[i]);
+            items[begin + i] = item_of_span(&m, &spans[i], cells[i]);
+            item_set_add(set, items[begin + i]);
+        }
+    }
+}
+
+static void place_boxes(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
+                        fetch_box *exact)
 {
     uint32_t cells[BOUNDS_BLOCK];
     fetch_box boxes[BOUNDS_BLOCK];
@@ -146,10 +209,27 @@ void bounds_place(const bounds_source *source, const item_grid *grid, item *item
         const int n = list_block(items + begin, count - begin, cells);
         source->read(source, cells, n, boxes);
         for (int i = 0; i < n; i++) {
-            if (exact) fetch_box_unite(exact, &boxes[i]);
+            fetch_box_unite(exact, &boxes[i]);
             bounds_transform(source, &boxes[i]);
             items[begin + i] = item_make(grid, boxes[i].lower, boxes[i].upper, cells[i]);
             item_set_add(set, items[begin + i]);
         }
     }
+}
+
+void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
+                  fetch_box *exact)
+{
+    item_set own = item_set_empty();
+    fetch_box box;
+    fetch_box_empty(&box);
+    if (source->read_spans) {
+        fetch_span span = fetch_span_empty();
+        place_spans(source, grid, items, count, &own, &span);
+        box = fetch_span_box(&span);
+    } else {
+        place_boxes(source, grid, items, count, &own, &box);
+    }
+    item_set_merge(set, &own);
+    if (exact) fetch_box_unite(exact, &box);
 }

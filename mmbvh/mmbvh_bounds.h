@@ -9,6 +9,9 @@
 /* The boxes of so many cells, in the source's own coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
+/* The same as floats, where the coordinates are. */
+typedef void bounds_read_spans(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans);
+
 /* box grows by so many cells. As many after soon, if not NULL, will be asked for later. */
 typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
                           fetch_box *box);
@@ -20,6 +23,7 @@ struct bounds_source {
     const float *lower, *upper; /* given boxes, count x 3 */
     int64_t box_count;          /* ghosts too */
     bounds_read *read;
+    bounds_read_spans *read_spans; /* NULL: coordinates are not, or not all, floats */
     bounds_unite *unite;
 };
 

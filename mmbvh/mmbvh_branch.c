@@ -18,6 +18,13 @@ enum {
     PARALLEL_MIN = 8 * CHUNK_MIN /* fewer items: a task of their own keeps a thread busy long enough */
 };
 
+/* What is known of a node before it is split. */
+typedef struct branch_node {
+    item_set set;
+    item_grid grid; /* that the items are in steps of */
+    int depth;
+} branch_node;
+
 /* A branch being split. */
 typedef struct splitting {
     item *items;
@@ -26,8 +33,9 @@ typedef struct splitting {
     int chunk_count;
     int64_t left[CHUNKS_MAX]; /* items of the left side, by chunk */
     int64_t left_count;
-    subtree_node node;
+    branch_node node;
     bin_mapping mapping;
+    int64_t stride; /* of the items that fill bins */
     bin_split split;
     bins total;
     item_set sides[2];
@@ -75,7 +83,7 @@ static void bin_chunk(splitting *s, const branch_builder *builder, int chunk, in
     (void)chunk;
     bins own;
     bins_clear(&own, s->mapping.count);
-    bins_fill(&own, &s->mapping, s->items + begin, end - begin);
+    bins_fill(&own, &s->mapping, s->items + begin, end - begin, s->stride);
 #pragma omp critical(mmbvh_merge)
     bins_merge(&s->total, &own, s->mapping.count);
 }
@@ -83,10 +91,12 @@ static void bin_chunk(splitting *s, const branch_builder *builder, int chunk, in
 static void part_chunk(splitting *s, const branch_builder *builder, int chunk, int64_t begin, int64_t end)
 {
     (void)builder;
-    lanes own[2] = {item_set_empty().centroids, item_set_empty().centroids};
-    s->left[chunk] = bins_part(&s->mapping, s->split, s->items + begin, end - begin, own);
+    item *items = s->items + begin;
+    const int64_t count = end - begin, left = bins_part(&s->mapping, s->split, items, count);
+    const item_set sides[2] = {item_set_of(items, left), item_set_of(items + left, count - left)};
+    s->left[chunk] = left;
 #pragma omp critical(mmbvh_merge)
-    for (int side = 0; side < 2; side++) s->sides[side].centroids = lanes_max(s->sides[side].centroids, own[side]);
+    for (int side = 0; side < 2; side++) item_set_merge(&s->sides[side], &sides[side]);
 }
 
 /* Runs of items on the wrong side of the border, as a walk meets them. */
@@ -135,9 +145,6 @@ static void exchange_strays(splitting *s)
 
 static void part(splitting *s, const branch_builder *builder)
 {
-    lanes bounds[2];
-    bins_split_bounds(&s->total, &s->mapping, s->split, bounds);
-    for (int side = 0; side < 2; side++) s->sides[side].bounds = bounds[side];
     for_chunks(s, builder, part_chunk);
     s->left_count = 0;
     for (int chunk = 0; chunk < s->chunk_count; chunk++) s->left_count += s->left[chunk];
@@ -150,22 +157,29 @@ static void halve(splitting *s)
     for (int64_t i = 0; i < s->count; i++) item_set_add(&s->sides[i >= s->left_count], s->items[i]);
 }
 
+/* By a part of the items, unless that finds no plane. */
+static void choose(splitting *s, const branch_builder *builder)
+{
+    s->mapping = bin_mapping_make(s->node.set.centroids, s->count);
+    for (s->stride = bins_stride(s->count);; s->stride = 1) {
+        bins_clear(&s->total, s->mapping.count);
+        for_chunks(s, builder, bin_chunk);
+        s->split = bins_choose(&s->total, &s->mapping);
+        if (s->split.axis >= 0 || s->stride == 1) return;
+    }
+}
+
 static void split_branch(splitting *s, const branch_builder *builder)
 {
     choose_chunks(s);
-    if (subtree_wants_finer_grid(&s->node)) {
-        s->node.grid = subtree_finer_grid(&s->node);
+    if (subtree_wants_finer_grid(s->node.set.bounds, &s->node.grid)) {
+        s->node.grid = subtree_finer_grid(s->node.set.bounds, &s->node.grid);
         s->node.set = item_set_empty();
         for_chunks(s, builder, place_chunk);
     }
     s->split = (bin_split){.axis = -1};
     s->sides[0] = s->sides[1] = item_set_empty();
-    if (s->node.depth < TOPOLOGY_MEDIAN_DEPTH) {
-        s->mapping = bin_mapping_make(s->node.set.centroids, s->count);
-        bins_clear(&s->total, s->mapping.count);
-        for_chunks(s, builder, bin_chunk);
-        s->split = bins_choose(&s->total, &s->mapping, s->node.set.bounds, &s->node.grid);
-    }
+    if (s->node.depth < TOPOLOGY_MEDIAN_DEPTH) choose(s, builder);
     if (s->split.axis < 0) {
         halve(s);
     } else {
@@ -173,14 +187,14 @@ static void split_branch(splitting *s, const branch_builder *builder)
     }
 }
 
-static void grow(const branch_builder *builder, topology *t, subtree_node node)
+static void grow(const branch_builder *builder, topology *t, branch_node node)
 {
     topology_build *build = builder->build;
     if (atomic_load(&build->failed)) return;
     item *items = builder->items + t->first;
     if (t->count <= TOPOLOGY_SUBTREE_CELLS) {
         topology_scratch *scratch = &build->scratch[omp_get_thread_num()];
-        const topology_link root = subtree_build(scratch, builder->source, items, t->count, &node);
+        const topology_link root = subtree_build(scratch, builder->source, items, t->count, &node.grid, node.depth);
         topology_keep(build, t, scratch, root);
         return;
     }
@@ -190,7 +204,7 @@ static void grow(const branch_builder *builder, topology *t, subtree_node node)
         const int64_t begin = side ? s.left_count : 0, end = side ? t->count : s.left_count;
         topology *child = t->children[side] = topology_new(build, t->first + begin, end - begin);
         if (!child) return;
-        const subtree_node below = {s.sides[side], s.node.grid, s.node.depth + 1};
+        const branch_node below = {s.sides[side], s.node.grid, node.depth + 1};
 #pragma omp task default(none) firstprivate(builder, child, below)
         grow(builder, child, below);
     }
@@ -200,7 +214,7 @@ topology *branch_build(const branch_builder *builder, const item_set *set, const
 {
     topology *root = topology_new(builder->build, 0, builder->count);
     if (!root) return NULL;
-    const subtree_node node = {*set, *grid, 1};
+    const branch_node node = {*set, *grid, 1};
 #pragma omp parallel num_threads(builder->build->threads)
 #pragma omp single
     grow(builder, root, node);

@@ -39,9 +39,14 @@ static int64_t chunk_start(const build *b, int chunk)
     return b->listed * chunk / FILL_CHUNKS;
 }
 
+static bool may_leave_out(const build *b)
+{
+    return !b->selected && b->source.g && b->source.g->ghosts;
+}
+
 static bool is_left_out(const build *b, int64_t cell)
 {
-    return !b->selected && b->source.g && grid_is_ghost(b->source.g, cell);
+    return may_leave_out(b) && grid_is_ghost(b->source.g, cell);
 }
 
 static uint32_t listed_cell(const build *b, int64_t i)
@@ -54,9 +59,9 @@ static void count_cells(build *b)
     b->starts[0] = 0;
 #pragma omp parallel for num_threads(b->threads)
     for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) {
-        int64_t count = 0;
-        for (int64_t cell = chunk_start(b, chunk); cell < chunk_start(b, chunk + 1); cell++)
-            count += !is_left_out(b, cell);
+        const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
+        int64_t count = end - begin;
+        for (int64_t cell = begin; may_leave_out(b) && cell < end; cell++) count -= is_left_out(b, cell);
         b->starts[chunk + 1] = count;
     }
     for (int chunk = 0; chunk < FILL_CHUNKS; chunk++) b->starts[chunk + 1] += b->starts[chunk];
@@ -68,8 +73,9 @@ static void count_cells(build *b)
 static void fill_items(const build *b, int chunk, item_set *set, fetch_box *exact)
 {
     item *items = b->items + b->starts[chunk];
+    const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
     int64_t count = 0;
-    for (int64_t cell = chunk_start(b, chunk); cell < chunk_start(b, chunk + 1); cell++) {
+    for (int64_t cell = begin; cell < end; cell++) {
         if (!is_left_out(b, cell)) items[count++] = item_of_index(listed_cell(b, cell));
     }
     bounds_place(&b->source, &b->grid, items, count, set, exact);
@@ -78,8 +84,9 @@ static void fill_items(const build *b, int chunk, item_set *set, fetch_box *exac
 static void fill_keys(const build *b, int chunk, fetch_box *exact)
 {
     uint64_t *keys = b->keys + b->starts[chunk];
+    const int64_t begin = chunk_start(b, chunk), end = chunk_start(b, chunk + 1);
     int64_t count = 0;
-    for (int64_t cell = chunk_start(b, chunk); cell < chunk_start(b, chunk + 1); cell++) {
+    for (int64_t cell = begin; cell < end; cell++) {
         if (!is_left_out(b, cell)) keys[count++] = listed_cell(b, cell);
     }
     morton_place(&b->source, b->coder, keys, count, exact);
@@ -234,7 +241,8 @@ static bool build_nodes(build *b)
     return is_built;
 }
 
-static insitu_status run(build *b, mmbvh *out, base_error *error)
+/* All but the bounds and ranges. */
+static insitu_status make(build *b, base_error *error)
 {
     const int64_t count = b->source.box_count;
     if (count > UINT32_MAX) {
@@ -243,15 +251,18 @@ static insitu_status run(build *b, mmbvh *out, base_error *error)
     }
     memcpy(b->tree.origin, b->source.origin, sizeof b->tree.origin);
     b->tree.scale = b->source.scale;
-    if (!build_nodes(b)) {
-        mmbvh_free(&b->tree);
-        return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: a tree over %lld cells", (long long)count);
-    }
-    const sweep s = sweep_of_bounds(&b->tree, &b->source);
-    sweep_tree(&s, b->threads);
+    if (build_nodes(b)) return INSITU_OK;
+    mmbvh_free(&b->tree);
+    return base_fail(error, INSITU_ERROR_MEMORY, "out of memory: a tree over %lld cells", (long long)count);
+}
+
+static void finish(build *b, const sweep *ranges, mmbvh *out)
+{
+    sweep s = sweep_of_bounds(&b->tree, &b->source);
+    s.then = ranges;
+    b->tree.unusable_cells = sweep_tree(&s, b->threads);
     b->tree.built_cost = cost_of_tree(&b->tree, b->threads);
     *out = b->tree;
-    return INSITU_OK;
 }
 
 static build begin(const bounds_source *source, const mmbvh_options *options)
@@ -275,8 +286,11 @@ insitu_status mmbvh_build(const grid *g, const grid_field *field, const double o
     if (!(scale > 0)) return base_fail(error, INSITU_ERROR_ARGUMENT, "a tree's scale must be above 0, not %g", scale);
     const bounds_source source = bounds_source_make(g, NULL, NULL, g->cell_count, origin, scale);
     build b = begin(&source, options);
-    const insitu_status status = run(&b, out, error);
-    return status ? status : mmbvh_refit_ranges(out, g, field, options);
+    const insitu_status status = make(&b, error);
+    if (status) return status;
+    const sweep ranges = sweep_of_ranges(&b.tree, g, field, mmbvh_own_ranges(&b.tree));
+    finish(&b, &ranges, out);
+    return INSITU_OK;
 }
 
 insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const float *ranges, int64_t count,
@@ -290,10 +304,10 @@ insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const fl
     }
     const bounds_source source = bounds_source_make(NULL, lower, upper, count, no_shift, 1);
     build b = begin(&source, options);
-    const insitu_status status = run(&b, out, error);
-    if (status || !count) return status;
-    const sweep s = sweep_of_box_ranges(out, ranges);
-    sweep_tree(&s, b.threads);
+    const insitu_status status = make(&b, error);
+    if (status) return status;
+    const sweep of_ranges = sweep_of_box_ranges(&b.tree, ranges);
+    finish(&b, &of_ranges, out);
     return INSITU_OK;
 }
 

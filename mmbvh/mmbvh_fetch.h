@@ -7,16 +7,19 @@
 #include <string.h>
 
 #include "grid.h"
+#include "mmbvh_vec4.h"
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* How a cell's vertices are found: all cells are tets one after the other, all of one type, or each says its own. */
-typedef enum fetch_shape { FETCH_TETS, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
+/* How a cell's vertices are found: all cells are tets one after the other, or hexes, all of one type, or each says its
+ * own. */
+typedef enum fetch_shape { FETCH_TETS, FETCH_HEXES, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
 
 static inline fetch_shape fetch_grid_shape(const grid *g)
 {
     if (g->cell_types || g->offsets.data) return FETCH_BY_CELL;
-    return g->cell_type == GRID_TET ? FETCH_TETS : FETCH_UNIFORM;
+    if (g->cell_type == GRID_TET) return FETCH_TETS;
+    return g->cell_type == GRID_HEX ? FETCH_HEXES : FETCH_UNIFORM;
 }
 
 MMBVH_INLINE int64_t fetch_index(const grid_array *a, int64_t i, const bool wide)
@@ -35,6 +38,7 @@ MMBVH_INLINE double fetch_number(const grid_array *a, int64_t i, const bool wide
 MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_shape shape)
 {
     if (shape == FETCH_TETS) return 4;
+    if (shape == FETCH_HEXES) return 8;
     return grid_type_vertices(shape == FETCH_UNIFORM ? g->cell_type : grid_cell_type(g, cell));
 }
 
@@ -56,13 +60,23 @@ MMBVH_INLINE fetch_range fetch_cell_range(const grid *g, const grid_array *value
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
     double low = INFINITY, high = -INFINITY, poison = 0;
+    float float_low = INFINITY, float_high = -INFINITY, float_poison = 0;
     for (int i = 0; i < count; i++) {
-        const double v = fetch_number(values, fetch_index(&g->connectivity, first + i, wide_index), wide_number);
-        low = v < low ? v : low;
-        high = v > high ? v : high;
-        poison += v - v; /* 0 while all are finite, then not a number */
+        const char *at = values->data + fetch_index(&g->connectivity, first + i, wide_index) * values->stride;
+        if (wide_number) {
+            const double v = *(const double *)(const void *)at;
+            low = v < low ? v : low;
+            high = v > high ? v : high;
+            poison += v - v; /* 0 while all are finite, then not a number */
+        } else {
+            const float v = *(const float *)(const void *)at;
+            float_low = v < float_low ? v : float_low;
+            float_high = v > float_high ? v : float_high;
+            float_poison += v - v;
+        }
     }
-    return (fetch_range){low, high, poison == 0};
+    if (wide_number) return (fetch_range){low, high, poison == 0};
+    return (fetch_range){(double)float_low, (double)float_high, float_poison == 0};
 }
 
 /* The same of any cell and any field. */
@@ -124,34 +138,92 @@ MMBVH_INLINE void fetch_box_unite(fetch_box *to, const fetch_box *box)
     }
 }
 
-/* The box grows by so many cells. Floats are compared as floats, and only the outcome is widened. */
+/* A box of floats that grows: lanes 0 to 2. */
+typedef struct fetch_span {
+    vec4 lower, upper;
+} fetch_span;
+
+static inline fetch_span fetch_span_empty(void)
+{
+    return (fetch_span){vec4_set1(INFINITY), vec4_set1(-INFINITY)};
+}
+
+static inline void fetch_span_unite(fetch_span *to, const fetch_span *span)
+{
+    to->lower = vec4_min(span->lower, to->lower);
+    to->upper = vec4_max(span->upper, to->upper);
+}
+
+static inline fetch_box fetch_span_box(const fetch_span *span)
+{
+    fetch_box box;
+    for (int axis = 0; axis < 3; axis++) {
+        box.lower[axis] = (double)span->lower[axis];
+        box.upper[axis] = (double)span->upper[axis];
+    }
+    return box;
+}
+
+/* Where a vertex's coordinates are: the axes' arrays have one stride. */
+MMBVH_INLINE const char *fetch_vertex(const grid *g, int64_t entry, const bool wide_index)
+{
+    return g->coordinates[0].data + fetch_index(&g->connectivity, entry, wide_index) * g->coordinates[0].stride;
+}
+
+/* The box grows by a cell whose coordinates are floats. */
+MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell, const fetch_shape shape,
+                                  const bool wide_index)
+{
+    const int64_t y = g->coordinates[1].data - g->coordinates[0].data;
+    const int64_t z = g->coordinates[2].data - g->coordinates[0].data;
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    for (int i = 0; i < count; i++) {
+        const char *at = fetch_vertex(g, first + i, wide_index);
+        const vec4 p = {*(const float *)(const void *)at, *(const float *)(const void *)(at + y),
+                        *(const float *)(const void *)(at + z), 0};
+        span->lower = vec4_min(p, span->lower);
+        span->upper = vec4_max(p, span->upper);
+    }
+}
+
+/* The box grows by a cell whose coordinates are doubles. */
+MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, const fetch_shape shape,
+                                 const bool wide_index)
+{
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    for (int i = 0; i < count; i++) {
+        const char *at = fetch_vertex(g, first + i, wide_index);
+        for (int axis = 0; axis < 3; axis++) {
+            const int64_t offset = g->coordinates[axis].data - g->coordinates[0].data;
+            const double x = *(const double *)(const void *)(at + offset);
+            box->lower[axis] = x < box->lower[axis] ? x : box->lower[axis];
+            box->upper[axis] = x > box->upper[axis] ? x : box->upper[axis];
+        }
+    }
+}
+
+/* The box grows by so many cells. Floats are compared as floats, and only the outcome is widened; two boxes of them
+ * grow in turns, as each comparison waits for the last of its box. */
 MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
                                   const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
-    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    fetch_box wide = *box;
-    for (int k = 0; k < cell_count; k++) {
-        const int count = fetch_vertex_count(g, cells[k], shape);
-        const int64_t first = fetch_first(g, cells[k], count, shape);
-        for (int i = 0; i < count; i++) {
-            const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
-            for (int axis = 0; axis < 3; axis++) {
-                const double x = fetch_number(&g->coordinates[axis], vertex, wide_number);
-                if (wide_number) {
-                    wide.lower[axis] = x < wide.lower[axis] ? x : wide.lower[axis];
-                    wide.upper[axis] = x > wide.upper[axis] ? x : wide.upper[axis];
-                } else {
-                    low[axis] = (float)x < low[axis] ? (float)x : low[axis];
-                    high[axis] = (float)x > high[axis] ? (float)x : high[axis];
-                }
-            }
-        }
+    if (wide_number) {
+        fetch_box all = *box;
+        for (int k = 0; k < cell_count; k++) fetch_box_cell(&all, g, cells[k], shape, wide_index);
+        *box = all;
+        return;
     }
-    for (int axis = 0; axis < 3 && !wide_number; axis++) {
-        wide.lower[axis] = (double)low[axis] < wide.lower[axis] ? (double)low[axis] : wide.lower[axis];
-        wide.upper[axis] = (double)high[axis] > wide.upper[axis] ? (double)high[axis] : wide.upper[axis];
+    fetch_span even = fetch_span_empty(), odd = even;
+    for (int k = 0; k < cell_count / 2; k++) {
+        fetch_span_cell(&even, g, cells[2 * k], shape, wide_index);
+        fetch_span_cell(&odd, g, cells[2 * k + 1], shape, wide_index);
     }
-    *box = wide;
+    if (cell_count & 1) fetch_span_cell(&even, g, cells[cell_count - 1], shape, wide_index);
+    fetch_span_unite(&even, &odd);
+    const fetch_box floats = fetch_span_box(&even);
+    fetch_box_unite(box, &floats);
 }
 
 /* To a node's coordinates, outward: rounding is monotonic, so the box of the rounded is the rounded box. */
@@ -164,13 +236,15 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
     }
 }
 
-/* Where the coordinates are not all floats or all doubles, or cells may be polyhedra, fetch_box_cells() will not do. */
+/* Where the coordinates are not all floats or all doubles, or not of one stride, or cells may be polyhedra,
+ * fetch_box_cells() will not do. */
 static inline bool fetch_is_plain(const grid *g)
 {
     if (grid_has_faces(g)) return false;
     const grid_array *c = g->coordinates;
     const bool integer = c[0].is_integer || c[1].is_integer || c[2].is_integer;
-    return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide;
+    return !integer && c[0].is_wide == c[1].is_wide && c[0].is_wide == c[2].is_wide && c[0].stride == c[1].stride &&
+           c[0].stride == c[2].stride;
 }
 
 static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cell)
@@ -190,29 +264,45 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
 /* One instance of a pass for each way an array can be laid out: DEFINE(name, shape, wide_index, wide_number) makes a
  * function, and FETCH_TABLE(prefix) is the table of them, by [shape][wide_index][wide_number]. */
 #define FETCH_INSTANCES(DEFINE, prefix)                                                                                \
-    DEFINE(prefix##_tets_44, FETCH_TETS, false, false)                                                                 \
-    DEFINE(prefix##_tets_48, FETCH_TETS, false, true)                                                                  \
-    DEFINE(prefix##_tets_84, FETCH_TETS, true, false)                                                                  \
-    DEFINE(prefix##_tets_88, FETCH_TETS, true, true)                                                                   \
-    DEFINE(prefix##_uniform_44, FETCH_UNIFORM, false, false)                                                           \
-    DEFINE(prefix##_uniform_48, FETCH_UNIFORM, false, true)                                                            \
-    DEFINE(prefix##_uniform_84, FETCH_UNIFORM, true, false)                                                            \
-    DEFINE(prefix##_uniform_88, FETCH_UNIFORM, true, true)                                                             \
-    DEFINE(prefix##_by_cell_44, FETCH_BY_CELL, false, false)                                                           \
-    DEFINE(prefix##_by_cell_48, FETCH_BY_CELL, false, true)                                                            \
-    DEFINE(prefix##_by_cell_84, FETCH_BY_CELL, true, false)                                                            \
-    DEFINE(prefix##_by_cell_88, FETCH_BY_CELL, true, true)
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                           \
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_hexes, FETCH_HEXES)                                                         \
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_uniform, FETCH_UNIFORM)                                                     \
+    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_by_cell, FETCH_BY_CELL)
 
+#define FETCH_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                                   \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                                 \
+    DEFINE(prefix##_48, shape, false, true)                                                                            \
+    DEFINE(prefix##_88, shape, true, true)
+
+/* clang-format off */
 #define FETCH_TABLE(prefix)                                                                                            \
     {                                                                                                                  \
         {{prefix##_tets_44, prefix##_tets_48}, {prefix##_tets_84, prefix##_tets_88}},                                  \
-            {{prefix##_uniform_44, prefix##_uniform_48}, {prefix##_uniform_84, prefix##_uniform_88}},                  \
-        {                                                                                                              \
-            {prefix##_by_cell_44, prefix##_by_cell_48},                                                                \
-            {                                                                                                          \
-                prefix##_by_cell_84, prefix##_by_cell_88                                                               \
-            }                                                                                                          \
-        }                                                                                                              \
+        {{prefix##_hexes_44, prefix##_hexes_48}, {prefix##_hexes_84, prefix##_hexes_88}},                              \
+        {{prefix##_uniform_44, prefix##_uniform_48}, {prefix##_uniform_84, prefix##_uniform_88}},                      \
+        {{prefix##_by_cell_44, prefix##_by_cell_48}, {prefix##_by_cell_84, prefix##_by_cell_88}},                      \
     }
+/* clang-format on */
+
+/* The same of floats alone; the table is by [shape][wide_index]. */
+#define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                     \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_hexes, FETCH_HEXES)                                                   \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_uniform, FETCH_UNIFORM)                                               \
+    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_by_cell, FETCH_BY_CELL)
+
+#define FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                             \
+    DEFINE(prefix##_44, shape, false, false)                                                                           \
+    DEFINE(prefix##_84, shape, true, false)
+
+/* clang-format off */
+#define FETCH_FLOAT_TABLE(prefix)                                                                                      \
+    {                                                                                                                  \
+        {prefix##_tets_44, prefix##_tets_84},                                                                          \
+        {prefix##_hexes_44, prefix##_hexes_84},                                                                        \
+        {prefix##_uniform_44, prefix##_uniform_84},                                                                    \
+        {prefix##_by_cell_44, prefix##_by_cell_84},                                                                    \
+    }
+/* clang-format on */
 
 #endif

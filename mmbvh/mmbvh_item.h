@@ -18,11 +18,11 @@ enum { ITEM_TOP = 32767 };
 
 typedef lanes item;
 
-/* Steps on each axis, in the tree's coordinates. */
+/* Steps in the tree's coordinates, as long on every axis: surface areas are then products of steps. */
 typedef struct item_grid {
     double origin[3];
-    double step[3];
-    double inverse[3]; /* of the steps; 0 on an axis without extent */
+    double step;       /* 0: no axis has a finite extent */
+    double inverse[3]; /* of the step; 0 on an axis without a finite extent */
     bool is_finest;    /* a finer one would not tell more cells apart */
 } item_grid;
 
@@ -66,10 +66,37 @@ static inline void item_set_merge(item_set *set, const item_set *other)
     set->centroids = lanes_max(set->centroids, other->centroids);
 }
 
+static inline item_set item_set_of(const item *items, int64_t count)
+{
+    item_set set = item_set_empty(), other = set;
+    for (int64_t i = 0; i < count / 2; i++) {
+        item_set_add(&set, items[2 * i]);
+        item_set_add(&other, items[2 * i + 1]);
+    }
+    if (count & 1) item_set_add(&set, items[count - 1]);
+    item_set_merge(&set, &other);
+    return set;
+}
+
 /* Of a box, in steps: lanes 0 to 2. */
 static inline lanes item_extent(lanes box)
 {
     return (lanes)((ulanes)box + (ulanes)lanes_swap(box) - (ulanes)lanes_set1(ITEM_TOP)); /* an empty one's wraps */
+}
+
+/* Half the surface area's terms, xy + yz and zx, of two boxes whose extents are lanes 0 to 2 and 4 to 6. Lanes 3
+ * and 7 may hold anything. */
+static inline ivec4 item_area_terms(lanes extents)
+{
+    const lanes turned = __builtin_shufflevector(extents, extents, 1, 2, 0, 3, 5, 6, 4, 7);
+    return lanes_pair_products(extents, turned & (lanes){-1, -1, -1, 0, -1, -1, -1, 0});
+}
+
+/* Half the surface area, in square steps. */
+static inline float item_half_area(lanes box)
+{
+    const vec4 terms = vec4_from_int(item_area_terms(item_extent(box)));
+    return terms[0] + terms[1];
 }
 
 /* The grid that is laid over a box. */

@@ -48,12 +48,41 @@ static inline lanes lanes_scale(lanes a, lanes factor)
 }
 
 /* Lanes 0 to 3, signed. */
-static inline vec4 lanes_to_vec4(lanes a)
+static inline ivec4 lanes_lower(lanes a)
 {
 #if defined(__SSE2__)
-    return (vec4)_mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16((__m128i)a, (__m128i)a), 16));
+    return (ivec4)_mm_unpacklo_epi16((__m128i)a, (__m128i)a) >> 16;
 #else
-    return (vec4){a[0], a[1], a[2], a[3]};
+    return (ivec4){a[0], a[1], a[2], a[3]};
+#endif
+}
+
+/* Lanes 4 to 7, signed. */
+static inline ivec4 lanes_upper(lanes a)
+{
+    return lanes_lower(lanes_swap(a));
+}
+
+/* Two vectors of integers, the first in lanes 0 to 3; lanes hold what fits into 16 bits, signed. */
+static inline lanes lanes_pack(ivec4 a, ivec4 b)
+{
+#if defined(__SSE2__)
+    return (lanes)_mm_packs_epi32((__m128i)a, (__m128i)b);
+#else
+    return (lanes){(int16_t)a[0], (int16_t)a[1], (int16_t)a[2], (int16_t)a[3],
+                   (int16_t)b[0], (int16_t)b[1], (int16_t)b[2], (int16_t)b[3]};
+#endif
+}
+
+/* The products, each even lane's and the next one's added. */
+static inline ivec4 lanes_pair_products(lanes a, lanes b)
+{
+#if defined(__SSE2__)
+    return (ivec4)_mm_madd_epi16((__m128i)a, (__m128i)b);
+#else
+    ivec4 sums;
+    for (int i = 0; i < 4; i++) sums[i] = a[2 * i] * b[2 * i] + a[2 * i + 1] * b[2 * i + 1];
+    return sums;
 #endif
 }
 

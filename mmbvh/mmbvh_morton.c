@@ -64,12 +64,13 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
     }
 }
 
-static inline uint64_t code_of(const morton_coder *coder, const fetch_box *box)
+/* Of a cell whose box's centre is this, in the source's coordinates. */
+static inline uint64_t code_of(const bounds_source *source, const morton_coder *coder, const double centre[3])
 {
     uint64_t code = 0;
     for (int axis = 0; axis < 3; axis++) {
-        const double centre = 0.5 * (box->lower[axis] + box->upper[axis]);
-        const double place = (centre - coder->origin[axis]) * coder->factor[axis];
+        const double x = (centre[axis] - source->origin[axis]) * source->scale;
+        const double place = (x - coder->origin[axis]) * coder->factor[axis];
         const unsigned step = (unsigned)(place > 0 ? place < coder->most[axis] ? place : coder->most[axis] : 0);
         for (int part = 0; part < MORTON_PARTS; part++) {
             const unsigned bits = step >> part * MORTON_PART_BITS & ((1 << MORTON_PART_BITS) - 1);
@@ -79,22 +80,57 @@ static inline uint64_t code_of(const morton_coder *coder, const fetch_box *box)
     return code;
 }
 
+static int list_block(const morton_coder *coder, const uint64_t *keys, int64_t count, uint32_t cells[BOUNDS_BLOCK])
+{
+    const uint64_t mask = (UINT64_C(1) << coder->index_bits) - 1;
+    const int n = (int)(count < BOUNDS_BLOCK ? count : BOUNDS_BLOCK);
+    for (int i = 0; i < n; i++) cells[i] = (uint32_t)(keys[i] & mask);
+    return n;
+}
+
+static fetch_box place_spans(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count)
+{
+    uint32_t cells[BOUNDS_BLOCK];
+    fetch_span spans[BOUNDS_BLOCK], all = fetch_span_empty();
+    for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
+        const int n = list_block(coder, keys + begin, count - begin, cells);
+        source->read_spans(source, cells, n, spans);
+        for (int i = 0; i < n; i++) {
+            double centre[3];
+            for (int axis = 0; axis < 3; axis++) {
+                centre[axis] = 0.5 * ((double)spans[i].lower[axis] + (double)spans[i].upper[axis]);
+            }
+            fetch_span_unite(&all, &spans[i]);
+            keys[begin + i] = code_of(source, coder, centre) | cells[i];
+        }
+    }
+    return fetch_span_box(&all);
+}
+
+static fetch_box place_boxes(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count)
+{
+    uint32_t cells[BOUNDS_BLOCK];
+    fetch_box boxes[BOUNDS_BLOCK], all;
+    fetch_box_empty(&all);
+    for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
+        const int n = list_block(coder, keys + begin, count - begin, cells);
+        source->read(source, cells, n, boxes);
+        for (int i = 0; i < n; i++) {
+            double centre[3];
+            for (int axis = 0; axis < 3; axis++) centre[axis] = 0.5 * (boxes[i].lower[axis] + boxes[i].upper[axis]);
+            fetch_box_unite(&all, &boxes[i]);
+            keys[begin + i] = code_of(source, coder, centre) | cells[i];
+        }
+    }
+    return all;
+}
+
 void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
                   fetch_box *exact)
 {
-    const uint64_t mask = (UINT64_C(1) << coder->index_bits) - 1;
-    uint32_t cells[BOUNDS_BLOCK];
-    fetch_box boxes[BOUNDS_BLOCK];
-    for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
-        const int n = (int)(count - begin < BOUNDS_BLOCK ? count - begin : BOUNDS_BLOCK);
-        for (int i = 0; i < n; i++) cells[i] = (uint32_t)(keys[begin + i] & mask);
-        source->read(source, cells, n, boxes);
-        for (int i = 0; i < n; i++) {
-            fetch_box_unite(exact, &boxes[i]);
-            bounds_transform(source, &boxes[i]);
-            keys[begin + i] = code_of(coder, &boxes[i]) | cells[i];
-        }
-    }
+    const fetch_box all =
+        source->read_spans ? place_spans(source, coder, keys, count) : place_boxes(source, coder, keys, count);
+    fetch_box_unite(exact, &all);
 }
 
 /* ---- sorting by the digits of the code, the lowest first -------------------------------------------------------- */

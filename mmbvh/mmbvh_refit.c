@@ -12,17 +12,23 @@ int sweep_threads(const mmbvh_options *options)
     return options && options->threads > 0 ? options->threads : omp_get_max_threads();
 }
 
+static int64_t run_all(const sweep *s, int64_t first, int64_t end)
+{
+    const int64_t sum = s->run(s, first, end);
+    return s->then ? run_all(s->then, first, end) : sum;
+}
+
 /* All below node is nodes[ref .. end): in parts of at most RUN_MAX by tasks, then the pair at ref itself. */
 static int64_t sweep_below(const sweep *s, int64_t first, int64_t end)
 {
-    if (end - first <= RUN_MAX) return s->run(s, first, end);
+    if (end - first <= RUN_MAX) return run_all(s, first, end);
     const int64_t right_first = mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
     int64_t left = 0, right = 0;
 #pragma omp task default(none) firstprivate(s, first, right_first) shared(left)
     left = sweep_below(s, first + 2, right_first);
     right = sweep_below(s, right_first, end);
 #pragma omp taskwait
-    return left + right + s->run(s, first, first + 2);
+    return left + right + run_all(s, first, first + 2);
 }
 
 int64_t sweep_tree(const sweep *s, int threads)
@@ -30,11 +36,11 @@ int64_t sweep_tree(const sweep *s, int threads)
     int64_t unusable = 0;
     const int64_t node_count = s->tree->node_count;
     if (!node_count) return 0;
-    if (node_count <= RUN_MAX) return s->run(s, 0, node_count);
+    if (node_count <= RUN_MAX) return run_all(s, 0, node_count);
 #pragma omp parallel num_threads(threads)
 #pragma omp single
     unusable = sweep_below(s, 1, node_count);
-    return unusable + s->run(s, 0, 1);
+    return unusable + run_all(s, 0, 1);
 }
 
 typedef struct range {

@@ -5,19 +5,18 @@
 
 enum { COARSE = 64 }; /* steps of the longest side: an area is off by 3 percent */
 
-bool subtree_wants_finer_grid(const subtree_node *node)
+bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid)
 {
-    const lanes extent = item_extent(node->set.bounds);
-    return !node->grid.is_finest && extent[0] < COARSE && extent[1] < COARSE && extent[2] < COARSE;
+    const lanes extent = item_extent(bounds);
+    return !grid->is_finest && extent[0] < COARSE && extent[1] < COARSE && extent[2] < COARSE;
 }
 
-item_grid subtree_finer_grid(const subtree_node *node)
+item_grid subtree_finer_grid(lanes bounds, const item_grid *grid)
 {
     double lower[3], upper[3];
     for (int axis = 0; axis < 3; axis++) {
-        const double origin = node->grid.origin[axis], step = node->grid.step[axis];
-        lower[axis] = origin + (ITEM_TOP - node->set.bounds[axis] - 0.5) * step;
-        upper[axis] = origin + (node->set.bounds[4 + axis] + 0.5) * step;
+        lower[axis] = grid->origin[axis] + (ITEM_TOP - bounds[axis] - 0.5) * grid->step;
+        upper[axis] = grid->origin[axis] + (bounds[4 + axis] + 0.5) * grid->step;
     }
     return item_grid_make(lower, upper);
 }
@@ -29,57 +28,54 @@ typedef struct subtree {
     bins bins;
 } subtree;
 
-static int64_t halve(const item *items, int64_t count, item_set sides[2])
+/* By a part of the items if they are many, unless that finds no plane. */
+static bin_split choose(subtree *s, lanes centroids, const item *items, int64_t count, bin_mapping *mapping)
 {
-    const int64_t middle = count / 2;
-    for (int64_t i = 0; i < count; i++) item_set_add(&sides[i >= middle], items[i]);
-    return middle;
+    *mapping = bin_mapping_make(centroids, count);
+    for (int64_t stride = bins_stride(count);; stride = 1) {
+        bins_clear(&s->bins, mapping->count);
+        bins_fill(&s->bins, mapping, items, count, stride);
+        const bin_split split = bins_choose(&s->bins, mapping);
+        if (split.axis >= 0 || stride == 1) return split;
+    }
 }
 
-static topology_link build(subtree *s, int64_t first, int64_t count, subtree_node *node)
+static bool is_leaf_for_sure(const item *items, int64_t count, lanes bounds)
+{
+    return count <= MMBVH_MAX_LEAF && !bins_worth_splitting(bins_least_cost(items, count), count, bounds);
+}
+
+static topology_link build(subtree *s, int64_t first, int64_t count, const item_grid *grid, int depth)
 {
     if (count == 1) return topology_leaf(first, 1);
     item *items = s->items + first;
-    if (subtree_wants_finer_grid(node)) {
-        node->grid = subtree_finer_grid(node);
-        node->set = item_set_empty();
-        bounds_place(s->source, &node->grid, items, count, &node->set, NULL);
+    item_set set = item_set_of(items, count);
+    item_grid finer;
+    if (subtree_wants_finer_grid(set.bounds, grid)) {
+        finer = subtree_finer_grid(set.bounds, grid);
+        grid = &finer;
+        set = item_set_empty();
+        bounds_place(s->source, grid, items, count, &set, NULL);
     }
-    bin_split split = {.axis = -1};
-    bin_mapping mapping = {.count = 0};
-    if (node->depth < TOPOLOGY_MEDIAN_DEPTH) {
-        mapping = bin_mapping_make(node->set.centroids, count);
-        bins_clear(&s->bins, mapping.count);
-        bins_fill(&s->bins, &mapping, items, count);
-        split = bins_choose(&s->bins, &mapping, node->set.bounds, &node->grid);
-    }
-    if (!bins_worth_splitting(split, count)) return topology_leaf(first, count);
+    if (is_leaf_for_sure(items, count, set.bounds)) return topology_leaf(first, count);
+    bin_mapping mapping;
+    bin_split split = {.axis = -1, .cost = INFINITY};
+    if (depth < TOPOLOGY_MEDIAN_DEPTH) split = choose(s, set.centroids, items, count, &mapping);
+    if (!bins_worth_splitting(split.cost, count, set.bounds)) return topology_leaf(first, count);
 
-    item_set sides[2] = {item_set_empty(), item_set_empty()};
-    int64_t left_count;
-    if (split.axis < 0) {
-        left_count = halve(items, count, sides);
-    } else {
-        lanes bounds[2], centroids[2] = {sides[0].centroids, sides[1].centroids};
-        bins_split_bounds(&s->bins, &mapping, split, bounds);
-        left_count = bins_part(&mapping, split, items, count, centroids);
-        for (int side = 0; side < 2; side++) sides[side] = (item_set){bounds[side], centroids[side]};
-    }
+    const int64_t left_count = split.axis < 0 ? count / 2 : bins_part(&mapping, split, items, count);
     const int64_t pair = topology_new_pair(s->scratch);
-    for (int side = 0; side < 2; side++) {
-        subtree_node child = {sides[side], node->grid, node->depth + 1};
-        const int64_t begin = side ? left_count : 0, end = side ? count : left_count;
-        const topology_link link = build(s, first + begin, end - begin, &child);
-        s->scratch->links[pair + side] = link;
-    }
+    const topology_link left = build(s, first, left_count, grid, depth + 1);
+    const topology_link right = build(s, first + left_count, count - left_count, grid, depth + 1);
+    s->scratch->links[pair] = left;
+    s->scratch->links[pair + 1] = right;
     return topology_inner(pair);
 }
 
 topology_link subtree_build(topology_scratch *scratch, const bounds_source *source, item *items, int64_t count,
-                            const subtree_node *root)
+                            const item_grid *grid, int depth)
 {
     subtree s = {.scratch = scratch, .source = source, .items = items};
-    subtree_node node = *root;
     scratch->count = 0;
-    return build(&s, 0, count, &node);
+    return build(&s, 0, count, grid, depth);
 }

@@ -6,21 +6,15 @@
 #include "mmbvh_bounds.h"
 #include "mmbvh_topology.h"
 
-/* Items on their way to be a node. */
-typedef struct subtree_node {
-    item_set set;
-    item_grid grid; /* that the items are in steps of */
-    int depth;
-} subtree_node;
+/* Is the grid too coarse for items of these bounds? */
+bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid);
 
-/* Is the grid too coarse for these items? */
-bool subtree_wants_finer_grid(const subtree_node *node);
+/* The grid over the bounds, which are in steps of grid. */
+item_grid subtree_finer_grid(lanes bounds, const item_grid *grid);
 
-/* The grid over the node's own bounds. */
-item_grid subtree_finer_grid(const subtree_node *node);
-
-/* Links of a tree over at most TOPOLOGY_SUBTREE_CELLS items, which are left in the order of the leaves. */
+/* Links of a tree over at most TOPOLOGY_SUBTREE_CELLS items in steps of grid, which are left in the order of the
+ * leaves. depth is of its root in the whole tree. */
 topology_link subtree_build(topology_scratch *scratch, const bounds_source *source, item *items, int64_t count,
-                            const subtree_node *root);
+                            const item_grid *grid, int depth);
 
 #endif

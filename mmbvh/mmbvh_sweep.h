@@ -22,9 +22,10 @@ struct sweep {
     const float *box_ranges;     /* of a parent tree */
     const bounds_source *source; /* of a sweep of bounds */
     mmbvh_ranges ranges;         /* written by a sweep of ranges */
+    const sweep *then; /* NULL, or one of the same tree that runs where this one has just been, in the cache */
 };
 
-/* Over the whole tree; returns the sum of what the runs returned. */
+/* Over the whole tree; returns the sum of what the runs returned, of the last sweep's if one follows the other. */
 int64_t sweep_tree(const sweep *s, int threads);
 
 /* The sweep that writes ranges of field (NULL: infinite ones). */

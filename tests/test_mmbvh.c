@@ -460,6 +460,27 @@ static void depth_is_bounded_where_cells_shrink_without_end(void **state)
     assert_depth_of_shrinking_boxes(2000); /* deep before one thread takes over */
 }
 
+/* Every seventh box, from which the first planes are chosen, lies at 0, the others wherever from 1 to 2. */
+static void planes_are_found_where_a_sample_finds_none(void **state)
+{
+    (void)state;
+    enum { COUNT = 40000 };
+    static float lower[COUNT][3], upper[COUNT][3], ranges[COUNT][2];
+    for (int64_t i = 0; i < COUNT; i++) {
+        lower[i][0] = i % 7 ? 1 + (float)hash_unit((uint64_t)i) : 0;
+        upper[i][0] = lower[i][0] + 0.001f;
+        upper[i][1] = upper[i][2] = 1;
+    }
+    for (int64_t count = COUNT / 10; count <= COUNT; count *= 10) {
+        mmbvh tree;
+        float low[2][4], high[2][4];
+        assert_int_equal(mmbvh_build_boxes(lower[0], upper[0], ranges[0], count, &variant, &tree, NULL), INSITU_OK);
+        for (int side = 0; side < 2; side++) mmbvh_node_box(&tree, 1 + side, low[side], high[side]);
+        assert_true(fmaxf(low[0][0], low[1][0]) > fminf(high[0][0], high[1][0]) - 0.02f);
+        mmbvh_free(&tree);
+    }
+}
+
 /* One cell far off on either side: the root's children are a leaf and all the rest, whichever way round. */
 static void refit_reaches_all_below_a_leafs_sibling(void **state)
 {
@@ -639,6 +660,7 @@ int main(void)
         cmocka_unit_test(further_fields_have_ranges_beside_the_tree),
         cmocka_unit_test(coincident_cells_are_halved),
         cmocka_unit_test(depth_is_bounded_where_cells_shrink_without_end),
+        cmocka_unit_test(planes_are_found_where_a_sample_finds_none),
         cmocka_unit_test(refit_reaches_all_below_a_leafs_sibling),
         cmocka_unit_test(parent_tree_holds_every_mesh),
         cmocka_unit_test(descent_to_a_point_misses_no_cell),
