@@ -41,8 +41,8 @@ typedef struct comp_statistics {
     double exchange_ms, merge_ms, gather_ms;
 } comp_statistics;
 
-/* Collective over comm, on which only compositing talks. out->rgba and out->depth must be allocated on rank 0 (width
- * and height set on all ranks) and are filled there; elsewhere they are not touched. items is reordered. An error on
+/* Collective over comm, on which only compositing talks. out->rgba must be allocated on rank 0, out->depth may be
+ * (width and height set on all ranks), and are filled there; elsewhere they are not touched. items is reordered. An error on
  * one rank (memory) is an error on all. threads: of this rank, 0: as many as OpenMP would take. statistics may be NULL.
  */
 insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,

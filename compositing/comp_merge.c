@@ -210,9 +210,21 @@ static int64_t blend_run(blend *b, const fragment *sorted, int64_t count)
     }
 }
 
+/* As below, of one fragment alone: most pixels. */
+static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
+{
+    for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];
+    out_rgba[3] = 1 - f->transmittance + f->transmittance * background[3];
+    *out_depth = nearest_surface(f, 1);
+}
+
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
 {
-    if (count > 1) sort(items, count);
+    if (count == 1) {
+        blend_single(items, background, out_rgba, out_depth);
+        return;
+    }
+    sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {

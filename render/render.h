@@ -153,7 +153,8 @@ typedef struct render_job {
                          off by more, in linear light; 0: into parts no longer than step */
     double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
                          ranks, so that all cut alike. 0: of this rank's */
-    int sample_group; /* samples of a ray looked up together, 1 .. 64: N of the sample position packets (thesis, 4.4.1) */
+    int sample_group; /* samples of a ray looked up together, 1 .. 64: N of the sample position packets (thesis, 4.4.1)
+                       */
     bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
     int frame;        /* 0 .. : which of the accumulated frames this is */
     bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */
@@ -181,6 +182,11 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
 /* Trace every pixel of the camera against this rank's parts and append what is seen to out (memory from memory.h;
  * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
+
+/* The same fragments, given away a tile at a time: every pixel of the camera lies in one of the tiles, and tiles
+ * without fragments are given too. As many threads call take as the job has. */
+insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
+                                 render_statistics *statistics, base_error *error);
 
 /* The instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may force a lower
  * one than the machine's best; a name that is unknown or not to be had is ignored, with render_isa_warning() telling.
