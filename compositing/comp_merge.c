@@ -218,12 +218,10 @@ static void blend_single(const fragment *f, const float background[4], float out
     *out_depth = nearest_surface(f, 1);
 }
 
-void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
+/* Apart, so that single fragments pay for none of it. */
+static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
+                                                   float out_rgba[4], float *out_depth)
 {
-    if (count == 1) {
-        blend_single(items, background, out_rgba, out_depth);
-        return;
-    }
     sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
@@ -243,4 +241,12 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
     for (int c = 0; c < 3; c++) out_rgba[c] = colour[c] + transmittance * background[c];
     out_rgba[3] = 1 - transmittance + transmittance * background[3];
     *out_depth = nearest_surface(items, count);
+}
+
+void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
+{
+    if (count == 1)
+        blend_single(items, background, out_rgba, out_depth);
+    else
+        blend_sorted(items, count, background, out_rgba, out_depth);
 }

@@ -15,7 +15,7 @@
 #include "memory.h"
 
 /* Of a tile that is looked at for pixels of one fragment each. */
-enum { MOST_PIXELS = 256 };
+enum { MOST_PIXELS = 256, ROW_PIXELS = 16 };
 
 /* A block that grows and forgets what it held. */
 typedef struct room {
@@ -89,8 +89,16 @@ static void store_background(const comp_tiles *tiles, int64_t pixel)
 
 static void clear(const comp_tiles *tiles, const pixel_area *area)
 {
+    const int64_t width = tiles->out->width;
+    float row[4 * ROW_PIXELS]; /* so that nothing is read but this */
+    for (int i = 0; i < 4 * ROW_PIXELS; i++) row[i] = tiles->background[i % 4];
     for (int64_t y = area->y; y < area->y + area->height; y++)
-        for (int64_t x = area->x; x < area->x + area->width; x++) store_background(tiles, y * tiles->out->width + x);
+        for (int x = 0; x < area->width; x += ROW_PIXELS) {
+            const int left = area->width - x, pixels = left < ROW_PIXELS ? left : ROW_PIXELS;
+            const int64_t first = y * width + area->x + x;
+            memcpy(tiles->out->rgba + 4 * first, row, 4 * (size_t)pixels * sizeof *row);
+            for (int i = 0; tiles->out->depth && i < pixels; i++) tiles->out->depth[first + i] = INFINITY;
+        }
 }
 
 /* The pixel's number in the area, row by row. The division is exact: half a pixel is far from where it would round. */
