@@ -14,8 +14,8 @@
 #include "comp_pixels.h"
 #include "memory.h"
 
-/* Of a tile that is looked at for pixels of one fragment each. */
-enum { MOST_PIXELS = 256, ROW_PIXELS = 16 };
+/* As the renderer's tiles are; larger ones are right too. */
+enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
 
 /* A block that grows and forgets what it held. */
 typedef struct room {
@@ -90,7 +90,7 @@ static void store_background(const comp_tiles *tiles, int64_t pixel)
 static void clear(const comp_tiles *tiles, const pixel_area *area)
 {
     const int64_t width = tiles->out->width;
-    float row[4 * ROW_PIXELS]; /* so that nothing is read but this */
+    float row[4 * ROW_PIXELS];
     for (int i = 0; i < 4 * ROW_PIXELS; i++) row[i] = tiles->background[i % 4];
     for (int64_t y = area->y; y < area->y + area->height; y++)
         for (int x = 0; x < area->width; x += ROW_PIXELS) {
@@ -143,9 +143,10 @@ static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64
 /* Where no pixel has two; false: one has, and what was stored is to be stored anew. */
 static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
 {
+    const int64_t pixels = (int64_t)area->width * area->height;
     unsigned char seen[MOST_PIXELS] = {0};
-    if (count > (int64_t)area->width * area->height || (int64_t)area->width * area->height > MOST_PIXELS) return false;
-    if (count < (int64_t)area->width * area->height) clear(tiles, area);
+    if (count > pixels || pixels > MOST_PIXELS) return false;
+    if (count < pixels) clear(tiles, area);
     for (int64_t i = 0; i < count; i++) {
         const uint32_t place = place_in(tiles, area, items[i].pixel);
         if (seen[place]) return false;

@@ -513,7 +513,7 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
 
 /* ---- tiles --------------------------------------------------------------------------------------------------- */
 
-enum { TILE = 16 };
+enum { LARGEST_TILE = 20 };
 
 /* A picture's fragments, some pixels with none, one or many, in any order within a tile. */
 typedef struct tiled {
@@ -539,16 +539,16 @@ static fragment crowded_fragment(uint32_t pixel)
     return f;
 }
 
-static void make_tiled(tiled *t, int width, int height, int most)
+static void make_tiled(tiled *t, int width, int height, int tile, int most)
 {
     int64_t count = 0;
     *t = (tiled){.picture = {.width = width, .height = height}};
     t->picture.rgba = malloc((size_t)width * (size_t)height * 4 * sizeof(float));
     t->picture.depth = malloc((size_t)width * (size_t)height * sizeof(float));
     t->items = malloc((size_t)width * (size_t)height * (size_t)(most + 1) * sizeof *t->items);
-    for (int y = 0; y < height; y += TILE)
-        for (int x = 0; x < width; x += TILE) {
-            const pixel_area area = {x, y, width - x < TILE ? width - x : TILE, height - y < TILE ? height - y : TILE};
+    for (int y = 0; y < height; y += tile)
+        for (int x = 0; x < width; x += tile) {
+            const pixel_area area = {x, y, width - x < tile ? width - x : tile, height - y < tile ? height - y : tile};
             const int64_t first = count;
             for (int k = 0; k < area.width * area.height; k++)
                 for (int64_t left = next_count(most); left > 0; left--)
@@ -605,12 +605,13 @@ static void tiles_are_merged_to_the_bit(void **context)
         comp_overlaps overlaps;
         comp_statistics statistics;
         base_error error = {0};
-        make_tiled(&t, 1 + (int)(next_random() % 50), 1 + (int)(next_random() % 40), trial % 10 ? trial % 5 : 30);
+        make_tiled(&t, 1 + (int)(next_random() % 50), 1 + (int)(next_random() % 40), trial % 7 == 3 ? LARGEST_TILE : 16,
+                   trial % 10 ? trial % 5 : 30);
         if (trial % 3 == 0) free(t.picture.depth), t.picture.depth = NULL;
         assert_int_equal(comp_tiles_begin(&tiles, blue, 3, finds_overlaps, &t.picture, &error), INSITU_OK);
 #pragma omp parallel for num_threads(3) schedule(dynamic, 1)
         for (int i = 0; i < t.tile_count; i++) {
-            fragment given[TILE * TILE * 31];
+            fragment given[LARGEST_TILE * LARGEST_TILE * 31];
             const int64_t count = t.starts[i + 1] - t.starts[i];
             if (count) memcpy(given, t.items + t.starts[i], (size_t)count * sizeof *given);
             if (!comp_tiles_take(&tiles, omp_get_thread_num(), &t.areas[i], given, count)) abort();
@@ -645,7 +646,7 @@ static void tiles_without_memory_are_refused(void **context)
     const int64_t held = base_memory_held();
     tiled t;
     int failures = 0;
-    make_tiled(&t, 40, 20, 5);
+    make_tiled(&t, 40, 20, 16, 5);
     for (int n = 1;; n++) {
         comp_overlaps overlaps = {0};
         base_memory_fail_nth(n);
