@@ -1,7 +1,7 @@
 /* The three phases of compositing: fragments to the owners of their pixels, merging there, pixels to rank 0. Each ends
  * with all ranks of one mind, so that a rank that ran out of memory stops the others where it stopped. Memory
  * is given back as soon as its phase is over: at the peak a rank holds its own fragments, those of the pixels it owns,
- * and the finished pixels. One rank alone merges its list where it lies. */
+ * and the finished pixels. One rank alone merges its list where it lies (or has none: comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>

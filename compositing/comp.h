@@ -8,8 +8,8 @@
  * Sorting by t makes the picture where fragments do not overlap. Volume fragments that do, because cells do, can be put
  * right only by who made them: comp_composite_overlaps() tells the pixels in which they overlap. Volume fragments of no
  * length at one t are samples of one place and may be any number: they share what all of them absorb in proportion to
- * what each would, in whatever order. Volume fragments that overlap over a length are mixed, each as a medium that is the
- * same throughout: the picture where they are short enough for that to be so. */
+ * what each would, in whatever order. Volume fragments that overlap over a length are mixed, each as a medium that is
+ * the same throughout: the picture where they are short enough for that to be so. */
 #ifndef COMP_COMP_H
 #define COMP_COMP_H
 
@@ -41,9 +41,10 @@ typedef struct comp_statistics {
     double exchange_ms, merge_ms, gather_ms;
 } comp_statistics;
 
-/* Collective over comm, on which only compositing talks. out->rgba and out->depth must be allocated on rank 0 (width
- * and height set on all ranks) and are filled there; elsewhere they are not touched. items is reordered. An error on
- * one rank (memory) is an error on all. threads: of this rank, 0: as many as OpenMP would take. statistics may be NULL.
+/* Collective over comm, on which only compositing talks. out->rgba must be allocated on rank 0, out->depth may be
+ * (width and height set on all ranks), and are filled there; elsewhere they are not touched. items is reordered. An
+ * error on one rank (memory) is an error on all. threads: of this rank, 0: as many as OpenMP would take. statistics may
+ * be NULL.
  */
 insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
                              comp_statistics *statistics, base_error *error);

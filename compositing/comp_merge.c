@@ -210,9 +210,19 @@ static int64_t blend_run(blend *b, const fragment *sorted, int64_t count)
     }
 }
 
-void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
+/* As below, of one fragment alone: most pixels. */
+static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
 {
-    if (count > 1) sort(items, count);
+    for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];
+    out_rgba[3] = 1 - f->transmittance + f->transmittance * background[3];
+    *out_depth = nearest_surface(f, 1);
+}
+
+/* Apart, so that single fragments pay for none of it. */
+static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
+                                                   float out_rgba[4], float *out_depth)
+{
+    sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
@@ -231,4 +241,12 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
     for (int c = 0; c < 3; c++) out_rgba[c] = colour[c] + transmittance * background[c];
     out_rgba[3] = 1 - transmittance + transmittance * background[3];
     *out_depth = nearest_surface(items, count);
+}
+
+void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
+{
+    if (count == 1)
+        blend_single(items, background, out_rgba, out_depth);
+    else
+        blend_sorted(items, count, background, out_rgba, out_depth);
 }

@@ -44,7 +44,7 @@ typedef struct scratch {
 void comp_pixels_store(image *out, const comp_pixel *from)
 {
     for (int c = 0; c < 4; c++) out->rgba[4 * (int64_t)from->pixel + c] = from->rgba[c];
-    out->depth[from->pixel] = from->depth;
+    if (out->depth) out->depth[from->pixel] = from->depth;
 }
 
 void comp_pixels_clear(const comp_layout *layout, image *out, const float background[4])
@@ -53,7 +53,7 @@ void comp_pixels_clear(const comp_layout *layout, image *out, const float backgr
 #pragma omp parallel for num_threads(layout->threads) schedule(static)
     for (int64_t i = 0; i < count; i++) {
         for (int c = 0; c < 4; c++) out->rgba[4 * i + c] = background[c];
-        out->depth[i] = INFINITY;
+        if (out->depth) out->depth[i] = INFINITY;
     }
 }
 
@@ -117,8 +117,7 @@ static void collect_slice(const merging *m, int64_t slice, int64_t count, scratc
     ends[slice_pixels] = count;
 }
 
-/* Atomic, for threads may have pixels of one byte. */
-static void add_overlap(unsigned char *overlaps, uint32_t pixel)
+void comp_add_overlap(unsigned char *overlaps, uint32_t pixel)
 {
     __atomic_fetch_or(&overlaps[pixel >> 3], (unsigned char)(1u << (pixel & 7)), __ATOMIC_RELAXED);
 }
@@ -133,7 +132,7 @@ static void blend_slice(merging *m, int64_t slice, scratch *own)
         if (count == 0) continue;
         comp_pixel pixel = {.pixel = items->pixel};
         comp_merge_pixel(items, count, m->background, pixel.rgba, &pixel.depth);
-        if (m->overlaps && comp_pixel_overlaps(items, count)) add_overlap(m->overlaps, pixel.pixel);
+        if (m->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(m->overlaps, pixel.pixel);
         if (m->out)
             comp_pixels_store(m->out, &pixel);
         else

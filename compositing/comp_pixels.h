@@ -19,6 +19,9 @@ typedef struct comp_pixel_list {
     int64_t count;
 } comp_pixel_list;
 
+/* To a set that other threads add to. */
+void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
+
 /* Every pixel of out becomes background, without depth. Local. */
 void comp_pixels_clear(const comp_layout *layout, image *out, const float background[4]);
 

@@ -185,6 +185,11 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
  * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
 
+/* The same fragments, given away a tile at a time: every pixel of the camera lies in one of the tiles, and tiles
+ * without fragments are given too. As many threads call take as the job has. */
+insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
+                                 render_statistics *statistics, base_error *error);
+
 /* The instruction set in use: "avx512", "avx2", "sse4.2" or "plain". INSITU_ISA in the environment may force a lower
  * one than the machine's best; a name that is unknown or not to be had is ignored, with render_isa_warning() telling.
  */

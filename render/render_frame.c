@@ -21,22 +21,43 @@ static double now(void)
 /* What most tiles make at most: beyond that they leave their piece. */
 enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 
-static void trace_tiles(const kernel_frame *frame, kernel_thread *thread, fragment_writer *writer)
+/* Where fragments go: into each writer's piece of a list, or to a taker, tile by tile. */
+typedef struct frame_end {
+    fragment_writer *writers; /* a thread each */
+    fragment_taker *take;     /* NULL: nobody */
+    void *state;
+} frame_end;
+
+static pixel_area area_of(const render_camera *camera, int column, int row)
+{
+    const int x = column * KERNEL_TILE, y = row * KERNEL_TILE;
+    return (pixel_area){x, y, camera->width - x < KERNEL_TILE ? camera->width - x : KERNEL_TILE,
+                        camera->height - y < KERNEL_TILE ? camera->height - y : KERNEL_TILE};
+}
+
+static void trace_tiles(const kernel_frame *frame, kernel_thread *thread, const frame_end *end)
 {
     const kernel_table *kernels = render_kernels();
-    const int columns = (frame->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
-    const int rows = (frame->job->camera.height + KERNEL_TILE - 1) / KERNEL_TILE;
+    const render_camera *camera = &frame->job->camera;
+    const int columns = (camera->width + KERNEL_TILE - 1) / KERNEL_TILE;
+    const int rows = (camera->height + KERNEL_TILE - 1) / KERNEL_TILE;
+    const int number = omp_get_thread_num();
+    fragment_list *own = &end->writers[number].list;
 #pragma omp for schedule(dynamic, 4)
     for (int tile = 0; tile < columns * rows; tile++) {
         if (thread->out_of_memory) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
-        fragment_writer_advance(writer, TILE_FRAGMENTS);
-        kernels->trace_tile(frame, thread, tile % columns * KERNEL_TILE, tile / columns * KERNEL_TILE);
+        const pixel_area area = area_of(camera, tile % columns, tile / columns);
+        if (!end->take) fragment_writer_advance(&end->writers[number], TILE_FRAGMENTS);
+        kernels->trace_tile(frame, thread, area.x, area.y);
+        if (!end->take || thread->out_of_memory) continue;
+        thread->out_of_memory = !end->take(end->state, number, &area, own->items, own->count);
+        own->count = 0;
     }
 }
 
 /* Threads' states; false where memory ran out. */
-static bool begin_threads(const kernel_frame *frame, fragment_writer *writers, kernel_thread *states, int threads)
+static bool begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
 {
     const size_t cache_bytes = render_kernels()->cache_bytes;
     bool has_polyhedra = false, has_memory = true;
@@ -47,7 +68,7 @@ static bool begin_threads(const kernel_frame *frame, fragment_writer *writers, k
         /* By the thread that will use it: first touch. */
         const int me = omp_get_thread_num();
         states[me] = (kernel_thread){.cache = base_calloc(1, cache_bytes),
-                                     .out = &writers[me].list,
+                                     .out = &end->writers[me].list,
                                      .reserve = fragment_reserve,
                                      .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                      .find_polyhedron = polyhedra_find,
@@ -75,13 +96,13 @@ static bool end_threads(kernel_thread *states, int threads, render_statistics *s
     return has_memory;
 }
 
-static bool trace_frame(kernel_frame *frame, fragment_writer *writers, int threads, render_statistics *statistics)
+static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
 {
     const render_job *job = frame->job;
     const int64_t pixels = (int64_t)job->camera.width * job->camera.height;
     kernel_thread *states = base_calloc((size_t)threads, sizeof *states);
     if (!states) return false;
-    bool has_memory = begin_threads(frame, writers, states, threads);
+    bool has_memory = begin_threads(frame, end, states, threads);
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (has_memory && frame->is_binned) {
         const double start = now();
@@ -90,7 +111,7 @@ static bool trace_frame(kernel_frame *frame, fragment_writer *writers, int threa
     }
     if (has_memory) {
 #pragma omp parallel num_threads(threads)
-        trace_tiles(frame, &states[omp_get_thread_num()], &writers[omp_get_thread_num()]);
+        trace_tiles(frame, &states[omp_get_thread_num()], end);
     }
     render_shown_free(frame);
     has_memory = end_threads(states, threads, statistics) && has_memory;
@@ -104,28 +125,56 @@ static int64_t expected_fragments(const render_job *job)
     return job->pixels ? 0 : (int64_t)job->camera.width * job->camera.height / 2;
 }
 
-insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error)
+static bool trace_to_list(kernel_frame *frame, fragment_writer *writers, int threads, fragment_list *out,
+                          render_statistics *statistics)
+{
+    fragment_pieces pieces;
+    if (!fragment_pieces_begin(&pieces, out, expected_fragments(frame->job))) return false;
+    for (int i = 0; i < threads; i++) writers[i] = (fragment_writer){.pieces = &pieces, .piece = -1};
+    const bool is_traced = trace_frame(frame, &(frame_end){.writers = writers}, threads, statistics);
+    return fragment_pieces_end(&pieces, writers, threads) && is_traced;
+}
+
+static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)
+{
+    for (int i = 0; i < threads; i++) end->writers[i] = (fragment_writer){.piece = -1};
+    const bool is_traced = trace_frame(frame, end, threads, statistics);
+    for (int i = 0; i < threads; i++) base_free(end->writers[i].list.items);
+    return is_traced;
+}
+
+/* out: NULL where there is a taker. */
+static insitu_status draw(const render_job *job, fragment_list *out, fragment_taker *take, void *state,
+                          render_statistics *statistics, base_error *error)
 {
     kernel_frame frame;
     render_statistics unwanted;
     insitu_status status = render_prepare(job, &frame, error);
     if (status != INSITU_OK) return status;
+    if (!statistics) statistics = &unwanted;
     const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
-    const int64_t first = out->count;
-    fragment_pieces pieces;
     fragment_writer *writers = base_calloc((size_t)threads, sizeof *writers);
-    bool has_memory = writers && fragment_pieces_begin(&pieces, out, expected_fragments(job));
-    if (has_memory) {
-        for (int i = 0; i < threads; i++) writers[i] = (fragment_writer){.pieces = &pieces, .piece = -1};
-        has_memory = trace_frame(&frame, writers, threads, statistics ? statistics : &unwanted);
-        has_memory = fragment_pieces_end(&pieces, writers, threads) && has_memory;
-    }
+    const bool has_memory =
+        writers && (out ? trace_to_list(&frame, writers, threads, out, statistics)
+                        : trace_to_taker(&frame, &(frame_end){writers, take, state}, threads, statistics));
     base_free(writers);
-    if (!has_memory) {
-        out->count = first;
+    if (!has_memory)
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the fragments and cells of %d x %d pixels",
                            job->camera.width, job->camera.height);
-    }
     render_unprepare(&frame);
     return status;
+}
+
+insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error)
+{
+    const int64_t first = out->count;
+    const insitu_status status = draw(job, out, NULL, NULL, statistics, error);
+    if (status != INSITU_OK) out->count = first;
+    return status;
+}
+
+insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
+                                 render_statistics *statistics, base_error *error)
+{
+    return draw(job, NULL, take, state, statistics, error);
 }

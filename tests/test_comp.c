@@ -9,10 +9,13 @@
 #include <string.h>
 
 #include <cmocka.h>
+#include <omp.h>
 
 #include "comp.h"
 #include "comp_bucket.h"
 #include "comp_schedule.h"
+#include "comp_tiles.h"
+#include "memory.h"
 
 enum { most_fragments = 200 };
 
@@ -508,6 +511,158 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
         if (do_overlap(cases[i].items, cases[i].count) != cases[i].overlap) fail_msg("case %d", (int)i);
 }
 
+/* ---- tiles --------------------------------------------------------------------------------------------------- */
+
+enum { LARGEST_TILE = 20 };
+
+/* A picture's fragments, some pixels with none, one or many, in any order within a tile. */
+typedef struct tiled {
+    image picture;
+    fragment *items; /* tile by tile */
+    int64_t starts[64];
+    pixel_area areas[64];
+    int tile_count;
+} tiled;
+
+static int64_t next_count(int most)
+{
+    return next_random() % 3 ? (int64_t)(next_random() % (uint32_t)(most + 1)) : 0;
+}
+
+/* Volumes may overlap, and be samples of one place. */
+static fragment crowded_fragment(uint32_t pixel)
+{
+    fragment f = random_fragment();
+    f.pixel = pixel;
+    f.t_in = floorf(f.t_in * 16) / 16;
+    f.t_out = f.kind >= FRAGMENT_SURFACE || next_random() % 2 ? f.t_in : f.t_out;
+    return f;
+}
+
+static void make_tiled(tiled *t, int width, int height, int tile, int most)
+{
+    int64_t count = 0;
+    *t = (tiled){.picture = {.width = width, .height = height}};
+    t->picture.rgba = malloc((size_t)width * (size_t)height * 4 * sizeof(float));
+    t->picture.depth = malloc((size_t)width * (size_t)height * sizeof(float));
+    t->items = malloc((size_t)width * (size_t)height * (size_t)(most + 1) * sizeof *t->items);
+    for (int y = 0; y < height; y += tile)
+        for (int x = 0; x < width; x += tile) {
+            const pixel_area area = {x, y, width - x < tile ? width - x : tile, height - y < tile ? height - y : tile};
+            const int64_t first = count;
+            for (int k = 0; k < area.width * area.height; k++)
+                for (int64_t left = next_count(most); left > 0; left--)
+                    t->items[count++] = crowded_fragment((uint32_t)((y + k / area.width) * width + x + k % area.width));
+            shuffle(t->items + first, (int)(count - first));
+            t->starts[t->tile_count] = first;
+            t->areas[t->tile_count++] = area;
+        }
+    t->starts[t->tile_count] = count;
+}
+
+static void free_tiled(tiled *t)
+{
+    free(t->picture.rgba);
+    free(t->picture.depth);
+    free(t->items);
+}
+
+/* Pixel by pixel, by the rule; returns whether the fragments overlap. */
+static bool merge_one(const tiled *t, uint32_t pixel, float rgba[4], float *depth)
+{
+    fragment own[most_fragments];
+    int count = 0;
+    for (int64_t i = 0; i < t->starts[t->tile_count]; i++)
+        if (t->items[i].pixel == pixel) own[count++] = t->items[i];
+    comp_merge_pixel(own, count, blue, rgba, depth);
+    return comp_pixel_overlaps(own, count);
+}
+
+static void check_tiled(const tiled *t, const comp_overlaps *overlaps, bool finds_overlaps)
+{
+    int64_t count = 0;
+    for (int pixel = 0; pixel < t->picture.width * t->picture.height; pixel++) {
+        float rgba[4], depth;
+        const bool overlap = merge_one(t, (uint32_t)pixel, rgba, &depth) && finds_overlaps;
+        assert_memory_equal(rgba, t->picture.rgba + 4 * pixel, sizeof rgba);
+        if (t->picture.depth) assert_memory_equal(&depth, t->picture.depth + pixel, sizeof depth);
+        assert_int_equal(overlap, overlaps->count && pixel_set_has(overlaps->pixels, pixel));
+        count += overlap;
+    }
+    assert_int_equal(count, overlaps->count);
+    assert_int_equal(count > 0, overlaps->pixels != NULL);
+}
+
+static void tiles_are_merged_to_the_bit(void **context)
+{
+    (void)context;
+    state = 7;
+    for (int trial = 0; trial < 60; trial++) {
+        const int64_t held = base_memory_held();
+        const bool finds_overlaps = trial % 2;
+        tiled t;
+        comp_tiles tiles;
+        comp_overlaps overlaps;
+        comp_statistics statistics;
+        base_error error = {0};
+        make_tiled(&t, 1 + (int)(next_random() % 50), 1 + (int)(next_random() % 40), trial % 7 == 3 ? LARGEST_TILE : 16,
+                   trial % 10 ? trial % 5 : 30);
+        if (trial % 3 == 0) free(t.picture.depth), t.picture.depth = NULL;
+        assert_int_equal(comp_tiles_begin(&tiles, blue, 3, finds_overlaps, &t.picture, &error), INSITU_OK);
+#pragma omp parallel for num_threads(3) schedule(dynamic, 1)
+        for (int i = 0; i < t.tile_count; i++) {
+            fragment given[LARGEST_TILE * LARGEST_TILE * 31];
+            const int64_t count = t.starts[i + 1] - t.starts[i];
+            if (count) memcpy(given, t.items + t.starts[i], (size_t)count * sizeof *given);
+            if (!comp_tiles_take(&tiles, omp_get_thread_num(), &t.areas[i], given, count)) abort();
+        }
+        comp_tiles_end(&tiles, &overlaps, &statistics);
+        assert_int_equal(statistics.sent_fragments, t.starts[t.tile_count]);
+        check_tiled(&t, &overlaps, finds_overlaps);
+        base_free(overlaps.pixels);
+        assert_int_equal(base_memory_held(), held);
+        free_tiled(&t);
+    }
+}
+
+static insitu_status merge_tiles(tiled *t, comp_overlaps *overlaps)
+{
+    comp_tiles tiles;
+    comp_statistics statistics;
+    base_error error = {0};
+    insitu_status status = comp_tiles_begin(&tiles, blue, 1, true, &t->picture, &error);
+    if (status != INSITU_OK) return status;
+    for (int i = 0; i < t->tile_count && status == INSITU_OK; i++)
+        if (!comp_tiles_take(&tiles, 0, &t->areas[i], t->items + t->starts[i], t->starts[i + 1] - t->starts[i]))
+            status = INSITU_ERROR_MEMORY;
+    comp_tiles_end(&tiles, overlaps, &statistics);
+    return status;
+}
+
+static void tiles_without_memory_are_refused(void **context)
+{
+    (void)context;
+    state = 8;
+    const int64_t held = base_memory_held();
+    tiled t;
+    int failures = 0;
+    make_tiled(&t, 40, 20, 16, 5);
+    for (int n = 1;; n++) {
+        comp_overlaps overlaps = {0};
+        base_memory_fail_nth(n);
+        const insitu_status status = merge_tiles(&t, &overlaps);
+        base_memory_fail_nth(0);
+        if (status == INSITU_OK) check_tiled(&t, &overlaps, true);
+        base_free(overlaps.pixels);
+        assert_int_equal(base_memory_held(), held);
+        if (status == INSITU_OK) break;
+        assert_int_equal(status, INSITU_ERROR_MEMORY);
+        failures++;
+    }
+    assert_true(failures > 4);
+    free_tiled(&t);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -527,6 +682,8 @@ int main(void)
         cmocka_unit_test(bucket_by_owner_keeps_the_set),
         cmocka_unit_test(pixels_beyond_the_image_are_seen),
         cmocka_unit_test(bucket_by_slice_sorts_by_owned_index),
+        cmocka_unit_test(tiles_are_merged_to_the_bit),
+        cmocka_unit_test(tiles_without_memory_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* What must not change a picture: threads, groups of samples, the order and numbering of cells and vertices, layouts,
  * how cells are dealt to parts and ranks, ghosts; and what values that are not finite may change. */
+#include "memory.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -56,6 +57,95 @@ static void threads_do_not_change_a_bit(void **state)
         drawn_free(&one);
         fixture_free(&f);
     }
+}
+
+/* ---- tile by tile -------------------------------------------------------------------------------------------- */
+
+typedef struct taken_tiles {
+    fragment_list list;
+    unsigned char pixels[64 * 64]; /* how often a tile had them */
+    int width, refuse_after;       /* tiles; negative: never */
+    bool is_astray;
+} taken_tiles;
+
+static bool take_tile(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
+{
+    taken_tiles *t = state;
+    bool is_well;
+    (void)thread;
+#pragma omp critical
+    {
+        is_well = t->refuse_after-- != 0;
+        for (int y = area->y; y < area->y + area->height; y++)
+            for (int x = area->x; x < area->x + area->width; x++) t->pixels[y * t->width + x]++;
+        for (int64_t i = 0; i < count; i++) {
+            const int x = (int)items[i].pixel % t->width - area->x, y = (int)items[i].pixel / t->width - area->y;
+            t->is_astray = t->is_astray || x < 0 || y < 0 || x >= area->width || y >= area->height;
+            t->list.items[t->list.count++] = items[i];
+        }
+    }
+    return is_well;
+}
+
+static int by_bytes(const void *a, const void *b)
+{
+    return memcmp(a, b, sizeof(fragment));
+}
+
+static void compare_tiles_with_list(render_fixture *f)
+{
+    const render_camera *camera = &f->job.camera;
+    const int64_t pixels = (int64_t)camera->width * camera->height;
+    taken_tiles t = {.width = camera->width, .refuse_after = -1};
+    fragment_list list = {0};
+    base_error error = {0};
+    assert_int_equal(render_frame(&f->job, &list, NULL, &error), INSITU_OK);
+    t.list.items = malloc((size_t)list.count * sizeof *t.list.items + 1);
+    assert_int_equal(render_frame_tiles(&f->job, take_tile, &t, NULL, &error), INSITU_OK);
+    assert_false(t.is_astray);
+    for (int64_t p = 0; p < pixels; p++) assert_int_equal(t.pixels[p], 1);
+    assert_int_equal(t.list.count, list.count);
+    qsort(list.items, (size_t)list.count, sizeof *list.items, by_bytes);
+    qsort(t.list.items, (size_t)list.count, sizeof *list.items, by_bytes);
+    assert_memory_equal(t.list.items, list.items, (size_t)list.count * sizeof *list.items);
+    free(t.list.items);
+    base_free(list.items);
+}
+
+/* Every pixel in one tile, and in the tile all that the list has of it. */
+static void tiles_have_what_the_list_has(void **state)
+{
+    (void)state;
+    unsigned char pixels[(61 * 47 + 7) / 8] = {0};
+    for (int64_t p = 0; p < 61 * 47; p++)
+        if (p * p % 7 < 3) pixel_set_add(pixels, p);
+    for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
+        for (int trial = 0; trial < 4; trial++) {
+            render_fixture f;
+            lattice_fixture(&f, trial % 2 ? TEST_POLYHEDRA : TEST_HEXES, scene, CAMERA_OUTSIDE);
+            f.job.threads = 1 + trial;
+            f.job.pixels = trial < 2 ? NULL : pixels;
+            f.job.separate_samples = trial == 3;
+            compare_tiles_with_list(&f);
+            fixture_free(&f);
+        }
+}
+
+static void refused_tiles_end_the_frame(void **state)
+{
+    (void)state;
+    const int64_t held = base_memory_held();
+    render_fixture f;
+    lattice_fixture(&f, TEST_TETS, TRANSPARENT, CAMERA_OUTSIDE);
+    for (int after = 0; after < 12; after += 5) {
+        taken_tiles t = {.width = f.job.camera.width, .refuse_after = after};
+        base_error error = {0};
+        t.list.items = malloc(sizeof(fragment) * 61 * 47 * 64);
+        assert_int_equal(render_frame_tiles(&f.job, take_tile, &t, NULL, &error), INSITU_ERROR_MEMORY);
+        free(t.list.items);
+    }
+    fixture_free(&f);
+    assert_int_equal(base_memory_held(), held);
 }
 
 /* The picture at once, a tile, a packet, each ray on its own: the same cells are met, or at least those that have a
@@ -505,6 +595,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(threads_do_not_change_a_bit),
+        cmocka_unit_test(tiles_have_what_the_list_has),
+        cmocka_unit_test(refused_tiles_end_the_frame),
         cmocka_unit_test(traversals_do_not_change_a_bit),
         cmocka_unit_test(sample_groups_draw_the_same),
         cmocka_unit_test(order_and_numbering_do_not_change_a_bit),

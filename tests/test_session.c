@@ -546,6 +546,38 @@ static void memory_is_given_back(void **context)
     everywhere(session == NULL && base_memory_held() == before);
 }
 
+/* The last picture's memory serves the next one, larger or smaller, and what is not its own does not show. */
+static void picture_memory_is_kept_to_a_limit(void **context)
+{
+    (void)context;
+    static const char large[] = "images:\n  - name: b\n    size: [100, 70]\n    layers:\n      - " SURFACE
+                                "\n    outputs: [{path: b.png}]\n" IMAGE("a", "1", SURFACE, "");
+    static const char huge[] = "images:\n  - name: h\n    size: [2049, 2048]\n    layers:\n      - " SURFACE
+                               "\n    outputs: [{path: h.png}]\n";
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    const caught_picture first = caught[0];
+    caught_count = 0;
+    everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 24 * 16 * 20 : 0));
+    insitu_destroy(&session);
+    session = open_session(MPI_COMM_WORLD, write_scene(large));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    for (int cycle = 0; cycle < 2; cycle++) {
+        step_draws(session, cycle, 2);
+        everywhere(insitu_last_report(session)->bytes_pictures == (own_rank == 0 ? 100 * 70 * 16 : 0));
+        everywhere(own_rank != 0 || (!caught[0].depth && is_same_picture(&first, &caught[1])));
+    }
+    insitu_destroy(&session);
+    session = open_session(MPI_COMM_WORLD, write_scene(huge));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    everywhere(insitu_last_report(session)->bytes_pictures == 0);
+    everywhere(own_rank != 0 || insitu_last_report(session)->bytes_peak >= 2049 * 2048 * 16);
+    if (own_rank == 0) free(first.rgba), free(first.depth);
+    insitu_destroy(&session);
+}
+
 /* Allocation n of a set and a step fails, on one rank or on all; then everything is as if it had not. */
 static void failing_allocation_is_an_error_and_no_more(void **context)
 {
@@ -629,6 +661,7 @@ static int run(void)
         cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
         cmocka_unit_test(bad_scene_opens_no_session),
         cmocka_unit_test(memory_is_given_back),
+        cmocka_unit_test(picture_memory_is_kept_to_a_limit),
         cmocka_unit_test(failing_allocation_is_an_error_and_no_more),
         cmocka_unit_test(failing_allocation_opens_no_session),
     };

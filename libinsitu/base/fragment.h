@@ -3,11 +3,12 @@
  * A volume fragment covers the samples of one rank between t_in and t_out, both included; a surface fragment has t_in
  * == t_out, the hit. Fragments of one pixel, from any ranks, do not overlap, so sorting by t_in and blending front to
  * back gives the picture. Where cells overlap, fragments may: either all volume fragments of the pixel are then single
- * samples, or short stretches of one cell each, or the pixel is not a picture yet (comp.h). Colours are linear and premultiplied: over(front, back) = (C1 +
- * T1 C2, T1 T2). */
+ * samples, or short stretches of one cell each, or the pixel is not a picture yet (comp.h). Colours are linear and
+ * premultiplied: over(front, back) = (C1 + T1 C2, T1 T2). */
 #ifndef BASE_FRAGMENT_H
 #define BASE_FRAGMENT_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 typedef struct fragment {
@@ -27,5 +28,15 @@ typedef struct fragment_list {
     int64_t count;
     int64_t capacity;
 } fragment_list;
+
+/* A rectangle of an image's pixels. */
+typedef struct pixel_area {
+    int x, y; /* its upper left pixel */
+    int width, height;
+} pixel_area;
+
+/* Takes all that a rank has in an area, as soon as it is made: count fragments in any order, that may be reordered and
+ * are gone after the call. thread: 0, 1 ..., of those who call at once. False where memory ran out. */
+typedef bool fragment_taker(void *state, int thread, const pixel_area *area, fragment *items, int64_t count);
 
 #endif

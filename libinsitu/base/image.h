@@ -7,7 +7,7 @@ typedef struct image {
     int height;
     float *rgba;  /* row-major, height × width × 4, top row first, premultiplied, linear light */
     float *depth; /* row-major, height × width: fragment.t_in of the nearest
-                     surface hit; +infinity where there is none */
+                     surface hit; +infinity where there is none. NULL: not wanted */
 } image;
 
 #endif

@@ -58,6 +58,7 @@ static void free_session(insitu_session *session)
     scene_free(&session->scene);
     base_free(session->scene_path);
     base_free(session->scene_warning);
+    session_drop_picture(session);
     session_text_free(&session->copied_why);
     session_text_free(&session->left_out);
     session_text_free(&session->warnings);

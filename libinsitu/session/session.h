@@ -160,6 +160,9 @@ struct insitu_session {
     uint64_t parent_key;
     bool is_parent_stale;
 
+    float *picture; /* rank 0: memory of the last picture, for the next one (session_draw.c) */
+    size_t picture_bytes;
+
     base_error error;
     insitu_report report;
     session_text copied_why, left_out, warnings;
@@ -218,6 +221,9 @@ const session_catalogue_field *session_catalogue_find(const session_catalogue_me
 insitu_status session_load_scene(insitu_session *session, const char *path, base_error *error); /* collective */
 bool session_scene_file_changed(const insitu_session *session); /* rank 0; false elsewhere */
 void session_reload_scene(insitu_session *session);             /* collective; a failure is a warning */
+
+/* session_draw.c: the memory of the last picture. */
+void session_drop_picture(insitu_session *session);
 
 /* session_report.c */
 void session_text_clear(session_text *text);

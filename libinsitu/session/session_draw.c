@@ -25,25 +25,52 @@ typedef struct canvas {
     double *sum;
 } canvas;
 
-static void canvas_free(canvas *c)
+/* A picture's memory stays for the next one, unless it is more than this: fresh pages cost as much as filling them. */
+enum { kept_bytes = 64 << 20 };
+
+void session_drop_picture(insitu_session *session)
 {
-    base_free(c->frame.rgba);
-    base_free(c->frame.depth);
+    base_free(session->picture);
+    session->picture = NULL;
+    session->picture_bytes = 0;
+}
+
+static float *make_picture(insitu_session *session, size_t bytes)
+{
+    if (session->picture_bytes >= bytes) return session->picture;
+    session_drop_picture(session);
+    session->picture = base_alloc(bytes);
+    session->picture_bytes = session->picture ? bytes : 0;
+    return session->picture;
+}
+
+static void canvas_free(insitu_session *session, canvas *c)
+{
+    if (session->picture_bytes > kept_bytes) session_drop_picture(session);
     base_free(c->sum);
 }
 
-static insitu_status canvas_create(const insitu_session *session, const scene_image *image, canvas *out,
-                                   base_error *error)
+static bool wants_depth(const scene_image *image)
+{
+    for (int i = 0; i < image->output_count; i++)
+        if (image->outputs[i].format == SCENE_EXR) return true;
+    return false;
+}
+
+static insitu_status canvas_create(insitu_session *session, const scene_image *image, canvas *out, base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
+    const size_t bytes = pixels * (wants_depth(image) ? 5 : 4) * sizeof(float);
+    const bool is_summed = image->frames > 1;
     out->frame.width = image->width;
     out->frame.height = image->height;
     if (session->rank != 0) return INSITU_OK;
-    out->frame.rgba = base_alloc(pixels * 4 * sizeof(float));
-    out->frame.depth = base_alloc(pixels * sizeof(float));
-    if (image->frames > 1) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
-    if (!out->frame.rgba || !out->frame.depth || (image->frames > 1 && !out->sum))
-        return session_no_memory(error, (int64_t)pixels * (image->frames > 1 ? 52 : 20), "a picture");
+    out->frame.rgba = make_picture(session, bytes);
+    if (wants_depth(image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
+    if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
+    if (!out->frame.rgba || (is_summed && !out->sum))
+        return session_no_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->sum : 0)),
+                                 "a picture");
     return INSITU_OK;
 }
 
@@ -131,7 +158,7 @@ static insitu_status draw_frames(insitu_session *session, const scene_image *ima
     }
     warn_of_overlaps(session, image, overlaps);
     if (target->sum) average_frames(target, image->frames, session->threads);
-    if (session->rank == 0) scale_depths(target, &view->space, session->threads);
+    if (target->frame.depth) scale_depths(target, &view->space, session->threads);
     return INSITU_OK;
 }
 
@@ -194,7 +221,7 @@ static insitu_status draw_image(insitu_session *session, const scene_image *imag
         status = write_outputs(session, image, &target, cycle, error);
         session->report.images++;
     }
-    canvas_free(&target);
+    canvas_free(session, &target);
     return status;
 }
 

@@ -10,6 +10,7 @@
 
 #include <string.h>
 
+#include "comp_tiles.h"
 #include "memory.h"
 #include "session_agree.h"
 
@@ -19,9 +20,38 @@ typedef struct frame_target {
     session_frame *frame;
 } frame_target;
 
+static void add_to_frame(const frame_target *t, const render_statistics *rendered, int64_t fragments,
+                         double composite_ms)
+{
+    t->frame->rays += rendered->rays;
+    t->frame->map_failures += rendered->map_failures;
+    t->frame->fragments += fragments;
+    t->frame->surface_ms += rendered->surface_ms;
+    t->frame->volume_ms += rendered->volume_ms;
+    t->frame->composite_ms += composite_ms;
+}
+
+/* One rank with something to trace: composited as it is traced (comp_tiles.h). */
+static insitu_status draw_alone(const frame_target *t, const render_job *job, image *out, comp_overlaps *overlaps,
+                                base_error *error)
+{
+    render_statistics rendered = {0};
+    comp_statistics composited = {0};
+    comp_tiles tiles;
+    if (comp_tiles_begin(&tiles, t->background, job->threads, overlaps != NULL, out, error) == INSITU_OK) {
+        render_frame_tiles(job, comp_tiles_take, &tiles, &rendered, error);
+        comp_tiles_end(&tiles, overlaps, &composited);
+    }
+    add_to_frame(t, &rendered, composited.sent_fragments, composited.merge_ms);
+    return session_agree(t->comm, error);
+}
+
 static insitu_status draw(const frame_target *t, const render_job *job, image *out, comp_overlaps *overlaps,
                           base_error *error)
 {
+    int ranks = 1;
+    MPI_Comm_size(t->comm, &ranks);
+    if (ranks == 1 && job->part_count > 0) return draw_alone(t, job, out, overlaps, error);
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
@@ -35,12 +65,7 @@ static insitu_status draw(const frame_target *t, const render_job *job, image *o
         status = comp_composite(t->comp_comm, &fragments, t->background, job->threads, out, &composited, error);
     if (status) status = session_agree_as_is(t->comm, error); /* compositing agrees on the status alone */
     base_free(fragments.items);
-    t->frame->rays += rendered.rays;
-    t->frame->map_failures += rendered.map_failures;
-    t->frame->fragments += composited.sent_fragments;
-    t->frame->surface_ms += rendered.surface_ms;
-    t->frame->volume_ms += rendered.volume_ms;
-    t->frame->composite_ms += 1e3 * (MPI_Wtime() - start);
+    add_to_frame(t, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
     return status;
 }
 
@@ -90,7 +115,7 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     for (int64_t p = 0; p < count; p++) {
         if (!pixel_set_has(pixels, p)) continue;
         memcpy(to->rgba + 4 * p, from->rgba + 4 * p, 4 * sizeof *to->rgba);
-        to->depth[p] = from->depth[p];
+        if (to->depth) to->depth[p] = from->depth[p];
     }
 }
 
@@ -122,9 +147,9 @@ static insitu_status draw_overlaps(const frame_target *t, const render_job *job,
     MPI_Comm_rank(t->comm, &rank);
     if (rank == 0) {
         beside.rgba = base_alloc((size_t)pixels * 4 * sizeof *beside.rgba);
-        beside.depth = base_alloc((size_t)pixels * sizeof *beside.depth);
+        if (out->depth) beside.depth = base_alloc((size_t)pixels * sizeof *beside.depth);
     }
-    if (!turn || (rank == 0 && (!beside.rgba || !beside.depth)))
+    if (!turn || (rank == 0 && (!beside.rgba || (out->depth && !beside.depth))))
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld pixels in which cells overlap",
                   (long long)overlaps->count);
     insitu_status status = session_agree(t->comm, error);

@@ -143,6 +143,7 @@ void session_end_report(insitu_session *session)
     if (render_isa_warning() && *render_isa_warning()) session_text_add(&session->warnings, "%s", render_isa_warning());
     for (int i = 0; i < session->mesh_count; i++) report_mesh(session, session->meshes[i]);
     report->bytes_trees += mmbvh_bytes(&session->parent);
+    report->bytes_pictures = (int64_t)session->picture_bytes;
     report->bytes_peak = base_memory_peak();
     report->copied_why = text_of(&session->copied_why);
     report->left_out = text_of(&session->left_out);

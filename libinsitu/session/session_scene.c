@@ -130,5 +130,6 @@ void session_reload_scene(insitu_session *session)
     }
     scene_free(&session->scene);
     session->scene = edited;
+    session_drop_picture(session);
     for (int i = 0; i < session->mesh_count; i++) session_drop_scalars(session->meshes[i]);
 }

@@ -119,7 +119,8 @@ typedef struct insitu_report {
     double refit_ms;        /* trees refitted */
     double surface_ms;      /* isosurfaces traced */
     double volume_ms;       /* volumes traced */
-    double composite_ms;    /* fragments exchanged, merged and gathered, waiting included */
+    double composite_ms;    /* fragments exchanged, merged and gathered, waiting included; alone: the slowest
+                               thread's */
     double write_ms;        /* images written, on rank 0 */
     int64_t cells;          /* handed over, ghosts included */
     int64_t cells_ghost;    /* not drawn: flagged as ghosts */
@@ -131,6 +132,7 @@ typedef struct insitu_report {
     int64_t bytes_borrowed; /* of the caller's arrays in use */
     int64_t bytes_copied;   /* of the caller's data held in copies, with reasons in copied_why */
     int64_t bytes_trees;    /* of all trees held */
+    int64_t bytes_pictures; /* of the last picture, kept on rank 0 for the next one; at most 64 MiB */
     int64_t bytes_peak;     /* most bytes the library held at once in this step */
     const char *copied_why; /* "" or a list of what was copied and why; valid until the next step */
     const char *left_out;   /* "" or a list of what the scene does not need and was not computed; as above */

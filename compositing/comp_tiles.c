@@ -1,0 +1,195 @@
+/* A rank alone owns all pixels, and whoever traces a tile has all of its fragments in cache. So nobody collects them:
+ * the tile's pixels are blended at once and stored, background where nothing is, and the fragments are forgotten. The
+ * image is written once, there is no list of fragments, and nothing waits for the last tile.
+ *
+ * A pixel's fragments need not follow each other. They are counted, and numbered pixel by pixel; a pixel of one
+ * fragment, as most are, is blended where that lies, the others are copied to a pile first. */
+#include "comp_tiles.h"
+
+#include <assert.h>
+#include <math.h>
+#include <omp.h>
+#include <string.h>
+
+#include "comp_pixels.h"
+#include "memory.h"
+
+/* As the renderer's tiles are; larger ones are right too. */
+enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
+
+/* A block that grows and forgets what it held. */
+typedef struct room {
+    void *data;
+    size_t bytes;
+} room;
+
+struct comp_tile_scratch {
+    room starts; /* int64_t, pixels of a tile + 1: in order */
+    room order;  /* int64_t: numbers of fragments, pixel by pixel */
+    room pile;   /* fragments of one pixel */
+    int64_t fragments;
+    double seconds;
+    char apart[64]; /* threads write to no common line */
+};
+
+static void *make_room(room *r, int64_t count, size_t size)
+{
+    const size_t bytes = (size_t)count * size;
+    if (bytes <= r->bytes) return r->data;
+    base_free(r->data);
+    r->data = base_alloc(bytes + bytes / 2);
+    r->bytes = r->data ? bytes + bytes / 2 : 0;
+    return r->data;
+}
+
+insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int threads, bool finds_overlaps,
+                               image *out, base_error *error)
+{
+    const int64_t pixels = (int64_t)out->width * out->height;
+    *tiles = (comp_tiles){.background = background,
+                          .out = out,
+                          .inverse_width = 1 / (double)out->width,
+                          .threads = threads > 0 ? threads : omp_get_max_threads()};
+    if (out->width < 1 || out->height < 1 || pixels > UINT32_MAX)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "compositing: no image of %d by %d pixels", out->width,
+                         out->height);
+    tiles->scratch = base_calloc((size_t)tiles->threads, sizeof *tiles->scratch);
+    if (finds_overlaps) tiles->overlaps = base_calloc(pixel_set_bytes(pixels), 1);
+    if (tiles->scratch && (tiles->overlaps || !finds_overlaps)) return INSITU_OK;
+    base_free(tiles->scratch);
+    base_free(tiles->overlaps);
+    return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels", (long long)pixels);
+}
+
+void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics *statistics)
+{
+    double slowest = 0;
+    *statistics = (comp_statistics){0};
+    for (int i = 0; i < tiles->threads; i++) {
+        comp_tile_scratch *own = &tiles->scratch[i];
+        statistics->sent_fragments += own->fragments;
+        slowest = fmax(slowest, own->seconds);
+        base_free(own->starts.data);
+        base_free(own->order.data);
+        base_free(own->pile.data);
+    }
+    statistics->merge_ms = 1e3 * slowest;
+    base_free(tiles->scratch);
+    const int64_t pixels = (int64_t)tiles->out->width * tiles->out->height;
+    const int64_t found = tiles->overlaps ? pixel_set_count(tiles->overlaps, pixels) : 0;
+    if (!found || !overlaps) base_free(tiles->overlaps);
+    if (overlaps) *overlaps = (comp_overlaps){found, found ? tiles->overlaps : NULL};
+}
+
+static void store_background(const comp_tiles *tiles, int64_t pixel)
+{
+    memcpy(tiles->out->rgba + 4 * pixel, tiles->background, 4 * sizeof *tiles->background);
+    if (tiles->out->depth) tiles->out->depth[pixel] = INFINITY;
+}
+
+static void clear(const comp_tiles *tiles, const pixel_area *area)
+{
+    const int64_t width = tiles->out->width;
+    float row[4 * ROW_PIXELS];
+    for (int i = 0; i < 4 * ROW_PIXELS; i++) row[i] = tiles->background[i % 4];
+    for (int64_t y = area->y; y < area->y + area->height; y++)
+        for (int x = 0; x < area->width; x += ROW_PIXELS) {
+            const int left = area->width - x, pixels = left < ROW_PIXELS ? left : ROW_PIXELS;
+            const int64_t first = y * width + area->x + x;
+            memcpy(tiles->out->rgba + 4 * first, row, 4 * (size_t)pixels * sizeof *row);
+            for (int i = 0; tiles->out->depth && i < pixels; i++) tiles->out->depth[first + i] = INFINITY;
+        }
+}
+
+/* The pixel's number in the area, row by row. The division is exact: half a pixel is far from where it would round. */
+static uint32_t place_in(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
+{
+    const uint32_t width = (uint32_t)tiles->out->width;
+    const uint32_t from = pixel - ((uint32_t)area->y * width + (uint32_t)area->x);
+    const uint32_t row = (uint32_t)(((double)from + 0.5) * tiles->inverse_width);
+    assert(row < (uint32_t)area->height && from - row * width < (uint32_t)area->width);
+    return row * (uint32_t)area->width + (from - row * width);
+}
+
+/* The fragments of the k-th pixel have the numbers order[starts[k]] .. order[starts[k + 1]]. */
+static void number(const comp_tiles *tiles, const pixel_area *area, const fragment *items, int64_t count,
+                   int64_t *starts, int64_t *order)
+{
+    const int64_t pixels = (int64_t)area->width * area->height;
+    memset(starts, 0, (size_t)pixels * sizeof *starts);
+    for (int64_t i = 0; i < count; i++) starts[place_in(tiles, area, items[i].pixel)]++;
+    for (int64_t k = 1; k < pixels; k++) starts[k] += starts[k - 1];
+    for (int64_t i = 0; i < count; i++) order[--starts[place_in(tiles, area, items[i].pixel)]] = i;
+    starts[pixels] = count;
+}
+
+/* One pixel's in one piece; NULL where memory ran out. */
+static fragment *collect(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
+{
+    if (count == 1) return &items[*order];
+    fragment *pile = make_room(&own->pile, count, sizeof *pile);
+    for (int64_t i = 0; i < count && pile; i++) pile[i] = items[order[i]];
+    return pile;
+}
+
+static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64_t count)
+{
+    float depth;
+    comp_merge_pixel(items, count, tiles->background, tiles->out->rgba + 4 * pixel, &depth);
+    if (tiles->out->depth) tiles->out->depth[pixel] = depth;
+    if (tiles->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
+}
+
+/* Where no pixel has two; false: one has, and what was stored is to be stored anew. */
+static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
+{
+    const int64_t pixels = (int64_t)area->width * area->height;
+    unsigned char seen[MOST_PIXELS] = {0};
+    if (count > pixels || pixels > MOST_PIXELS) return false;
+    if (count < pixels) clear(tiles, area);
+    for (int64_t i = 0; i < count; i++) {
+        const uint32_t place = place_in(tiles, area, items[i].pixel);
+        if (seen[place]) return false;
+        seen[place] = 1;
+        blend(tiles, items[i].pixel, &items[i], 1);
+    }
+    return true;
+}
+
+static bool blend_tile(const comp_tiles *tiles, comp_tile_scratch *own, const pixel_area *area, fragment *items,
+                       int64_t count)
+{
+    if (blend_singles(tiles, area, items, count)) return true;
+    const int64_t pixels = (int64_t)area->width * area->height;
+    int64_t *starts = make_room(&own->starts, pixels + 1, sizeof *starts);
+    int64_t *order = make_room(&own->order, count, sizeof *order);
+    if (!starts || !order) return false;
+    number(tiles, area, items, count, starts, order);
+    for (int64_t k = 0; k < pixels; k++) {
+        const int64_t pixel = (area->y + k / area->width) * tiles->out->width + area->x + k % area->width;
+        const int64_t own_count = starts[k + 1] - starts[k];
+        if (!own_count) {
+            store_background(tiles, pixel);
+            continue;
+        }
+        fragment *collected = collect(own, items, order + starts[k], own_count);
+        if (!collected) return false;
+        blend(tiles, pixel, collected, own_count);
+    }
+    return true;
+}
+
+bool comp_tiles_take(void *state, int thread, const pixel_area *area, fragment *items, int64_t count)
+{
+    comp_tiles *tiles = state;
+    comp_tile_scratch *own = &tiles->scratch[thread];
+    const double start = omp_get_wtime();
+    bool is_well = true;
+    if (count)
+        is_well = blend_tile(tiles, own, area, items, count);
+    else
+        clear(tiles, area);
+    own->fragments += count;
+    own->seconds += omp_get_wtime() - start;
+    return is_well;
+}

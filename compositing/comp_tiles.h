@@ -1,0 +1,31 @@
+/* One rank alone: pixels are blended as their fragments are made, a tile at a time. */
+#ifndef COMP_COMP_TILES_H
+#define COMP_COMP_TILES_H
+
+#include "comp.h"
+
+typedef struct comp_tile_scratch comp_tile_scratch;
+
+typedef struct comp_tiles {
+    const float *background;
+    image *out;
+    unsigned char *overlaps; /* pixel_set.h; NULL where nobody asks */
+    double inverse_width;
+    int threads;
+    comp_tile_scratch *scratch; /* each thread's */
+} comp_tiles;
+
+/* For at most so many threads. out as in comp_composite(); overlaps are looked for where finds_overlaps. Local; on an
+ * error there is nothing to end. */
+insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int threads, bool finds_overlaps,
+                               image *out, base_error *error);
+
+/* A fragment_taker (fragment.h), tiles its state: out's pixels of the tile become what comp_composite() makes of these
+ * fragments, to the bit. Tiles lie in out, and do not overlap. */
+bool comp_tiles_take(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
+
+/* What was taken, and the time it took the slowest thread, go to statistics; overlaps may be NULL, else becomes the
+ * pixels that were found. */
+void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics *statistics);
+
+#endif
