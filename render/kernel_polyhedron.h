@@ -202,6 +202,20 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
     m->w = vf_select(apart, m->w_face, m->w);
 }
 
+/* Of rays that meet the patch twice and both triangles, the nearer place is the nearer triangle's. */
+static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *const m[2], kernel_quad_place places[2])
+{
+    const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
+    const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
+    const kernel_quad_place own = places[0];
+    places[0].s = vf_select(swap, places[1].s, own.s);
+    places[0].r = vf_select(swap, places[1].r, own.r);
+    places[0].t = vf_select(swap, places[1].t, own.t);
+    places[1].s = vf_select(swap, own.s, places[1].s);
+    places[1].r = vf_select(swap, own.r, places[1].r);
+    places[1].t = vf_select(swap, own.t, places[1].t);
+}
+
 /* A quad, by the first of its two triangles: where its patch is met, as a hex beside it has it. */
 static void kernel_passage_quad(const polyhedron *c, int first, vm rays, bool has_colour, kernel_passage *r)
 {
@@ -228,6 +242,7 @@ static void kernel_passage_quad(const polyhedron *c, int first, vm rays, bool ha
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
     const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
     const int count = kernel_quad_places(&quad, once, twice, s, q, places);
+    if (count == 2) kernel_places_pair(m, places);
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();
         if (vm_any(left)) kernel_facet_face(c, corner, &places[0], left, has_colour, m[half]);
