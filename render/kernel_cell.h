@@ -15,7 +15,7 @@
 #ifndef RENDER_KERNEL_CELL_H
 #define RENDER_KERNEL_CELL_H
 
-#include "kernel_line.h"
+#include "kernel_quad.h"
 
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2, KERNEL_MAX_LINES = 18 };
 
@@ -491,151 +491,6 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
     return false;
 }
 
-/* A quad in the ray's plane: corner 0, the edges to corners 1 and 3, and corner 0 - 1 + 2 - 3; how far the edges reach
- * along the ray. */
-typedef struct kernel_patch {
-    vf ax, ay, ex, ey, gx, gy, hx, hy;
-    float ez, gz;
-} kernel_patch;
-
-SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_projected *q, const float *z, const int corner[4])
-{
-    p->ez = fmaxf(fabsf(z[corner[1]] - z[corner[0]]), fabsf(z[corner[2]] - z[corner[3]]));
-    p->gz = fmaxf(fabsf(z[corner[3]] - z[corner[0]]), fabsf(z[corner[2]] - z[corner[1]]));
-    p->ax = q->x[corner[0]], p->ay = q->y[corner[0]];
-    p->ex = q->x[corner[1]] - p->ax, p->ey = q->y[corner[1]] - p->ay;
-    p->gx = q->x[corner[3]] - p->ax, p->gy = q->y[corner[3]] - p->ay;
-    p->hx = (q->x[corner[2]] - q->x[corner[1]]) - p->gx, p->hy = (q->y[corner[2]] - q->y[corner[1]]) - p->gy;
-}
-
-/* Newton's method for the ray's place (s, r) on the patch, within [0, 1]: the error goes as its square in each step,
- * 0.2 to 1e-9 in four. Returns the rays that have arrived: to what float32 leaves of the quad's size, across the ray.
- * Where the quad is so steep that this is 8 times as much along it, none have. */
-SIMD_INLINE vm kernel_patch_newton(const kernel_patch *p, vf *s, vf *r)
-{
-    for (int step = 0;; step++) {
-        const vf rx = p->gx + *s * p->hx, ry = p->gy + *s * p->hy;
-        const vf dx = -((p->ax + *s * p->ex) + *r * rx), dy = -((p->ay + *s * p->ey) + *r * ry);
-        const vf sx = p->ex + *r * p->hx, sy = p->ey + *r * p->hy;
-        const vf det = sx * ry - sy * rx;
-        if (step == 4) {
-            const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
-            const vm open = vf_lt(e * p->gz + g * p->ez, vf_abs(det) * 8.0f);
-            return vm_and(open, vf_le(vf_abs(dx) + vf_abs(dy), (e + g) * 1.2e-7f));
-        }
-        const vf inverse = vf_select(vf_eq(det, vf_set(0)), vf_set(0), 1.0f / det);
-        *s = vf_clamp(*s + (dx * ry - dy * rx) * inverse, vf_set(0), vf_set(1));
-        *r = vf_clamp(*r + (sx * dy - sy * dx) * inverse, vf_set(0), vf_set(1));
-    }
-}
-
-/* A quad in one ray's plane, in double: products of float32 are exact there. */
-typedef struct kernel_flat_quad {
-    double x[4], y[4];
-} kernel_flat_quad;
-
-static inline double kernel_flat_cross(const kernel_flat_quad *q, int i, int j)
-{
-    return q->x[i] * q->y[j] - q->x[j] * q->y[i];
-}
-
-/* The two x of b0 (1-x)² + 2 b1 (1-x) x + b2 x² = 0; twice one place, the double root's, where there is none. */
-static inline void kernel_flat_roots(double b0, double b1, double b2, double x[2])
-{
-    const double square = b1 * b1 - b0 * b2, root = square > 0 ? __builtin_sqrt(square) : 0;
-    const double h = b1 < 0 ? root - b1 : -(b1 + root);
-    x[0] = h / (h + b2);
-    x[1] = square > 0 ? b0 / (b0 + h) : x[0];
-}
-
-static inline double kernel_flat_beyond(const double place[2])
-{
-    double most = 0;
-    for (int i = 0; i < 2; i++) most = fmax(most, fmax(-place[i], place[i] - 1));
-    return most;
-}
-
-/* The patch's point at the origin, of two the one nearer to the guess in place. For a given r the points are on the
- * line from u = (1-r) c0 + r c3 to w = (1-r) c1 + r c2, which goes through the origin where u × w = 0:
- *     (1-r)² c0×c1 + (1-r) r (c0×c2 + c3×c1) + r² c3×c2 = 0,
- * and likewise for a given s. Of a quad seen all but edge-on, whose corners' cross products are tiny, both are as exact
- * as these. Where the patch has no such point, although the ray crosses its two triangles, the one nearest to being it,
- * whatever the guess: the ray then enters and leaves behind the quad at one place. False where the triangle's place is
- * to be kept: two corners are in one place, at the ray, or the quad is a line to float32, and so flat: which of two
- * such quads at an edge comes first, their triangles tell by exact signs. */
-static inline bool kernel_flat_solve(const kernel_flat_quad *q, double place[2])
-{
-    const double across = kernel_flat_cross(q, 0, 2), other = kernel_flat_cross(q, 3, 1);
-    double r[2], s[2], least = 1e30, nearest = 1e30, best[2] = {0, 0}, size = 0, breadth = 0;
-    for (int i = 0; i < 4; i++) {
-        size = fmax(size, fabs(q->x[i]) + fabs(q->y[i]));
-        breadth = fmax(breadth, fmax(fabs(kernel_flat_cross(q, i, (i + 1) & 3)), fabs(i % 2 ? across : other)));
-    }
-    if (!(breadth > 1e-6 * size * size)) return false;
-    kernel_flat_roots(kernel_flat_cross(q, 0, 1), 0.5 * (across + other), kernel_flat_cross(q, 3, 2), r);
-    kernel_flat_roots(kernel_flat_cross(q, 0, 3), 0.5 * (across - other), kernel_flat_cross(q, 1, 2), s);
-    for (int i = 0; i < 2; i++) {
-        const double ux = q->x[0] + r[i] * (q->x[3] - q->x[0]), uy = q->y[0] + r[i] * (q->y[3] - q->y[0]);
-        const double wx = q->x[1] + r[i] * (q->x[2] - q->x[1]), wy = q->y[1] + r[i] * (q->y[2] - q->y[1]);
-        const double near = fabs(ux - wx) > fabs(uy - wy) ? ux / (ux - wx) : uy / (uy - wy);
-        const double at[2] = {fabs(s[0] - near) <= fabs(s[1] - near) ? s[0] : s[1], r[i]};
-        const double beyond = fmax(kernel_flat_beyond(at), 1e-6);
-        const double away = fabs(at[0] - place[0]) + fabs(at[1] - place[1]);
-        if (!(away < 1e30) || !(beyond < least || (beyond == least && away < nearest))) continue;
-        least = beyond;
-        nearest = away;
-        for (int k = 0; k < 2; k++) best[k] = fmin(fmax(at[k], 0), 1);
-    }
-    if (least == 1e30) return false;
-    place[0] = best[0];
-    place[1] = best[1];
-    return true;
-}
-
-/* Ray by ray in double: quads seen nearly edge-on, where float32 leaves no place along the ray, and folded ones. */
-static __attribute__((noinline, cold)) vm kernel_quad_exactly(const kernel_projected *q, const int corner[4], vm wanted,
-                                                              vf *s, vf *r)
-{
-    unsigned found = 0;
-    for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
-        const int lane = __builtin_ctz(bits);
-        double place[2] = {(double)(*s)[lane], (double)(*r)[lane]};
-        kernel_flat_quad flat;
-        for (int i = 0; i < 4; i++) {
-            flat.x[i] = (double)q->x[corner[i]][lane];
-            flat.y[i] = (double)q->y[corner[i]][lane];
-        }
-        if (!kernel_flat_solve(&flat, place)) continue;
-        (*s)[lane] = (float)place[0];
-        (*r)[lane] = (float)place[1];
-        found |= 1u << lane;
-    }
-    return vm_from_bits(found);
-}
-
-/* Where the rays of wanted meet the quad's bilinear patch: s along corners 0 to 1, r along 0 to 3, from the guess in
- * them. Returns those that have a point; the others' s and r are not to be used. */
-SIMD_INLINE vm kernel_quad_solve(const kernel_projected *q, const float *z, const int corner[4], vm wanted, vf *s,
-                                 vf *r)
-{
-    kernel_patch patch;
-    const vf guess_s = *s, guess_r = *r;
-    kernel_patch_setup(&patch, q, z, corner);
-    const vm arrived = kernel_patch_newton(&patch, s, r);
-    const vm left = vm_andnot(wanted, arrived);
-    if (__builtin_expect(!vm_any(left), 1)) return arrived;
-    *s = vf_select(arrived, *s, guess_s);
-    *r = vf_select(arrived, *r, guess_r);
-    return vm_or(arrived, kernel_quad_exactly(q, corner, left, s, r));
-}
-
-SIMD_INLINE vf kernel_bilinear(const float *f, const int corner[4], vf s, vf r)
-{
-    const vf low = f[corner[0]] + s * (f[corner[1]] - f[corner[0]]);
-    const vf high = f[corner[3]] + s * (f[corner[2]] - f[corner[3]]);
-    return low + r * (high - low);
-}
-
 /* Edge functions of a crossed triangle i, j, k in the order, the weights, and one over their sum. Tets weigh in the
  * same way: a face's depth and value have the same bits from both its cells. */
 typedef struct kernel_weights {
@@ -667,31 +522,52 @@ SIMD_INLINE void kernel_triangle_values(const kernel_cell *c, const kernel_shape
         out->r[a] = kernel_weigh(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
 
-/* The crossing of a quad, given that of one of its triangles: on the bilinear patch that the isoparametric map puts
- * there, so that the field inside the cells on both sides goes on to the same value. Where the patch is folded as seen
- * along the ray and no such point is found, the triangle's stays. */
-SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *shape, const kernel_projected *q,
-                                    const int corner[4], const kernel_weights *w, bool has_colour, kernel_crossing *out)
+/* The edge function from one corner to another. */
+SIMD_INLINE vf kernel_corner_edge(const kernel_cell *c, const kernel_edges *edges, int from, int to)
+{
+    return c->rank[from] < c->rank[to] ? edges->e[from][to] : -edges->e[to][from];
+}
+
+SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, const int corner[4], kernel_quad *out)
+{
+    for (int i = 0; i < 4; i++) {
+        out->x[i] = q->x[corner[i]];
+        out->y[i] = q->y[corner[i]];
+        out->z[i] = z[corner[i]];
+    }
+}
+
+/* A guess at where rays of hit, which cross the triangle of corners 0, half + 1 and half + 2, meet the patch: the
+ * triangle's place. */
+SIMD_INLINE void kernel_quad_guess(const int corner[4], int half, const kernel_weights *w, vm hit, vf *s, vf *r)
 {
     static const float unit_s[4] = {0, 1, 1, 0}, unit_r[4] = {0, 0, 1, 1};
-    int at[3] = {0, 0, 0};
-    for (int n = 0; n < 4; n++) {
-        if (corner[n] == w->i) at[0] = n;
-        if (corner[n] == w->j) at[1] = n;
-        if (corner[n] == w->k) at[2] = n;
+    const int order[3] = {w->i, w->j, w->k};
+    float place_s[3], place_r[3];
+    for (int n = 0; n < 3; n++) {
+        const int at = order[n] == corner[0] ? 0 : order[n] == corner[half + 1] ? half + 1 : half + 2;
+        place_s[n] = unit_s[at];
+        place_r[n] = unit_r[at];
     }
-    const vf guess_s = kernel_weigh(w, unit_s[at[0]], unit_s[at[1]], unit_s[at[2]]);
-    const vf guess_r = kernel_weigh(w, unit_r[at[0]], unit_r[at[1]], unit_r[at[2]]);
-    vf s = guess_s, r = guess_r;
-    const vm arrived = kernel_quad_solve(q, c->z, corner, out->mask, &s, &r);
-    s = vf_select(arrived, s, guess_s);
-    r = vf_select(arrived, r, guess_r);
-    out->t = vf_select(arrived, kernel_bilinear(c->z, corner, s, r), out->t);
-    out->v = kernel_bilinear(c->f, corner, s, r);
-    out->w = has_colour ? kernel_bilinear(c->g, corner, s, r) : vf_set(0);
+    *s = vf_select(hit, kernel_weigh(w, place_s[0], place_s[1], place_s[2]), *s);
+    *r = vf_select(hit, kernel_weigh(w, place_r[0], place_r[1], place_r[2]), *r);
+}
+
+/* The crossing of a quad's patch. The isoparametric map has the same patch there, so that the field inside the cells on
+ * both sides goes on to the same value. */
+SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *shape, const int corner[4],
+                                    const kernel_quad_place *at, bool has_colour, kernel_crossing *out)
+{
+    float f[4], g[4];
+    for (int i = 0; i < 4; i++) f[i] = c->f[corner[i]], g[i] = has_colour ? c->g[corner[i]] : 0;
+    out->mask = at->mask;
+    out->t = at->t;
+    out->v = kernel_bilinear(f, at->s, at->r);
+    out->w = has_colour ? kernel_bilinear(g, at->s, at->r) : vf_set(0);
     for (int a = 0; a < 3; a++) {
         const float base = shape->corners[corner[0]][a];
-        out->r[a] = (base + s * (shape->corners[corner[1]][a] - base)) + r * (shape->corners[corner[3]][a] - base);
+        out->r[a] =
+            (base + at->s * (shape->corners[corner[1]][a] - base)) + at->r * (shape->corners[corner[3]][a] - base);
     }
 }
 
@@ -708,6 +584,51 @@ SIMD_INLINE vm kernel_triangle(const kernel_cell *c, const kernel_edges *edges, 
     *w = kernel_weights_of(i, j, k, edges->e[i][j], edges->e[j][k], edges->e[i][k]);
     *t = kernel_weigh_depth(w, c->z);
     return hit;
+}
+
+/* Of a quad that is a triangle. */
+static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_cell *c, const kernel_shape *shape,
+                                                                      const kernel_edges *edges, vm rays,
+                                                                      const int corner[4], bool has_colour,
+                                                                      kernel_crossing *out)
+{
+    int n = 0;
+    for (int half = 0; half < 2; half++) {
+        kernel_weights w;
+        out[n].mask = kernel_triangle(c, edges, rays, corner[0], corner[half + 1], corner[half + 2], &w, &out[n].t);
+        if (vm_any(out[n].mask)) kernel_triangle_values(c, shape, &w, has_colour, &out[n++]);
+    }
+    return n;
+}
+
+/* How many crossings there are, 0 to 2; each ray's are in one of them or in both. */
+SIMD_INLINE int kernel_quad_crossings(const kernel_cell *c, const kernel_shape *shape, const kernel_projected *q,
+                                      const kernel_edges *edges, vm rays, const int corner[4], bool has_colour,
+                                      kernel_crossing *out)
+{
+    kernel_quad quad;
+    kernel_quad_place places[2];
+    vf s = vf_set(0), r = vf_set(0), t;
+    vm once = vm_none();
+    for (int half = 0; half < 2; half++) {
+        kernel_weights w;
+        const vm hit = kernel_triangle(c, edges, rays, corner[0], corner[half + 1], corner[half + 2], &w, &t);
+        if (!vm_any(hit)) continue;
+        once = vm_xor(once, hit);
+        kernel_quad_guess(corner, half, &w, hit, &s, &r);
+    }
+    quad.e01 = edges->e[corner[0]][corner[1]];
+    quad.e03 = edges->e[corner[0]][corner[3]];
+    quad.e12 = kernel_corner_edge(c, edges, corner[1], corner[2]);
+    quad.e32 = kernel_corner_edge(c, edges, corner[3], corner[2]);
+    const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
+    if (!vm_any(vm_or(once, twice))) return 0;
+    if (kernel_quad_collapses(c, corner))
+        return kernel_collapsed_crossings(c, shape, edges, rays, corner, has_colour, out);
+    kernel_quad_take(q, c->z, corner, &quad);
+    const int n = kernel_quad_places(&quad, once, twice, s, r, places);
+    for (int i = 0; i < n; i++) kernel_quad_values(c, shape, corner, &places[i], has_colour, &out[i]);
+    return n;
 }
 
 /* All crossings of a cell with quads; returns how many triangles are crossed by some ray. */
@@ -735,16 +656,7 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
         int corner[4];
         kernel_quad_corners(c, loop, corner);
         kernel_poly_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
-        for (int half = 0; half < 2; half++) {
-            kernel_crossing *next = &out[n];
-            next->mask = kernel_triangle(c, &edges, rays, corner[0], corner[half + 1], corner[half + 2], &w, &next->t);
-            if (!vm_any(next->mask)) continue;
-            if (kernel_quad_collapses(c, corner))
-                kernel_triangle_values(c, shape, &w, has_colour, next);
-            else
-                kernel_quad_values(c, shape, &q, corner, &w, has_colour, next);
-            n++;
-        }
+        n += kernel_quad_crossings(c, shape, &q, &edges, rays, corner, has_colour, &out[n]);
     }
     return n;
 }

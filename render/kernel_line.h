@@ -81,19 +81,34 @@ SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_spot a)
     return (vf_set(a.y) - p->origin_y) - p->slope_y * a.z;
 }
 
-/* To the exact sign of what is projected. Where it is zero the tie is decided as kernel_cell.h has it, and the sign of
- * the zero says how. */
+/* Below this the products' errors may be too small for float32. */
+#define KERNEL_EDGE_LEAST 1e-30f
+
+/* e of rays on which it is all but zero: its sign is taken in double, where products of float32 are exact; its size, as
+ * little beside that of any other edge, need not be known, but that not all weights may be zero. Where e is zero the
+ * tie is decided as kernel_cell.h has it, and the sign of the zero says how. */
+static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, vf by, vf e)
+{
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+        const double x0 = (double)ax[lane], y0 = (double)ay[lane], x1 = (double)bx[lane], y1 = (double)by[lane];
+        const double exact = x0 * y1 - x1 * y0;
+        if (!(fabsf(e[lane]) <= KERNEL_EDGE_LEAST)) continue;
+        if (exact == 0)
+            e[lane] = y1 < y0 || (y0 == y1 && x0 < x1) ? 0.0f : -0.0f;
+        else
+            e[lane] = exact > 0 ? KERNEL_EDGE_LEAST : -KERNEL_EDGE_LEAST;
+    }
+    return e;
+}
+
+/* To the exact sign of what is projected. */
 SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_spot a, kernel_spot b)
 {
     const vf ax = kernel_project_x(p, a), ay = kernel_project_y(p, a);
     const vf bx = kernel_project_x(p, b), by = kernel_project_y(p, b);
     const vf e = vf_diff_of_products(ax, by, bx, ay);
-    const vm tie = vf_eq(e, vf_set(0));
-    if (__builtin_expect(!vm_any(tie), 1)) return e;
-    const vm level = vm_and(vf_eq(ay, by), vf_lt(ax, bx));
-    const vm positive = vm_or(vf_lt(by, ay), level);
-    const vf zero = vf_set(0);
-    return vf_select(tie, vf_select(positive, zero, -zero), e);
+    const vm tie = vf_le(vf_abs(e), vf_set(KERNEL_EDGE_LEAST));
+    return __builtin_expect(vm_any(tie), 0) ? kernel_edge_tied(ax, ay, bx, by, e) : e;
 }
 
 static __attribute__((noinline, cold)) vf kernel_edge_doubted(const kernel_packet *p, kernel_spot a, kernel_spot b,

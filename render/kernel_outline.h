@@ -80,10 +80,9 @@ SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
  * Let L be linear in the point, and E its largest difference from the field at a vertex. The field less L is the
  * vertices' differences weighed by the shape functions, which in the cell are not negative and sum to 1: so |F - L| <=
  * E in all of it, however distorted it is, and at most 3.4 E (1.5³) on the quarter around in which solutions of a
- * folded map count (kernel_map.h). Where a ray meets a quad's triangles but not its patch, the face's value is that of
- * a place beside the ray: off by a part of the quad's alternating sum of corners, along which L changes by at most the
- * sum of its three parts' sizes. A hit is a zero of F, or between two values of opposite signs, so L is no larger there
- * than these sums: the hit is in a slab of the cell's hull, thin where the field is smooth. */
+ * folded map count (kernel_map.h). A face's value is that of
+ * its patch at the ray, within the corners'. A hit is a zero of F, or between two values of opposite signs, so L is no
+ * larger there than these sums: the hit is in a slab of the cell's hull, thin where the field is smooth. */
 
 /* Sums over the edges along each of the cell's coordinates: a mean edge times their number. */
 static inline int kernel_cell_edges(int type, signed char edges[3][4][2], int count[3])

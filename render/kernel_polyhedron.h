@@ -129,35 +129,6 @@ SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
 
 /* ---- the surface ---- */
 
-/* Where and with what values the ray meets the patch of a quad whose half w it crosses: as a hex next to it has it. */
-static void kernel_polyhedron_quad(const polyhedron *c, const kernel_passage *r, const int around[4],
-                                   const kernel_weights *w, bool has_colour, kernel_meeting *out)
-{
-    static const signed char loop[4] = {0, 1, 2, 3};
-    kernel_cell quad;
-    kernel_projected q;
-    kernel_weights local = *w;
-    kernel_crossing crossing = {.mask = out->mask, .t = out->t};
-    int corner[4];
-    for (int i = 0; i < 4; i++) {
-        memcpy(quad.world[i], c->world[around[i]], sizeof quad.world[i]);
-        quad.z[i] = c->z[around[i]];
-        quad.f[i] = c->f[around[i]];
-        quad.g[i] = has_colour ? c->g[around[i]] : 0;
-        quad.rank[i] = around[i]; /* numbers are in the order */
-        q.x[i] = r->x[around[i]], q.y[i] = r->y[around[i]];
-        if (w->i == around[i]) local.i = i;
-        if (w->j == around[i]) local.j = i;
-        if (w->k == around[i]) local.k = i;
-    }
-    kernel_quad_corners(&quad, loop, corner);
-    if (kernel_quad_collapses(&quad, corner)) return;
-    kernel_quad_values(&quad, &kernel_shapes[0], &q, corner, &local, has_colour, &crossing);
-    out->t_face = crossing.t;
-    out->v_face = crossing.v;
-    out->w_face = crossing.w;
-}
-
 SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool has_colour, kernel_meeting *out)
 {
     out->t = kernel_weigh_depth(w, c->z);
@@ -176,6 +147,114 @@ SIMD_INLINE void kernel_passage_edge(const kernel_packet *p, const polyhedron *c
     r->edge[number] = kernel_edge(p, &line, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
 }
 
+/* Who crosses the triangle, and its place. */
+static vm kernel_passage_facet(const polyhedron *c, const polyhedron_facet *t, vm rays, bool has_colour,
+                               kernel_passage *r, kernel_weights *w, kernel_meeting *out)
+{
+    const vf ij = r->edge[t->edge[0]], jk = r->edge[t->edge[1]], ik = r->edge[t->edge[2]];
+    out->mask = kernel_inside(rays, ij, jk, ik);
+    if (!vm_any(out->mask)) return out->mask;
+    *w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], ij, jk, ik);
+    kernel_meet(c, w, has_colour, out);
+    return out->mask;
+}
+
+/* The edge function from one of the facet's vertices to another. */
+SIMD_INLINE vf kernel_facet_side(const polyhedron_facet *t, const kernel_passage *r, int from, int to)
+{
+    const int low = from < to ? from : to, high = from < to ? to : from;
+    const int n = low != t->vertex[0] ? 1 : high == t->vertex[1] ? 0 : 2;
+    return from < to ? r->edge[t->edge[n]] : -r->edge[t->edge[n]];
+}
+
+SIMD_INLINE bool kernel_facet_has(const polyhedron_facet *t, int vertex)
+{
+    return t->vertex[0] == vertex || t->vertex[1] == vertex || t->vertex[2] == vertex;
+}
+
+SIMD_INLINE void kernel_quad_of_facets(const polyhedron *c, const kernel_passage *r, const polyhedron_facet *const t[2],
+                                       const int corner[4], kernel_quad *out)
+{
+    for (int i = 0; i < 4; i++) {
+        out->x[i] = r->x[corner[i]];
+        out->y[i] = r->y[corner[i]];
+        out->z[i] = c->z[corner[i]];
+    }
+    out->e01 = kernel_facet_side(t[0], r, corner[0], corner[1]);
+    out->e12 = kernel_facet_side(t[0], r, corner[1], corner[2]);
+    out->e03 = kernel_facet_side(t[1], r, corner[0], corner[3]);
+    out->e32 = kernel_facet_side(t[1], r, corner[3], corner[2]);
+}
+
+/* A place on the patch as the facet's meeting with its face. Rays that do not cross the triangle have the face's place
+ * for its. */
+SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_place *at, vm mine,
+                                   bool has_colour, kernel_meeting *m)
+{
+    float f[4], g[4];
+    for (int i = 0; i < 4; i++) f[i] = c->f[corner[i]], g[i] = has_colour ? c->g[corner[i]] : 0;
+    m->t_face = vf_select(mine, at->t, m->t_face);
+    m->v_face = vf_select(mine, kernel_bilinear(f, at->s, at->r), m->v_face);
+    m->w_face = has_colour ? vf_select(mine, kernel_bilinear(g, at->s, at->r), m->w_face) : vf_set(0);
+    const vm apart = vm_andnot(mine, m->mask);
+    m->t = vf_select(apart, m->t_face, m->t);
+    m->v = vf_select(apart, m->v_face, m->v);
+    m->w = vf_select(apart, m->w_face, m->w);
+}
+
+/* Of rays that meet the patch twice and both triangles, the nearer place is the nearer triangle's. */
+static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *const m[2], kernel_quad_place places[2])
+{
+    const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
+    const vm swap = vm_and(both, vm_xor(vf_lt(places[0].t, places[1].t), vf_lt(m[0]->t, m[1]->t)));
+    const kernel_quad_place own = places[0];
+    places[0].s = vf_select(swap, places[1].s, own.s);
+    places[0].r = vf_select(swap, places[1].r, own.r);
+    places[0].t = vf_select(swap, places[1].t, own.t);
+    places[1].s = vf_select(swap, own.s, places[1].s);
+    places[1].r = vf_select(swap, own.r, places[1].r);
+    places[1].t = vf_select(swap, own.t, places[1].t);
+}
+
+/* A quad, by the first of its two triangles: where its patch is met, as a hex beside it has it. */
+static void kernel_passage_quad(const polyhedron *c, int first, vm rays, bool has_colour, kernel_passage *r)
+{
+    static const signed char loop[4] = {0, 1, 2, 3};
+    const int *around = c->quads[c->facets[first].quad];
+    kernel_cell ranks;
+    kernel_weights w;
+    kernel_quad quad;
+    kernel_quad_place places[2];
+    vf s = vf_set(0), q = vf_set(0);
+    int corner[4];
+    for (int i = 0; i < 4; i++) ranks.rank[i] = around[i]; /* numbers are in the order */
+    kernel_quad_corners(&ranks, loop, corner);
+    for (int i = 0; i < 4; i++) corner[i] = around[corner[i]];
+    const bool has_corner = kernel_facet_has(&c->facets[first], corner[1]);
+    const int twin = c->facets[first].twin, half_of[2] = {has_corner ? first : twin, has_corner ? twin : first};
+    const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
+    kernel_meeting *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
+    for (int half = 0; half < 2; half++) {
+        const vm hit = kernel_passage_facet(c, t[half], rays, has_colour, r, &w, m[half]);
+        if (vm_any(hit)) kernel_quad_guess(corner, half, &w, hit, &s, &q);
+    }
+    kernel_quad_of_facets(c, r, t, corner, &quad);
+    const vm once = vm_xor(m[0]->mask, m[1]->mask);
+    const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
+    const int count = kernel_quad_places(&quad, once, twice, s, q, places);
+    if (count == 2) kernel_places_pair(m, places);
+    for (int half = 0; half < 2; half++) {
+        vm left = count ? vm_and(once, m[half]->mask) : vm_none();
+        if (vm_any(left)) kernel_facet_face(c, corner, &places[0], left, has_colour, m[half]);
+        if (count == 2) {
+            kernel_facet_face(c, corner, &places[half], places[1].mask, has_colour, m[half]);
+            left = vm_or(left, places[1].mask);
+        }
+        r->left[half_of[half]] = left;
+        if (vm_any(left)) r->met[r->met_count++] = half_of[half];
+    }
+}
+
 /* All crossings of the surface; false where no ray has any. */
 static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
                                  kernel_passage *r)
@@ -186,16 +265,13 @@ static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm
     }
     for (int i = 0; i < c->edge_count; i++) kernel_passage_edge(p, c, r, i, c->edges[i][0], c->edges[i][1]);
     for (int i = 0; i < c->facet_count; i++) {
-        const polyhedron_facet *t = &c->facets[i];
-        const vm hit = kernel_inside(rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
-        if (!vm_any(hit)) continue;
-        const kernel_weights w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], r->edge[t->edge[0]],
-                                                   r->edge[t->edge[1]], r->edge[t->edge[2]]);
-        kernel_meeting *m = &r->facets[i];
-        kernel_meet(c, &w, has_colour, m);
-        m->mask = r->left[i] = hit;
-        if (t->quad >= 0) kernel_polyhedron_quad(c, r, c->quads[t->quad], &w, has_colour, m);
-        r->met[r->met_count++] = i;
+        kernel_weights w;
+        if (c->facets[i].quad >= 0) {
+            if (i < c->facets[i].twin) kernel_passage_quad(c, i, rays, has_colour, r);
+            continue;
+        }
+        r->left[i] = kernel_passage_facet(c, &c->facets[i], rays, has_colour, r, &w, &r->facets[i]);
+        if (vm_any(r->left[i])) r->met[r->met_count++] = i;
     }
     return r->met_count > 0;
 }

@@ -484,12 +484,23 @@ static void keep_vertices(const work *w, polyhedron *c)
     c->values[c->vertex_count] = c->is_constant ? c->values[0] : sum[3];
 }
 
+/* A quad with two neighbouring corners in one place is a triangle (kernel_cell.h). */
+static bool collapses(const work *w, const int *around)
+{
+    for (int i = 0; i < 4; i++) {
+        const double *a = w->vertices[around[i]].position, *b = w->vertices[around[(i + 1) % 4]].position;
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) return true;
+    }
+    return false;
+}
+
 static void keep_quads(const work *w, polyhedron *c, int *quad_of)
 {
     int count = 0;
     for (int face = 0; face < w->face_count; face++) {
         const int first = w->face_first[face];
-        quad_of[face] = w->face_first[face + 1] - first == 4 ? count : -1;
+        const bool is_quad = w->face_first[face + 1] - first == 4 && !collapses(w, &w->entry[first]);
+        quad_of[face] = is_quad ? count : -1;
         if (quad_of[face] >= 0) memcpy(c->quads[count++], &w->entry[first], 4 * sizeof(int));
     }
 }
@@ -506,6 +517,7 @@ static void keep_facets(work *w, polyhedron *c)
         const work_facet *from = &w->facets[i];
         polyhedron_facet *to = &c->facets[i];
         to->quad = quad_of[from->face];
+        to->twin = -1;
         to->sign = from->volume > 0 ? 1 : from->volume < 0 ? -1 : 0;
         c->is_star = c->is_star && to->sign >= 0;
         for (int k = 0; k < 3; k++) {
@@ -522,6 +534,14 @@ static void keep_facets(work *w, polyhedron *c)
     }
 }
 
+/* The halves of a quad have its smallest vertex, and so are near each other in the order. */
+static void keep_twins(polyhedron *c)
+{
+    for (int i = 0; i < c->facet_count; i++)
+        for (int j = i + 1; c->facets[i].quad >= 0 && c->facets[i].twin < 0 && j < c->facet_count; j++)
+            if (c->facets[j].quad == c->facets[i].quad) c->facets[i].twin = j, c->facets[j].twin = i;
+}
+
 static polyhedron *keep(polyhedron_store *store, work *w)
 {
     polyhedron shape = {.vertex_count = w->vertex_count, .facet_count = w->facet_count};
@@ -534,6 +554,7 @@ static polyhedron *keep(polyhedron_store *store, work *w)
     keep_vertices(w, c);
     turn_outward(w, (const double(*)[3])c->world);
     keep_facets(w, c);
+    keep_twins(c);
     return c;
 }
 

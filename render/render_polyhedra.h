@@ -11,7 +11,8 @@
 typedef struct polyhedron_facet {
     int vertex[3];
     int edge[3];
-    int quad;   /* the quad it is half of, or -1 */
+    int quad;   /* the quad it is half of, or -1, */
+    int twin;   /* and the other half's number */
     float sign; /* of the tet it spans with the centre: 1, -1 where that lies outside, 0 where it has no volume */
 } polyhedron_facet;
 
@@ -32,7 +33,7 @@ typedef struct polyhedron {
     int64_t *vertices; /* vertex_count */
     int (*edges)[2];
     polyhedron_facet *facets;
-    int (*quads)[4]; /* the corners around of faces of four vertices */
+    int (*quads)[4]; /* the corners around of faces of four vertices in as many places */
 } polyhedron;
 
 typedef struct polyhedron_store polyhedron_store;

@@ -101,6 +101,9 @@ static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_t
         l.py[lane] = rays->y[ray];
     }
     chord_tile_rays(p, &l);
+    p->is_pencil = rays->is_pencil;
+    p->u = f->job->camera.is_orthographic ? p->origin_x : p->slope_x;
+    p->v = f->job->camera.is_orthographic ? p->origin_y : p->slope_y;
     kernel_packet_tree_rays(p, &l);
     double base[3], direction[3];
     kernel_tree_ray(f, tile->centre_x, tile->centre_y, base, direction);
@@ -109,13 +112,22 @@ static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_t
     p->t_far = vf_set(INFINITY);
 }
 
+static double chord_radius(const kernel_frame *f, const chord_rays *rays)
+{
+    double most = 0;
+    for (int i = 0; i < rays->count; i++)
+        most = fmax(most, fmax(fabs(rays->x[i] - rays->centre_x), fabs(rays->y[i] - rays->centre_y)));
+    return most * (f->job->camera.is_orthographic ? f->job->space.scale : 1) * (1 + 1e-6);
+}
+
 static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays *rays)
 {
     const bool flat = f->job->camera.is_orthographic;
     const kernel_tile tile = {.centre_x = rays->centre_x,
                               .centre_y = rays->centre_y,
                               .shear_x = flat ? 0 : (float)rays->centre_x,
-                              .shear_y = flat ? 0 : (float)rays->centre_y};
+                              .shear_y = flat ? 0 : (float)rays->centre_y,
+                              .radius = (float)chord_radius(f, rays)};
     thread->serial++;
     for (int i = 0; i < rays->count; i++) rays->span_count[i] = 0;
     for (int first = 0; first < rays->count; first += SIMD_WIDTH) {

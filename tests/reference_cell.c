@@ -173,24 +173,34 @@ static int find_patch_points(const reference_cell *cell, const reference_line *l
     return solve_bilinear(a, b, c, d, points);
 }
 
-/* From a quad's triangles that are crossed to its patch. A ray through one of them meets the patch once. A ray through
- * both has one of them from behind: it meets the patch twice or, the patch being smooth where the triangles have a
- * fold, not at all; then both crossings are put in one place, and nothing is between them. */
-static void move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
-                          reference_crossing *crossings, int count)
+/* From a quad's triangles that are crossed, count of them, to the crossings of its patch, of which there are as many
+ * but for an even number: a ray through one triangle meets the patch once, a ray through both or none twice or not at
+ * all, as the patch is smooth where the triangles have a fold. Returns how many there are; sets is_folded for a ray
+ * that meets both triangles and not the patch. */
+static int move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
+                         reference_crossing crossings[2], int count, bool *is_folded)
 {
     patch_point points[2];
     const int inside = find_patch_points(cell, line, face, points);
-    const int nearest = points[1].beyond < points[0].beyond;
+    const int nearest = points[1].beyond < points[0].beyond, left = count == 1 ? 1 : inside == 2 ? 2 : 0;
     double z[4];
+    *is_folded = *is_folded || count > left;
     for (int i = 0; i < 4; i++) z[i] = cell->position[face[i]][2];
-    for (int i = 0; i < count; i++) {
-        const patch_point *point = &points[inside == 2 ? i : nearest];
+    for (int i = 0; i < left; i++) {
+        const patch_point *point = &points[left == 2 ? i : nearest];
         crossings[i].is_folded = count != 1 || inside != 1;
         crossings[i].u = clamp_unit(point->u);
         crossings[i].w = clamp_unit(point->w);
-        if (count == 2 || inside == 1) crossings[i].z = bilinear(z, crossings[i].u, crossings[i].w);
+        if (left == 2 || inside == 1) crossings[i].z = bilinear(z, crossings[i].u, crossings[i].w);
+        if (!count) crossings[i].z_triangle = crossings[i].z;
     }
+    if (left == 2 && (crossings[0].z < crossings[1].z) != (crossings[0].z_triangle < crossings[1].z_triangle)) {
+        const double z_triangle = crossings[0].z_triangle;
+        const int triangle = crossings[0].triangle;
+        crossings[0].z_triangle = crossings[1].z_triangle, crossings[0].triangle = crossings[1].triangle;
+        crossings[1].z_triangle = z_triangle, crossings[1].triangle = triangle;
+    }
+    return left;
 }
 
 static int insert_crossing(reference_crossing *crossings, int count, const reference_crossing *found)
@@ -204,19 +214,22 @@ static int insert_crossing(reference_crossing *crossings, int count, const refer
 static int polyhedron_crossings(const reference_cell *cell, const reference_line *line, reference_crossing *crossings)
 {
     const reference_polyhedron *p = &cell->poly;
+    bool is_folded = false;
     int count = 0;
     for (int i = 0, next; i < p->triangle_count; i = next) {
         const int face = p->face_of[i];
         reference_crossing found[REFERENCE_MAX_CROSSINGS];
         int of_face = 0;
+        for (int k = 0; k < 2; k++) found[k] = (reference_crossing){.face = face, .triangle = -1};
         for (next = i; next < p->triangle_count && p->face_of[next] == face; next++) {
             if (!triangle_crossed(cell, line, p->triangles[next], &found[of_face])) continue;
             found[of_face].face = face;
             found[of_face++].triangle = next;
         }
-        if (of_face && p->face_size[face] == 4) move_to_patch(cell, line, p->faces[face], found, of_face);
+        if (p->face_size[face] == 4) of_face = move_to_patch(cell, line, p->faces[face], found, of_face, &is_folded);
         for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
+    for (int i = 0; i < count && is_folded; i++) crossings[i].is_folded = true;
     return count;
 }
 
@@ -225,19 +238,21 @@ int reference_crossings(const reference_cell *cell, const reference_line *line,
 {
     if (cell->type == GRID_POLYHEDRON) return polyhedron_crossings(cell, line, crossings);
     const cell_faces *faces = faces_of(cell->type);
+    bool is_folded = false;
     int count = 0;
     for (int face = 0; face < faces->count; face++) {
         int triangles[2][3];
         const int halves = split_face(cell, faces->vertices[face], triangles);
-        reference_crossing found[2];
+        reference_crossing found[2] = {{.face = face}, {.face = face}};
         int of_face = 0;
         for (int half = 0; half < halves; half++) {
             if (!triangle_crossed(cell, line, triangles[half], &found[of_face])) continue;
             found[of_face++].face = face;
         }
-        if (of_face && halves == 2) move_to_patch(cell, line, faces->vertices[face], found, of_face);
+        if (halves == 2) of_face = move_to_patch(cell, line, faces->vertices[face], found, of_face, &is_folded);
         for (int k = 0; k < of_face; k++) count = insert_crossing(crossings, count, &found[k]);
     }
+    for (int i = 0; i < count && is_folded; i++) crossings[i].is_folded = true;
     return count;
 }
 
@@ -306,6 +321,7 @@ static double profile_end(const reference_cell *cell, const reference_line *line
     double sum;
     bool is_folded;
     const double face = reference_face_value(cell, line, end, values, &is_folded);
+    if (end->triangle < 0) return face;
     const double triangle = triangle_value(cell, line, cell->poly.triangles[end->triangle], values);
     /* A little inside: the error is that much of the field's change in the cell. */
     if (!sum_on_line(cell, line, end->z_triangle + 1e-10 * inward, values, &sum)) sum = triangle;
@@ -335,6 +351,14 @@ int reference_profile_breaks(const reference_cell *cell, const reference_line *l
     return count;
 }
 
+/* The sum at a sheet, of the side that has one: a piece between two triangles of a quad, whose patch the ray does not
+ * meet, is in none of the tets, and the field on it the line between its sheets. */
+static bool sum_at_sheet(const reference_cell *cell, const reference_line *line, double z, double aside,
+                         const double *values, double *value)
+{
+    return sum_on_line(cell, line, z + aside, values, value) || sum_on_line(cell, line, z - aside, values, value);
+}
+
 bool reference_profile_value(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
                              const double *values, double z, double *value)
 {
@@ -348,8 +372,8 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     const bool is_first = next == 1 && cell->poly.face_size[ends[0].face] == 4;
     const bool is_last = next == count - 1 && cell->poly.face_size[ends[1].face] == 4;
     if (!is_first && !is_last) {
-        const double inner = 1e-9 * length;
-        return sum_on_line(cell, line, fmin(fmax(z, ends[0].z + inner), ends[1].z - inner), values, value);
+        const double inner = 1e-9 * length, held = fmin(fmax(z, ends[0].z + inner), ends[1].z - inner);
+        if (sum_on_line(cell, line, held, values, value)) return true;
     }
     /* Sums a little inside the piece: a sheet may lie in the face at the other end. */
     const double aside = 1e-9 * (behind - before);
@@ -357,11 +381,11 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     if (next == 1)
         v0 = profile_end(cell, line, &ends[0], values, length);
     else
-        is_good = sum_on_line(cell, line, before + aside, values, &v0);
+        is_good = sum_at_sheet(cell, line, before, aside, values, &v0);
     if (next == count - 1)
         v1 = profile_end(cell, line, &ends[1], values, -length);
     else
-        is_good = sum_on_line(cell, line, behind - aside, values, &v1) && is_good;
+        is_good = sum_at_sheet(cell, line, behind, -aside, values, &v1) && is_good;
     *value = behind > before ? v0 + (z - before) / (behind - before) * (v1 - v0) : v0;
     return is_good;
 }

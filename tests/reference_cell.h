@@ -32,15 +32,15 @@ typedef struct reference_line {
     double base[2], slope[2];
 } reference_line;
 
-/* Where a line meets the cell's surface. That a face is met is decided on its triangles; where a quad is met, on its
- * bilinear patch, at the coordinates u, w. */
+/* Where a line meets the cell's surface: triangles as they are, a quad on its bilinear patch, at the coordinates u, w;
+ * whether an odd number of times, its triangles say. */
 typedef struct reference_crossing {
     double z;
     int face;
-    int triangle;      /* of a polyhedron */
+    int triangle;      /* of a polyhedron; -1 where none is met but the patch of its face, twice */
     double z_triangle; /* where the triangle is met */
     double u, w;
-    bool is_folded; /* the ray meets the patch twice, or its triangles and not the patch */
+    bool is_folded; /* the ray meets the patch twice, or the triangles of some quad of the cell and not its patch */
 } reference_crossing;
 
 enum { REFERENCE_MAX_CROSSINGS = REFERENCE_MAX_TRIANGLES };

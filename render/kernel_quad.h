@@ -1,0 +1,319 @@
+/* A ray and a quad's bilinear patch: how often they meet, and where.
+ *
+ * Corners 0 to 3 go around; in the ray's plane, with the ray at the origin, they are c0 to c3. The patch's point (s, r)
+ * is (1-r) ((1-s) c0 + s c1) + r ((1-s) c3 + s c2). For a given r these are the points of the line from u = (1-r) c0 +
+ * r c3 to w = (1-r) c1 + r c2, which goes through the origin where B(r) = u × w = 0; likewise A(s) = 0:
+ *
+ *     B(r) = (1-r)² b0 + 2 r (1-r) b1 + r² b2,   b0 = c0×c1,  2 b1 = c0×c2 + c3×c1,  b2 = c3×c2
+ *     A(s) = (1-s)² a0 + 2 s (1-s) a1 + s² a2,   a0 = c0×c3,  2 a1 = c0×c2 + c1×c3,  a2 = c1×c2
+ *
+ * b0, b2, a0 and a2 are the edge functions of the four sides, whose exact signs, ties included, the ray has from all
+ * cells alike. They decide almost everything:
+ * - How often the ray meets the patch is as odd or even as how often it meets the quad's two triangles: both surfaces
+ *   have the same border. A bilinear patch is met twice at most; so odd is once.
+ * - The two discriminants b1² - b0 b2 and a1² - a0 a2 are one and the same number D. At a root the patch's Jacobian in
+ *   the plane is J = A'(s) = -B'(r) = 2 sqrt(D) or -2 sqrt(D): the two roots of A and those of B pair up by its sign.
+ * - Odd: then b0, b2 differ in sign or a0, a2 do. If b0 and b2 do, B rises or falls through (0, 1) once, which is the
+ *   sign of B' there and so that of J: the root is chosen without any arithmetic. Likewise for A.
+ * - Even: twice or never. Twice only where b0, b2 have one sign, a0, a2 have one, b1 and a1 the others, and D > 0. It
+ *   is the one decision that rounding may take, of a ray at the patch's silhouette, whose two places are then the same
+ *   to 1e-8; all cells of the face take it from the same numbers.
+ *
+ * Where b0 and b2 differ in sign, D is a sum of two positive terms, and a root is a quotient of sums of terms of one
+ * sign: nothing cancels. What is computed in double from the corners' float32 is therefore exact but for rounding,
+ * however edge-on, thin or warped the quad: the crossings of two quads at their common edge come in the order that the
+ * corners' float32 places have them in. That is what keeps a ray's intervals from overlapping.
+ *
+ * Where the whole ray B(r) = 0, it runs along the patch (along an edge, or a ruling), and the place is the limit of
+ * those of rays moved by (e, e²), as kernel_cell.h has it for ties: there B(r) is -e times the y of w - u.
+ *
+ * Most rays meet a quad well inside and not nearly edge-on: Newton's method in float32 is then good enough, as no other
+ * crossing of the cell is near. */
+#ifndef RENDER_KERNEL_QUAD_H
+#define RENDER_KERNEL_QUAD_H
+
+#include "kernel_line.h"
+
+/* In a packet's planes. e01 is the edge function from corner 0 to corner 1, its sign bit the exact one. */
+typedef struct kernel_quad {
+    vf x[4], y[4];
+    float z[4];
+    vf e01, e32, e03, e12;
+} kernel_quad;
+
+/* Rays at the patch: s along corners 0 to 1, r along 0 to 3, and their depth. */
+typedef struct kernel_quad_place {
+    vm mask;
+    vf s, r, t;
+} kernel_quad_place;
+
+SIMD_INLINE vf kernel_bilinear(const float f[4], vf s, vf r)
+{
+    const vf low = f[0] + s * (f[1] - f[0]), high = f[3] + s * (f[2] - f[3]);
+    return low + r * (high - low);
+}
+
+/* ---- one ray, in double ---- */
+
+typedef struct kernel_flat_quad {
+    double x[4], y[4], z[4];
+    bool e01, e32, e03, e12; /* negative? */
+} kernel_flat_quad;
+
+/* (1-x)² c0 + 2 x (1-x) c1 + x² c2, and the sign bits of c0 and c2. */
+typedef struct kernel_flat_quadratic {
+    double c0, c1, c2;
+    bool is_negative0, is_negative2;
+} kernel_flat_quadratic;
+
+/* Of float32 corners exact but for one rounding. */
+static inline double kernel_flat_cross(const kernel_flat_quad *q, int i, int j)
+{
+    return q->x[i] * q->y[j] - q->x[j] * q->y[i];
+}
+
+static inline kernel_flat_quadratic kernel_flat_b(const kernel_flat_quad *q)
+{
+    return (kernel_flat_quadratic){kernel_flat_cross(q, 0, 1),
+                                   0.5 * (kernel_flat_cross(q, 0, 2) + kernel_flat_cross(q, 3, 1)),
+                                   kernel_flat_cross(q, 3, 2), q->e01, q->e32};
+}
+
+static inline kernel_flat_quadratic kernel_flat_a(const kernel_flat_quad *q)
+{
+    return (kernel_flat_quadratic){kernel_flat_cross(q, 0, 3),
+                                   0.5 * (kernel_flat_cross(q, 0, 2) + kernel_flat_cross(q, 1, 3)),
+                                   kernel_flat_cross(q, 1, 2), q->e03, q->e12};
+}
+
+static inline bool kernel_flat_turns(const kernel_flat_quadratic *c)
+{
+    return c->is_negative0 != c->is_negative2;
+}
+
+static inline bool kernel_flat_vanishes(const kernel_flat_quadratic *c)
+{
+    return c->c0 == 0 && c->c1 == 0 && c->c2 == 0;
+}
+
+static inline double kernel_flat_discriminant(const kernel_flat_quadratic *c)
+{
+    const double d = c->c1 * c->c1 - c->c0 * c->c2;
+    return d > 0 ? d : 0;
+}
+
+/* The root in [0, 1] at which the derivative is 2 turn: of its two forms the one in which nothing cancels. */
+static inline double kernel_flat_root(const kernel_flat_quadratic *c, double turn)
+{
+    const bool is_sum = c->c1 * turn <= 0;
+    const double n = is_sum ? turn - c->c1 : c->c0, d = is_sum ? n + c->c2 : c->c0 - c->c1 - turn;
+    const double x = d != 0 ? n / d : is_sum;
+    return x >= 0 ? fmin(x, 1) : 0;
+}
+
+/* Where v0 + x (v1 - v0) = 0, v0 and v1 not both 0. */
+static inline double kernel_flat_zero(double v0, double v1)
+{
+    const double x = v0 / (v0 - v1);
+    return x >= 0 ? fmin(x, 1) : 0;
+}
+
+/* The limit of the root on the line from corner i to i2 and j to j2, B or A being 0 all along it. */
+static inline double kernel_flat_limit(const kernel_flat_quad *q, int i, int i2, int j, int j2)
+{
+    const double y0 = q->y[i2] - q->y[i], y1 = q->y[j2] - q->y[j];
+    return y0 != y1 ? kernel_flat_zero(y0, y1) : kernel_flat_zero(q->x[i2] - q->x[i], q->x[j2] - q->x[j]);
+}
+
+/* The place where J is positive or negative. */
+static inline void kernel_flat_place(const kernel_flat_quad *q, const kernel_flat_quadratic *a,
+                                     const kernel_flat_quadratic *b, double root, double place[3])
+{
+    const double s = kernel_flat_vanishes(a) ? kernel_flat_limit(q, 0, 3, 1, 2) : kernel_flat_root(a, root);
+    const double r = kernel_flat_vanishes(b) ? kernel_flat_limit(q, 0, 1, 3, 2) : kernel_flat_root(b, -root);
+    place[0] = s;
+    place[1] = r;
+    place[2] = (1 - r) * ((1 - s) * q->z[0] + s * q->z[1]) + r * ((1 - s) * q->z[3] + s * q->z[2]);
+}
+
+/* Of a ray that meets the triangles once. */
+static inline void kernel_flat_once(const kernel_flat_quad *q, double place[3])
+{
+    const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
+    const bool by_b = kernel_flat_turns(&b);
+    const double root = __builtin_sqrt(kernel_flat_discriminant(by_b ? &b : &a));
+    const bool is_rising = by_b ? b.is_negative0 : a.is_negative0;
+    kernel_flat_place(q, &a, &b, by_b != is_rising ? root : -root, place);
+}
+
+/* Is the quadratic's middle so far on the other side of its ends, which are on one, that it may have two roots? */
+static inline bool kernel_flat_bends(const kernel_flat_quadratic *c)
+{
+    return !kernel_flat_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
+}
+
+/* Of a ray that meets the triangles twice or never. False where it does not meet the patch. */
+static inline bool kernel_flat_twice(const kernel_flat_quad *q, double places[2][3])
+{
+    const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
+    if (!kernel_flat_bends(&a) || !kernel_flat_bends(&b)) return false;
+    const double root = __builtin_sqrt(kernel_flat_discriminant(&b));
+    if (!(root > 0)) return false;
+    kernel_flat_place(q, &a, &b, root, places[0]);
+    kernel_flat_place(q, &a, &b, -root, places[1]);
+    return true;
+}
+
+static inline bool kernel_is_negative(vf v, int lane)
+{
+    return __builtin_signbit(v[lane]) != 0;
+}
+
+static inline kernel_flat_quad kernel_flat_of(const kernel_quad *q, int lane)
+{
+    kernel_flat_quad flat = {.e01 = kernel_is_negative(q->e01, lane),
+                             .e32 = kernel_is_negative(q->e32, lane),
+                             .e03 = kernel_is_negative(q->e03, lane),
+                             .e12 = kernel_is_negative(q->e12, lane)};
+    for (int i = 0; i < 4; i++) {
+        flat.x[i] = (double)q->x[i][lane];
+        flat.y[i] = (double)q->y[i][lane];
+        flat.z[i] = (double)q->z[i];
+    }
+    return flat;
+}
+
+static inline void kernel_quad_put(kernel_quad_place *out, int lane, const double place[3])
+{
+    out->s[lane] = (float)place[0];
+    out->r[lane] = (float)place[1];
+    out->t[lane] = (float)place[2];
+}
+
+static __attribute__((noinline, cold)) void kernel_quad_once(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+{
+    for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
+        const int lane = __builtin_ctz(bits);
+        const kernel_flat_quad flat = kernel_flat_of(q, lane);
+        double place[3];
+        kernel_flat_once(&flat, place);
+        kernel_quad_put(out, lane, place);
+    }
+}
+
+/* Returns the rays of wanted that meet the patch twice, their places added to both. */
+static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q, vm wanted, kernel_quad_place out[2])
+{
+    unsigned found = 0;
+    for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
+        const int lane = __builtin_ctz(bits);
+        const kernel_flat_quad flat = kernel_flat_of(q, lane);
+        double places[2][3];
+        if (!kernel_flat_twice(&flat, places)) continue;
+        kernel_quad_put(&out[0], lane, places[0]);
+        kernel_quad_put(&out[1], lane, places[1]);
+        found |= 1u << lane;
+    }
+    return vm_from_bits(found);
+}
+
+/* ---- a packet ---- */
+
+/* Corner 0, the edges to corners 1 and 3, and corner 0 - 1 + 2 - 3, in the ray's plane; how far the edges reach along
+ * the ray. */
+typedef struct kernel_patch {
+    vf ax, ay, ex, ey, gx, gy, hx, hy;
+    float ez, gz;
+} kernel_patch;
+
+SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_quad *q)
+{
+    p->ez = fmaxf(fabsf(q->z[1] - q->z[0]), fabsf(q->z[2] - q->z[3]));
+    p->gz = fmaxf(fabsf(q->z[3] - q->z[0]), fabsf(q->z[2] - q->z[1]));
+    p->ax = q->x[0], p->ay = q->y[0];
+    p->ex = q->x[1] - p->ax, p->ey = q->y[1] - p->ay;
+    p->gx = q->x[3] - p->ax, p->gy = q->y[3] - p->ay;
+    p->hx = (q->x[2] - q->x[1]) - p->gx, p->hy = (q->y[2] - q->y[1]) - p->gy;
+}
+
+/* Newton's method for the ray's place (s, r) on the patch, within [0, 1]: the error goes as its square in each step,
+ * 0.2 to 1e-9 in four. Returns the rays that have arrived: to what float32 leaves of the quad's size, across the ray.
+ * None have where the quad is so steep that this is 8 times as much along it, or nearly folded, nor where the place is
+ * so near the quad's border that the crossing of a face beside it, 1e-6 of its size off, may come in the wrong order.
+ */
+SIMD_INLINE vm kernel_patch_newton(const kernel_patch *p, vf *s, vf *r)
+{
+    const vf zero = vf_set(0), one = vf_set(1);
+    for (int step = 0;; step++) {
+        const vf rx = p->gx + *s * p->hx, ry = p->gy + *s * p->hy;
+        const vf dx = -((p->ax + *s * p->ex) + *r * rx), dy = -((p->ay + *s * p->ey) + *r * ry);
+        const vf sx = p->ex + *r * p->hx, sy = p->ey + *r * p->hy;
+        const vf det = sx * ry - sy * rx;
+        if (step == 4) {
+            const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
+            const vf rim = vf_min(vf_min(*s, one - *s), vf_min(*r, one - *r));
+            const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(det) * 8.0f);
+            const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), rim));
+            return vm_and(inside, vf_le(vf_abs(dx) + vf_abs(dy), (e + g) * 1.2e-7f));
+        }
+        const vf inverse = vf_select(vf_eq(det, zero), zero, 1.0f / det);
+        *s = vf_clamp(*s + (dx * ry - dy * rx) * inverse, zero, one);
+        *r = vf_clamp(*r + (sx * dy - sy * dx) * inverse, zero, one);
+    }
+}
+
+/* Where rays of once, which meet the triangles once, meet the patch, from the guess s, r. */
+SIMD_INLINE void kernel_quad_meet(const kernel_quad *q, vm once, vf s, vf r, kernel_quad_place *out)
+{
+    kernel_patch patch;
+    kernel_patch_setup(&patch, q);
+    const vm left = vm_andnot(once, kernel_patch_newton(&patch, &s, &r));
+    *out = (kernel_quad_place){once, s, r, kernel_bilinear(q->z, s, r)};
+    if (__builtin_expect(vm_any(left), 0)) kernel_quad_once(q, left, out);
+}
+
+/* May rays meet the patch twice? By the signs of its sides alone: none does that meets the triangles once. */
+SIMD_INLINE vm kernel_quad_sides(vm rays, vf e01, vf e32, vf e03, vf e12)
+{
+    const vi b = vi_from_bits(e01) ^ vi_from_bits(e32), a = vi_from_bits(e03) ^ vi_from_bits(e12);
+    return vm_and(rays, vm_sign(~(a | b)));
+}
+
+/* v, mirrored where the other is negative. */
+SIMD_INLINE vf kernel_turned(vf v, vf other)
+{
+    return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
+}
+
+/* Of rays of which kernel_quad_sides() is true those that may indeed. */
+SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
+{
+    const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
+    const vf other = vf_diff_of_products(q->x[3], q->y[1], q->x[1], q->y[3]);
+    const vf slack = 1e-6f * (vf_abs(across) + vf_abs(other));
+    const vm b = vf_le(kernel_turned(across + other, q->e01), slack);
+    const vm a = vf_le(kernel_turned(across - other, q->e03), slack);
+    return vm_and(rays, vm_and(a, b));
+}
+
+/* Where rays meet the patch, those of once from the guess s, r, those of twice in two places or none. Returns how many
+ * of out there are, 0 to 2. */
+SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, vf s, vf r, kernel_quad_place out[2])
+{
+    const vf zero = vf_set(0);
+    int count = 0;
+    if (vm_any(once)) {
+        kernel_quad_meet(q, once, s, r, &out[0]);
+        count = 1;
+    }
+    if (!vm_any(twice)) return count;
+    const vm bends = kernel_quad_bends(q, twice);
+    if (__builtin_expect(!vm_any(bends), 1)) return count;
+    if (!count) out[0] = (kernel_quad_place){vm_none(), zero, zero, zero};
+    out[1] = (kernel_quad_place){vm_none(), zero, zero, zero};
+    out[1].mask = kernel_quad_twice(q, bends, out);
+    out[0].mask = vm_or(out[0].mask, out[1].mask);
+    return vm_any(out[1].mask) ? 2 : count;
+}
+
+#endif
