@@ -123,7 +123,8 @@ static double chord_radius(const kernel_frame *f, const chord_rays *rays)
 static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays *rays)
 {
     const bool flat = f->job->camera.is_orthographic;
-    const kernel_tile tile = {.centre_x = rays->centre_x,
+    const kernel_tile tile = {.depth_shift = f->depth_shift,
+                              .centre_x = rays->centre_x,
                               .centre_y = rays->centre_y,
                               .shear_x = flat ? 0 : (float)rays->centre_x,
                               .shear_y = flat ? 0 : (float)rays->centre_y,

@@ -419,7 +419,7 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
     for (int i = 0; i < 2; i++) {
         bool is_folded;
         face[i] = reference_face_value(&c->cell, &t->line, &ends[i], values, &is_folded);
-        if (is_folded) t->out->ambiguous = true;
+        if (is_folded && c->cell.type == GRID_POLYHEDRON) t->out->ambiguous = true;
     }
     for (int i = 0; i < layer->value_count; i++) {
         const double iso = layer->values[i];
@@ -480,7 +480,8 @@ static void cross_volume(trace *t, const placed_cell *c, int layer, const double
                          const reference_crossing ends[2])
 {
     const double spacing = t->scene->job->step / t->length;
-    if (ends[0].is_folded || ends[1].is_folded) t->out->ambiguous = true;
+    const bool is_folded = ends[0].is_folded || ends[1].is_folded;
+    if (is_folded && c->cell.type == GRID_POLYHEDRON) t->out->ambiguous = true;
     int64_t k = (int64_t)floor(ends[0].z / spacing - t->jitter) - 1;
     for (k = k < 0 ? 0 : k;; k++) {
         const double z = ((double)k + t->jitter) * spacing;

@@ -34,7 +34,7 @@ typedef struct reference_ray {
     double eye_margin;    /* between a hit and the eye's plane */
     bool ambiguous;       /* a cell met more than one root, or its interpolant at a face has the other side of the
                              isovalue than the face: the first hit is then a matter of the root finder. Or a face's
-                             bilinear map is folded where the ray meets it. */
+                             bilinear map is folded where the ray meets it, in a polyhedron. */
     bool map_failed;      /* an inverse map had no solution */
 } reference_ray;
 

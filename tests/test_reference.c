@@ -251,7 +251,8 @@ static void face_values_join_the_interior(void **state)
                 double value;
                 bool is_folded;
                 const double face = reference_face_value(&cell, &line, &c[k], values, &is_folded);
-                const double point[3] = {line.base[0] + line.slope[0] * c[k].z, line.base[1] + line.slope[1] * c[k].z, c[k].z};
+                const double point[3] = {line.base[0] + line.slope[0] * c[k].z, line.base[1] + line.slope[1] * c[k].z,
+                                         c[k].z};
                 assert_true(reference_interpolate(&cell, point, values, &value, NULL));
                 /* Near a collapsed vertex the map's inverse loses half of the digits. */
                 assert_true(fabs(face - value) < (s < 4 ? 1e-11 : 1e-6));

@@ -46,7 +46,7 @@ static void surface_is_the_reference_for_every_kind_and_camera(void **state)
             fixture_add_surface(&f, one_value, 1, 1);
             const fixture_outcome o = fixture_compare(&f, &fixture_usual_bounds, case_name(kind, camera, "one value"));
             assert_true(o.hits > 150);
-            assert_few_ambiguous(&o, kind == TEST_TETS ? 0 : 0.1);
+            assert_few_ambiguous(&o, kind == TEST_TETS ? 0 : 0.02);
             fixture_free(&f);
         }
 }
