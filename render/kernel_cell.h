@@ -113,27 +113,6 @@ SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int
     return c;
 }
 
-SIMD_INLINE void kernel_cell_swap(kernel_cell *c, int i, int j)
-{
-    for (int a = 0; a < 3; a++) {
-        const double w = c->world[i][a];
-        c->world[i][a] = c->world[j][a];
-        c->world[j][a] = w;
-    }
-    const double v = c->values[i];
-    c->values[i] = c->values[j];
-    c->values[j] = v;
-    const int64_t n = c->vertices[i];
-    c->vertices[i] = c->vertices[j];
-    c->vertices[j] = n;
-    float *lists[4] = {c->x, c->y, c->z, c->f};
-    for (int a = 0; a < 4; a++) {
-        const float w = lists[a][i];
-        lists[a][i] = lists[a][j];
-        lists[a][j] = w;
-    }
-}
-
 SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
 {
     return c->rank[i] < c->rank[j];
@@ -188,6 +167,39 @@ SIMD_INLINE void kernel_cell_rank(kernel_cell *c)
         }
 }
 
+/* Every vertex to its rank: no branch depends on the order, which none could foresee. */
+SIMD_INLINE void kernel_tet_order(kernel_cell *c)
+{
+    int rank[4] = {0, 0, 0, 0};
+    for (int i = 0; i < 4; i++)
+        for (int j = i + 1; j < 4; j++) {
+            const int after = kernel_position_before(c->world[j], c->world[i]);
+            rank[i] += after;
+            rank[j] += 1 - after;
+        }
+    double world[4][3], values[4];
+    int64_t vertices[4];
+    float lists[4][4];
+    for (int i = 0; i < 4; i++) {
+        const int to = rank[i];
+        for (int a = 0; a < 3; a++) world[to][a] = c->world[i][a];
+        values[to] = c->values[i];
+        vertices[to] = c->vertices[i];
+        lists[0][to] = c->x[i];
+        lists[1][to] = c->y[i];
+        lists[2][to] = c->z[i];
+        lists[3][to] = c->f[i];
+    }
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < 3; a++) c->world[i][a] = world[i][a];
+    memcpy(c->values, values, sizeof values);
+    memcpy(c->vertices, vertices, sizeof vertices);
+    memcpy(c->x, lists[0], sizeof lists[0]);
+    memcpy(c->y, lists[1], sizeof lists[1]);
+    memcpy(c->z, lists[2], sizeof lists[2]);
+    memcpy(c->f, lists[3], sizeof lists[3]);
+}
+
 /* The order of coordinates: a tet, symmetric in its vertices, is put in that order; other cells get ranks, and are
  * turned to begin by them, with all that a cell has of its vertices (but the colours, which come later). Nothing in a
  * cell then depends on how the simulation numbers its vertices, not even where its map is folded and has several
@@ -195,10 +207,7 @@ SIMD_INLINE void kernel_cell_rank(kernel_cell *c)
 SIMD_INLINE void kernel_cell_order(kernel_cell *c)
 {
     if (c->type == GRID_TET) {
-        static const int network[5][2] = {{0, 1}, {2, 3}, {0, 2}, {1, 3}, {1, 2}};
-        for (int k = 0; k < 5; k++)
-            if (kernel_position_before(c->world[network[k][1]], c->world[network[k][0]]))
-                kernel_cell_swap(c, network[k][0], network[k][1]);
+        kernel_tet_order(c);
         return;
     }
     int from[GRID_MAX_CELL_VERTICES];
@@ -236,8 +245,6 @@ SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float
 {
     kernel_place_in(p->frame, p->tile, world, out_x, out_y, out_z);
 }
-
-typedef double kernel_doubles __attribute__((vector_size(32)));
 
 /* kernel_place_in() of a tet's vertices at once: the same operations, and so the same bits. */
 SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
@@ -297,29 +304,55 @@ static const signed char kernel_tet_edge[KERNEL_TET_EDGES][2] = {{0, 1}, {0, 2},
 
 SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    float size[4], doubt = 0;
+    kernel_four at[3], size;
+    kernel_line lines[8];
+    float doubt = 0;
     for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    at[0] = kernel_four_load(c->x);
+    at[1] = kernel_four_load(c->y);
+    at[2] = kernel_four_load(c->z);
+    /* Edges 0 to 3, 4 and 5. */
+    kernel_four_lines(f, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2), KERNEL_PICKED(size, 0, 0, 0, 1),
+                      KERNEL_PICKED(size, 1, 2, 3, 2), lines);
+    kernel_four_lines(f, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3), KERNEL_PICKED(size, 1, 2, 2, 2),
+                      KERNEL_PICKED(size, 3, 3, 3, 3), lines + 4);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        const int a = kernel_tet_edge[n][0], b = kernel_tet_edge[n][1];
-        c->lines[n] = kernel_line_between(f, kernel_cell_spot(c, a), kernel_cell_spot(c, b), size[a], size[b]);
-        doubt = doubt < c->lines[n].bound ? c->lines[n].bound : doubt;
+        c->lines[n] = lines[n];
+        doubt = doubt < lines[n].bound ? lines[n].bound : doubt;
     }
     c->doubt = doubt;
 }
 
+SIMD_INLINE void kernel_tet_project(const kernel_packet *p, const kernel_cell *c, vf x[4], vf y[4])
+{
+    for (int i = 0; i < 4; i++) {
+        x[i] = kernel_project_x(p, kernel_cell_spot(c, i));
+        y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
+    }
+}
+
+/* What kernel_edge() gives of each, from vertices that are projected once. */
 static __attribute__((noinline)) void kernel_tet_edges_exactly(const kernel_packet *p, const kernel_cell *c,
                                                                vf e[KERNEL_TET_EDGES])
 {
-    for (int n = 0; n < KERNEL_TET_EDGES; n++)
-        e[n] = kernel_edge(p, &c->lines[n], kernel_cell_spot(c, kernel_tet_edge[n][0]),
-                           kernel_cell_spot(c, kernel_tet_edge[n][1]));
+    vf x[4], y[4];
+    kernel_tet_project(p, c, x, y);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int a = kernel_tet_edge[n][0], b = kernel_tet_edge[n][1];
+        const vf line = kernel_line_at(p, &c->lines[n]);
+        const vm doubt = vm_not(vf_lt(vf_set(c->lines[n].bound), vf_abs(line)));
+        e[n] = vm_any(doubt) ? vf_select(doubt, kernel_edge_between(x[a], y[a], x[b], y[b]), line) : line;
+    }
 }
 
 SIMD_INLINE void kernel_tet_edges_projected(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
 {
-    for (int n = 0; n < KERNEL_TET_EDGES; n++)
-        e[n] = kernel_edge_projected(p, kernel_cell_spot(c, kernel_tet_edge[n][0]),
-                                     kernel_cell_spot(c, kernel_tet_edge[n][1]));
+    vf x[4], y[4];
+    kernel_tet_project(p, c, x, y);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int a = kernel_tet_edge[n][0], b = kernel_tet_edge[n][1];
+        e[n] = kernel_edge_between(x[a], y[a], x[b], y[b]);
+    }
 }
 
 /* All edge functions at once; one by one only where one of them is in doubt. */
@@ -327,6 +360,10 @@ SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, 
 {
     if (!p->is_pencil) {
         kernel_tet_edges_projected(p, c, e);
+        return;
+    }
+    if (c->doubt == INFINITY) { /* an edge is short */
+        kernel_tet_edges_exactly(p, c, e);
         return;
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++) e[n] = kernel_line_at(p, &c->lines[n]);

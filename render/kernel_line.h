@@ -65,6 +65,54 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a
                          is_short ? (float)INFINITY : 6 * 6e-8f * product};
 }
 
+/* ---- four edges at once: the same operations, and so the same bits ---- */
+
+typedef float kernel_four __attribute__((vector_size(16)));
+
+SIMD_INLINE kernel_four kernel_four_load(const float *p)
+{
+    kernel_four v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+
+/* Lanes of a vector, and of the three of a place. */
+#define KERNEL_PICKED(v, i, j, k, l) __builtin_shufflevector(v, v, i, j, k, l)
+#define KERNEL_PICK(at, i, j, k, l)                                                                                    \
+    (kernel_spots)                                                                                                     \
+    {                                                                                                                  \
+        KERNEL_PICKED(at[0], i, j, k, l), KERNEL_PICKED(at[1], i, j, k, l), KERNEL_PICKED(at[2], i, j, k, l)           \
+    }
+
+typedef struct kernel_spots {
+    kernel_four x, y, z;
+} kernel_spots;
+
+typedef double kernel_doubles __attribute__((vector_size(32)));
+
+/* kernel_line_between() of edges from a to b. */
+SIMD_INLINE void kernel_four_lines(const kernel_frame *f, kernel_spots a, kernel_spots b, kernel_four size_a,
+                                   kernel_four size_b, kernel_line lines[4])
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const kernel_doubles ax = __builtin_convertvector(a.x, kernel_doubles),
+                         ay = __builtin_convertvector(a.y, kernel_doubles);
+    const kernel_doubles bx = __builtin_convertvector(b.x, kernel_doubles),
+                         by = __builtin_convertvector(b.y, kernel_doubles);
+    kernel_doubles da = __builtin_convertvector(a.z, kernel_doubles) + f->depth_shift;
+    kernel_doubles db = __builtin_convertvector(b.z, kernel_doubles) + f->depth_shift;
+    if (flat) da = db = (kernel_doubles){1, 1, 1, 1};
+    const kernel_four c = __builtin_convertvector(ax * by - bx * ay, kernel_four);
+    const kernel_four cu = __builtin_convertvector(db * ay - da * by, kernel_four);
+    const kernel_four cv = __builtin_convertvector(da * bx - db * ax, kernel_four);
+    const kernel_four product = size_a * size_b, x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
+    const kernel_four square = x * x + y * y + z * z, bound = 6 * 6e-8f * product;
+    for (int n = 0; n < 4; n++) {
+        const bool is_short = product[n] > KERNEL_SHORT_EDGE * square[n];
+        lines[n] = (kernel_line){c[n], cu[n], cv[n], is_short ? (float)INFINITY : bound[n]};
+    }
+}
+
 SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_spot a, kernel_spot b)
 {
     return kernel_line_between(p->frame, a, b, kernel_spot_size(p->frame, p->tile, a),
@@ -102,13 +150,17 @@ static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, 
 }
 
 /* To the exact sign of what is projected. */
-SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_spot a, kernel_spot b)
+SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
 {
-    const vf ax = kernel_project_x(p, a), ay = kernel_project_y(p, a);
-    const vf bx = kernel_project_x(p, b), by = kernel_project_y(p, b);
     const vf e = vf_diff_of_products(ax, by, bx, ay);
     const vm tie = vf_le(vf_abs(e), vf_set(KERNEL_EDGE_LEAST));
     return __builtin_expect(vm_any(tie), 0) ? kernel_edge_tied(ax, ay, bx, by, e) : e;
+}
+
+SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_spot a, kernel_spot b)
+{
+    return kernel_edge_between(kernel_project_x(p, a), kernel_project_y(p, a), kernel_project_x(p, b),
+                               kernel_project_y(p, b));
 }
 
 static __attribute__((noinline, cold)) vf kernel_edge_doubted(const kernel_packet *p, kernel_spot a, kernel_spot b,

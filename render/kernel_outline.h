@@ -11,15 +11,6 @@
 #include "kernel_cell.h"
 #include "kernel_tile.h"
 
-typedef float kernel_four __attribute__((vector_size(16)));
-
-SIMD_INLINE kernel_four kernel_four_load(const float *p)
-{
-    kernel_four v;
-    memcpy(&v, p, sizeof v);
-    return v;
-}
-
 SIMD_INLINE kernel_four kernel_four_pick(kernel_four v, const int32_t *index)
 {
 #if defined(__AVX__)

@@ -490,13 +490,20 @@ SIMD_INLINE void kernel_tile_trace_shown(kernel_tile_trace *t, kernel_tile_shown
     }
 }
 
+/* The tile's cells; returns how many they are. */
+SIMD_INLINE int kernel_shown_in_tile(const kernel_frame *f, int x0, int y0, kernel_tile_shown **items)
+{
+    const int columns = (f->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
+    const uint32_t *starts = f->shown_starts + (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE);
+    *items = f->shown + starts[0];
+    return (int)(starts[1] - starts[0]);
+}
+
 SIMD_INLINE void kernel_tile_surfaces_shown(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
-    const int columns = (f->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
-    const int tile = t->tile.y0 / KERNEL_TILE * columns + t->tile.x0 / KERNEL_TILE;
-    kernel_tile_shown *items = f->shown + f->shown_starts[tile];
-    const int count = (int)(f->shown_starts[tile + 1] - f->shown_starts[tile]);
+    kernel_tile_shown *items;
+    const int count = kernel_shown_in_tile(f, t->tile.x0, t->tile.y0, &items);
     if (!count) return;
     if (f->opaque_count) kernel_tile_trace_shown(t, items, count, false);
     if (f->opaque_count < f->surface_count) kernel_tile_trace_shown(t, items, count, true);

@@ -257,6 +257,7 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     t->t_near = (float)-f->depth_shift;
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);
+    if (!f->needs_planes) return;
     kernel_borders borders;
     kernel_tile_borders(&borders, f, &t->tile);
     kernel_tree_planes(&t->tree_planes, f, &borders);

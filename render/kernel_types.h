@@ -92,6 +92,7 @@ typedef struct kernel_frame {
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
     bool has_transparent;
     bool is_binned;     /* surfaces' cells are binned by tile, where that pays */
+    bool needs_planes;  /* tiles go down the trees */
     bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
     bool has_segments;  /* volumes are integrated by segments, else sampled */

@@ -170,6 +170,8 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
         return;
     }
     kernel_tile_trace *t = &((kernel_memory *)thread->cache)->tile;
+    kernel_tile_shown *items;
+    if (f->shown && !f->volume_count && !kernel_shown_in_tile(f, x0, y0, &items)) return;
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
