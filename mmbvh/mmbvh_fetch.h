@@ -263,11 +263,13 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
 
 /* One instance of a pass for each way an array can be laid out: DEFINE(name, shape, wide_index, wide_number) makes a
  * function, and FETCH_TABLE(prefix) is the table of them, by [shape][wide_index][wide_number]. */
-#define FETCH_INSTANCES(DEFINE, prefix)                                                                                \
-    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                           \
-    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_hexes, FETCH_HEXES)                                                         \
-    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_uniform, FETCH_UNIFORM)                                                     \
-    FETCH_SHAPE_INSTANCES(DEFINE, prefix##_by_cell, FETCH_BY_CELL)
+#define FETCH_INSTANCES(DEFINE, prefix) FETCH_EACH_SHAPE(FETCH_SHAPE_INSTANCES, DEFINE, prefix)
+
+#define FETCH_EACH_SHAPE(INSTANCES, DEFINE, prefix)                                                                    \
+    INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                                       \
+    INSTANCES(DEFINE, prefix##_hexes, FETCH_HEXES)                                                                     \
+    INSTANCES(DEFINE, prefix##_uniform, FETCH_UNIFORM)                                                                 \
+    INSTANCES(DEFINE, prefix##_by_cell, FETCH_BY_CELL)
 
 #define FETCH_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                                   \
     FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                                 \
@@ -285,11 +287,7 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
 /* clang-format on */
 
 /* The same of floats alone; the table is by [shape][wide_index]. */
-#define FETCH_FLOAT_INSTANCES(DEFINE, prefix)                                                                          \
-    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_tets, FETCH_TETS)                                                     \
-    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_hexes, FETCH_HEXES)                                                   \
-    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_uniform, FETCH_UNIFORM)                                               \
-    FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix##_by_cell, FETCH_BY_CELL)
+#define FETCH_FLOAT_INSTANCES(DEFINE, prefix) FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)
 
 #define FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                             \
     DEFINE(prefix##_44, shape, false, false)                                                                           \
