@@ -54,11 +54,9 @@ static insitu_status layout_of(MPI_Comm comm, const image *out, int threads, com
 {
     int ranks = 1;
     MPI_Comm_size(comm, &ranks);
-    const int64_t pixel_count = (int64_t)out->width * out->height;
-    if (out->width < 1 || out->height < 1 || pixel_count > UINT32_MAX)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "compositing: no image of %d by %d pixels", out->width,
-                         out->height);
-    *layout = comp_layout_of((uint32_t)pixel_count, ranks);
+    const insitu_status status = comp_check_size(out, error);
+    if (status) return status;
+    *layout = comp_layout_of((uint32_t)((int64_t)out->width * out->height), ranks);
     layout->threads = threads > 0 ? threads : omp_get_max_threads();
     return INSITU_OK;
 }

@@ -117,6 +117,12 @@ static void collect_slice(const merging *m, int64_t slice, int64_t count, scratc
     ends[slice_pixels] = count;
 }
 
+insitu_status comp_check_size(const image *out, base_error *error)
+{
+    if (out->width >= 1 && out->height >= 1 && (int64_t)out->width * out->height <= UINT32_MAX) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_ARGUMENT, "compositing: no image of %d by %d pixels", out->width, out->height);
+}
+
 void comp_add_overlap(unsigned char *overlaps, uint32_t pixel)
 {
     __atomic_fetch_or(&overlaps[pixel >> 3], (unsigned char)(1u << (pixel & 7)), __ATOMIC_RELAXED);

@@ -19,6 +19,9 @@ typedef struct comp_pixel_list {
     int64_t count;
 } comp_pixel_list;
 
+/* Has the image pixels, as many as fragments can name? */
+insitu_status comp_check_size(const image *out, base_error *error);
+
 /* To a set that other threads add to. */
 void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 

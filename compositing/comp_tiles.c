@@ -50,9 +50,8 @@ insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int
                           .out = out,
                           .inverse_width = 1 / (double)out->width,
                           .threads = threads > 0 ? threads : omp_get_max_threads()};
-    if (out->width < 1 || out->height < 1 || pixels > UINT32_MAX)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "compositing: no image of %d by %d pixels", out->width,
-                         out->height);
+    const insitu_status status = comp_check_size(out, error);
+    if (status) return status;
     tiles->scratch = base_calloc((size_t)tiles->threads, sizeof *tiles->scratch);
     if (finds_overlaps) tiles->overlaps = base_calloc(pixel_set_bytes(pixels), 1);
     if (tiles->scratch && (tiles->overlaps || !finds_overlaps)) return INSITU_OK;
