@@ -484,14 +484,11 @@ static void keep_vertices(const work *w, polyhedron *c)
     c->values[c->vertex_count] = c->is_constant ? c->values[0] : sum[3];
 }
 
-/* A quad with two neighbouring corners in one place is a triangle (kernel_cell.h). */
 static bool collapses(const work *w, const int *around)
 {
-    for (int i = 0; i < 4; i++) {
-        const double *a = w->vertices[around[i]].position, *b = w->vertices[around[(i + 1) % 4]].position;
-        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) return true;
-    }
-    return false;
+    const double *corners[4];
+    for (int i = 0; i < 4; i++) corners[i] = w->vertices[around[i]].position;
+    return quad_collapses(corners);
 }
 
 static void keep_quads(const work *w, polyhedron *c, int *quad_of)

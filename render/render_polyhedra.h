@@ -36,6 +36,16 @@ typedef struct polyhedron {
     int (*quads)[4]; /* the corners around of faces of four vertices in as many places */
 } polyhedron;
 
+/* A quad with two neighbouring corners in one place is a triangle, and its neighbour may have it as such. */
+static inline bool quad_collapses(const double *const corners[4])
+{
+    for (int i = 0; i < 4; i++) {
+        const double *a = corners[i], *b = corners[(i + 1) & 3];
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) return true;
+    }
+    return false;
+}
+
 typedef struct polyhedron_store polyhedron_store;
 
 /* One thread's. NULL where memory ran out. */
