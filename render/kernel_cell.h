@@ -156,48 +156,37 @@ SIMD_INLINE void kernel_cell_turn(const kernel_cell *c, int from[GRID_MAX_CELL_V
     }
 }
 
-SIMD_INLINE void kernel_cell_rank(kernel_cell *c)
+/* Each vertex's place in the order of coordinates, without a branch on it, which none could foresee. */
+SIMD_INLINE void kernel_rank_positions(double (*const world)[3], const int count, int *rank)
 {
-    for (int i = 0; i < c->count; i++) c->rank[i] = 0;
-    for (int i = 0; i < c->count; i++)
-        for (int j = i + 1; j < c->count; j++) {
-            const bool after = kernel_position_before(c->world[j], c->world[i]);
-            c->rank[i] += after;
-            c->rank[j] += !after;
-        }
-}
-
-/* Every vertex to its rank: no branch depends on the order, which none could foresee. */
-SIMD_INLINE void kernel_tet_order(kernel_cell *c)
-{
-    int rank[4] = {0, 0, 0, 0};
-    for (int i = 0; i < 4; i++)
-        for (int j = i + 1; j < 4; j++) {
-            const int after = kernel_position_before(c->world[j], c->world[i]);
+    for (int i = 0; i < count; i++) rank[i] = 0;
+    for (int i = 0; i < count; i++)
+        for (int j = i + 1; j < count; j++) {
+            const int after = kernel_position_before(world[j], world[i]);
             rank[i] += after;
             rank[j] += 1 - after;
         }
-    double world[4][3], values[4];
-    int64_t vertices[4];
-    float lists[4][4];
-    for (int i = 0; i < 4; i++) {
-        const int to = rank[i];
-        for (int a = 0; a < 3; a++) world[to][a] = c->world[i][a];
-        values[to] = c->values[i];
-        vertices[to] = c->vertices[i];
-        lists[0][to] = c->x[i];
-        lists[1][to] = c->y[i];
-        lists[2][to] = c->z[i];
-        lists[3][to] = c->f[i];
+}
+
+/* All that a cell has of its vertices (but the colours, which come later), from vertex from[i] to place i. */
+SIMD_INLINE void kernel_cell_permute(kernel_cell *c, const int *from, const int count)
+{
+    double world[GRID_MAX_CELL_VERTICES][3], values[GRID_MAX_CELL_VERTICES];
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    float *const lists[4] = {c->x, c->y, c->z, c->f};
+    float own[4][GRID_MAX_CELL_VERTICES];
+    for (int i = 0; i < count; i++) {
+        for (int a = 0; a < 3; a++) world[i][a] = c->world[from[i]][a];
+        values[i] = c->values[from[i]];
+        vertices[i] = c->vertices[from[i]];
+        for (int n = 0; n < 4; n++) own[n][i] = lists[n][from[i]];
     }
-    for (int i = 0; i < 4; i++)
+    for (int i = 0; i < count; i++) {
         for (int a = 0; a < 3; a++) c->world[i][a] = world[i][a];
-    memcpy(c->values, values, sizeof values);
-    memcpy(c->vertices, vertices, sizeof vertices);
-    memcpy(c->x, lists[0], sizeof lists[0]);
-    memcpy(c->y, lists[1], sizeof lists[1]);
-    memcpy(c->z, lists[2], sizeof lists[2]);
-    memcpy(c->f, lists[3], sizeof lists[3]);
+        c->values[i] = values[i];
+        c->vertices[i] = vertices[i];
+        for (int n = 0; n < 4; n++) lists[n][i] = own[n][i];
+    }
 }
 
 /* The order of coordinates: a tet, symmetric in its vertices, is put in that order; other cells get ranks, and are
@@ -206,24 +195,18 @@ SIMD_INLINE void kernel_tet_order(kernel_cell *c)
  * solutions. */
 SIMD_INLINE void kernel_cell_order(kernel_cell *c)
 {
+    int from[GRID_MAX_CELL_VERTICES], rank[GRID_MAX_CELL_VERTICES];
     if (c->type == GRID_TET) {
-        kernel_tet_order(c);
+        kernel_rank_positions(c->world, 4, rank);
+        for (int i = 0; i < 4; i++) from[rank[i]] = i;
+        kernel_cell_permute(c, from, 4);
         return;
     }
-    int from[GRID_MAX_CELL_VERTICES];
-    kernel_cell_rank(c);
+    kernel_rank_positions(c->world, c->count, c->rank);
     kernel_cell_turn(c, from);
-    const kernel_cell own = *c;
-    for (int i = 0; i < c->count; i++) {
-        memcpy(c->world[i], own.world[from[i]], sizeof c->world[i]);
-        c->values[i] = own.values[from[i]];
-        c->vertices[i] = own.vertices[from[i]];
-        c->rank[i] = own.rank[from[i]];
-        c->x[i] = own.x[from[i]];
-        c->y[i] = own.y[from[i]];
-        c->z[i] = own.z[from[i]];
-        c->f[i] = own.f[from[i]];
-    }
+    kernel_cell_permute(c, from, c->count);
+    for (int i = 0; i < c->count; i++) rank[i] = c->rank[from[i]];
+    for (int i = 0; i < c->count; i++) c->rank[i] = rank[i];
 }
 
 /* A position into tile space (kernel_packet.h). */
@@ -249,16 +232,15 @@ SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float
 /* kernel_place_in() of a tet's vertices at once: the same operations, and so the same bits. */
 SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    typedef float floats __attribute__((vector_size(16)));
     kernel_doubles d[3], place[3];
     for (int a = 0; a < 3; a++)
         d[a] = (kernel_doubles){c->world[0][a], c->world[1][a], c->world[2][a], c->world[3][a]} - f->job->camera.eye[a];
     for (int a = 0; a < 3; a++)
         place[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
     const kernel_doubles depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * place[2] : place[2];
-    const floats x = __builtin_convertvector(place[0] - tile->centre_x * depth, floats);
-    const floats y = __builtin_convertvector(place[1] - tile->centre_y * depth, floats);
-    const floats z = __builtin_convertvector(place[2] - tile->depth_shift, floats);
+    const kernel_four x = __builtin_convertvector(place[0] - tile->centre_x * depth, kernel_four);
+    const kernel_four y = __builtin_convertvector(place[1] - tile->centre_y * depth, kernel_four);
+    const kernel_four z = __builtin_convertvector(place[2] - tile->depth_shift, kernel_four);
     memcpy(c->x, &x, sizeof x);
     memcpy(c->y, &y, sizeof y);
     memcpy(c->z, &z, sizeof z);
@@ -518,14 +500,11 @@ static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kerne
         kernel_poly_lines(c, f, tile);
 }
 
-/* A quad with two neighbouring corners in one place is a triangle, and its neighbour may have it as such. */
 SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4])
 {
-    for (int i = 0; i < 4; i++) {
-        const double *a = c->world[corner[i]], *b = c->world[corner[(i + 1) & 3]];
-        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) return true;
-    }
-    return false;
+    const double *const corners[4] = {c->world[corner[0]], c->world[corner[1]], c->world[corner[2]],
+                                      c->world[corner[3]]};
+    return quad_collapses(corners);
 }
 
 /* Edge functions of a crossed triangle i, j, k in the order, the weights, and one over their sum. Tets weigh in the

@@ -3,8 +3,7 @@
  * by tile (render_shown.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace them from the nearest on,
  * blocks that know of something nearer left out:
  *
- *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks'
- * packets
+ *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
  * A tile's own traversal (kernel_tile_surface.h) looks at the same nodes as its neighbours and places the same cells,
  * most of which lie beside it. It is better where surfaces hide more cells than they show, for it sees none of what is
@@ -21,7 +20,7 @@
 typedef struct kernel_tets {
     int count;
     uint32_t cell[SIMD_WIDTH];
-    int64_t vertices[SIMD_WIDTH][4];
+    int64_t vertices[SIMD_WIDTH][GRID_MAX_CELL_VERTICES];
 } kernel_tets;
 
 /* One subtree's search. */
@@ -144,7 +143,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     const grid *g = s->frame->job->parts[s->part].cells;
     kernel_outline o = {0};
     kernel_shown shown = {.cell = index, .source = s->source};
-    /* The corners of the vertices' box; depths of its nearer side are those of its farther one's columns or less. */
+    /* The corners of the vertices' box. */
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, index);
     int64_t vertex;
@@ -297,13 +296,9 @@ static void kernel_find_coming(kernel_finder *s)
         const uint32_t cell = s->coming[n];
         if (grid_cell_type(g, cell) == GRID_TET) {
             int64_t *vertices = s->tets.vertices[s->tets.count];
-            const int64_t first = g->offsets.data ? grid_array_index(&g->offsets, cell) : 4 * (int64_t)cell;
             s->tets.cell[s->tets.count++] = cell;
-            for (int i = 0; i < 4; i++) {
-                const int64_t v = vertices[i] = grid_array_index(&g->connectivity, first + i);
-                __builtin_prefetch(field->values.data + v * field->values.stride);
-                for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
-            }
+            grid_cell_vertices(g, cell, vertices);
+            for (int i = 0; i < 4; i++) kernel_prefetch_vertex(g, field, vertices[i]);
             continue;
         }
         kernel_cell_fetch(&s->cell, g, field, cell);
@@ -436,16 +431,14 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_shown *show
     kernel_cell *c = &t->cell;
     kernel_cell_fetch(c, g, &layer->field.fields[part], shown->cell);
     if (c->type == GRID_POLYHEDRON) {
-        for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, shown->cell, NULL, 0);
+        kernel_blocks_meet(t, blocks, part, shown->cell, NULL, 0);
         return;
     }
     kernel_cell_move(c, t->frame, &t->tile, g);
     kernel_cell_relative(c, layer->values[value]);
-    kernel_cell_order(c);
-    kernel_cell_lines(c, t->frame, &t->tile);
-    if (layer->colour_map) kernel_cell_colours(c, t->surface, part);
+    kernel_tile_ready(t, part);
     t->poly.is_set_up = false;
-    for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, c->index, c, value);
+    kernel_blocks_meet(t, blocks, part, c->index, c, value);
 }
 
 /* Set the layer of the tile by the source; returns the isovalue's number in it. */

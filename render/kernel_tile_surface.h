@@ -92,6 +92,20 @@ SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, ui
     if (is_nearer) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
 }
 
+SIMD_INLINE void kernel_blocks_meet(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
+                                    const kernel_cell *cell, int value)
+{
+    for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, index, cell, value);
+}
+
+/* Of a moved cell with its values, before blocks meet it. */
+SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
+{
+    kernel_cell_order(&t->cell);
+    kernel_cell_lines(&t->cell, t->frame, &t->tile);
+    if (t->surface->layer->colour_map) kernel_cell_colours(&t->cell, t->surface, part);
+}
+
 /* Blocks in which a body of this outline may show. */
 SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
 {
@@ -124,15 +138,19 @@ SIMD_INLINE void kernel_tile_cell(kernel_tile_trace *t, int part, unsigned block
         if (!c->is_placed) kernel_cell_move(c, t->frame, &t->tile, t->frame->job->parts[part].cells);
         kernel_cell_relative(c, layer->values[value]);
         t->poly.is_set_up = false;
-        unsigned left = kernel_tile_narrow(t, c, blocks);
+        const unsigned left = kernel_tile_narrow(t, c, blocks);
         if (left && !is_ordered) {
             is_ordered = true;
-            kernel_cell_order(c);
-            kernel_cell_lines(c, t->frame, &t->tile);
-            if (layer->colour_map) kernel_cell_colours(c, t->surface, part);
+            kernel_tile_ready(t, part);
         }
-        for (; left; left &= left - 1) kernel_block_meet(t, __builtin_ctz(left), part, c->index, c, value);
+        kernel_blocks_meet(t, left, part, c->index, c, value);
     }
+}
+
+SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, int64_t v)
+{
+    __builtin_prefetch(field->values.data + v * field->values.stride);
+    for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
 /* All that the cells are made of is on its way from memory before the first of it is looked at. */
@@ -143,11 +161,8 @@ SIMD_INLINE void kernel_tile_prefetch(const grid *g, const grid_field *field, co
     for (int n = 0; n < count; n++)
         __builtin_prefetch(g->connectivity.data + (int64_t)cells[n] * vertices * g->connectivity.stride);
     for (int n = 0; n < count; n++)
-        for (int i = 0; i < vertices; i++) {
-            const int64_t v = grid_array_index(&g->connectivity, (int64_t)cells[n] * vertices + i);
-            __builtin_prefetch(field->values.data + v * field->values.stride);
-            for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
-        }
+        for (int i = 0; i < vertices; i++)
+            kernel_prefetch_vertex(g, field, grid_array_index(&g->connectivity, (int64_t)cells[n] * vertices + i));
 }
 
 static void kernel_tile_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
@@ -159,8 +174,7 @@ static void kernel_tile_leaf(kernel_tile_trace *t, int part, const uint32_t *cel
     for (int n = 0; n < count; n++) {
         kernel_cell_fetch(c, g, &layer->field.fields[part], cells[n]);
         if (c->type == GRID_POLYHEDRON) {
-            for (unsigned left = blocks; left; left &= left - 1)
-                kernel_block_meet(t, __builtin_ctz(left), part, cells[n], NULL, 0);
+            kernel_blocks_meet(t, blocks, part, cells[n], NULL, 0);
             continue;
         }
         if (c->is_finite) kernel_tile_cell(t, part, blocks);
