@@ -1,12 +1,6 @@
 # The renderer against brute force in double, against itself, on every instruction set and on ranks.
-add_library(test_meshes STATIC test_meshes.c)
-target_include_directories(test_meshes PUBLIC . ${PROJECT_SOURCE_DIR}/libinsitu/base)
-target_link_libraries(test_meshes PUBLIC m PRIVATE insitu_flags)
-
-add_library(test_render_support STATIC
-  reference_cell.c reference_integral.c reference_polyhedron.c reference_render.c test_render_fixture.c)
-target_link_libraries(test_render_support
-  PUBLIC test_meshes insitu_internal PkgConfig::CMOCKA PRIVATE insitu_flags)
+add_library(test_render_support STATIC test_render_fixture.c)
+target_link_libraries(test_render_support PUBLIC test_truth PkgConfig::CMOCKA PRIVATE insitu_flags)
 
 function(insitu_render_program name)
   add_executable(${name} ${name}.c)

@@ -1,7 +1,7 @@
 # Sessions: on any ranks, right and wrong input. Pictures are caught by the fixture; test_api writes them.
 function(insitu_session_program target)
-  add_executable(${target} ${target}.c test_session_fixture.c test_meshes.c)
-  target_link_libraries(${target} PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+  add_executable(${target} ${target}.c test_session_fixture.c)
+  target_link_libraries(${target} PRIVATE insitu_flags test_meshes insitu_internal PkgConfig::CMOCKA)
 endfunction()
 
 insitu_session_program(test_session_input)
