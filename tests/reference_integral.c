@@ -4,12 +4,11 @@
  * and steps of the transfer function are not known here: they are found by halving. */
 #include "reference_integral.h"
 
+#include "reference_base.h"
+#include "reference_cell.h"
 #include "reference_polyhedron.h"
 
-#include "reference_cell.h"
-
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 typedef struct placed_cell {
@@ -50,45 +49,6 @@ typedef struct course {
     double length; /* per z */
 } course;
 
-static void *reserve(void *block, size_t bytes)
-{
-    void *p = realloc(block, bytes ? bytes : 1);
-    if (!p) {
-        fprintf(stderr, "reference: out of memory\n");
-        exit(1);
-    }
-    return p;
-}
-
-static double dot(const double *a, const double *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-double reference_opacity(const render_transfer *t, double value)
-{
-    const int last = t->opacity_count - 1;
-    if (value < t->opacity_values[0]) return (double)t->opacities[0];
-    for (int i = 0; i < last; i++) {
-        const double low = t->opacity_values[i], high = t->opacity_values[i + 1];
-        if (value < high)
-            return (double)t->opacities[i] +
-                   (value - low) / (high - low) * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
-    }
-    return (double)t->opacities[last];
-}
-
-void reference_colour(const render_transfer *t, double value, double colour[3])
-{
-    const double range = t->high - t->low, x = range > 0 ? (value - t->low) / range : 0;
-    const double place = fmin(fmax(x, 0), 1) * (t->colour_count - 1);
-    const int i = place >= t->colour_count - 1 ? t->colour_count - 2 : (int)place;
-    for (int c = 0; c < 3; c++) {
-        const double low = (double)t->colours[3 * i + c], high = (double)t->colours[3 * i + 3 + c];
-        colour[c] = low + (place - i) * (high - low);
-    }
-}
-
 static void add_cell(reference_integral *scene, int volume, int part, int64_t index)
 {
     const render_job *job = scene->job;
@@ -109,7 +69,7 @@ static void add_cell(reference_integral *scene, int volume, int part, int64_t in
         double from_eye[3];
         grid_vertex(g, vertices[i], c->cell.world[i]);
         for (int axis = 0; axis < 3; axis++) from_eye[axis] = c->cell.world[i][axis] - job->camera.eye[axis];
-        for (int axis = 0; axis < 3; axis++) c->cell.position[i][axis] = dot(axes[axis], from_eye);
+        for (int axis = 0; axis < 3; axis++) c->cell.position[i][axis] = reference_dot(axes[axis], from_eye);
     }
     if (c->cell.type == GRID_POLYHEDRON) reference_polyhedron_setup(&c->cell);
     scene->count++;
@@ -126,9 +86,9 @@ static int64_t count_drawn(const render_job *job)
 
 reference_integral *reference_integral_create(const render_job *job, double tolerance)
 {
-    reference_integral *scene = reserve(NULL, sizeof *scene);
+    reference_integral *scene = reference_reserve(NULL, sizeof *scene);
     const size_t most = (size_t)count_drawn(job) * (size_t)job->volume_count;
-    *scene = (reference_integral){job, tolerance, 0, reserve(NULL, most * sizeof(placed_cell))};
+    *scene = (reference_integral){job, tolerance, 0, reference_reserve(NULL, most * sizeof(placed_cell))};
     for (int volume = 0; volume < job->volume_count; volume++)
         for (int part = 0; part < job->part_count; part++)
             for (int64_t cell = 0; cell < job->parts[part].cells->cell_count; cell++)
@@ -240,7 +200,8 @@ static stretch *collect(const reference_integral *scene, const reference_line *l
         const int found = is_near(cell, line) ? reference_crossings(cell, line, crossings) : 0;
         for (int k = 0; k + 1 < found; k += 2) {
             if (!(crossings[k + 1].z > fmax(crossings[k].z, 0))) continue;
-            if (*count == capacity) list = reserve(list, (size_t)(capacity = 2 * capacity + 64) * sizeof *list);
+            if (*count == capacity)
+                list = reference_reserve(list, (size_t)(capacity = 2 * capacity + 64) * sizeof *list);
             list[(*count)++] = (stretch){
                 &scene->cells[i], fmax(crossings[k].z, 0), crossings[k + 1].z, {crossings[k], crossings[k + 1]}};
         }
@@ -257,10 +218,10 @@ static course begin_ray(const reference_integral *scene, int x, int y)
     render_camera_ray(camera, x, y, base, direction);
     for (int axis = 0; axis < 3; axis++) from_eye[axis] = base[axis] - camera->eye[axis];
     for (int axis = 0; axis < 2; axis++) {
-        c.line.base[axis] = dot(axes[axis], from_eye);
-        c.line.slope[axis] = dot(axes[axis], direction);
+        c.line.base[axis] = reference_dot(axes[axis], from_eye);
+        c.line.slope[axis] = reference_dot(axes[axis], direction);
     }
-    c.length = camera->is_orthographic ? 1 : sqrt(dot(direction, direction));
+    c.length = camera->is_orthographic ? 1 : sqrt(reference_dot(direction, direction));
     return c;
 }
 
@@ -280,7 +241,7 @@ static int compare_numbers(const void *left, const void *right)
 /* Where something begins or ends, sorted. */
 static double *find_cuts(const stretch *list, int64_t count, const reference_hit *hits, int hit_count, int64_t *cuts)
 {
-    double *z = reserve(NULL, (size_t)(2 * count + hit_count) * sizeof *z);
+    double *z = reference_reserve(NULL, (size_t)(2 * count + hit_count) * sizeof *z);
     *cuts = 0;
     for (int64_t i = 0; i < count; i++) {
         z[(*cuts)++] = list[i].z_in;
@@ -307,7 +268,7 @@ void reference_integral_trace(const reference_integral *scene, int x, int y, con
     int next = 0;
     stretch *list = collect(scene, &c.line, &count);
     double *z = find_cuts(list, count, hits, hit_count, &cuts);
-    c.active = reserve(NULL, (size_t)count * sizeof *c.active);
+    c.active = reference_reserve(NULL, (size_t)count * sizeof *c.active);
     for (int64_t i = 0; i < cuts && sum.transmittance > 0; i++) {
         for (; next < hit_count && hits[next].depth <= z[i]; next++) blend_hit(&sum, &hits[next]);
         if (i + 1 == cuts || !(z[i] < z[i + 1])) continue;

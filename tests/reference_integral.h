@@ -16,8 +16,4 @@ void reference_integral_free(reference_integral *scene);
 void reference_integral_trace(const reference_integral *scene, int x, int y, const float background[4],
                               const reference_hit *hits, int hit_count, double rgba[4]);
 
-/* Colour and opacity of a value, as render.h says. */
-double reference_opacity(const render_transfer *t, double value);
-void reference_colour(const render_transfer *t, double value, double colour[3]);
-
 #endif

@@ -6,10 +6,10 @@
  * that the ray misses. */
 #include "reference_render.h"
 
+#include "reference_base.h"
 #include "reference_cell.h"
 #include "reference_polyhedron.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,24 +51,9 @@ typedef struct placed_cell {
     double size;
 } placed_cell;
 
-static void *reserve(void *block, size_t bytes)
-{
-    void *p = realloc(block, bytes ? bytes : 1);
-    if (!p) {
-        fprintf(stderr, "reference: out of memory\n");
-        exit(1);
-    }
-    return p;
-}
-
-static double dot(const double *a, const double *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static bool normalize(double *v)
 {
-    const double length = sqrt(dot(v, v));
+    const double length = sqrt(reference_dot(v, v));
     for (int axis = 0; axis < 3 && length > 0; axis++) v[axis] /= length;
     return length > 0;
 }
@@ -76,17 +61,17 @@ static bool normalize(double *v)
 reference_scene *reference_create(const render_job *job)
 {
     const double *axes[3] = {job->camera.right, job->camera.up, job->camera.forward};
-    reference_scene *scene = reserve(NULL, sizeof *scene);
+    reference_scene *scene = reference_reserve(NULL, sizeof *scene);
     scene->job = job;
-    scene->positions = reserve(NULL, sizeof *scene->positions * (size_t)job->part_count);
+    scene->positions = reference_reserve(NULL, sizeof *scene->positions * (size_t)job->part_count);
     for (int i = 0; i < job->part_count; i++) {
         const grid *g = job->parts[i].cells;
-        double *p = scene->positions[i] = reserve(NULL, 3 * sizeof *p * (size_t)g->vertex_count);
+        double *p = scene->positions[i] = reference_reserve(NULL, 3 * sizeof *p * (size_t)g->vertex_count);
         for (int64_t v = 0; v < g->vertex_count; v++) {
             double world[3];
             grid_vertex(g, v, world);
             for (int axis = 0; axis < 3; axis++) world[axis] -= job->camera.eye[axis];
-            for (int axis = 0; axis < 3; axis++) p[3 * v + axis] = dot(axes[axis], world);
+            for (int axis = 0; axis < 3; axis++) p[3 * v + axis] = reference_dot(axes[axis], world);
         }
     }
     return scene;
@@ -104,7 +89,7 @@ static event *add_event(trace *t)
 {
     if (t->count == t->capacity) {
         t->capacity = 2 * t->capacity + 64;
-        t->events = reserve(t->events, (size_t)t->capacity * sizeof *t->events);
+        t->events = reference_reserve(t->events, (size_t)t->capacity * sizeof *t->events);
     }
     event *e = &t->events[t->count++];
     memset(e, 0, sizeof *e);
@@ -114,33 +99,6 @@ static event *add_event(trace *t)
 static void lessen(double *margin, double by)
 {
     *margin = fmin(*margin, by);
-}
-
-/* ---- transfer ---- */
-
-static void table_colour(const render_transfer *transfer, double value, double colour[3])
-{
-    const double range = transfer->high - transfer->low;
-    double x = range > 0 ? (value - transfer->low) / range : 0;
-    x = (x < 0 ? 0 : x > 1 ? 1 : x) * (transfer->colour_count - 1);
-    const int i = x >= transfer->colour_count - 1 ? transfer->colour_count - 2 : (int)x;
-    for (int c = 0; c < 3; c++) {
-        const double a = (double)transfer->colours[3 * i + c], b = (double)transfer->colours[3 * i + 3 + c];
-        colour[c] = a + (x - i) * (b - a);
-    }
-}
-
-static double table_opacity(const render_transfer *transfer, double value)
-{
-    const double *at = transfer->opacity_values;
-    const float *opacity = transfer->opacities;
-    const int last = transfer->opacity_count - 1;
-    if (value < at[0]) return (double)opacity[0];
-    for (int i = 0; i < last; i++)
-        if (value < at[i + 1])
-            return (double)opacity[i] +
-                   (value - at[i]) / (at[i + 1] - at[i]) * ((double)opacity[i + 1] - (double)opacity[i]);
-    return (double)opacity[last];
 }
 
 /* ---- surfaces ---- */
@@ -157,8 +115,8 @@ static void shade(const trace *t, const render_material *m, const double base[3]
         double half[3];
         for (int axis = 0; axis < 3; axis++) half[axis] = light->direction[axis] + view[axis];
         normalize(half);
-        const double facing = fmax(0, dot(normal, light->direction));
-        const double shine = pow(fmax(0, dot(normal, half)), (double)m->shininess);
+        const double facing = fmax(0, reference_dot(normal, light->direction));
+        const double shine = pow(fmax(0, reference_dot(normal, half)), (double)m->shininess);
         for (int c = 0; c < 3; c++) {
             diffuse[c] += (double)light->colour[c] * (double)m->diffuse * facing;
             specular[c] += (double)light->colour[c] * (double)m->specular * shine;
@@ -355,7 +313,7 @@ static void surface_colour(trace *t, const placed_cell *c, const render_surface_
     if (!layer->colour_map) return;
     double values[REFERENCE_MAX_VERTICES];
     grid_cell_values(&layer->colour_field.fields[c->part_index], c->index, c->vertices, c->cell.count, values);
-    table_colour(layer->colour_map, value_along(t, c, values, z), colour);
+    reference_colour(layer->colour_map, value_along(t, c, values, z), colour);
 }
 
 static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index,
@@ -378,7 +336,7 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     reference_interpolate(&c->cell, point, values, &value, gradient);
     to_world(&t->scene->job->camera, gradient, e->hit.normal);
     normalize(e->hit.normal);
-    const double along = dot(e->hit.normal, t->direction) / sqrt(dot(t->direction, t->direction));
+    const double along = reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
     e->hit.conditioning = 1 / fabs(along);
     e->blur = c->size * e->hit.conditioning;
@@ -463,7 +421,7 @@ static void cross_surfaces(trace *t, const placed_cell *c, const reference_cross
 
 static void add_sample(trace *t, const render_transfer *transfer, int layer, double depth, double value)
 {
-    const double opacity = table_opacity(transfer, value);
+    const double opacity = reference_opacity(transfer, value);
     double colour[3];
     t->out->samples++;
     if (opacity <= 0) return;
@@ -472,7 +430,7 @@ static void add_sample(trace *t, const render_transfer *transfer, int layer, dou
     e->is_sample = true;
     e->order = layer;
     e->transmittance = pow(1 - opacity, t->scene->job->step / transfer->unit_distance);
-    table_colour(transfer, value, colour);
+    reference_colour(transfer, value, colour);
     for (int c = 0; c < 3; c++) e->hit.colour[c] = colour[c];
 }
 
@@ -640,10 +598,10 @@ static void begin_ray(trace *t, const reference_scene *scene, int x, int y)
     render_camera_ray(camera, x, y, base, t->direction);
     for (int axis = 0; axis < 3; axis++) from_eye[axis] = base[axis] - camera->eye[axis];
     for (int axis = 0; axis < 2; axis++) {
-        t->line.base[axis] = dot(axes[axis], from_eye);
-        t->line.slope[axis] = dot(axes[axis], t->direction);
+        t->line.base[axis] = reference_dot(axes[axis], from_eye);
+        t->line.slope[axis] = reference_dot(axes[axis], t->direction);
     }
-    t->length = camera->is_orthographic ? 1 : sqrt(dot(t->direction, t->direction));
+    t->length = camera->is_orthographic ? 1 : sqrt(reference_dot(t->direction, t->direction));
     const uint32_t pixel = (uint32_t)(y * camera->width + x);
     t->jitter = scene->job->jitter ? render_jitter(pixel, (uint32_t)scene->job->frame) : 0.5;
 }
