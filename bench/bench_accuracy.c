@@ -10,7 +10,7 @@
 #include "bench_stats.h"
 #include "bench_vtk.h"
 
-static const accuracy_effort whole = {512, 32, 5, 1, 16, 128, 60, false}, large = {1024, 64, 5, 2, 0, 128, 60, true},
+static const accuracy_effort whole = {512, 32, 5, 1, 64, 128, 60, false}, large = {1024, 64, 5, 2, 0, 128, 60, true},
                              quick = {256, 16, 3, 0.2, 8, 64, 30, false}, smoke = {64, 8, 1, 0, 4, 16, 20, false};
 
 void accuracy_print_head(void)
