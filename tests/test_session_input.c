@@ -300,13 +300,46 @@ static void inverse_maps_that_fail_are_counted(void **context)
     everywhere(hand_over(session, &input) == INSITU_OK);
 }
 
+/* Cells of one type, and indices of 4 bytes in the place of those of 8. */
+static void make_plain(session_input *in)
+{
+    char *indices = (char *)in->part.connectivity;
+    for (int64_t i = 0; i < in->part.connectivity_count; i++) {
+        const int32_t narrow = (int32_t)in->part.connectivity[i];
+        memcpy(indices + i * (int64_t)sizeof narrow, &narrow, sizeof narrow);
+    }
+    in->mesh.connectivity.type = INSITU_INT32;
+    in->mesh.cell_types.data = in->mesh.offsets.data = NULL;
+    in->mesh.cell_type = INSITU_HEX;
+}
+
+/* Cells of one type are looked at several at once. */
+static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
+{
+    (void)context;
+    for (int cell = 0; cell < 20; cell += 3) {
+        char words[64];
+        snprintf(words, sizeof words, "rank 0: mesh \"m\": cell %d (hex): vertex index ", cell);
+        if (own_rank == 0) input.part.connectivity[8 * cell + cell % 8] = cell % 2 ? -1 : input.part.vertex_count;
+        make_plain(&input);
+        everywhere(hand_over(session, &input) == INSITU_OK);
+        told_everywhere(session, insitu_step(session, 17 + cell, 0), INSITU_ERROR_MESH, words);
+        input_renew(&input);
+        make_plain(&input);
+        everywhere(hand_over(session, &input) == INSITU_OK);
+        step_is_good(session, 18 + cell);
+        input_renew(&input);
+    }
+    everywhere(hand_over(session, &input) == INSITU_OK);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spoilt_input_is_told_to_all),        cmocka_unit_test(call_without_a_mesh_is_told_once),
         cmocka_unit_test(field_missing_on_one_rank_names_it), cmocka_unit_test(field_of_two_centrings_is_refused),
         cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine), cmocka_unit_test(value_that_is_not_finite_is_counted),
-        cmocka_unit_test(inverse_maps_that_fail_are_counted),
+        cmocka_unit_test(inverse_maps_that_fail_are_counted), cmocka_unit_test(bad_cell_of_a_mesh_of_one_type_is_named),
     };
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);

@@ -24,19 +24,15 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part)
 
 /* ---- volumes and sizes --------------------------------------------------------------------------------------- */
 
-/* Six times the signed volume of the tet of a corner and its three neighbours, these in right-handed order. */
-MMBVH_INLINE double corner_volume(double points[][3], const signed char *corner)
-{
-    double edge[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int axis = 0; axis < 3; axis++) edge[i][axis] = points[corner[i + 1]][axis] - points[corner[0]][axis];
-    return edge[0][0] * (edge[1][1] * edge[2][2] - edge[1][2] * edge[2][1]) +
-           edge[0][1] * (edge[1][2] * edge[2][0] - edge[1][0] * edge[2][2]) +
-           edge[0][2] * (edge[1][0] * edge[2][1] - edge[1][1] * edge[2][0]);
-}
+/* A type's corners, each with its three neighbours in right-handed order: the cell's volume is what their tets'
+ * volumes, six times, sum to, over shares. Exact for cells with parallel edges, else a mean. */
+typedef struct cell_corners {
+    const signed char (*corners)[4];
+    int count;
+    double shares; /* what a cell of volume 1 sums to */
+} cell_corners;
 
-/* Signed volume, from the corners' tets: exact for cells with parallel edges, else their mean. */
-MMBVH_INLINE double signed_volume(int type, double points[][3])
+MMBVH_INLINE cell_corners corners_of(int type)
 {
     static const signed char tet[][4] = {{0, 1, 2, 3}};
     static const signed char hex[][4] = {{0, 1, 3, 4}, {1, 2, 0, 5}, {2, 3, 1, 6}, {3, 0, 2, 7},
@@ -44,33 +40,59 @@ MMBVH_INLINE double signed_volume(int type, double points[][3])
     static const signed char wedge[][4] = {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5},
                                            {3, 5, 4, 0}, {4, 3, 5, 1}, {5, 4, 3, 2}};
     static const signed char pyramid[][4] = {{0, 1, 3, 4}, {1, 2, 0, 4}, {2, 3, 1, 4}, {3, 0, 2, 4}};
-    const signed char(*corners)[4] = type == GRID_TET     ? tet
-                                     : type == GRID_HEX   ? hex
-                                     : type == GRID_WEDGE ? wedge
-                                                          : pyramid;
-    const int count = type == GRID_TET ? 1 : type == GRID_HEX ? 8 : type == GRID_WEDGE ? 6 : 4;
-    double sum = 0;
-    for (int i = 0; i < count; i++) sum += corner_volume(points, corners[i]);
-    const double shares = type == GRID_TET ? 6 : type == GRID_HEX ? 8 : 12; /* what a cell of volume 1 sums to */
-    return sum / shares;
+    if (type == GRID_TET) return (cell_corners){tet, 1, 6};
+    if (type == GRID_HEX) return (cell_corners){hex, 8, 8};
+    return type == GRID_WEDGE ? (cell_corners){wedge, 6, 12} : (cell_corners){pyramid, 4, 12};
 }
 
-/* The cube root, without a call where volumes are of any usual size: a third of the exponent (bits of a double are its
- * logarithm, but for a part of 0.09), off by at most 0.033, and two steps of Halley's method, which cubes the error
- * each time: 2.1e-5, then rounding. */
-MMBVH_INLINE double cube_root(double x)
+MMBVH_INLINE double determinant(const double u[3], const double v[3], const double w[3])
 {
-    if (!(x > 1e-280 && x < 1e280)) return cbrt(x);
+    return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+}
+
+MMBVH_INLINE double signed_volume(int type, double points[][3])
+{
+    const cell_corners of = corners_of(type);
+    double sum = 0;
+    for (int i = 0; i < of.count; i++) {
+        double edge[3][3];
+        for (int k = 0; k < 3; k++)
+            for (int axis = 0; axis < 3; axis++)
+                edge[k][axis] = points[of.corners[i][k + 1]][axis] - points[of.corners[i][0]][axis];
+        sum += determinant(edge[0], edge[1], edge[2]);
+    }
+    return sum / of.shares;
+}
+
+MMBVH_INLINE bool has_usual_root(double x)
+{
+    return x > 1e-280 && x < 1e280;
+}
+
+/* About the cube root: a third of the exponent (bits of a double are its logarithm, but for a part of 0.09), off by at
+ * most 0.033. */
+MMBVH_INLINE double cube_root_begin(double x)
+{
     uint64_t bits;
     double y;
     memcpy(&bits, &x, sizeof bits);
     bits = bits / 3 + 0x2a9f7893782da1ceu; /* two thirds of 1.0's bits, less the part that the mantissa leaves */
     memcpy(&y, &bits, sizeof y);
-    for (int step = 0; step < 2; step++) {
-        const double cube = y * y * y;
-        y *= (cube + 2 * x) / (2 * cube + x);
-    }
     return y;
+}
+
+/* A step of Halley's method cubes the error: two from the begin on leave 2.1e-5, then rounding. */
+MMBVH_INLINE double cube_root_step(double x, double y)
+{
+    const double cube = y * y * y;
+    return y * ((cube + 2 * x) / (2 * cube + x));
+}
+
+/* The cube root, without a call where volumes are of any usual size. */
+MMBVH_INLINE double cube_root(double x)
+{
+    if (!has_usual_root(x)) return cbrt(x);
+    return cube_root_step(x, cube_root_step(x, cube_root_begin(x)));
 }
 
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
@@ -132,25 +154,174 @@ MMBVH_INLINE bool take_points(const grid *g, int64_t first, int count, bool is_g
     return is_ghost || poison == 0;
 }
 
+/* False where the cell is bad. */
+MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t, const fetch_shape shape,
+                           const bool wide_index, const bool wide_number)
+{
+    const grid *g = &mesh->cells;
+    const int type = shape == FETCH_TETS ? GRID_TET : grid_cell_type(g, cell);
+    const int count = fetch_vertex_count(g, cell, shape);
+    if (count == 0 || (shape == FETCH_BY_CELL && !offsets_are_good(mesh, cell, count))) return false;
+    const bool is_ghost = grid_is_ghost(g, cell);
+    double points[GRID_MAX_CELL_VERTICES][3];
+    if (!take_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, wide_index, wide_number))
+        return false;
+    t->ghosts += is_ghost;
+    if (is_ghost) return true;
+    for (int i = 0; i < count; i++) tally_point(t, points[i]);
+    tally_volume(t, signed_volume(type, points));
+    return true;
+}
+
+/* ---- cells of one type, LANES at once ----
+ *
+ * The same operations on each cell, in an order that the compiler makes vectors of. Where anything is unusual about one
+ * of them (a bad index, a ghost, a volume that is not finite or has no usual root) they are taken one by one instead. A
+ * volume is finite only where all coordinates are: each is in a product of it, and what is not finite stays so. */
+
+enum { LANES = 8 };
+
+typedef double lanes[LANES];
+
+typedef struct lane_bounds {
+    lanes lower[3], upper[3];
+} lane_bounds;
+
+MMBVH_INLINE lane_bounds lane_bounds_of(const mesh_tally *t)
+{
+    lane_bounds b;
+    for (int axis = 0; axis < 3; axis++)
+        for (int lane = 0; lane < LANES; lane++) {
+            b.lower[axis][lane] = t->lower[axis];
+            b.upper[axis][lane] = t->upper[axis];
+        }
+    return b;
+}
+
+MMBVH_INLINE void tally_bounds(mesh_tally *t, const lane_bounds *b)
+{
+    for (int axis = 0; axis < 3; axis++)
+        for (int lane = 0; lane < LANES; lane++) {
+            const double lower = b->lower[axis][lane], upper = b->upper[axis][lane];
+            t->lower[axis] = lower < t->lower[axis] ? lower : t->lower[axis];
+            t->upper[axis] = upper > t->upper[axis] ? upper : t->upper[axis];
+        }
+}
+
+/* Are so many entries from the first on indices of vertices? By the signs of index and last - index. */
+MMBVH_INLINE bool are_vertices(const grid *g, int64_t first, const int count, const bool wide_index)
+{
+    const int64_t last = g->vertex_count - 1;
+    if (!wide_index && g->connectivity.stride == sizeof(int32_t)) {
+        const uint32_t *indices = (const uint32_t *)(const void *)g->connectivity.data + first;
+        const uint32_t narrow_last = last < INT32_MAX ? (uint32_t)last : INT32_MAX;
+        uint32_t signs = 0;
+        for (int i = 0; i < count; i++) signs |= indices[i] | (narrow_last - indices[i]);
+        return last >= 0 && !(signs >> 31);
+    }
+    int64_t signs = 0;
+    for (int i = 0; i < count; i++) {
+        const int64_t vertex = fetch_index(&g->connectivity, first + i, wide_index);
+        signs |= vertex | (last - (vertex & INT64_MAX));
+    }
+    return signs >= 0;
+}
+
+MMBVH_INLINE void take_lanes(const grid *g, int64_t first, const int count, lanes at[][3], const bool wide_index,
+                             const bool wide_number)
+{
+    const int64_t y = g->coordinates[1].data - g->coordinates[0].data;
+    const int64_t z = g->coordinates[2].data - g->coordinates[0].data;
+    for (int lane = 0; lane < LANES; lane++)
+        for (int i = 0; i < count; i++) {
+            const char *const vertex = fetch_vertex(g, first + lane * count + i, wide_index);
+            const char *const place[3] = {vertex, vertex + y, vertex + z};
+            for (int axis = 0; axis < 3; axis++)
+                at[i][axis][lane] = wide_number ? *(const double *)(const void *)place[axis]
+                                                : (double)*(const float *)(const void *)place[axis];
+        }
+}
+
+MMBVH_INLINE void lane_volumes(const int type, lanes (*const at)[3], lanes volume)
+{
+    const cell_corners of = corners_of(type);
+    for (int lane = 0; lane < LANES; lane++) volume[lane] = 0;
+    for (int i = 0; i < of.count; i++) {
+        const signed char *corner = of.corners[i];
+        lanes *const o = at[corner[0]], *const a = at[corner[1]], *const b = at[corner[2]], *const c = at[corner[3]];
+        for (int lane = 0; lane < LANES; lane++) {
+            const double u[3] = {a[0][lane] - o[0][lane], a[1][lane] - o[1][lane], a[2][lane] - o[2][lane]};
+            const double v[3] = {b[0][lane] - o[0][lane], b[1][lane] - o[1][lane], b[2][lane] - o[2][lane]};
+            const double w[3] = {c[0][lane] - o[0][lane], c[1][lane] - o[1][lane], c[2][lane] - o[2][lane]};
+            volume[lane] += determinant(u, v, w);
+        }
+    }
+    for (int lane = 0; lane < LANES; lane++) volume[lane] /= of.shares;
+}
+
+MMBVH_INLINE void grow_lanes(lane_bounds *b, lanes (*const at)[3], const int count)
+{
+    for (int i = 0; i < count; i++)
+        for (int axis = 0; axis < 3; axis++)
+            for (int lane = 0; lane < LANES; lane++) {
+                const double x = at[i][axis][lane];
+                b->lower[axis][lane] = x < b->lower[axis][lane] ? x : b->lower[axis][lane];
+                b->upper[axis][lane] = x > b->upper[axis][lane] ? x : b->upper[axis][lane];
+            }
+}
+
+/* Of volumes with usual roots. */
+MMBVH_INLINE void tally_volumes(mesh_tally *t, const lanes volume)
+{
+    lanes size, root;
+    for (int lane = 0; lane < LANES; lane++) size[lane] = fabs(volume[lane]);
+    for (int lane = 0; lane < LANES; lane++) root[lane] = cube_root_begin(size[lane]);
+    for (int step = 0; step < 2; step++)
+        for (int lane = 0; lane < LANES; lane++) root[lane] = cube_root_step(size[lane], root[lane]);
+    for (int lane = 0; lane < LANES; lane++) {
+        t->inverted += volume[lane] < 0;
+        t->sizes += root[lane];
+    }
+    t->drawn += LANES;
+}
+
+/* False, and nothing done, where cells are to be taken one by one. */
+MMBVH_INLINE bool run_lanes(const grid *g, int64_t cell, mesh_tally *t, lane_bounds *bounds, const fetch_shape shape,
+                            const bool wide_index, const bool wide_number)
+{
+    const int type = shape == FETCH_TETS ? GRID_TET : shape == FETCH_HEXES ? GRID_HEX : g->cell_type;
+    const int count = grid_type_vertices(type);
+    lanes at[GRID_MAX_CELL_VERTICES][3], volume;
+    bool is_usual = are_vertices(g, cell * count, LANES * count, wide_index);
+    if (g->ghosts)
+        for (int lane = 0; lane < LANES; lane++) is_usual &= !grid_is_ghost(g, cell + lane);
+    if (!is_usual) return false;
+    take_lanes(g, cell * count, count, at, wide_index, wide_number);
+    lane_volumes(type, at, volume);
+    for (int lane = 0; lane < LANES; lane++) is_usual &= has_usual_root(fabs(volume[lane]));
+    if (!is_usual) return false;
+    grow_lanes(bounds, at, count);
+    tally_volumes(t, volume);
+    return true;
+}
+
 MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally,
                          const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
-    const grid *g = &mesh->cells;
     mesh_tally t = *tally;
+    lane_bounds bounds = lane_bounds_of(tally);
+    bool is_good = true;
     int64_t cell = begin;
-    for (; cell < end; cell++) {
-        const int type = shape == FETCH_TETS ? GRID_TET : grid_cell_type(g, cell);
-        const int count = fetch_vertex_count(g, cell, shape);
-        if (count == 0 || (shape == FETCH_BY_CELL && !offsets_are_good(mesh, cell, count))) break;
-        const bool is_ghost = grid_is_ghost(g, cell);
-        double points[GRID_MAX_CELL_VERTICES][3];
-        if (!take_points(g, fetch_first(g, cell, count, shape), count, is_ghost, points, wide_index, wide_number))
-            break;
-        t.ghosts += is_ghost;
-        if (is_ghost) continue;
-        for (int i = 0; i < count; i++) tally_point(&t, points[i]);
-        tally_volume(&t, signed_volume(type, points));
+    while (cell < end && is_good) {
+        const int64_t next = cell + LANES < end ? cell + LANES : end;
+        if (shape != FETCH_BY_CELL && next - cell == LANES &&
+            run_lanes(&mesh->cells, cell, &t, &bounds, shape, wide_index, wide_number)) {
+            cell = next;
+            continue;
+        }
+        while (cell < next && (is_good = run_cell(mesh, cell, &t, shape, wide_index, wide_number))) cell++;
     }
+    tally_bounds(&t, &bounds);
     *tally = t;
     return cell;
 }
