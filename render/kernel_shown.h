@@ -21,7 +21,19 @@ typedef struct kernel_tets {
     int count;
     uint32_t cell[SIMD_WIDTH];
     int64_t vertices[SIMD_WIDTH][GRID_MAX_CELL_VERTICES];
+    int32_t plain[4][SIMD_WIDTH]; /* the vertices of a plain mesh, instead */
 } kernel_tets;
+
+/* A mesh of tets alone whose indices are int32 one after the other, and whose coordinates and values float32, within
+ * reach of a gather: strides in elements. */
+typedef struct kernel_plain {
+    bool is_so;
+    bool is_interleaved; /* a vertex's coordinates are side by side */
+    const int32_t *connectivity;
+    const float *coordinates[3], *values;
+    int32_t stride, value_stride;
+    float eye[3][2], scale; /* in two parts: the nearest float, and what is left */
+} kernel_plain;
 
 /* One subtree's search. */
 typedef struct kernel_finder {
@@ -37,8 +49,55 @@ typedef struct kernel_finder {
     kernel_cell cell;
     uint32_t coming[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
     kernel_tets tets;            /* tets whose vertices are */
+    kernel_plain plain;
     int coming_count;
 } kernel_finder;
+
+/* The least float that is not below x. */
+SIMD_INLINE float kernel_not_below(double x)
+{
+    float f = (float)x;
+    int32_t bits;
+    if (!((double)f < x)) return f;
+    if (f == 0) return 1e-45f;
+    memcpy(&bits, &f, sizeof bits);
+    bits += f > 0 ? 1 : -1;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+
+/* A stride in elements of float32; 0: elements are others, or some of so many out of a gather's reach. */
+static inline int32_t kernel_plain_stride(const grid_array *a, int64_t count)
+{
+    const int64_t stride = a->stride / (int64_t)sizeof(float);
+    const bool is_plain = !a->is_wide && !a->is_integer && a->stride % (int64_t)sizeof(float) == 0;
+    return is_plain && stride > 0 && stride < INT32_MAX && count <= INT32_MAX / stride ? (int32_t)stride : 0;
+}
+
+/* Numbers are of sizes at which float32 differences keep their precision. */
+static inline void kernel_plain_begin(kernel_plain *p, const kernel_frame *f, const grid *g, const grid_field *field)
+{
+    const grid_array *c = g->coordinates;
+    memset(p, 0, sizeof *p);
+    if (g->offsets.data || g->cell_types || g->cell_type != GRID_TET || g->connectivity.is_wide ||
+        g->connectivity.stride != sizeof(int32_t) || field->is_cell_centred || field->component < 0)
+        return;
+    p->connectivity = (const int32_t *)(const void *)g->connectivity.data;
+    p->stride = kernel_plain_stride(&c[0], g->vertex_count);
+    p->value_stride = kernel_plain_stride(&field->values, g->vertex_count);
+    p->values = (const float *)(const void *)(field->values.data + field->component * field->component_stride);
+    p->scale = (float)f->job->space.scale;
+    p->is_so = p->stride && p->value_stride && p->scale > 1e-25f && p->scale < 1e25f;
+    p->is_interleaved = true;
+    for (int a = 0; a < 3; a++) {
+        const double eye = f->job->camera.eye[a];
+        p->coordinates[a] = (const float *)(const void *)c[a].data;
+        p->eye[a][0] = (float)eye;
+        p->eye[a][1] = (float)(eye - (double)p->eye[a][0]);
+        p->is_so = p->is_so && kernel_plain_stride(&c[a], g->vertex_count) == p->stride && fabs(eye) < 1e15;
+        p->is_interleaved = p->is_interleaved && c[a].data == c[0].data + a * (int64_t)sizeof(float);
+    }
+}
 
 static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, const kernel_subtree *subtree)
 {
@@ -49,6 +108,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->source = (uint32_t)subtree->part * RENDER_MAX_ISOVALUES;
     while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
     s->coming_count = s->tets.count = 0;
+    kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->surface->layer->field.fields[s->part]);
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);
@@ -164,30 +224,29 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
 }
 
-SIMD_INLINE void kernel_find_cell(kernel_finder *s)
+/* One isovalue of the fetched cell. */
+static void kernel_find_value(kernel_finder *s, int value)
 {
     const render_surface_layer *layer = s->surface->layer;
     kernel_cell *c = &s->cell;
-    for (int value = 0; value < layer->value_count; value++) {
-        kernel_outline o;
-        kernel_shown shown = {.cell = c->index, .source = s->source + (uint32_t)value};
-        if (!kernel_cell_straddles(c, layer->values[value])) continue;
-        if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
-        kernel_cell_relative(c, layer->values[value]);
-        if (c->type == GRID_TET) {
-            if (!kernel_tet_outline(c, &o)) continue;
-        } else {
-            kernel_vertex_outline(c, &o);
-            if (!kernel_slab_outline(c, &o)) continue;
-        }
-        if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+    kernel_outline o;
+    kernel_shown shown = {.cell = c->index, .source = s->source + (uint32_t)value};
+    if (!kernel_cell_straddles(c, layer->values[value])) return;
+    if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    kernel_cell_relative(c, layer->values[value]);
+    if (c->type == GRID_TET) {
+        if (!kernel_tet_outline(c, &o)) return;
+    } else {
+        kernel_vertex_outline(c, &o);
+        if (!kernel_slab_outline(c, &o)) return;
     }
+    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
 }
 
 /* ---- tets, as many at once as there are lanes ----
  *
- * In float32 from the eye on: positions err by 4 roundings of their distance from it, and so do X, Y and depth; all of
- * it is within the pads of kernel_block_range(), which take this of the picture's scale too. */
+ * In float32 from the eye on: positions err by 8 roundings of their distance from it, and so do X, Y and depth; all of
+ * it is within the pads of kernel_pixel_range(), which take this of the picture's scale too. */
 
 /* Where the surface of one isovalue is in each: ends over the edges that it crosses. */
 typedef struct kernel_tet_ends {
@@ -195,9 +254,8 @@ typedef struct kernel_tet_ends {
 } kernel_tet_ends;
 
 typedef struct kernel_tet_lanes {
-    float f[4][SIMD_WIDTH], at[3][4][SIMD_WIDTH];
-    uint32_t cell[SIMD_WIDTH];
-    int count;
+    vf f[4], at[3][4]; /* values less the isovalue; from the eye, in the space's scale */
+    vm negative[4];
 } kernel_tet_lanes;
 
 SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_lanes *l, kernel_tet_ends *e)
@@ -205,18 +263,16 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
     const vf most = vf_set(INFINITY);
-    vf f[4], at[4][3];
-    for (int i = 0; i < 4; i++) {
-        const vf d[3] = {vf_load(l->at[0][i]), vf_load(l->at[1][i]), vf_load(l->at[2][i])};
-        f[i] = vf_load(l->f[i]);
+    vf at[4][3];
+    for (int i = 0; i < 4; i++)
         for (int a = 0; a < 3; a++)
-            at[i][a] = (d[0] * (float)axes[a][0] + d[1] * (float)axes[a][1]) + d[2] * (float)axes[a][2];
-    }
+            at[i][a] =
+                (l->at[0][i] * (float)axes[a][0] + l->at[1][i] * (float)axes[a][1]) + l->at[2][i] * (float)axes[a][2];
     *e = (kernel_tet_ends){most, -most, most, -most, most, -most};
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const vm crossed = vm_xor(vf_lt(f[i], vf_set(0)), vf_lt(f[j], vf_set(0)));
-        const vf along = f[i] / (f[i] - f[j]);
+        const vm crossed = vm_xor(l->negative[i], l->negative[j]);
+        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* not 0 / 0 */
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = at[i][a] + along * (at[j][a] - at[i][a]);
         vf inverse = vf_set(1);
@@ -231,28 +287,113 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_
     }
 }
 
-static void kernel_find_tet_lanes(kernel_finder *s, const kernel_tet_lanes *l, uint32_t source)
+/* kernel_block_range() lane by lane: the first and last pixels. Returns the lanes that have any. */
+SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, int pixels, vf *first, vf *last)
 {
-    kernel_tet_ends e;
-    float ends[6][SIMD_WIDTH];
-    kernel_tet_lanes_ends(s, l, &e);
-    vf_store(ends[0], e.near);
-    vf_store(ends[1], e.far);
-    vf_store(ends[2], e.left);
-    vf_store(ends[3], e.right);
-    vf_store(ends[4], e.top);
-    vf_store(ends[5], e.bottom);
-    for (int n = 0; n < l->count; n++) {
-        kernel_shown shown = {.cell = l->cell[n], .source = source};
-        const kernel_extent depth = {ends[0][n] + s->t_near, ends[1][n] + s->t_near};
-        const kernel_extent columns = {ends[2][n], ends[3][n]}, rows = {ends[4][n], ends[5][n]};
-        if (kernel_extents_shown(s, depth, fabsf(ends[1][n]) + fabsf(s->t_near), columns, rows, &shown))
-            kernel_add_shown(s, &shown);
+    const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
+    *first = vf_max(-vf_floor(pad - (low + zero)), vf_set(0));
+    *last = vf_min(vf_floor((high + zero) + pad), vf_set((float)(pixels - 1)));
+    return vf_le(*first, *last);
+}
+
+/* kernel_extents_shown() lane by lane, of so many lanes those whose bits are set. */
+static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigned lanes, const uint32_t *cells,
+                             uint32_t source)
+{
+    const render_camera *camera = &s->frame->job->camera;
+    const bool flat = camera->is_orthographic;
+    kernel_shown_list *list = s->list;
+    vf first[2], last[2];
+    float near[SIMD_WIDTH];
+    int32_t ends[4][SIMD_WIDTH];
+    const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
+    /* The largest blur of any lane stands for all. */
+    const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
+    vm shown = kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), camera->width,
+                                  &first[0], &last[0]);
+    shown = vm_and(shown, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale), camera->height,
+                                             &first[1], &last[1]));
+    const vm anywhere = flat ? vm_none() : vm_not(vf_lt(0.01f * size, e->near));
+    const vm behind = vf_lt((e->far + s->t_near) + pad, vf_set(s->t_near));
+    lanes &= vm_bits(vm_andnot(vm_or(shown, anywhere), behind));
+    const int most[2] = {camera->width - 1, camera->height - 1};
+    for (int a = 0; a < 2; a++) {
+        const vi from = vi_from_vf(vf_select(anywhere, vf_set(0), first[a]));
+        const vi to = vi_from_vf(vf_select(anywhere, vf_set((float)most[a]), last[a]));
+        memcpy(ends[2 * a], &from, sizeof from);
+        memcpy(ends[2 * a + 1], &to, sizeof to);
+    }
+    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* not a number: that */
+    if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
+    for (; lanes; lanes &= lanes - 1) {
+        const int n = __builtin_ctz(lanes);
+        list->items[list->count++] = (kernel_shown){.cell = cells[n],
+                                                    .source = source,
+                                                    .near = near[n],
+                                                    .x0 = (uint16_t)(ends[0][n] / KERNEL_BLOCK),
+                                                    .x1 = (uint16_t)(ends[1][n] / KERNEL_BLOCK),
+                                                    .y0 = (uint16_t)(ends[2][n] / KERNEL_BLOCK),
+                                                    .y1 = (uint16_t)(ends[3][n] / KERNEL_BLOCK)};
     }
 }
 
-/* Those of the tets that the layer's isovalues cross. */
-static void kernel_find_tets(kernel_finder *s)
+/* Tets of a plain mesh. v < value is v < the least float not below it. The differences' signs are right but where they
+ * vanish in float32, and then along an edge that is as good as a point. */
+SIMD_INLINE void kernel_plain_value(kernel_finder *s, const vf v[4], kernel_tet_lanes *l, int value)
+{
+    const double isovalue = s->surface->layer->values[value];
+    const float middle = (float)isovalue, rest = (float)(isovalue - (double)middle);
+    const vf least = vf_set(kernel_not_below(isovalue));
+    vf size = vf_set(0);
+    vm usual = vm_all_lanes(), negative = vm_none(), positive = vm_none();
+    for (int i = 0; i < 4; i++) {
+        l->f[i] = (v[i] - middle) - rest;
+        l->negative[i] = vf_lt(v[i], least);
+        negative = vm_or(negative, l->negative[i]);
+        positive = vm_or(positive, vf_le(least, v[i]));
+        size = vf_max(vf_abs(l->f[i]), size);
+        usual = vm_and(usual, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
+        for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(l->at[a][i]), vf_set(1e15f)));
+    }
+    usual = vm_and(usual, vf_lt(vf_set(1e-30f), size));
+    const unsigned all = (1u << s->tets.count) - 1, crossed = vm_bits(vm_and(negative, positive)) & all;
+    /* Of no usual size, or not numbers: one by one. */
+    const unsigned good = crossed & vm_bits(usual);
+    if (good) {
+        kernel_tet_ends e;
+        kernel_tet_lanes_ends(s, l, &e);
+        kernel_add_lanes(s, &e, good, s->tets.cell, s->source + (uint32_t)value);
+    }
+    for (unsigned odd = crossed & ~good; odd; odd &= odd - 1) {
+        kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->surface->layer->field.fields[s->part],
+                          s->tets.cell[__builtin_ctz(odd)]);
+        if (s->cell.is_finite) kernel_find_value(s, value);
+    }
+}
+
+static void kernel_find_plain_tets(kernel_finder *s)
+{
+    const kernel_plain *p = &s->plain;
+    kernel_tets *t = &s->tets;
+    kernel_tet_lanes l;
+    vf v[4];
+    if (!t->count) return;
+    for (int n = t->count; n < SIMD_WIDTH; n++)
+        for (int i = 0; i < 4; i++) t->plain[i][n] = t->plain[i][0];
+    for (int i = 0; i < 4; i++) {
+        vi vertex;
+        memcpy(&vertex, t->plain[i], sizeof vertex);
+        v[i] = vf_gather(p->values, vertex * p->value_stride);
+        vertex *= p->stride;
+        for (int a = 0; a < 3; a++)
+            l.at[a][i] = ((vf_gather(p->coordinates[a], vertex) - p->eye[a][0]) - p->eye[a][1]) * p->scale;
+    }
+    for (int value = 0; value < s->surface->layer->value_count; value++) kernel_plain_value(s, v, &l, value);
+    t->count = 0;
+}
+
+/* Tets of any other mesh, one by one until they are in lanes. */
+static void kernel_find_any_tets(kernel_finder *s)
 {
     const render_surface_layer *layer = s->surface->layer;
     const grid_field *field = &layer->field.fields[s->part];
@@ -260,8 +401,9 @@ static void kernel_find_tets(kernel_finder *s)
     const double *eye = s->frame->job->camera.eye, scale = s->frame->job->space.scale;
     kernel_cell *c = &s->cell;
     for (int value = 0; value < layer->value_count; value++) {
-        kernel_tet_lanes lanes;
-        lanes.count = 0;
+        float f[4][SIMD_WIDTH] = {{0}}, at[3][4][SIMD_WIDTH] = {{{0}}};
+        uint32_t cells[SIMD_WIDTH];
+        int count = 0;
         for (int n = 0; n < s->tets.count; n++) {
             c->count = 4;
             if (!grid_cell_values(field, s->tets.cell[n], s->tets.vertices[n], 4, c->values)) continue;
@@ -270,26 +412,62 @@ static void kernel_find_tets(kernel_finder *s)
             for (int i = 0; i < 4; i++) {
                 double world[3];
                 grid_vertex(g, s->tets.vertices[n][i], world);
-                for (int a = 0; a < 3; a++) lanes.at[a][i][lanes.count] = (float)((world[a] - eye[a]) * scale);
-                lanes.f[i][lanes.count] = c->f[i];
+                for (int a = 0; a < 3; a++) at[a][i][count] = (float)((world[a] - eye[a]) * scale);
+                f[i][count] = c->f[i];
             }
-            lanes.cell[lanes.count++] = s->tets.cell[n];
+            cells[count++] = s->tets.cell[n];
         }
-        for (int n = lanes.count; lanes.count && n < SIMD_WIDTH; n++)
-            for (int i = 0; i < 4; i++) {
-                lanes.f[i][n] = lanes.f[i][0];
-                for (int a = 0; a < 3; a++) lanes.at[a][i][n] = lanes.at[a][i][0];
-            }
-        if (lanes.count) kernel_find_tet_lanes(s, &lanes, s->source + (uint32_t)value);
+        if (!count) continue;
+        kernel_tet_lanes l;
+        kernel_tet_ends e;
+        for (int i = 0; i < 4; i++) {
+            l.f[i] = vf_load(f[i]);
+            l.negative[i] = vf_lt(l.f[i], vf_set(0));
+            for (int a = 0; a < 3; a++) l.at[a][i] = vf_load(at[a][i]);
+        }
+        kernel_tet_lanes_ends(s, &l, &e);
+        kernel_add_lanes(s, &e, (1u << count) - 1, cells, s->source + (uint32_t)value);
     }
     s->tets.count = 0;
 }
 
+static void kernel_find_tets(kernel_finder *s)
+{
+    if (s->plain.is_so)
+        kernel_find_plain_tets(s);
+    else
+        kernel_find_any_tets(s);
+}
+
 /* ---- leaves ---- */
+
+/* Their vertices are on their way. */
+static void kernel_find_coming_plain(kernel_finder *s)
+{
+    const kernel_plain *p = &s->plain;
+    for (int n = 0; n < s->coming_count; n++) {
+        const int32_t *vertices = p->connectivity + 4 * (int64_t)s->coming[n];
+        s->tets.cell[n] = s->coming[n];
+        for (int i = 0; i < 4; i++) {
+            const int64_t at = (int64_t)vertices[i] * p->stride;
+            s->tets.plain[i][n] = vertices[i];
+            __builtin_prefetch(p->values + (int64_t)vertices[i] * p->value_stride);
+            __builtin_prefetch(p->coordinates[0] + at);
+            if (!p->is_interleaved) __builtin_prefetch(p->coordinates[1] + at);
+            __builtin_prefetch(p->coordinates[2] + at);
+        }
+    }
+    s->tets.count = s->coming_count;
+    s->coming_count = 0;
+}
 
 /* Cells whose connectivity has come: tets wait for their vertices, others are done with. */
 static void kernel_find_coming(kernel_finder *s)
 {
+    if (s->plain.is_so) {
+        kernel_find_coming_plain(s);
+        return;
+    }
     const grid *g = s->frame->job->parts[s->part].cells;
     const grid_field *field = &s->surface->layer->field.fields[s->part];
     for (int n = 0; n < s->coming_count; n++) {
@@ -305,7 +483,7 @@ static void kernel_find_coming(kernel_finder *s)
         if (s->cell.type == GRID_POLYHEDRON)
             kernel_find_polyhedron(s, cell);
         else if (s->cell.is_finite)
-            kernel_find_cell(s);
+            for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_value(s, value);
     }
     s->coming_count = 0;
 }
@@ -331,28 +509,54 @@ static void kernel_find_rest(kernel_finder *s)
     kernel_find_tets(s);
 }
 
-/* Depth first, the left child first: in the order in which leaves lie in memory. */
+/* A node is looked at beside others, each of which has what it needs on its way from memory while they wait. */
+enum { KERNEL_FRONT = 8, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
+
+/* May it show in the picture? Children of one that lies in it need not be asked. */
+SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
+{
+    kernel_lie lie = {0};
+    if (*is_inside) return true;
+    const kernel_sides sides = kernel_box_sides(&s->planes, tree, node, &lie);
+    const unsigned outside =
+        (sides.below & (1u | 1u << KERNEL_ROWS_LANE)) | (sides.above & (2u | 2u << KERNEL_ROWS_LANE));
+    *is_inside = !outside && lie.near >= s->t_near;
+    return kernel_blocks_of(sides) && !(lie.far < s->t_near);
+}
+
+/* Depth first, from the left, KERNEL_FRONT nodes at once: about in the order in which leaves lie in memory. Entries are
+ * 2 nodes + 1 where it lies in the picture. One node at once needs no more room than the tree is deep. */
 static void kernel_find_shown(kernel_finder *s, int64_t root)
 {
     const mmbvh *tree = s->frame->job->parts[s->part].tree;
     const mmbvh_ranges *ranges = &s->surface->layer->field.ranges[s->part];
-    int64_t stack[MMBVH_MAX_DEPTH + 1];
+    int64_t stack[KERNEL_FRONT_ROOM + 2 * KERNEL_FRONT];
     int top = 0;
-    stack[top++] = root;
+    stack[top++] = 2 * root;
     while (top && !s->list->is_full) {
-        const int64_t node = stack[--top];
-        if (!kernel_node_shows(&s->surface->interest, ranges, node)) continue;
-        const kernel_lie lie = kernel_box_lie(&s->planes, tree, node);
-        if (!lie.blocks || lie.far < s->t_near) continue;
-        const int count = mmbvh_node_count(tree, node);
-        const int64_t ref = mmbvh_node_ref(tree, node);
-        if (count) {
-            kernel_find_leaf(s, tree->cells + ref, count);
-            continue;
+        int64_t front[KERNEL_FRONT];
+        const int most = top < KERNEL_FRONT_ROOM - MMBVH_MAX_DEPTH ? KERNEL_FRONT : 1;
+        int open = 0;
+        for (int n = 0; n < most && top; n++) {
+            const int64_t entry = stack[--top], node = entry >> 1;
+            bool is_inside = entry & 1;
+            if (!kernel_node_shows(&s->surface->interest, ranges, node)) continue;
+            if (!kernel_node_in_picture(s, tree, node, &is_inside)) continue;
+            const int count = mmbvh_node_count(tree, node);
+            const int64_t ref = mmbvh_node_ref(tree, node);
+            if (count) {
+                kernel_find_leaf(s, tree->cells + ref, count);
+                continue;
+            }
+            __builtin_prefetch(ranges->low + ref * ranges->stride);
+            __builtin_prefetch(ranges->low + (ref + 1) * ranges->stride);
+            front[open++] = 2 * ref + is_inside;
         }
-        __builtin_prefetch(ranges->low + ref * ranges->stride);
-        stack[top++] = ref + 1;
-        stack[top++] = ref;
+        while (open) {
+            const int64_t left = front[--open];
+            stack[top++] = left + 2;
+            stack[top++] = left;
+        }
     }
     kernel_find_rest(s);
 }
@@ -373,7 +577,8 @@ typedef struct kernel_by_depth {
 static inline int kernel_part_by_depth(kernel_tile_shown *items, int begin, int end)
 {
     const float a = items[begin].near, b = items[begin + (end - begin) / 2].near, c = items[end - 1].near;
-    const float pivot = fmaxf(fminf(a, b), fminf(fmaxf(a, b), c));
+    const float least = a < b ? a : b, most = a < b ? b : a;
+    const float pivot = c < least ? least : c < most ? c : most;
     int i = begin - 1, j = end;
     for (;;) {
         do i++;
@@ -451,15 +656,21 @@ SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *p
     return isovalue->value;
 }
 
-SIMD_INLINE void kernel_tile_prefetch_shown(kernel_tile_trace *t, const kernel_tile_shown *items, int count)
+/* What some of the next cells are made of, on its way from memory: their vertices, whose indices have come, and the
+ * indices of those that follow. */
+SIMD_INLINE void kernel_tile_prefetch_shown(kernel_tile_trace *t, const kernel_tile_shown *items, int count, int more)
 {
-    for (int n = 0; n < count; n++) {
-        int part;
-        if (!(items[n].blocks & kernel_blocks_beyond(t, items[n].near))) continue;
-        kernel_tile_source(t, items[n].source, &part);
-        kernel_tile_prefetch(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part], &items[n].cell,
-                             1);
-    }
+    for (int pass = 0; pass < 2; pass++)
+        for (int n = 0; n < (pass ? count : count + more); n++) {
+            int part;
+            if (!(items[n].blocks & t->wanted & kernel_blocks_beyond(t, items[n].near))) continue;
+            kernel_tile_source(t, items[n].source, &part);
+            const grid *g = t->frame->job->parts[part].cells;
+            if (pass)
+                kernel_tile_prefetch_vertices(g, &t->surface->layer->field.fields[part], items[n].cell);
+            else
+                kernel_tile_prefetch_indices(g, items[n].cell);
+        }
 }
 
 /* The tile's opaque surfaces, or the transparent ones, for which those must be known. */
@@ -471,7 +682,8 @@ SIMD_INLINE void kernel_tile_trace_shown(kernel_tile_trace *t, kernel_tile_shown
     for (int left; (left = kernel_next_by_depth(&queue, &next)) != 0; far = kernel_tile_far(t)) {
         if (left <= KERNEL_PIECE) {
             if (next->near > far) return;
-            kernel_tile_prefetch_shown(t, next, left);
+            const int after = (int)(items + count - next) - left;
+            kernel_tile_prefetch_shown(t, next, left, after < KERNEL_PIECE ? after : KERNEL_PIECE);
         }
         for (; left; left--, next++) {
             int part;

@@ -196,11 +196,11 @@ typedef struct kernel_lie {
     float near, far, along;
 } kernel_lie;
 
-SIMD_INLINE kernel_lie kernel_box_lie(const kernel_planes *q, const mmbvh *tree, int64_t node)
+/* On which sides a node's box is; of its lie all but the blocks. */
+SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *tree, int64_t node, kernel_lie *lie)
 {
     float lower[4], upper[4];
     kernel_sides sides = {0, 0};
-    kernel_lie lie = {0};
     mmbvh_node_box(tree, node, lower, upper);
     const float middle[3] = {0.5f * (lower[0] + upper[0]), 0.5f * (lower[1] + upper[1]), 0.5f * (lower[2] + upper[2])};
     const float half[3] = {0.5f * (upper[0] - lower[0]), 0.5f * (upper[1] - lower[1]), 0.5f * (upper[2] - lower[2])};
@@ -210,12 +210,18 @@ SIMD_INLINE kernel_lie kernel_box_lie(const kernel_planes *q, const mmbvh *tree,
         const vf reach = (q->size[0][v] * half[0] + q->size[1][v] * half[1]) + (q->size[2][v] * half[2] + q->error[v]);
         kernel_sides_add(&sides, v, at - reach, at + reach);
         if (v == KERNEL_DEPTH_LANE / SIMD_WIDTH) {
-            lie.near = (at - reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            lie.far = (at + reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            lie.along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
+            lie->near = (at - reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            lie->far = (at + reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            lie->along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
         }
     }
-    lie.blocks = kernel_blocks_of(sides);
+    return sides;
+}
+
+SIMD_INLINE kernel_lie kernel_box_lie(const kernel_planes *q, const mmbvh *tree, int64_t node)
+{
+    kernel_lie lie = {0};
+    lie.blocks = kernel_blocks_of(kernel_box_sides(q, tree, node, &lie));
     return lie;
 }
 

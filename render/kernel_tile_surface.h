@@ -153,16 +153,26 @@ SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, 
     for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
+/* Of cells of one type: others are not foreseen. */
+SIMD_INLINE void kernel_tile_prefetch_indices(const grid *g, uint32_t cell)
+{
+    const int vertices = grid_type_vertices(g->cell_type);
+    if (!g->offsets.data && vertices)
+        __builtin_prefetch(g->connectivity.data + (int64_t)cell * vertices * g->connectivity.stride);
+}
+
+SIMD_INLINE void kernel_tile_prefetch_vertices(const grid *g, const grid_field *field, uint32_t cell)
+{
+    const int vertices = g->offsets.data ? 0 : grid_type_vertices(g->cell_type);
+    for (int i = 0; i < vertices; i++)
+        kernel_prefetch_vertex(g, field, grid_array_index(&g->connectivity, (int64_t)cell * vertices + i));
+}
+
 /* All that the cells are made of is on its way from memory before the first of it is looked at. */
 SIMD_INLINE void kernel_tile_prefetch(const grid *g, const grid_field *field, const uint32_t *cells, int count)
 {
-    const int vertices = grid_type_vertices(g->cell_type);
-    if (g->offsets.data || !vertices) return;
-    for (int n = 0; n < count; n++)
-        __builtin_prefetch(g->connectivity.data + (int64_t)cells[n] * vertices * g->connectivity.stride);
-    for (int n = 0; n < count; n++)
-        for (int i = 0; i < vertices; i++)
-            kernel_prefetch_vertex(g, field, grid_array_index(&g->connectivity, (int64_t)cells[n] * vertices + i));
+    for (int n = 0; n < count; n++) kernel_tile_prefetch_indices(g, cells[n]);
+    for (int n = 0; n < count; n++) kernel_tile_prefetch_vertices(g, field, cells[n]);
 }
 
 static void kernel_tile_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)

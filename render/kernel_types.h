@@ -58,11 +58,19 @@ typedef struct kernel_tile_shown {
     uint32_t cell, source, blocks;
 } kernel_tile_shown;
 
+/* A list is a chain of chunks, none of which moves. */
+typedef struct kernel_shown_chunk {
+    struct kernel_shown_chunk *before;
+    int64_t count; /* of one that is full */
+    kernel_shown items[];
+} kernel_shown_chunk;
+
 typedef struct kernel_shown_list {
-    kernel_shown *items;
-    int64_t count, capacity;
-    bool is_full;   /* no more are wanted: memory ran out, or the bound is reached */
-    int64_t *bound; /* how many more all lists together may have room for */
+    kernel_shown_chunk *chunk; /* the one that is filled; NULL at first */
+    kernel_shown *items;       /* its own, */
+    int64_t count, capacity;   /* count of which are filled */
+    bool is_full;              /* no more are wanted: memory ran out, or the bound is reached */
+    int64_t *bound;            /* how many more all lists together may have room for */
 } kernel_shown_list;
 
 /* A subtree to look for them in. */

@@ -9,7 +9,7 @@
 #include "memory.h"
 #include "render_isa.h"
 
-enum { SUBTREES = 128, ITEMS = 1024, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
+enum { SUBTREES = 128, ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
@@ -51,18 +51,33 @@ static bool cut_trees(const kernel_frame *f, subtree_list *list)
 
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
+/* Another chunk. */
 static bool grow(kernel_shown_list *list)
 {
-    const int64_t capacity = list->capacity + list->capacity / 2 + ITEMS;
+    const int64_t twice = 2 * list->capacity, capacity = !twice ? ITEMS : twice < MOST_ITEMS ? twice : MOST_ITEMS;
     int64_t left;
 #pragma omp atomic capture
-    left = *list->bound -= capacity - list->capacity;
-    kernel_shown *items = left < 0 ? NULL : base_realloc(list->items, (size_t)capacity * sizeof *items);
-    list->is_full = !items;
-    if (!items) return false;
-    list->items = items;
+    left = *list->bound -= capacity;
+    kernel_shown_chunk *chunk = left < 0 ? NULL : base_alloc(sizeof *chunk + (size_t)capacity * sizeof *chunk->items);
+    list->is_full = !chunk;
+    if (!chunk) return false;
+    if (list->chunk) list->chunk->count = list->count;
+    chunk->before = list->chunk;
+    chunk->count = 0;
+    list->chunk = chunk;
+    list->items = chunk->items;
+    list->count = 0;
     list->capacity = capacity;
     return true;
+}
+
+static void free_list(kernel_shown_list *list)
+{
+    while (list->chunk) {
+        kernel_shown_chunk *before = list->chunk->before;
+        base_free(list->chunk);
+        list->chunk = before;
+    }
 }
 
 /* ---- tiles ---------------------------------------------------------------------------------------------------- */
@@ -85,17 +100,17 @@ static unsigned bits_of(int first, int last, int tile)
     return not_before & ((1u << BLOCKS) - 1) >> (to < BLOCKS - 1 ? BLOCKS - 1 - to : 0);
 }
 
-static void count_tiles(const kernel_shown_list *list, int64_t across, uint32_t *counts)
+static void count_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *counts)
 {
-    for (const kernel_shown *s = list->items, *end = s + list->count; s < end; s++)
+    for (const kernel_shown *s = chunk->items, *end = s + chunk->count; s < end; s++)
         for (int y = s->y0 / BLOCKS; y <= s->y1 / BLOCKS; y++)
             for (int x = s->x0 / BLOCKS; x <= s->x1 / BLOCKS; x++) counts[y * across + x]++;
 }
 
 /* at: where each tile's next one goes. */
-static void bin_tiles(const kernel_shown_list *list, int64_t across, uint32_t *at, kernel_tile_shown *out)
+static void bin_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_shown *out)
 {
-    for (const kernel_shown *s = list->items, *end = s + list->count; s < end; s++)
+    for (const kernel_shown *s = chunk->items, *end = s + chunk->count; s < end; s++)
         for (int y = s->y0 / BLOCKS; y <= s->y1 / BLOCKS; y++) {
             const unsigned rows = bits_of(s->y0, s->y1, y);
             for (int x = s->x0 / BLOCKS; x <= s->x1 / BLOCKS; x++) {
@@ -146,7 +161,9 @@ static void run(search *s, kernel_thread *thread_of, int threads)
 #pragma omp for schedule(dynamic, 1)
         for (int64_t i = 0; i < s->subtrees.count; i++)
             if (!list->is_full) kernels->find_shown(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
-        count_tiles(list, across, s->counts + me * tiles);
+        if (list->chunk) list->chunk->count = list->count;
+        for (const kernel_shown_chunk *c = list->chunk; c; c = c->before)
+            count_tiles(c, across, s->counts + me * tiles);
 #pragma omp barrier
 #pragma omp single
         {
@@ -155,7 +172,8 @@ static void run(search *s, kernel_thread *thread_of, int threads)
             is_full = is_full || count > (uint64_t)most;
             if (!is_full) s->shown = base_alloc(count * sizeof *s->shown);
         }
-        if (s->shown) bin_tiles(list, across, s->counts + me * tiles, s->shown);
+        for (const kernel_shown_chunk *c = s->shown ? list->chunk : NULL; c; c = c->before)
+            bin_tiles(c, across, s->counts + me * tiles, s->shown);
     }
 }
 
@@ -170,7 +188,7 @@ void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int thread
         for (int t = 0; t < threads; t++) s.lists[t].bound = &s.bound;
         run(&s, thread_of, threads);
     }
-    for (int t = 0; s.lists && t < threads; t++) base_free(s.lists[t].items);
+    for (int t = 0; s.lists && t < threads; t++) free_list(&s.lists[t]);
     base_free(s.lists);
     base_free(s.counts);
     base_free(s.subtrees.items);
