@@ -24,17 +24,6 @@ typedef struct kernel_tets {
     int32_t plain[4][SIMD_WIDTH]; /* the vertices of a plain mesh, instead */
 } kernel_tets;
 
-/* A mesh of tets alone whose indices are int32 one after the other, and whose coordinates and values float32, within
- * reach of a gather: strides in elements. */
-typedef struct kernel_plain {
-    bool is_so;
-    bool is_interleaved; /* a vertex's coordinates are side by side */
-    const int32_t *connectivity;
-    const float *coordinates[3], *values;
-    int32_t stride, value_stride;
-    float eye[3][2], scale; /* in two parts: the nearest float, and what is left */
-} kernel_plain;
-
 /* One subtree's search. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
@@ -64,39 +53,6 @@ SIMD_INLINE float kernel_not_below(double x)
     bits += f > 0 ? 1 : -1;
     memcpy(&f, &bits, sizeof f);
     return f;
-}
-
-/* A stride in elements of float32; 0: elements are others, or some of so many out of a gather's reach. */
-static inline int32_t kernel_plain_stride(const grid_array *a, int64_t count)
-{
-    const int64_t stride = a->stride / (int64_t)sizeof(float);
-    const bool is_plain = !a->is_wide && !a->is_integer && a->stride % (int64_t)sizeof(float) == 0;
-    return is_plain && stride > 0 && stride < INT32_MAX && count <= INT32_MAX / stride ? (int32_t)stride : 0;
-}
-
-/* Numbers are of sizes at which float32 differences keep their precision. */
-static inline void kernel_plain_begin(kernel_plain *p, const kernel_frame *f, const grid *g, const grid_field *field)
-{
-    const grid_array *c = g->coordinates;
-    memset(p, 0, sizeof *p);
-    if (g->offsets.data || g->cell_types || g->cell_type != GRID_TET || g->connectivity.is_wide ||
-        g->connectivity.stride != sizeof(int32_t) || field->is_cell_centred || field->component < 0)
-        return;
-    p->connectivity = (const int32_t *)(const void *)g->connectivity.data;
-    p->stride = kernel_plain_stride(&c[0], g->vertex_count);
-    p->value_stride = kernel_plain_stride(&field->values, g->vertex_count);
-    p->values = (const float *)(const void *)(field->values.data + field->component * field->component_stride);
-    p->scale = (float)f->job->space.scale;
-    p->is_so = p->stride && p->value_stride && p->scale > 1e-25f && p->scale < 1e25f;
-    p->is_interleaved = true;
-    for (int a = 0; a < 3; a++) {
-        const double eye = f->job->camera.eye[a];
-        p->coordinates[a] = (const float *)(const void *)c[a].data;
-        p->eye[a][0] = (float)eye;
-        p->eye[a][1] = (float)(eye - (double)p->eye[a][0]);
-        p->is_so = p->is_so && kernel_plain_stride(&c[a], g->vertex_count) == p->stride && fabs(eye) < 1e15;
-        p->is_interleaved = p->is_interleaved && c[a].data == c[0].data + a * (int64_t)sizeof(float);
-    }
 }
 
 static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, const kernel_subtree *subtree)
@@ -621,12 +577,13 @@ static inline int kernel_next_by_depth(kernel_by_depth *q, const kernel_tile_sho
 /* The farthest that a block knows of. */
 SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
 {
-    float far = -INFINITY;
-    for (unsigned left = t->wanted; left; left &= left - 1) {
-        const int block = __builtin_ctz(left);
-        far = fmaxf(far, t->far[block / SIMD_WIDTH][block % SIMD_WIDTH]);
+    const unsigned lanes = (1u << SIMD_WIDTH) - 1;
+    vf far = vf_set(-INFINITY);
+    for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) {
+        const vm wanted = vm_from_bits(t->wanted >> v * SIMD_WIDTH & lanes);
+        far = vf_max(far, vf_select(wanted, t->far[v], vf_set(-INFINITY)));
     }
-    return far;
+    return vf_reduce_max(far);
 }
 
 static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_shown *shown, int part, int value, unsigned blocks)
@@ -634,12 +591,21 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_shown *show
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = &t->cell;
-    kernel_cell_fetch(c, g, &layer->field.fields[part], shown->cell);
-    if (c->type == GRID_POLYHEDRON) {
-        kernel_blocks_meet(t, blocks, part, shown->cell, NULL, 0);
-        return;
+    if (t->plain_layer != t->layer || t->plain_part != part) {
+        t->plain_layer = t->layer;
+        t->plain_part = part;
+        kernel_plain_begin(&t->plain, t->frame, g, &layer->field.fields[part]);
     }
-    kernel_cell_move(c, t->frame, &t->tile, g);
+    if (t->plain.is_so) {
+        kernel_plain_cell(c, &t->plain, t->frame, &t->tile, shown->cell);
+    } else {
+        kernel_cell_fetch(c, g, &layer->field.fields[part], shown->cell);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_blocks_meet(t, blocks, part, shown->cell, NULL, 0);
+            return;
+        }
+        kernel_cell_move(c, t->frame, &t->tile, g);
+    }
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
     t->poly.is_set_up = false;

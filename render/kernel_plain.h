@@ -1,0 +1,70 @@
+/* Meshes that most simulations of tets have, whose arrays are read without asking each element for its type. */
+#ifndef RENDER_KERNEL_PLAIN_H
+#define RENDER_KERNEL_PLAIN_H
+
+#include "kernel_cell.h"
+
+/* A mesh of tets alone whose indices are int32 one after the other, and whose coordinates and values float32, within
+ * reach of a gather: strides in elements. */
+typedef struct kernel_plain {
+    bool is_so;
+    bool is_interleaved; /* a vertex's coordinates are side by side */
+    const int32_t *connectivity;
+    const float *coordinates[3], *values;
+    int32_t stride, value_stride;
+    float eye[3][2], scale; /* in two parts: the nearest float, and what is left */
+} kernel_plain;
+
+/* A stride in elements of float32; 0: elements are others, or some of so many out of a gather's reach. */
+static inline int32_t kernel_plain_stride(const grid_array *a, int64_t count)
+{
+    const int64_t stride = a->stride / (int64_t)sizeof(float);
+    const bool is_plain = !a->is_wide && !a->is_integer && a->stride % (int64_t)sizeof(float) == 0;
+    return is_plain && stride > 0 && stride < INT32_MAX && count <= INT32_MAX / stride ? (int32_t)stride : 0;
+}
+
+/* Numbers are of sizes at which float32 differences keep their precision. */
+static inline void kernel_plain_begin(kernel_plain *p, const kernel_frame *f, const grid *g, const grid_field *field)
+{
+    const grid_array *c = g->coordinates;
+    memset(p, 0, sizeof *p);
+    if (g->offsets.data || g->cell_types || g->cell_type != GRID_TET || g->connectivity.is_wide ||
+        g->connectivity.stride != sizeof(int32_t) || field->is_cell_centred || field->component < 0)
+        return;
+    p->connectivity = (const int32_t *)(const void *)g->connectivity.data;
+    p->stride = kernel_plain_stride(&c[0], g->vertex_count);
+    p->value_stride = kernel_plain_stride(&field->values, g->vertex_count);
+    p->values = (const float *)(const void *)(field->values.data + field->component * field->component_stride);
+    p->scale = (float)f->job->space.scale;
+    p->is_so = p->stride && p->value_stride && p->scale > 1e-25f && p->scale < 1e25f;
+    p->is_interleaved = true;
+    for (int a = 0; a < 3; a++) {
+        const double eye = f->job->camera.eye[a];
+        p->coordinates[a] = (const float *)(const void *)c[a].data;
+        p->eye[a][0] = (float)eye;
+        p->eye[a][1] = (float)(eye - (double)p->eye[a][0]);
+        p->is_so = p->is_so && kernel_plain_stride(&c[a], g->vertex_count) == p->stride && fabs(eye) < 1e15;
+        p->is_interleaved = p->is_interleaved && c[a].data == c[0].data + a * (int64_t)sizeof(float);
+    }
+}
+
+/* A tet with finite values, as kernel_cell_fetch() and kernel_cell_move() make it. */
+SIMD_INLINE void kernel_plain_cell(kernel_cell *c, const kernel_plain *p, const kernel_frame *f,
+                                   const kernel_tile *tile, uint32_t index)
+{
+    const int32_t *vertices = p->connectivity + 4 * (int64_t)index;
+    c->index = index;
+    c->type = GRID_TET;
+    c->count = 4;
+    c->is_finite = c->is_placed = true;
+    c->has_lines = false;
+    for (int i = 0; i < 4; i++) {
+        const int64_t vertex = vertices[i];
+        c->vertices[i] = vertex;
+        c->values[i] = (double)p->values[vertex * p->value_stride];
+        for (int a = 0; a < 3; a++) c->world[i][a] = (double)p->coordinates[a][vertex * p->stride];
+    }
+    kernel_tet_place(c, f, tile);
+}
+
+#endif
