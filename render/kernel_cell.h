@@ -33,6 +33,7 @@ typedef struct kernel_cell {
     int rank[GRID_MAX_CELL_VERTICES];    /* place in the order of coordinates */
     kernel_line lines[KERNEL_MAX_LINES]; /* of the edges, then of the quads' diagonals */
     float doubt;                         /* of a tet: the largest of its lines' bounds */
+    float least[4];                      /* kernel_least_weight() of a tet's faces; [0]: no less than of any triangle */
 } kernel_cell;
 
 /* Where rays go through a face: v of f, w of g, at the cell's own coordinates r (for tets not set). */
@@ -284,9 +285,16 @@ SIMD_INLINE kernel_spot kernel_cell_spot(const kernel_cell *c, int i)
 enum { KERNEL_TET_EDGES = 6 };
 static const signed char kernel_tet_edge[KERNEL_TET_EDGES][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
+/* Over the edges of each face, in kernel_triangle_least()'s order. */
+SIMD_INLINE kernel_four kernel_tet_face_sums(const kernel_four e[2])
+{
+    return (__builtin_shufflevector(e[0], e[1], 0, 0, 1, 3) + __builtin_shufflevector(e[0], e[1], 3, 4, 5, 5)) +
+           __builtin_shufflevector(e[0], e[1], 1, 2, 2, 4);
+}
+
 SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    kernel_four at[3], size;
+    kernel_four at[3], size, errors[2], extents[2];
     kernel_line lines[8];
     float doubt = 0;
     for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
@@ -294,15 +302,19 @@ SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const k
     at[1] = kernel_four_load(c->y);
     at[2] = kernel_four_load(c->z);
     /* Edges 0 to 3, 4 and 5. */
-    kernel_four_lines(f, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2), KERNEL_PICKED(size, 0, 0, 0, 1),
-                      KERNEL_PICKED(size, 1, 2, 3, 2), lines);
-    kernel_four_lines(f, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3), KERNEL_PICKED(size, 1, 2, 2, 2),
-                      KERNEL_PICKED(size, 3, 3, 3, 3), lines + 4);
+    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2),
+                      KERNEL_PICKED(size, 0, 0, 0, 1), KERNEL_PICKED(size, 1, 2, 3, 2), lines, &errors[0], &extents[0]);
+    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3),
+                      KERNEL_PICKED(size, 1, 2, 2, 2), KERNEL_PICKED(size, 3, 3, 3, 3), lines + 4, &errors[1],
+                      &extents[1]);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         c->lines[n] = lines[n];
         doubt = doubt < lines[n].bound ? lines[n].bound : doubt;
     }
     c->doubt = doubt;
+    const kernel_four error = kernel_tet_face_sums(errors), extent = kernel_tet_face_sums(extents);
+    const kernel_four least = error * extent * (0.5f / KERNEL_WEIGHT_ERROR);
+    memcpy(c->least, &least, sizeof least);
 }
 
 SIMD_INLINE void kernel_tet_project(const kernel_packet *p, const kernel_cell *c, vf x[4], vf y[4])
@@ -344,10 +356,6 @@ SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, 
         kernel_tet_edges_projected(p, c, e);
         return;
     }
-    if (c->doubt == INFINITY) { /* an edge is short */
-        kernel_tet_edges_exactly(p, c, e);
-        return;
-    }
     for (int n = 0; n < KERNEL_TET_EDGES; n++) e[n] = kernel_line_at(p, &c->lines[n]);
     const vf low = vf_min(vf_min(vf_abs(e[0]), vf_abs(e[1])), vf_abs(e[2]));
     const vf least = vf_min(vf_min(low, vf_min(vf_abs(e[3]), vf_abs(e[4]))), vf_abs(e[5]));
@@ -373,6 +381,42 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
+/* The faces' vertices and edges. */
+static const signed char kernel_tet_face[4][6] = {
+    {0, 1, 2, 0, 3, 1}, {0, 1, 3, 0, 4, 2}, {0, 2, 3, 1, 5, 2}, {1, 2, 3, 3, 5, 4}};
+
+/* Where a ray goes in and out, in whichever order. */
+typedef struct kernel_ends {
+    kernel_sums a, b;
+} kernel_ends;
+
+/* Of the faces that each ray crosses (which of them, but the last), the first and the last. */
+SIMD_INLINE kernel_ends kernel_tet_choose(vm m012, vm m013, vm m023, vm m123, const kernel_sums *s012,
+                                          const kernel_sums *s013, const kernel_sums *s023, const kernel_sums *s123)
+{
+    const kernel_sums a = kernel_sums_select(m013, s013, s023), b = kernel_sums_select(m023, s023, s013);
+    return (kernel_ends){kernel_sums_select(m012, s012, &a), kernel_sums_select(m123, s123, &b)};
+}
+
+/* With the edges of faces projected on rays where their weights are not good enough. */
+static __attribute__((noinline, cold)) kernel_ends
+kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour)
+{
+    kernel_sums sums[4];
+    vm hit[4];
+    for (int n = 0; n < 4; n++) {
+        const signed char *f = kernel_tet_face[n];
+        vf ij = e[f[3]], jk = e[f[4]], ik = e[f[5]];
+        hit[n] = kernel_inside(rays, ij, jk, ik);
+        const vm weak = kernel_weak(hit[n], kernel_weight(ij, jk, ik), c->least[n]);
+        if (vm_any(weak))
+            kernel_triangle_mend(p, kernel_cell_spot(c, f[0]), kernel_cell_spot(c, f[1]), kernel_cell_spot(c, f[2]),
+                                 weak, &ij, &jk, &ik);
+        sums[n] = kernel_tet_sums(c, f[0], f[1], f[2], ij, jk, ik, has_colour);
+    }
+    return kernel_tet_choose(hit[0], hit[1], hit[2], hit[3], &sums[0], &sums[1], &sums[2], &sums[3]);
+}
+
 /* Without branches: all four faces' sums, of which each ray takes its first and its last crossed face's. */
 SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
                                      kernel_interval *out)
@@ -388,19 +432,23 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
     const kernel_sums s013 = kernel_tet_sums(c, 0, 1, 3, e[0], e[4], e[2], has_colour);
     const kernel_sums s023 = kernel_tet_sums(c, 0, 2, 3, e[1], e[5], e[2], has_colour);
     const kernel_sums s123 = kernel_tet_sums(c, 1, 2, 3, e[3], e[5], e[4], has_colour);
-    kernel_sums a = kernel_sums_select(m013, &s013, &s023), b = kernel_sums_select(m023, &s023, &s013);
-    a = kernel_sums_select(m012, &s012, &a);
-    b = kernel_sums_select(m123, &s123, &b);
-    const vf scale_a = 1.0f / a.weight, scale_b = 1.0f / b.weight;
-    const vf t_a = a.depth * scale_a, t_b = b.depth * scale_b;
-    const vf v_a = a.value * scale_a, v_b = b.value * scale_b;
+    kernel_ends ends = kernel_tet_choose(m012, m013, m023, m123, &s012, &s013, &s023, &s123);
+    if (p->is_pencil) {
+        const vm weak =
+            vm_or(vm_or(kernel_weak(m012, s012.weight, c->least[0]), kernel_weak(m013, s013.weight, c->least[1])),
+                  vm_or(kernel_weak(m023, s023.weight, c->least[2]), kernel_weak(m123, s123.weight, c->least[3])));
+        if (__builtin_expect(vm_any(weak), 0)) ends = kernel_tet_mend(p, c, rays, e, has_colour);
+    }
+    const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
+    const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
+    const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
     const vm swap = vf_lt(t_b, t_a);
     out->t_in = vf_select(swap, t_b, t_a);
     out->t_out = vf_select(swap, t_a, t_b);
     out->v_in = vf_select(swap, v_b, v_a);
     out->v_out = vf_select(swap, v_a, v_b);
     if (!has_colour) return;
-    const vf w_a = a.colour * scale_a, w_b = b.colour * scale_b;
+    const vf w_a = ends.a.colour * scale_a, w_b = ends.b.colour * scale_b;
     out->w_in = vf_select(swap, w_b, w_a);
     out->w_out = vf_select(swap, w_a, w_b);
 }
@@ -484,10 +532,14 @@ SIMD_INLINE void kernel_poly_lines(kernel_cell *c, const kernel_frame *f, const 
         ends[shape->edge_count + face][1] = (signed char)corner[2];
     }
     for (int i = 0; i < c->count; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    kernel_blur most = {0, 0};
     for (int n = 0; n < count; n++) {
         const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
-        c->lines[n] = kernel_line_between(f, kernel_cell_spot(c, a), kernel_cell_spot(c, b), size[a], size[b]);
+        const kernel_spot from = kernel_cell_spot(c, a), to = kernel_cell_spot(c, b);
+        c->lines[n] = kernel_line_between(f, from, to, size[a], size[b]);
+        if (c->type != GRID_HEX) most = kernel_blur_more(most, kernel_line_blur(&c->lines[n], tile->radius, from, to));
     }
+    c->least[0] = c->type == GRID_HEX ? (float)INFINITY : kernel_blur_least(most); /* hexes hardly have triangles */
 }
 
 static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
@@ -517,6 +569,20 @@ typedef struct kernel_weights {
 SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, vf ik)
 {
     return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
+}
+
+/* Those of a triangle of these spots, made good enough on rays that cross it; least is no less than its own. */
+SIMD_INLINE void kernel_weights_mend(const kernel_packet *p, float least, vm hit, kernel_spot i, kernel_spot j,
+                                     kernel_spot k, kernel_weights *w)
+{
+    if (!p->is_pencil) return;
+    const vf weight = kernel_weight(w->ij, w->jk, w->ik);
+    if (__builtin_expect(!vm_any(kernel_weak(hit, weight, least)), 1)) return;
+    const vm weak = kernel_weak(hit, weight, kernel_triangle_least(p, i, j, k));
+    vf ij = w->ij, jk = w->jk, ik = w->ik;
+    if (!vm_any(weak)) return;
+    kernel_triangle_mend(p, i, j, k, weak, &ij, &jk, &ik);
+    *w = kernel_weights_of(w->i, w->j, w->k, ij, jk, ik);
 }
 
 SIMD_INLINE vf kernel_weigh(const kernel_weights *w, float fi, float fj, float fk)
@@ -587,9 +653,9 @@ SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *sh
     }
 }
 
-/* Weights of triangle a, b, c of the cell, depth, and who crosses it. */
+/* Weights of triangle a, b, c of the cell, and who crosses it. */
 SIMD_INLINE vm kernel_triangle(const kernel_cell *c, const kernel_edges *edges, vm rays, int i, int j, int k,
-                               kernel_weights *w, vf *t)
+                               kernel_weights *w)
 {
     int swap;
     if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
@@ -598,37 +664,52 @@ SIMD_INLINE vm kernel_triangle(const kernel_cell *c, const kernel_edges *edges, 
     const vm hit = kernel_inside(rays, edges->e[i][j], edges->e[j][k], edges->e[i][k]);
     if (!vm_any(hit)) return hit;
     *w = kernel_weights_of(i, j, k, edges->e[i][j], edges->e[j][k], edges->e[i][k]);
-    *t = kernel_weigh_depth(w, c->z);
     return hit;
 }
 
+/* The crossing of such a triangle; false where no ray has any. */
+SIMD_INLINE bool kernel_triangle_crossing(const kernel_packet *p, const kernel_cell *c, const kernel_shape *shape,
+                                          const kernel_edges *edges, vm rays, const int corners[3], bool has_colour,
+                                          kernel_crossing *out)
+{
+    kernel_weights w;
+    const vm hit = kernel_triangle(c, edges, rays, corners[0], corners[1], corners[2], &w);
+    if (!vm_any(hit)) return false;
+    kernel_weights_mend(p, c->least[0], hit, kernel_cell_spot(c, w.i), kernel_cell_spot(c, w.j),
+                        kernel_cell_spot(c, w.k), &w);
+    out->mask = hit;
+    out->t = kernel_weigh_depth(&w, c->z);
+    kernel_triangle_values(c, shape, &w, has_colour, out);
+    return true;
+}
+
 /* Of a quad that is a triangle. */
-static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_cell *c, const kernel_shape *shape,
+static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_packet *p, const kernel_cell *c,
+                                                                      const kernel_shape *shape,
                                                                       const kernel_edges *edges, vm rays,
                                                                       const int corner[4], bool has_colour,
                                                                       kernel_crossing *out)
 {
     int n = 0;
     for (int half = 0; half < 2; half++) {
-        kernel_weights w;
-        out[n].mask = kernel_triangle(c, edges, rays, corner[0], corner[half + 1], corner[half + 2], &w, &out[n].t);
-        if (vm_any(out[n].mask)) kernel_triangle_values(c, shape, &w, has_colour, &out[n++]);
+        const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
+        n += kernel_triangle_crossing(p, c, shape, edges, rays, corners, has_colour, &out[n]);
     }
     return n;
 }
 
 /* How many crossings there are, 0 to 2; each ray's are in one of them or in both. */
-SIMD_INLINE int kernel_quad_crossings(const kernel_cell *c, const kernel_shape *shape, const kernel_projected *q,
-                                      const kernel_edges *edges, vm rays, const int corner[4], bool has_colour,
-                                      kernel_crossing *out)
+SIMD_INLINE int kernel_quad_crossings(const kernel_packet *p, const kernel_cell *c, const kernel_shape *shape,
+                                      const kernel_projected *q, const kernel_edges *edges, vm rays,
+                                      const int corner[4], bool has_colour, kernel_crossing *out)
 {
     kernel_quad quad;
     kernel_quad_place places[2];
-    vf s = vf_set(0), r = vf_set(0), t;
+    vf s = vf_set(0), r = vf_set(0);
     vm once = vm_none();
     for (int half = 0; half < 2; half++) {
         kernel_weights w;
-        const vm hit = kernel_triangle(c, edges, rays, corner[0], corner[half + 1], corner[half + 2], &w, &t);
+        const vm hit = kernel_triangle(c, edges, rays, corner[0], corner[half + 1], corner[half + 2], &w);
         if (!vm_any(hit)) continue;
         once = vm_xor(once, hit);
         kernel_quad_guess(corner, half, &w, hit, &s, &r);
@@ -640,7 +721,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_cell *c, const kernel_shape *
     const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
     if (!vm_any(vm_or(once, twice))) return 0;
     if (kernel_quad_collapses(c, corner))
-        return kernel_collapsed_crossings(c, shape, edges, rays, corner, has_colour, out);
+        return kernel_collapsed_crossings(p, c, shape, edges, rays, corner, has_colour, out);
     kernel_quad_take(q, c->z, corner, &quad);
     const int n = kernel_quad_places(&quad, once, twice, s, r, places);
     for (int i = 0; i < n; i++) kernel_quad_values(c, shape, corner, &places[i], has_colour, &out[i]);
@@ -663,16 +744,15 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
     int n = 0;
     for (int face = 0; face < shape->face_count; face++) {
         const signed char *loop = shape->faces[face].vertices;
-        kernel_weights w;
         if (shape->faces[face].count == 3) {
-            out[n].mask = kernel_triangle(c, &edges, rays, loop[0], loop[1], loop[2], &w, &out[n].t);
-            if (vm_any(out[n].mask)) kernel_triangle_values(c, shape, &w, has_colour, &out[n++]);
+            const int corners[3] = {loop[0], loop[1], loop[2]};
+            n += kernel_triangle_crossing(p, c, shape, &edges, rays, corners, has_colour, &out[n]);
             continue;
         }
         int corner[4];
         kernel_quad_corners(c, loop, corner);
         kernel_poly_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
-        n += kernel_quad_crossings(c, shape, &q, &edges, rays, corner, has_colour, &out[n]);
+        n += kernel_quad_crossings(p, c, shape, &q, &edges, rays, corner, has_colour, &out[n]);
     }
     return n;
 }

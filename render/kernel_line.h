@@ -21,10 +21,19 @@
  * edge function of vertices that are off by r N: by at most 4 r Na Nb / 2. The sum is 5.3 r Na Nb; 6 leaves room for
  * products of errors and for the bound's own roundings.
  *
- * Depths from these weights err as those from projected vertices do, by the roundings of X, Y and x, y, which are r of
- * the tile's size: an affine e is off by 3.3 r Na Nb at the very most, 1 r of that as a rule, so that a weight is off
- * by r times the square of the tile's size over the triangle's area: too much where cells are smaller than tiles, so
- * that short edges are always in doubt, and projected. */
+ * Weights. Signs are exact, sizes are not: where a triangle is crossed, its depth and value are means of its vertices'
+ * weighed by the opposite edges' functions, of sum A (twice the triangle's area as the ray sees it). An error d of one
+ * of these moves the depth t by d |z - t| / A, z being its vertex's, and so all three by no more than D S / A, where D
+ * is the sum of their d, and S the triangle's extent in depth; and the place across the ray by as much with the extent
+ * across. By the count above d is at most r (3 |c| + 4 |cu| W + 3 |cv| W): what rounds u and v moves the ray, for all
+ * triangles alike. So where A is at least D S / KERNEL_WEIGHT_ERROR, the weights' roundings move the crossing by no
+ * more than KERNEL_WEIGHT_ERROR along the ray: 4 r with all of them at their worst, where t itself is rounded by up to
+ * r / 2. The extents across count for a quarter: there a crossing may move by 4 times as much, as that changes the
+ * value alone. On rays where A is less (the triangle is seen edge on, or the tile is wide beside it) all three edges
+ * are projected: what errs then is where the vertices are, by r N as above, for all their triangles alike, and the
+ * weights are exact to some r of each. Which it is depends on the triangle and the ray alone. (An edge in doubt has
+ * been projected in any case: on a ray that crosses the triangle its e is off by no more than r N times the edges
+ * beside it, which is what moved vertices do.) */
 #ifndef RENDER_KERNEL_LINE_H
 #define RENDER_KERNEL_LINE_H
 
@@ -48,21 +57,52 @@ SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *til
     return 2 * (x > y ? x : y) + 5 * tile->radius * depth;
 }
 
-/* The most that Na Nb may be in squares of the edge's length: a weight is then off by 1 r of that as a rule, 2e-6. */
-#define KERNEL_SHORT_EDGE 32
-
-/* Of the edge from a to b, a before b in the order; sizes as above. An edge that is short beside the tile is in doubt
- * on every ray. */
+/* Of the edge from a to b, a before b in the order; sizes as above. */
 SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
                                             float size_b)
 {
     const bool flat = f->job->camera.is_orthographic;
     const double da = flat ? 1 : (double)a.z + f->depth_shift, db = flat ? 1 : (double)b.z + f->depth_shift;
     const double ax = (double)a.x, ay = (double)a.y, bx = (double)b.x, by = (double)b.y;
-    const float product = size_a * size_b, x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
-    const bool is_short = product > KERNEL_SHORT_EDGE * (x * x + y * y + z * z);
     return (kernel_line){(float)(ax * by - bx * ay), (float)(db * ay - da * by), (float)(da * bx - db * ax),
-                         is_short ? (float)INFINITY : 6 * 6e-8f * product};
+                         6 * 6e-8f * (size_a * size_b)};
+}
+
+/* ---- how good weights are ---- */
+
+/* Along the ray, in t: two of them in a ray's chord leave half of the 1e-6 that it may be off by (tests/test_chords.c).
+ */
+#define KERNEL_WEIGHT_ERROR 2.4e-7f
+
+/* Of an edge: by how much its function may err, d above, and its extent, those across for a quarter. */
+typedef struct kernel_blur {
+    float error, extent;
+} kernel_blur;
+
+SIMD_INLINE kernel_blur kernel_line_blur(const kernel_line *l, float radius, kernel_spot a, kernel_spot b)
+{
+    const float x = fabsf(a.x - b.x), y = fabsf(a.y - b.y), z = fabsf(a.z - b.z);
+    return (kernel_blur){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
+                         z + 0.25f * (x + y)};
+}
+
+/* The least A that is good enough, of a triangle whose edges' errors and extents have these sums: along an axis the
+ * edges are together twice as long as the triangle. */
+SIMD_INLINE float kernel_least_weight(float errors, float extents)
+{
+    return errors * extents * (0.5f / KERNEL_WEIGHT_ERROR);
+}
+
+/* The larger of both. */
+SIMD_INLINE kernel_blur kernel_blur_more(kernel_blur a, kernel_blur b)
+{
+    return (kernel_blur){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
+}
+
+/* No less than that of any triangle whose edges have no more than most each. */
+SIMD_INLINE float kernel_blur_least(kernel_blur most)
+{
+    return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
 }
 
 /* ---- four edges at once: the same operations, and so the same bits ---- */
@@ -90,9 +130,16 @@ typedef struct kernel_spots {
 
 typedef double kernel_doubles __attribute__((vector_size(32)));
 
-/* kernel_line_between() of edges from a to b. */
-SIMD_INLINE void kernel_four_lines(const kernel_frame *f, kernel_spots a, kernel_spots b, kernel_four size_a,
-                                   kernel_four size_b, kernel_line lines[4])
+SIMD_INLINE kernel_four kernel_four_abs(kernel_four v)
+{
+    typedef int32_t kernel_four_bits __attribute__((vector_size(16)));
+    return (kernel_four)((kernel_four_bits)v & 0x7fffffff);
+}
+
+/* kernel_line_between() of edges from a to b, and kernel_line_blur(). */
+SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_spots a, kernel_spots b,
+                                   kernel_four size_a, kernel_four size_b, kernel_line lines[4], kernel_four *errors,
+                                   kernel_four *extents)
 {
     const bool flat = f->job->camera.is_orthographic;
     const kernel_doubles ax = __builtin_convertvector(a.x, kernel_doubles),
@@ -105,12 +152,11 @@ SIMD_INLINE void kernel_four_lines(const kernel_frame *f, kernel_spots a, kernel
     const kernel_four c = __builtin_convertvector(ax * by - bx * ay, kernel_four);
     const kernel_four cu = __builtin_convertvector(db * ay - da * by, kernel_four);
     const kernel_four cv = __builtin_convertvector(da * bx - db * ax, kernel_four);
-    const kernel_four product = size_a * size_b, x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
-    const kernel_four square = x * x + y * y + z * z, bound = 6 * 6e-8f * product;
-    for (int n = 0; n < 4; n++) {
-        const bool is_short = product[n] > KERNEL_SHORT_EDGE * square[n];
-        lines[n] = (kernel_line){c[n], cu[n], cv[n], is_short ? (float)INFINITY : bound[n]};
-    }
+    const kernel_four bound = 6 * 6e-8f * (size_a * size_b);
+    for (int n = 0; n < 4; n++) lines[n] = (kernel_line){c[n], cu[n], cv[n], bound[n]};
+    const kernel_four x = kernel_four_abs(a.x - b.x), y = kernel_four_abs(a.y - b.y), z = kernel_four_abs(a.z - b.z);
+    *errors = 6e-8f * (3 * kernel_four_abs(c) + radius * (4 * kernel_four_abs(cu) + 3 * kernel_four_abs(cv)));
+    *extents = z + 0.25f * (x + y);
 }
 
 SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_spot a, kernel_spot b)
@@ -201,6 +247,38 @@ SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k
 SIMD_INLINE vf kernel_weight(vf ij, vf jk, vf ik)
 {
     return (jk - ik) + ij;
+}
+
+SIMD_INLINE kernel_blur kernel_edge_blur(const kernel_packet *p, kernel_spot a, kernel_spot b)
+{
+    const kernel_line l = kernel_line_of(p, a, b);
+    return kernel_line_blur(&l, p->tile->radius, a, b);
+}
+
+/* kernel_least_weight() of the triangle i, j, k in the order. */
+static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_spot i, kernel_spot j,
+                                                                   kernel_spot k)
+{
+    const kernel_blur ij = kernel_edge_blur(p, i, j), jk = kernel_edge_blur(p, j, k), ik = kernel_edge_blur(p, i, k);
+    return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
+}
+
+/* Whose weights of a triangle that they cross are not good enough? */
+SIMD_INLINE vm kernel_weak(vm hit, vf weight, float least)
+{
+    return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
+}
+
+/* The triangle's edge functions, projected on these rays. */
+static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_packet *p, kernel_spot i, kernel_spot j,
+                                                                 kernel_spot k, vm weak, vf *ij, vf *jk, vf *ik)
+{
+    const vf ax = kernel_project_x(p, i), ay = kernel_project_y(p, i);
+    const vf bx = kernel_project_x(p, j), by = kernel_project_y(p, j);
+    const vf cx = kernel_project_x(p, k), cy = kernel_project_y(p, k);
+    *ij = vf_select(weak, kernel_edge_between(ax, ay, bx, by), *ij);
+    *jk = vf_select(weak, kernel_edge_between(bx, by, cx, cy), *jk);
+    *ik = vf_select(weak, kernel_edge_between(ax, ay, cx, cy), *ik);
 }
 
 #endif

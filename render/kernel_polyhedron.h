@@ -112,10 +112,11 @@ SIMD_INLINE kernel_spot kernel_polyhedron_spot(const polyhedron *c, int i)
     return (kernel_spot){c->x[i], c->y[i], c->z[i]};
 }
 
-SIMD_INLINE void kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
+SIMD_INLINE kernel_blur kernel_polyhedron_line(polyhedron *c, const kernel_packet *p, int n, int a, int b)
 {
     const kernel_line line = kernel_line_of(p, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
     memcpy(c->lines[n], &line, sizeof line);
+    return kernel_line_blur(&line, p->tile->radius, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
 }
 
 SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
@@ -123,8 +124,12 @@ SIMD_INLINE void kernel_polyhedron_place(polyhedron *c, const kernel_packet *p)
     for (int i = 0; i <= c->vertex_count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_placed = true;
     if (!p->is_pencil) return;
-    for (int i = 0; i < c->edge_count; i++) kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]);
-    for (int i = 0; i < c->vertex_count; i++) kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count);
+    kernel_blur most = {0, 0};
+    for (int i = 0; i < c->edge_count; i++)
+        most = kernel_blur_more(most, kernel_polyhedron_line(c, p, i, c->edges[i][0], c->edges[i][1]));
+    for (int i = 0; i < c->vertex_count; i++)
+        most = kernel_blur_more(most, kernel_polyhedron_line(c, p, c->edge_count + i, i, c->vertex_count));
+    c->least = kernel_blur_least(most);
 }
 
 /* ---- the surface ---- */
@@ -147,15 +152,24 @@ SIMD_INLINE void kernel_passage_edge(const kernel_packet *p, const polyhedron *c
     r->edge[number] = kernel_edge(p, &line, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
 }
 
-/* Who crosses the triangle, and its place. */
-static vm kernel_passage_facet(const polyhedron *c, const polyhedron_facet *t, vm rays, bool has_colour,
-                               kernel_passage *r, kernel_weights *w, kernel_meeting *out)
+SIMD_INLINE void kernel_polyhedron_mend(const kernel_packet *p, const polyhedron *c, vm hit, kernel_weights *w)
+{
+    kernel_weights_mend(p, c->least, hit, kernel_polyhedron_spot(c, w->i), kernel_polyhedron_spot(c, w->j),
+                        kernel_polyhedron_spot(c, w->k), w);
+}
+
+/* Who crosses the triangle, and its place. The weights are for guesses at its quad's patch, as a hex beside it has
+ * them. */
+static vm kernel_passage_facet(const kernel_packet *p, const polyhedron *c, const polyhedron_facet *t, vm rays,
+                               bool has_colour, kernel_passage *r, kernel_weights *w, kernel_meeting *out)
 {
     const vf ij = r->edge[t->edge[0]], jk = r->edge[t->edge[1]], ik = r->edge[t->edge[2]];
     out->mask = kernel_inside(rays, ij, jk, ik);
     if (!vm_any(out->mask)) return out->mask;
     *w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], ij, jk, ik);
-    kernel_meet(c, w, has_colour, out);
+    kernel_weights mended = *w;
+    kernel_polyhedron_mend(p, c, out->mask, &mended);
+    kernel_meet(c, &mended, has_colour, out);
     return out->mask;
 }
 
@@ -217,7 +231,8 @@ static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *c
 }
 
 /* A quad, by the first of its two triangles: where its patch is met, as a hex beside it has it. */
-static void kernel_passage_quad(const polyhedron *c, int first, vm rays, bool has_colour, kernel_passage *r)
+static void kernel_passage_quad(const kernel_packet *p, const polyhedron *c, int first, vm rays, bool has_colour,
+                                kernel_passage *r)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
     const int *around = c->quads[c->facets[first].quad];
@@ -235,7 +250,7 @@ static void kernel_passage_quad(const polyhedron *c, int first, vm rays, bool ha
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
     kernel_meeting *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
     for (int half = 0; half < 2; half++) {
-        const vm hit = kernel_passage_facet(c, t[half], rays, has_colour, r, &w, m[half]);
+        const vm hit = kernel_passage_facet(p, c, t[half], rays, has_colour, r, &w, m[half]);
         if (vm_any(hit)) kernel_quad_guess(corner, half, &w, hit, &s, &q);
     }
     kernel_quad_of_facets(c, r, t, corner, &quad);
@@ -267,10 +282,10 @@ static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm
     for (int i = 0; i < c->facet_count; i++) {
         kernel_weights w;
         if (c->facets[i].quad >= 0) {
-            if (i < c->facets[i].twin) kernel_passage_quad(c, i, rays, has_colour, r);
+            if (i < c->facets[i].twin) kernel_passage_quad(p, c, i, rays, has_colour, r);
             continue;
         }
-        r->left[i] = kernel_passage_facet(c, &c->facets[i], rays, has_colour, r, &w, &r->facets[i]);
+        r->left[i] = kernel_passage_facet(p, c, &c->facets[i], rays, has_colour, r, &w, &r->facets[i]);
         if (vm_any(r->left[i])) r->met[r->met_count++] = i;
     }
     return r->met_count > 0;
@@ -328,7 +343,8 @@ static void kernel_passage_sheets(const kernel_packet *p, const polyhedron *c, v
         kernel_meeting *m = &r->sheets[i];
         m->mask = kernel_inside(rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         if (!vm_any(m->mask)) continue;
-        const kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
+        kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
+        kernel_polyhedron_mend(p, c, m->mask, &w);
         kernel_meet(c, &w, has_colour, m);
         r->met_sheets[r->sheet_count++] = i;
     }

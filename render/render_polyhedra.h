@@ -30,6 +30,7 @@ typedef struct polyhedron {
     float *x, *y, *z;  /* tile space */
     float *f, *g;      /* values as the kernels want them; of the colour field */
     float (*lines)[4]; /* kernel_line.h: of the edges, then from each vertex to the centre */
+    float least;       /* of all its triangles: kernel_blur_least() */
     int64_t *vertices; /* vertex_count */
     int (*edges)[2];
     polyhedron_facet *facets;

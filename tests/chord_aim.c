@@ -242,7 +242,6 @@ void chord_aim_rays(const test_mesh *mesh, int n, chord_aim aim, uint64_t *count
     const int64_t cell = whole(counter, mesh->cell_count);
     double eye[3], focal[3];
     rays->count = 0;
-    rays->is_pencil = false;
     switch (aim) {
     case CHORD_AXIS_ALIGNED: aim_by_lattice(n, counter, camera, rays); break;
     case CHORD_ALONG_EDGES:

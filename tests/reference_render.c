@@ -338,7 +338,11 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     normalize(e->hit.normal);
     const double along = reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
-    e->hit.conditioning = 1 / fabs(along);
+    /* A polyhedron that is entered and left through one quad's patch, beside its triangles, is passed outside of its
+     * tets: the field there goes from patch to patch along the ray, and across it there is none. */
+    const bool has_gradient = along != 0;
+    if (!has_gradient) t->out->ambiguous = true;
+    e->hit.conditioning = has_gradient ? 1 / fabs(along) : 1;
     e->blur = c->size * e->hit.conditioning;
     surface_colour(t, c, layer, value_index, depth, colour);
     shade(t, &layer->material, colour, e->hit.normal, e->hit.colour);

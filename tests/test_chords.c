@@ -1,7 +1,9 @@
 /* A ray's intervals in the cells of a mesh add up to its chord of the mesh's hull, and every end within the hull is the
  * end of exactly two intervals, to the bit: no gap, no double. On exact and on jittered lattices of every cell type,
  * the hull of all of them being the cube [-1, 1]^3, for rays at random, to and along vertices, edges and faces, and
- * along the lattice.
+ * along the lattice. Every ray is traced twice: set up alone, its edge functions all projected (as differences for
+ * normals have it), and as one of a tile, its edge functions by lines where these are good enough (as frames have it).
+ * The tile is as wide as its rays are apart: a thousandth of a cell to several cells.
  *
  * Lengths are in sides of the hull, 1 in the kernels' scaled units, and may be off by 1e-6. A ray that grazes the hull
  * has no chord to that accuracy in float32:
@@ -225,7 +227,8 @@ static void trace(const render_job *job, kernel_thread *thread, chord_rays *rays
     render_unprepare(&frame);
 }
 
-static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally *t)
+/* The first tally is of rays that are set up alone, the second of the same rays as those of one tile. */
+static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t count, tally tallies[2])
 {
     static const double value[1] = {0};
     static chord_rays rays;
@@ -237,14 +240,17 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
     fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
                    (const double[]){0, 0, 0});
     fixture_add_surface(&f, value, 1, 1);
-    for (const int64_t end = t->rays + count; t->rays < end;) {
+    for (const int64_t end = tallies[0].rays + count; tallies[0].rays < end;) {
         render_camera *c = &f.job.camera;
         chord_aim_rays(&mesh, SIDE, aim, &counter, c, &rays);
         const double depth = -(c->forward[0] * c->eye[0] + c->forward[1] * c->eye[1] + c->forward[2] * c->eye[2]);
         f.job.space.depth_origin = fmax(depth, 0);
-        trace(&f.job, &thread, &rays);
-        for (int i = 0; i < rays.count; i++)
-            judge_ray(&f.job, rays.x[i], rays.y[i], rays.spans[i], rays.span_count[i], t);
+        for (int by_tile = 0; by_tile < 2; by_tile++) {
+            rays.is_pencil = by_tile;
+            trace(&f.job, &thread, &rays);
+            for (int i = 0; i < rays.count; i++)
+                judge_ray(&f.job, rays.x[i], rays.y[i], rays.spans[i], rays.span_count[i], &tallies[by_tile]);
+        }
     }
     fixture_free(&f);
     test_mesh_free(&mesh);
@@ -252,13 +258,14 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
     base_free(thread.cache);
 }
 
-static void tell(const char *what, const char *mesh, const tally *t)
+static void tell(const char *what, const char *mesh, int by_tile, const tally *t)
 {
-    printf(
-        "%s%s%s: %lld rays, %lld cells; off by %.2g of the side at most, %lld graze the hull; overlaps by rounding on "
-        "%lld, %.2g at most; %lld wrong lengths, %lld with ends alone\n",
-        what, *mesh ? ", " : "", mesh, (long long)t->rays, (long long)t->spans, t->worst_length, (long long)t->grazing,
-        (long long)t->doubled, t->worst_doubled, (long long)t->off, (long long)t->unpaired);
+    printf("%s%s%s, %s: %lld rays, %lld cells; off by %.2g of the side at most, %lld graze the hull; overlaps by "
+           "rounding on "
+           "%lld, %.2g at most; %lld wrong lengths, %lld with ends alone\n",
+           what, *mesh ? ", " : "", mesh, by_tile ? "by tile" : "alone", (long long)t->rays, (long long)t->spans,
+           t->worst_length, (long long)t->grazing, (long long)t->doubled, t->worst_doubled, (long long)t->off,
+           (long long)t->unpaired);
 }
 
 static void add_tally(tally *sum, const tally *t)
@@ -277,18 +284,23 @@ static void add_tally(tally *sum, const tally *t)
 static void judge(chord_aim aim, const char *what)
 {
     const int64_t share = rays_wanted / (CHORD_AIM_COUNT * MESH_COUNT * 2) + 1;
-    tally all = {.rays = 0};
+    tally all[2] = {{.rays = 0}};
     for (chord_mesh mesh = 0; mesh < MESH_COUNT; mesh++)
         for (int jittered = 0; jittered < 2; jittered++) {
-            tally t = {.rays = 0};
-            judge_mesh(mesh, jittered ? jitter_wanted : 0, aim, share, &t);
-            if (t.off || t.unpaired || getenv("INSITU_TEST_VERBOSE")) tell(what, mesh_name(mesh), &t);
-            assert_true(3 * t.met > t.rays);
-            add_tally(&all, &t);
+            tally t[2] = {{.rays = 0}};
+            judge_mesh(mesh, jittered ? jitter_wanted : 0, aim, share, t);
+            for (int by_tile = 0; by_tile < 2; by_tile++) {
+                if (t[by_tile].off || t[by_tile].unpaired || getenv("INSITU_TEST_VERBOSE"))
+                    tell(what, mesh_name(mesh), by_tile, &t[by_tile]);
+                assert_true(3 * t[by_tile].met > t[by_tile].rays);
+                add_tally(&all[by_tile], &t[by_tile]);
+            }
         }
-    tell(what, "", &all);
-    assert_int_equal(all.off, 0);
-    assert_int_equal(all.unpaired, 0);
+    for (int by_tile = 0; by_tile < 2; by_tile++) tell(what, "", by_tile, &all[by_tile]);
+    for (int by_tile = 0; by_tile < 2; by_tile++) {
+        assert_int_equal(all[by_tile].off, 0);
+        assert_int_equal(all[by_tile].unpaired, 0);
+    }
 }
 
 static void random_rays_add_up_to_their_chords(void **state)

@@ -332,11 +332,7 @@ static void compare_ray(comparison *c, const reference_scene *scene, int x, int 
     reference_trace(scene, x, y, fixture_background, &ray);
     c->outcome.rays++;
     if (is_excluded(&ray, c->bounds->margin)) {
-        /* Samples of two cells in one place: warped quads that stand through each other. */
-        if (ray.ambiguous)
-            c->outcome.ambiguous++;
-        else
-            c->outcome.excluded++;
+        c->outcome.excluded++;
         return;
     }
     const bool slow = is_slow(c, &ray);
