@@ -70,37 +70,101 @@ SIMD_INLINE void kernel_vertex_outline(const kernel_cell *c, kernel_outline *o)
  *
  * Let L be linear in the point, and E its largest difference from the field at a vertex. The field less L is the
  * vertices' differences weighed by the shape functions, which in the cell are not negative and sum to 1: so |F - L| <=
- * E in all of it, however distorted it is, and at most 3.4 E (1.5³) on the quarter around in which solutions of a
- * folded map count (kernel_map.h). A face's value is that of
- * its patch at the ray, within the corners'. A hit is a zero of F, or between two values of opposite signs, so L is no
- * larger there than these sums: the hit is in a slab of the cell's hull, thin where the field is smooth. */
+ * E in all of it, however distorted it is; faces' values, on their patches, are the field's. A hit is a zero of F, or
+ * between two values of opposite signs and in proportion to them, so that |L| <= E there too: it is in a slab of the
+ * cell's hull, thin where the field is smooth.
+ *
+ * That is so where the point has coordinates in the cell. Where its map is folded, solutions up to a quarter outside
+ * count (kernel_map.h), where the weights' sizes sum to at most 1.5³. Folded it is not if its Jacobian differs from
+ * that at the middle, J0, by so little that |J0^-1 J - 1| < 1 (in the Frobenius norm, at all corners, and so
+ * everywhere, J being linear in each coordinate): then no two coordinates have one place, and those between a ray's
+ * crossings of the faces are in the cell. */
 
-/* Sums over the edges along each of the cell's coordinates: a mean edge times their number. */
-static inline int kernel_cell_edges(int type, signed char edges[3][4][2], int count[3])
+/* A type's Jacobian: at the middle, columns as sums of the vertices' places with weights; at the corners, columns as
+ * vertex 1 - vertex 0, and + vertex 3 - vertex 2 where these are not the same. */
+typedef struct kernel_differential {
+    float middle[3][GRID_MAX_CELL_VERTICES];
+    int column_count, corner_count;
+    struct {
+        signed char along, vertex[4];
+    } columns[12];
+    signed char corners[8][3]; /* columns */
+} kernel_differential;
+
+static const kernel_differential kernel_differentials[3] = {
+    {{{-0.25f, 0.25f, 0.25f, -0.25f, -0.25f, 0.25f, 0.25f, -0.25f},
+      {-0.25f, -0.25f, 0.25f, 0.25f, -0.25f, -0.25f, 0.25f, 0.25f},
+      {-0.25f, -0.25f, -0.25f, -0.25f, 0.25f, 0.25f, 0.25f, 0.25f}},
+     12,
+     8,
+     {{0, {0, 1}},
+      {0, {3, 2}},
+      {0, {4, 5}},
+      {0, {7, 6}},
+      {1, {0, 3}},
+      {1, {1, 2}},
+      {1, {4, 7}},
+      {1, {5, 6}},
+      {2, {0, 4}},
+      {2, {1, 5}},
+      {2, {2, 6}},
+      {2, {3, 7}}},
+     {{0, 4, 8}, {0, 5, 9}, {1, 5, 10}, {1, 4, 11}, {2, 6, 8}, {2, 7, 9}, {3, 7, 10}, {3, 6, 11}}},
+    {{{-0.5f, 0.5f, 0, -0.5f, 0.5f, 0},
+      {-0.5f, 0, 0.5f, -0.5f, 0, 0.5f},
+      {-1.0f / 3, -1.0f / 3, -1.0f / 3, 1.0f / 3, 1.0f / 3, 1.0f / 3}},
+     7,
+     6,
+     {{0, {0, 1}}, {0, {3, 4}}, {1, {0, 2}}, {1, {3, 5}}, {2, {0, 3}}, {2, {1, 4}}, {2, {2, 5}}},
+     {{0, 2, 4}, {0, 2, 5}, {0, 2, 6}, {1, 3, 4}, {1, 3, 5}, {1, 3, 6}}},
+    /* In the pyramid's own coordinates (kernel_map.h), k from the apex. */
+    {{{-0.5f, 0.5f, 0.5f, -0.5f}, {-0.5f, -0.5f, 0.5f, 0.5f}, {0.75f, 0.25f, -0.25f, 0.25f, -1}},
+     6,
+     4,
+     {{0, {0, 1}}, {0, {3, 2}}, {1, {0, 3}}, {1, {1, 2}}, {2, {4, 0}}, {2, {4, 1, 2, 3}}},
+     {{0, 2, 4}, {0, 3, 4}, {1, 2, 4}, {1, 3, 5}}}};
+
+SIMD_INLINE const kernel_differential *kernel_cell_differential(int type)
 {
-    static const signed char hex[3][4][2] = {
-        {{0, 1}, {3, 2}, {4, 5}, {7, 6}}, {{0, 3}, {1, 2}, {4, 7}, {5, 6}}, {{0, 4}, {1, 5}, {2, 6}, {3, 7}}};
-    static const signed char wedge[3][4][2] = {{{0, 1}, {3, 4}}, {{0, 2}, {3, 5}}, {{0, 3}, {1, 4}, {2, 5}}};
-    static const signed char pyramid[3][4][2] = {{{0, 1}, {3, 2}}, {{0, 3}, {1, 2}}, {{0, 4}, {1, 4}, {2, 4}, {3, 4}}};
-    static const int counts[3][3] = {{4, 4, 4}, {2, 2, 3}, {2, 2, 4}};
-    const int which = type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : 2;
-    memcpy(edges, which == 0 ? hex : which == 1 ? wedge : pyramid, sizeof hex);
-    memcpy(count, counts[which], sizeof counts[which]);
-    return which;
+    return &kernel_differentials[type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : 2];
+}
+
+/* inverse: that of the Jacobian at the middle, times volume. What is left to 1 is far more than all rounding. */
+static inline bool kernel_is_unfolded(const kernel_cell *c, const kernel_differential *d, const float inverse[3][3],
+                                      float volume)
+{
+    const float scale = 1 / volume;
+    float y[GRID_MAX_CELL_VERTICES][3], off[12];
+    for (int i = 0; i < c->count; i++)
+        for (int a = 0; a < 3; a++)
+            y[i][a] = scale * (inverse[a][0] * (c->x[i] - c->x[0]) + inverse[a][1] * (c->y[i] - c->y[0]) +
+                               inverse[a][2] * (c->z[i] - c->z[0]));
+    for (int n = 0; n < d->column_count; n++) {
+        const signed char *v = d->columns[n].vertex;
+        off[n] = 0;
+        for (int a = 0; a < 3; a++) {
+            const float more = v[2] != v[3] ? y[v[3]][a] - y[v[2]][a] : 0;
+            const float part = (y[v[1]][a] - y[v[0]][a]) + more - (a == d->columns[n].along ? 1.0f : 0);
+            off[n] += part * part;
+        }
+    }
+    for (int n = 0; n < d->corner_count; n++) {
+        const signed char *columns = d->corners[n];
+        if (!(off[columns[0]] + off[columns[1]] + off[columns[2]] < 0.9f)) return false;
+    }
+    return true;
 }
 
 /* L at the vertices, and how thick the slab is: |L| <= *thickness. False where no L is of use. */
 static inline bool kernel_linear_part(const kernel_cell *c, float at[GRID_MAX_CELL_VERTICES], float *thickness)
 {
     const float *places[4] = {c->x, c->y, c->z, c->f};
-    signed char edges[3][4][2];
-    int count[3];
-    float d[3][4], n[3][3], middle[4], g[3], size = 0, error = 0, bend = 0;
-    kernel_cell_edges(c->type, edges, count);
+    const kernel_differential *differential = kernel_cell_differential(c->type);
+    float d[3][4], n[3][3], middle[4], g[3], size = 0, error = 0, blur = 0;
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 4; a++) {
             d[i][a] = 0;
-            for (int e = 0; e < count[i]; e++) d[i][a] += places[a][edges[i][e][1]] - places[a][edges[i][e][0]];
+            for (int v = 0; v < c->count; v++) d[i][a] += differential->middle[i][v] * places[a][v];
         }
     for (int i = 0; i < 3; i++) {
         const float *u = d[(i + 1) % 3], *v = d[(i + 2) % 3];
@@ -123,19 +187,10 @@ static inline bool kernel_linear_part(const kernel_cell *c, float at[GRID_MAX_CE
         }
         error = fabsf(at[i] - c->f[i]) > error ? fabsf(at[i] - c->f[i]) : error;
     }
-    const kernel_shape *shape = kernel_cell_shape(c->type);
-    for (int i = 0; i < shape->face_count; i++) {
-        const signed char *v = shape->faces[i].vertices;
-        if (shape->faces[i].count == 3) continue;
-        float sum = 0;
-        for (int a = 0; a < 3; a++)
-            sum += fabsf(g[a] * ((places[a][v[0]] - places[a][v[1]]) + (places[a][v[2]] - places[a][v[3]])));
-        bend = sum > bend ? sum : bend;
-    }
+    if (!kernel_is_unfolded(c, differential, (const float(*)[3])n, volume)) error *= 3.4f;
     /* f is at most about 1. Places are known to a rounding of where they are: X, Y and Z to r, their middle to 8 r. */
-    float blur = 0;
     for (int a = 0; a < 3; a++) blur += fabsf(g[a]) * kernel_largest(places[a], c->count);
-    *thickness = 3.4f * error + bend + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * blur;
+    *thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * blur;
     return *thickness < 1;
 }
 

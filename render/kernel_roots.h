@@ -4,13 +4,12 @@
  * is F(r*(u)). On a piece of the curve from a to b take the chord c(u) = a + u (b - a). F(c(u)) is a cubic (F is
  * trilinear), of which we know both ends and both end slopes, so its four Bernstein coefficients, which bound it. How
  * far is the curve from the chord? Let Y = J0^-1 X with J0 the Jacobian at the cell's centre: Y(r) = r + N(r) + const,
- * N's derivative at most theta (Frobenius, found at the corners of the cell's domain, widened: it is convex along each
- * axis). So |r1 - r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) less the
- * line between its ends: again a cubic with known coefficients 0, e1, e2, 0, hence
- *     |c - r*| <= dev = L 3/4 max(|e1|, |e2|),          |F(c) - F(r*)| <= G dev,
- *     |c' - r*'| <= L (K dev |b - a| + |e'|) = dev',    |F(c)' - F(r*)'| <= H dev (|b - a| + dev') + G dev',
- * with G, H, K bounds of F's gradient, F's Hessian and N's. dev falls by four when a piece is halved, and is 0 where
- * the map is affine: there F(c(u)) is the field itself.
+ * N's derivative at most theta (found at the corners of the cell's domain: a norm is convex along each axis). So |r1 -
+ * r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) less the line between its
+ * ends: again a cubic with known coefficients 0, e1, e2, 0, hence |c - r*| <= dev = L 3/4 max(|e1|, |e2|), |F(c) -
+ * F(r*)| <= G dev, |c' - r*'| <= L (K dev |b - a| + |e'|) = dev',    |F(c)' - F(r*)'| <= H dev (|b - a| + dev') + G
+ * dev', with G, H, K bounds of F's gradient, F's Hessian and N's. dev falls by four when a piece is halved, and is 0
+ * where the map is affine: there F(c(u)) is the field itself.
  *
  * A piece whose coefficients are all farther from 0 than G dev has no root; one whose derivative's coefficients are
  * all of one sign and farther from 0 than their bound has one root where the ends' signs differ, else none; any other
@@ -33,6 +32,7 @@
 #define KERNEL_ROOT_BAND 3e-7f /* rounding of F where the largest |F| at a vertex is near 1 */
 #define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
+#define KERNEL_DOMAIN_RIM 0.03125
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
 /* Of one cell and isovalue. */
@@ -53,11 +53,11 @@ static inline void kernel_product_slopes(const double r[3], double out[4][3])
     memcpy(out, slopes, sizeof slopes);
 }
 
-/* The extreme slopes of the products over the cell's domain, widened by an eighth on all sides: a point between a
- * warped face's triangles and its bilinear patch is outside the domain. Returns how many; the first is the centre's. */
+/* The extreme slopes of the products over the cell's domain, widened by KERNEL_DOMAIN_RIM on all sides for what
+ * rounding takes out of it. Returns how many; the first is the centre's. */
 static inline int kernel_extreme_slopes(int type, double out[9][4][3])
 {
-    const double wide = 0.125;
+    const double wide = KERNEL_DOMAIN_RIM;
     int n = 0;
     if (type == GRID_WEDGE) {
         kernel_product_slopes((const double[]){1.0 / 3, 1.0 / 3, 0.5}, out[n++]);
@@ -84,13 +84,14 @@ static inline int kernel_extreme_slopes(int type, double out[9][4][3])
 }
 
 /* Frobenius norm of a polynomial's Hessian over the widened domain; of a pyramid's times k: those of a b / k with a / k
- * and b / k in [-1/8, 9/8] are at most 1, 9/8, 9/8 and 2.54 over k. */
+ * and b / k in [-1/32, 33/32] are at most 1, 33/32, 33/32 and 2.13 over k, their norm 3.29. */
 static inline double kernel_hessian_norm(int type, const double c[4])
 {
-    if (type == GRID_PYRAMID) return fabs(c[0]) * 3.7;
+    if (type == GRID_PYRAMID) return fabs(c[0]) * 3.29;
     double sum = 0;
     for (int j = 0; j < 3; j++) {
-        const double largest = fmax(fabs(c[j] - 0.125 * c[3]), fabs(c[j] + 1.25 * c[3]));
+        const double largest =
+            fmax(fabs(c[j] - KERNEL_DOMAIN_RIM * c[3]), fabs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
         sum += 2 * largest * largest;
     }
     return sqrt(sum);
@@ -133,27 +134,43 @@ static inline void kernel_bounds_bend(kernel_bounds *b, const kernel_map *map, c
     b->coarsest = is_solid ? 1 : 0.125f;
 }
 
+/* A bound of how much m lengthens a vector, at most 1.15 times what it is: the norm of its singular values to the
+ * eighth power, which is one, and so convex as they all are. */
+static inline double kernel_matrix_norm(const double m[3][3])
+{
+    double square[3][3], sum = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k <= i; k++)
+            square[i][k] = square[k][i] = m[0][i] * m[0][k] + m[1][i] * m[1][k] + m[2][i] * m[2][k];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            const double fourth =
+                square[i][0] * square[k][0] + square[i][1] * square[k][1] + square[i][2] * square[k][2];
+            sum += fourth * fourth;
+        }
+    return sqrt(sqrt(sqrt(sum)));
+}
+
 static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, int type)
 {
     double slopes[9][4][3], bent[3][4], field[4], theta = 0, gradient = 0, twist = 0;
     const int count = kernel_extreme_slopes(type, slopes);
     kernel_bounds_bend(b, map, slopes[0], bent);
     for (int n = 1; n < count; n++) {
-        double move = 0, steep = 0;
+        double steep = 0, m[3][3];
         for (int a = 0; a < 3; a++) {
             double f = (double)map->field.c[1 + a];
             for (int j = 0; j < 4; j++) f += (double)map->field.c[4 + j] * slopes[n][j][a];
             steep += f * f;
             for (int i = 0; i < 3; i++) {
-                double d = 0;
-                for (int j = 0; j < 4; j++) d += bent[i][j] * (slopes[n][j][a] - slopes[0][j][a]);
-                move += d * d;
+                m[i][a] = 0;
+                for (int j = 0; j < 4; j++) m[i][a] += bent[i][j] * (slopes[n][j][a] - slopes[0][j][a]);
             }
         }
+        const double move = kernel_matrix_norm((const double(*)[3])m);
         theta = move > theta ? move : theta;
         gradient = steep > gradient ? steep : gradient;
     }
-    theta = sqrt(theta);
     if (!(theta < 0.9)) b->coarsest = 0.125f;
     b->stretch = theta < 0.9 ? (float)(1 / (1 - theta)) : 10;
     b->slope = (float)sqrt(gradient);
