@@ -24,9 +24,10 @@ typedef struct kernel_map {
     float origin[3]; /* vertex 0 */
     float tolerance; /* a Newton step below it is the last */
     kernel_polynomial position[3], field, colour;
+    double exact[4][8]; /* the positions' coefficients and the field's, not rounded */
 } kernel_map;
 
-SIMD_INLINE void kernel_polynomial_fit(kernel_polynomial *p, int type, const double v[GRID_MAX_CELL_VERTICES])
+SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[GRID_MAX_CELL_VERTICES])
 {
     double c[8] = {0};
     if (type == GRID_HEX) {
@@ -52,14 +53,16 @@ SIMD_INLINE void kernel_polynomial_fit(kernel_polynomial *p, int type, const dou
         c[3] = v[0] - v[4];
         c[4] = v[0] - v[1] + v[2] - v[3];
     }
-    for (int i = 0; i < 8; i++) p->c[i] = (float)c[i];
+    memcpy(out, c, sizeof c);
 }
 
-SIMD_INLINE void kernel_polynomial_of_floats(kernel_polynomial *p, int type, const float *v, float origin)
+SIMD_INLINE void kernel_polynomial_of_floats(kernel_polynomial *p, int type, const float *v, float origin,
+                                             double exact[8])
 {
     double d[GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < grid_type_vertices(type); i++) d[i] = (double)v[i] - (double)origin;
-    kernel_polynomial_fit(p, type, d);
+    kernel_polynomial_fit(exact, type, d);
+    for (int i = 0; i < 8; i++) p->c[i] = (float)exact[i];
 }
 
 SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
@@ -68,10 +71,10 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     m->origin[0] = c->x[0];
     m->origin[1] = c->y[0];
     m->origin[2] = c->z[0];
-    kernel_polynomial_of_floats(&m->position[0], c->type, c->x, c->x[0]);
-    kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0]);
-    kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0]);
-    kernel_polynomial_of_floats(&m->field, c->type, c->f, 0);
+    kernel_polynomial_of_floats(&m->position[0], c->type, c->x, c->x[0], m->exact[0]);
+    kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0], m->exact[1]);
+    kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0], m->exact[2]);
+    kernel_polynomial_of_floats(&m->field, c->type, c->f, 0, m->exact[3]);
     /* The error goes as the square of the step, times the map's curvature: below 5e-5 the next one would be under
      * float32's resolution for all but the most warped cells. */
     m->tolerance = 5e-5f;
@@ -79,7 +82,8 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
 
 SIMD_INLINE void kernel_map_colour(kernel_map *m, const kernel_cell *c)
 {
-    kernel_polynomial_of_floats(&m->colour, c->type, c->g, 0);
+    double unused[8];
+    kernel_polynomial_of_floats(&m->colour, c->type, c->g, 0, unused);
 }
 
 /* m and its derivatives. */

@@ -404,44 +404,99 @@ SIMD_INLINE void kernel_bracket(kernel_packet *p, const kernel_search *s, vm ray
     }
 }
 
-/* The roots between low and high: Newton's method on the four equations X(r) = ray(t), F(r) = 0 at once, t kept within
- * the bracket; where it does not converge, by the bracket alone. */
+/* ---- the last step ---- */
+
+typedef double kernel_wide __attribute__((vector_size(8 * SIMD_WIDTH)));
+
+SIMD_INLINE kernel_wide kernel_widen(vf v)
+{
+    return __builtin_convertvector(v, kernel_wide);
+}
+
+SIMD_INLINE vf kernel_narrow(kernel_wide v)
+{
+    return __builtin_convertvector(v, vf);
+}
+
+SIMD_INLINE kernel_wide kernel_wide_value(const double c[8], const kernel_wide r[3], kernel_wide m)
+{
+    return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
+           r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
+}
+
+/* How far the places r at depth t are off their rays, and the field there, in double: exact but for the rounding of r
+ * and t themselves. */
+SIMD_INLINE void kernel_residuals(const kernel_packet *p, const kernel_map *map, const kernel_point *at, vf off[3],
+                                  vf *value)
+{
+    const kernel_wide r[3] = {kernel_widen(at->r[0]), kernel_widen(at->r[1]), kernel_widen(at->r[2])};
+    const kernel_wide t = kernel_widen(at->t);
+    kernel_wide m = r[0] * r[1];
+    if (map->is_pyramid) m /= kernel_widen(vf_max(at->r[2], vf_set(1e-6f)));
+    const kernel_wide x = kernel_widen(p->origin_x) + kernel_widen(p->slope_x) * t;
+    const kernel_wide y = kernel_widen(p->origin_y) + kernel_widen(p->slope_y) * t;
+    off[0] = kernel_narrow(x - (double)map->origin[0] - kernel_wide_value(map->exact[0], r, m));
+    off[1] = kernel_narrow(y - (double)map->origin[1] - kernel_wide_value(map->exact[1], r, m));
+    off[2] = kernel_narrow(t - (double)map->origin[2] - kernel_wide_value(map->exact[2], r, m));
+    *value = kernel_narrow(kernel_wide_value(map->exact[3], r, m));
+}
+
+/* A step of Newton's method on the four equations X(r) = ray(t), F(r) = 0 at once, from how far these are off; t is
+ * kept within the bracket. Returns who has come to its end. */
+SIMD_INLINE vm kernel_polish_step(const kernel_packet *p, const kernel_search *s, vm rays, const kernel_product *m,
+                                  const vf off[3], vf field, kernel_point *out)
+{
+    const kernel_map *map = s->map;
+    const vf zero = vf_set(0);
+    kernel_jacobian j;
+    vf gradient[3], step[3], speed[3], largest = zero;
+    kernel_map_jacobian(map, m, out->r, &j);
+    kernel_polynomial_gradient(map, &map->field, m, out->r, gradient);
+    const vm flat = vf_eq(j.det, zero);
+    const vf inverse = vf_select(flat, zero, 1.0f / j.det);
+    for (int a = 0; a < 3; a++) {
+        step[a] = ((j.cross[0][a] * off[0] + j.cross[1][a] * off[1]) + j.cross[2][a] * off[2]) * inverse;
+        speed[a] = ((j.cross[0][a] * p->slope_x + j.cross[1][a] * p->slope_y) + j.cross[2][a]) * inverse;
+    }
+    const vf value = field + kernel_dot(gradient, step), rate = kernel_dot(gradient, speed);
+    const vf move = vf_select(vf_eq(rate, zero), zero, -(value / rate));
+    const vf t = vf_clamp(out->t + move, s->low.t, s->high.t);
+    for (int a = 0; a < 3; a++) {
+        const vf change = vf_clamp(step[a] + speed[a] * (t - out->t), vf_set(-1), vf_set(1));
+        largest = vf_max(largest, vf_abs(change));
+        out->r[a] = vf_select(rays, vf_clamp(out->r[a] + change, vf_set(-1), vf_set(2)), out->r[a]);
+    }
+    out->t = vf_select(rays, t, out->t);
+    return vm_and(rays, vm_andnot(vf_le(largest, vf_set(map->tolerance)), flat));
+}
+
+/* The roots between low and high by such steps, the last of them from residuals in double; where they do not converge,
+ * by the bracket alone. */
 SIMD_INLINE void kernel_polish(kernel_packet *p, const kernel_search *s, kernel_point *out)
 {
     const kernel_map *map = s->map;
     const vf zero = vf_set(0), fall = s->low.value - s->high.value;
     const vf along = vf_clamp(vf_select(vf_eq(fall, zero), zero, s->low.value / fall), zero, vf_set(1));
     vm open = s->found;
+    vf off[3], value;
     out->t = s->low.t + along * (s->high.t - s->low.t);
     out->value = zero;
     for (int a = 0; a < 3; a++) out->r[a] = s->low.r[a] + along * (s->high.r[a] - s->low.r[a]);
     for (int n = 0; n < KERNEL_POLISH_STEPS && vm_any(open); n++) {
         const kernel_product m = kernel_map_product(map, out->r);
-        kernel_jacobian j;
-        vf gradient[3], off[3], speed[3], largest = zero;
-        kernel_map_jacobian(map, &m, out->r, &j);
-        kernel_polynomial_gradient(map, &map->field, &m, out->r, gradient);
         const vf target[3] = {(p->origin_x + p->slope_x * out->t) - map->origin[0],
                               (p->origin_y + p->slope_y * out->t) - map->origin[1], out->t - map->origin[2]};
-        const vm flat = vf_eq(j.det, zero);
-        const vf inverse = vf_select(flat, zero, 1.0f / j.det);
         for (int a = 0; a < 3; a++) off[a] = target[a] - kernel_polynomial_value(map, &map->position[a], &m, out->r);
-        vf step[3];
-        for (int a = 0; a < 3; a++) {
-            step[a] = ((j.cross[0][a] * off[0] + j.cross[1][a] * off[1]) + j.cross[2][a] * off[2]) * inverse;
-            speed[a] = ((j.cross[0][a] * p->slope_x + j.cross[1][a] * p->slope_y) + j.cross[2][a]) * inverse;
-        }
-        const vf value = kernel_polynomial_value(map, &map->field, &m, out->r) + kernel_dot(gradient, step);
-        const vf rate = kernel_dot(gradient, speed);
-        const vf move = vf_select(vf_eq(rate, zero), zero, -(value / rate));
-        const vf t = vf_clamp(out->t + move, s->low.t, s->high.t);
-        for (int a = 0; a < 3; a++) {
-            const vf change = vf_clamp(step[a] + speed[a] * (t - out->t), vf_set(-1), vf_set(1));
-            largest = vf_max(largest, vf_abs(change));
-            out->r[a] = vf_select(open, vf_clamp(out->r[a] + change, vf_set(-1), vf_set(2)), out->r[a]);
-        }
-        out->t = vf_select(open, t, out->t);
-        open = vm_andnot(open, vm_andnot(vf_le(largest, vf_set(map->tolerance)), flat));
+        value = kernel_polynomial_value(map, &map->field, &m, out->r);
+        open = vm_andnot(open, kernel_polish_step(p, s, open, &m, off, value, out));
+    }
+    const vm close = vm_andnot(s->found, open);
+    if (vm_any(close)) {
+        const kernel_product m = kernel_map_product(map, out->r);
+        kernel_point last = *out;
+        kernel_residuals(p, map, out, off, &value);
+        /* At a double root the field's slope is rounding, and a step by it leads away. */
+        kernel_place_move(kernel_polish_step(p, s, close, &m, off, value, &last), &last, out);
     }
     if (vm_any(open)) kernel_bracket(p, s, open, out);
 }
