@@ -23,9 +23,10 @@
 #define RENDER_KERNEL_SEGMENTS_H
 
 #include "kernel_integral.h"
+#include "kernel_preintegral.h"
 #include "kernel_volume.h"
 
-enum { KERNEL_WINDOW = 64, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
+enum { KERNEL_WINDOW = 128, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
 
 typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
@@ -509,6 +510,8 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
                                   const kernel_segments *list)
 {
     kernel_sorted sorted;
+    kernel_pre_end end;
+    end.value = vf_set(NAN);
     kernel_segments_sort(list, &sorted);
     for (int n = 0; n < sorted.row_count; n++) {
         const vf t_in = sorted.t_in[n];
@@ -516,9 +519,13 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         const vm has = vm_and(vf_lt(t_in, vf_set(INFINITY)), vf_lt(vf_set(KERNEL_DARK), b->light));
         if (!vm_any(has)) break;
         const vf t_out = kernel_items_gather(list, 1, item);
+        const vf length = (t_out - t_in) * list->per_t;
+        const vf v_in = kernel_items_gather(list, 2, item), v_out = kernel_items_gather(list, 3, item);
         kernel_light light = kernel_clear();
-        kernel_integrate(pieces, has, (t_out - t_in) * list->per_t, kernel_items_gather(list, 2, item),
-                         kernel_items_gather(list, 3, item), &light);
+        if (pieces->preintegral)
+            light = kernel_preintegrated(pieces, has, length, v_in, v_out, &end);
+        else
+            kernel_integrate(pieces, has, length, v_in, v_out, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
         kernel_blend_light(b, has, t_in, t_out, &light);
     }

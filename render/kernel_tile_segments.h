@@ -118,7 +118,7 @@ static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint
             kernel_tile_cell_segments(t, s, part, cells[n], NULL, blocks);
             continue;
         }
-        const unsigned meets = kernel_tile_volume_cell(t, c, &s->map, g, transfer, blocks);
+        const unsigned meets = kernel_tile_volume_cell(t, c, &s->map, g, transfer, false, blocks);
         if (meets) kernel_tile_cell_segments(t, s, part, cells[n], c, meets);
     }
 }

@@ -71,9 +71,10 @@ SIMD_INLINE void kernel_tile_samples(kernel_tile_trace *t, kernel_tile_volume *v
     }
 }
 
-/* Ready the fetched cell for rays of blocks, and its map; returns the blocks that it may show in. */
+/* Ready the fetched cell for rays of blocks, which are a pencil or are not, and its map; returns the blocks that it may
+ * show in. */
 SIMD_INLINE unsigned kernel_tile_volume_cell(kernel_tile_trace *t, kernel_cell *c, kernel_map *map, const grid *g,
-                                             const kernel_transfer *transfer, unsigned blocks)
+                                             const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
 {
     kernel_outline outline;
     if (!c->is_finite || !kernel_cell_shows(c, transfer)) return 0;
@@ -83,7 +84,7 @@ SIMD_INLINE unsigned kernel_tile_volume_cell(kernel_tile_trace *t, kernel_cell *
     if (!meets) return 0;
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);
-    kernel_cell_lines(c, t->frame, &t->tile);
+    if (is_pencil) kernel_cell_lines(c, t->frame, &t->tile);
     if (c->type != GRID_TET && !c->is_constant) kernel_map_setup(map, c);
     return meets;
 }
@@ -102,7 +103,7 @@ static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32
             kernel_tile_samples(t, v, part, cells[n], NULL, blocks);
             continue;
         }
-        const unsigned meets = kernel_tile_volume_cell(t, c, &v->map, g, transfer, blocks);
+        const unsigned meets = kernel_tile_volume_cell(t, c, &v->map, g, transfer, true, blocks);
         if (meets) kernel_tile_samples(t, v, part, cells[n], c, meets);
     }
 }
