@@ -3,6 +3,7 @@
 #define RENDER_KERNEL_PIECES_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 /* KERNEL_BLACK: what is behind so little light is left out of a segment. KERNEL_SHORT: kernel_integral.h. */
 #if defined(KERNEL_REAL_IS_DOUBLE)
@@ -43,6 +44,26 @@ typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
+/* A bin of the sums (kernel_preintegral.h), in units; read as ten floats. */
+typedef struct kernel_pre_entry {
+    struct {
+        int32_t before; /* of all bins before it */
+        float own;
+    } sums[4];      /* the extinction's, and those of the emission in three channels */
+    int32_t colour; /* at its middle, 10 bits a channel */
+    float rough;    /* by how much extinction and emission vary in it, as light */
+} kernel_pre_entry;
+
+typedef struct kernel_preintegral {
+    int bin_count;             /* of equal width; an entry before them and one behind are endless */
+    kernel_pre_entry *entries; /* bin_count + 2 */
+    float low, inverse;        /* the bins' begin, and 1 / their width */
+    float depth_unit, light_unit;
+    float colour_unit, colour_error;
+    float bend_square, bend, bend_at_ends, contrast;
+    float allowed_absorbed, allowed_length;
+} kernel_preintegral;
+
 typedef struct kernel_pieces {
     int count;
     kernel_piece *pieces; /* by value; the first and the last are endless */
@@ -52,7 +73,8 @@ typedef struct kernel_pieces {
     /* Of the bounds' bins: also from bin_low; below and above the bins the function is constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
-    float contrast; /* no two colours differ by more, in any channel; black and white counted */
+    float contrast;                  /* no two colours differ by more, in any channel; black and white counted */
+    kernel_preintegral *preintegral; /* NULL: no error is allowed */
 } kernel_pieces;
 
 #endif

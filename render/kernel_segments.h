@@ -23,18 +23,14 @@
 #define RENDER_KERNEL_SEGMENTS_H
 
 #include "kernel_integral.h"
+#include "kernel_preintegral.h"
 #include "kernel_volume.h"
 
-enum { KERNEL_WINDOW = 64, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
+enum { KERNEL_WINDOW = 128, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
 
 typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
-
-typedef struct kernel_segment_rows {
-    float t_in[KERNEL_WINDOW][SIMD_WIDTH], t_out[KERNEL_WINDOW][SIMD_WIDTH];
-    float v_in[KERNEL_WINDOW][SIMD_WIDTH], v_out[KERNEL_WINDOW][SIMD_WIDTH];
-} kernel_segment_rows;
 
 /* Crossings of transparent surfaces: the first of each ray in rows, sorted, +inf where there are no more. */
 typedef struct kernel_cuts {
@@ -46,11 +42,12 @@ typedef struct kernel_cuts {
 
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
-    kernel_segment_rows rows;
+    kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* each ray's, as they come */
     /* Meshes that overlap to no end: of segments that begin at one place, where no order is meant, those for which
      * there is no room are integrated at once, and blended behind the window's. */
     kernel_light heap;
     vf t_begin, t_end; /* the window */
+    bool is_shortened; /* t_end has been lowered since this was last made false */
     vf per_t;          /* unit distances per t */
     kernel_cuts cuts;
 } kernel_segments;
@@ -116,69 +113,125 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, 
 
 /* ---- a ray's segments ---- */
 
-static inline void kernel_rows_set(kernel_segment_rows *r, int lane, int at, const kernel_segment *s)
+static void kernel_items_sort(kernel_segment *items, int count)
 {
-    r->t_in[at][lane] = s->t_in;
-    r->t_out[at][lane] = s->t_out;
-    r->v_in[at][lane] = s->v_in;
-    r->v_out[at][lane] = s->v_out;
+    for (int n = 1; n < count; n++) {
+        const kernel_segment s = items[n];
+        int at = n;
+        for (; at > 0 && items[at - 1].t_in > s.t_in; at--) items[at] = items[at - 1];
+        items[at] = s;
+    }
 }
 
-static inline void kernel_rows_move(kernel_segment_rows *r, int lane, int from, int to)
+SIMD_INLINE void kernel_heap_clear(kernel_light *heap, int lane)
 {
-    r->t_in[to][lane] = r->t_in[from][lane];
-    r->t_out[to][lane] = r->t_out[from][lane];
-    r->v_in[to][lane] = r->v_in[from][lane];
-    r->v_out[to][lane] = r->v_out[from][lane];
+    for (int a = 0; a < 3; a++) heap->colour[a][lane] = 0;
+    heap->depth[lane] = 0;
+    heap->transmittance[lane] = 1;
 }
 
-/* Make room in a full ray: the window ends at its farthest segment, which goes, with all that begin there. Returns
- * false where that would be all. */
-static bool kernel_rows_shorten(kernel_segments *list, int lane)
+/* Make room in a full ray for the segment, where it is of the window: that now ends at the begin of one of its farther
+ * segments, which go. False where there is no room: all begin where it does. */
+static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segments *list, int lane,
+                                                                    const kernel_segment *s)
 {
-    const kernel_segment_rows *r = &list->rows;
-    int count = KERNEL_WINDOW - 1;
-    const float end = r->t_in[count][lane];
-    while (count > 0 && r->t_in[count - 1][lane] == end) count--;
-    if (count == 0) return false;
-    list->count[lane] = count;
-    list->t_end[lane] = end;
+    kernel_segment *items = list->items[lane];
+    kernel_items_sort(items, KERNEL_WINDOW);
+    int count = KERNEL_WINDOW * 3 / 4;
+    const float first = items[0].t_in, last = items[KERNEL_WINDOW - 1].t_in;
+    if (first == last) {
+        if (s->t_in == first) return false;
+        list->t_end[lane] = fmaxf(s->t_in, first);
+        if (s->t_in < first) {
+            list->count[lane] = 0;
+            kernel_heap_clear(&list->heap, lane);
+        }
+    } else {
+        while (items[count].t_in == first) count++;
+        while (items[count - 1].t_in == items[count].t_in) count--;
+        list->count[lane] = count;
+        list->t_end[lane] = items[count].t_in;
+    }
+    list->is_shortened = true;
     return true;
 }
 
 /* False where there is no room: more segments begin at one place than a window holds. */
-static inline bool kernel_rows_insert(kernel_segments *list, int lane, const kernel_segment *s)
+SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kernel_segment *s)
 {
-    kernel_segment_rows *r = &list->rows;
-    if (list->count[lane] == KERNEL_WINDOW && !kernel_rows_shorten(list, lane)) {
-        const float all = r->t_in[0][lane];
-        if (s->t_in == all) return false;
-        list->t_end[lane] = fminf(list->t_end[lane], fmaxf(s->t_in, all));
-        if (s->t_in < all) list->count[lane] = 0;
+    if (__builtin_expect(list->count[lane] == KERNEL_WINDOW, 0)) {
+        if (!kernel_segments_shorten(list, lane, s)) return false;
+        if (!(s->t_in < list->t_end[lane])) return true;
     }
-    if (!(s->t_in < list->t_end[lane])) return true;
-    int at = list->count[lane]++;
-    for (; at > 0 && r->t_in[at - 1][lane] > s->t_in; at--) kernel_rows_move(r, lane, at - 1, at);
-    kernel_rows_set(r, lane, at, s);
+    list->items[lane][list->count[lane]++] = *s;
     return true;
 }
 
+/* Of rays whose window they are of. */
 SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays, vf t_in, vf t_out,
                                      vf v_in, vf v_out)
 {
+    kernel_segment all[SIMD_WIDTH];
     float a[4][SIMD_WIDTH];
     unsigned bits = vm_bits(rays), left = 0;
+    if (!bits) return;
     vf_store(a[0], t_in);
     vf_store(a[1], t_out);
     vf_store(a[2], v_in);
     vf_store(a[3], v_out);
+    for (int i = 0; i < SIMD_WIDTH; i++) all[i] = (kernel_segment){a[0][i], a[1][i], a[2][i], a[3][i]};
     for (; bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        const kernel_segment s = {a[0][lane], a[1][lane], a[2][lane], a[3][lane]};
-        if (!kernel_rows_insert(list, lane, &s)) left |= bits & -bits;
+        if (!kernel_segments_put(list, lane, &all[lane])) left |= bits & -bits;
     }
     if (__builtin_expect(left != 0, 0))
         kernel_integrate(pieces, vm_from_bits(left), (t_out - t_in) * list->per_t, v_in, v_out, &list->heap);
+}
+
+/* The packet's segments by t_in: rows of the n-th of each ray. */
+typedef struct kernel_sorted {
+    int row_count;
+    vf t_in[KERNEL_WINDOW]; /* +inf where there are no more */
+    vi item[KERNEL_WINDOW]; /* where it is among the ray's, in floats from list->items on */
+} kernel_sorted;
+
+SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
+{
+    return vf_gather(&list->items[0][0].t_in + member, item);
+}
+
+/* By insertion, all rays at once: cells come nearly in order, for the traversal is front to back. */
+static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out)
+{
+    enum { FLOATS = sizeof(kernel_segment) / sizeof(float) };
+    int32_t first[SIMD_WIDTH];
+    vi firsts, counts;
+    out->row_count = 0;
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+        first[lane] = lane * KERNEL_WINDOW * FLOATS;
+        out->row_count = list->count[lane] > out->row_count ? list->count[lane] : out->row_count;
+    }
+    memcpy(&firsts, first, sizeof firsts);
+    memcpy(&counts, list->count, sizeof counts);
+    const vf count = vf_from_vi(counts);
+    for (int n = 0; n < out->row_count; n++) {
+        const vm has = vf_lt(vf_set((float)n), count);
+        vi item = (vi)vf_select(has, (vf)(firsts + n * FLOATS), (vf)firsts);
+        vf t_in = vf_select(has, kernel_items_gather(list, 0, item), vf_set(INFINITY));
+        int at = n;
+        for (; at > 0; at--) {
+            const vf before = out->t_in[at - 1];
+            const vi earlier = out->item[at - 1];
+            const vm moves = vf_lt(t_in, before);
+            if (!vm_any(moves)) break;
+            out->t_in[at] = vf_select(moves, before, t_in);
+            out->item[at] = (vi)vf_select(moves, (vf)earlier, (vf)item);
+            t_in = vf_select(moves, t_in, before);
+            item = (vi)vf_select(moves, (vf)item, (vf)earlier);
+        }
+        out->t_in[at] = t_in;
+        out->item[at] = item;
+    }
 }
 
 /* ---- a cell's segments ---- */
@@ -346,7 +399,7 @@ SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *
         s.before = s.after;
         s.after = s.ahead;
         s.bend = s.next_bend;
-        open = inner;
+        open = vm_and(inner, vf_lt(s.from, list->t_end));
     }
 }
 
@@ -456,20 +509,23 @@ SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, 
 static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kernel_pieces *pieces,
                                   const kernel_segments *list)
 {
-    const kernel_segment_rows *r = &list->rows;
-    float counts[SIMD_WIDTH];
-    int most = 0;
-    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
-        counts[lane] = (float)list->count[lane];
-        most = list->count[lane] > most ? list->count[lane] : most;
-    }
-    const vf count = vf_load(counts);
-    for (int n = 0; n < most; n++) {
-        const vm has = vm_and(vf_lt(vf_set((float)n), count), vf_lt(vf_set(KERNEL_DARK), b->light));
+    kernel_sorted sorted;
+    kernel_pre_end end;
+    end.value = vf_set(NAN);
+    kernel_segments_sort(list, &sorted);
+    for (int n = 0; n < sorted.row_count; n++) {
+        const vf t_in = sorted.t_in[n];
+        const vi item = sorted.item[n];
+        const vm has = vm_and(vf_lt(t_in, vf_set(INFINITY)), vf_lt(vf_set(KERNEL_DARK), b->light));
         if (!vm_any(has)) break;
-        const vf t_in = vf_load(r->t_in[n]), t_out = vf_load(r->t_out[n]);
+        const vf t_out = kernel_items_gather(list, 1, item);
+        const vf length = (t_out - t_in) * list->per_t;
+        const vf v_in = kernel_items_gather(list, 2, item), v_out = kernel_items_gather(list, 3, item);
         kernel_light light = kernel_clear();
-        kernel_integrate(pieces, has, (t_out - t_in) * list->per_t, vf_load(r->v_in[n]), vf_load(r->v_out[n]), &light);
+        if (pieces->preintegral)
+            light = kernel_preintegrated(pieces, has, length, v_in, v_out, &end);
+        else
+            kernel_integrate(pieces, has, length, v_in, v_out, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
         kernel_blend_light(b, has, t_in, t_out, &light);
     }
@@ -493,13 +549,26 @@ SIMD_INLINE void kernel_trace_apart(kernel_packet *p)
     }
 }
 
+/* A window from list->t_begin on. */
+SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
+{
+    memset(list->count, 0, sizeof list->count);
+    list->heap = kernel_clear();
+    list->t_end = t_end;
+    list->is_shortened = false;
+}
+
+SIMD_INLINE kernel_blend kernel_blend_begin(void)
+{
+    const vf zero = vf_set(0), one = vf_set(1);
+    return (kernel_blend){vm_none(), zero, zero, zero, zero, {zero, zero, zero}, one, zero, {zero, zero, zero}, one};
+}
+
 /* One window from list->t_begin on; t_end is lowered to where it ended. */
 SIMD_INLINE void kernel_trace_window(kernel_packet *p, kernel_segment_state *state)
 {
     kernel_segments *list = state->list;
-    for (int lane = 0; lane < SIMD_WIDTH; lane++) list->count[lane] = 0;
-    list->heap = kernel_clear();
-    list->t_end = p->t_far;
+    kernel_segments_begin(list, p->t_far);
     kernel_trace_parts(p, &p->frame->job->volumes[0].field, &p->frame->volumes[0].interest, list->t_begin, &list->t_end,
                        kernel_segment_leaf, state);
 }
@@ -510,9 +579,7 @@ SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
     const kernel_frame *f = p->frame;
     kernel_segments list;
     kernel_segment_state state = {&list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
-    kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
-    b.lost[0] = b.lost[1] = b.lost[2] = b.depth = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] =
-        vf_set(0);
+    kernel_blend b = kernel_blend_begin();
     list.per_t = f->volumes[0].exponent / p->sample_step;
     list.t_begin = p->t_near;
     kernel_cuts_find(p, first_fragment, &list.cuts);

@@ -71,6 +71,24 @@ SIMD_INLINE void kernel_tile_samples(kernel_tile_trace *t, kernel_tile_volume *v
     }
 }
 
+/* Ready the fetched cell for rays of blocks, which are a pencil or are not, and its map; returns the blocks that it may
+ * show in. */
+SIMD_INLINE unsigned kernel_tile_volume_cell(kernel_tile_trace *t, kernel_cell *c, kernel_map *map, const grid *g,
+                                             const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
+{
+    kernel_outline outline;
+    if (!c->is_finite || !kernel_cell_shows(c, transfer)) return 0;
+    kernel_cell_move(c, t->frame, &t->tile, g);
+    kernel_vertex_outline(c, &outline);
+    const unsigned meets = kernel_tile_keep(t, &outline, blocks);
+    if (!meets) return 0;
+    kernel_cell_order(c);
+    kernel_cell_domain(c, transfer);
+    if (is_pencil) kernel_cell_lines(c, t->frame, &t->tile);
+    if (c->type != GRID_TET && !c->is_constant) kernel_map_setup(map, c);
+    return meets;
+}
+
 static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
     kernel_tile_volume *v = kernel_tile_volume_of(t);
@@ -80,37 +98,34 @@ static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32
     kernel_cell *c = &v->cell;
     kernel_tile_prefetch(g, field, cells, count);
     for (int n = 0; n < count; n++) {
-        kernel_outline outline;
         kernel_cell_fetch(c, g, field, cells[n]);
         if (c->type == GRID_POLYHEDRON) {
             kernel_tile_samples(t, v, part, cells[n], NULL, blocks);
             continue;
         }
-        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
-        kernel_cell_move(c, t->frame, &t->tile, g);
-        kernel_vertex_outline(c, &outline);
-        const unsigned meets = kernel_tile_keep(t, &outline, blocks);
-        if (!meets) continue;
-        kernel_cell_order(c);
-        kernel_cell_domain(c, transfer);
-        kernel_cell_lines(c, t->frame, &t->tile);
-        if (c->type != GRID_TET && !c->is_constant) kernel_map_setup(&v->map, c);
-        kernel_tile_samples(t, v, part, cells[n], c, meets);
+        const unsigned meets = kernel_tile_volume_cell(t, c, &v->map, g, transfer, true, blocks);
+        if (meets) kernel_tile_samples(t, v, part, cells[n], c, meets);
+    }
+}
+
+/* The trees of the parts, with the volume's ranges. */
+SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, const uint32_t *parts, int count,
+                                          unsigned blocks, kernel_tile_visit *visit)
+{
+    const render_field *field = &t->frame->job->volumes[volume].field;
+    for (int n = 0; n < count; n++) {
+        const int part = (int)parts[n];
+        if (field->ranges[part].low)
+            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
+                                 &t->frame->volumes[volume].interest, blocks, part, visit);
     }
 }
 
 static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
                                      unsigned blocks)
 {
-    const int volume = kernel_tile_volume_of(t)->volume;
-    const render_field *field = &t->frame->job->volumes[volume].field;
     (void)unused;
-    for (int n = 0; n < count; n++) {
-        const int part = (int)parts[n];
-        if (field->ranges[part].low)
-            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
-                                 &t->frame->volumes[volume].interest, blocks, part, kernel_tile_volume_leaf);
-    }
+    kernel_tile_volume_trees(t, kernel_tile_volume_of(t)->volume, parts, count, blocks, kernel_tile_volume_leaf);
 }
 
 /* ---- windows ---- */

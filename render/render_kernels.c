@@ -1,6 +1,6 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
- * its surfaces first, so that volumes know where opaque ones end them. Surfaces and samples are traced all of it in one
- * traversal, or packet by packet; segments packet by packet. */
+ * its surfaces first, so that volumes know where opaque ones end them. A tile is traced in one traversal, or packet by
+ * packet. */
 #include <math.h>
 
 #include "kernel_segments.h"
@@ -8,6 +8,7 @@
 #include "kernel_polyhedron_volume.h"
 #include "kernel_shown.h"
 #include "kernel_spmd.h"
+#include "kernel_tile_segments.h"
 #include "kernel_tile_surface.h"
 #include "kernel_tile_volume.h"
 
@@ -54,12 +55,18 @@ typedef struct kernel_memory {
     kernel_surface_cache cache; /* first: kernel_thread's cache is this */
     kernel_tile_trace tile;
     kernel_tile_volume volume;
+    kernel_tile_segments segments;
     kernel_finder finder;
 } kernel_memory;
 
 SIMD_INLINE kernel_tile_volume *kernel_tile_volume_of(kernel_tile_trace *t)
 {
     return &((kernel_memory *)t->thread->cache)->volume;
+}
+
+SIMD_INLINE kernel_tile_segments *kernel_tile_segments_of(kernel_tile_trace *t)
+{
+    return &((kernel_memory *)t->thread->cache)->segments;
 }
 
 static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
@@ -142,7 +149,8 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
     t->thread->surface_seconds += t->thread->now() - start;
 }
 
-static void trace_tile_segments(kernel_tile_trace *t)
+/* Each as a fragment of its own: packet by packet. */
+static void trace_tile_apart(kernel_tile_trace *t)
 {
     for (unsigned left = t->wanted; left; left &= left - 1) {
         const int block = __builtin_ctz(left);
@@ -153,6 +161,13 @@ static void trace_tile_segments(kernel_tile_trace *t)
             trace_packet_volumes(&t->packets[i], &t->hits[i], t->thread->out->count);
         }
     }
+}
+
+static void trace_tile_segments(kernel_tile_trace *t)
+{
+    const double start = t->thread->now();
+    kernel_tile_segments_trace(t);
+    t->thread->volume_seconds += t->thread->now() - start;
 }
 
 static void trace_tile_samples(kernel_tile_trace *t)
@@ -177,7 +192,9 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
     if (f->surface_count) trace_tile_surfaces(t);
     if (!f->volume_count) return;
-    if (f->has_segments)
+    if (f->has_segments && f->job->separate_samples)
+        trace_tile_apart(t);
+    else if (f->has_segments)
         trace_tile_segments(t);
     else
         trace_tile_samples(t);

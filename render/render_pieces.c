@@ -236,6 +236,9 @@ insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, 
 
 void render_pieces_free(kernel_pieces *pieces)
 {
+    if (pieces->preintegral) base_free(pieces->preintegral->entries);
+    base_free(pieces->preintegral);
     base_free(pieces->pieces);
+    pieces->preintegral = NULL;
     pieces->pieces = NULL;
 }

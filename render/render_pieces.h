@@ -8,6 +8,10 @@
 /* Colours may be off the table's by tolerance where that saves pieces; 0: by rounding. Freed by render_pieces_free().
  */
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error);
+/* Sums for an error of max_error in the light of a ray that goes no farther than reach in the cells, in unit distances.
+ */
+insitu_status render_preintegral_build(kernel_pieces *pieces, const render_transfer *t, double max_error, double reach,
+                                       base_error *error);
 void render_pieces_free(kernel_pieces *pieces);
 
 #endif

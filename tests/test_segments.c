@@ -213,6 +213,69 @@ static void orders_on_jittered_hexes(void **state)
     fixture_free(&f);
 }
 
+/* The tets and functions of above, where an error is allowed: by preintegration, in parts, and exactly in turns. */
+static void random_tets_keep_max_error(void **state)
+{
+    (void)state;
+    for (int digits = 2; digits <= 5; digits++) {
+        const double allowed = pow(10, -digits);
+        double worst = 0;
+        for (uint64_t seed = 0; seed < 60; seed++) {
+            test_mesh mesh;
+            render_fixture f;
+            random_function function;
+            const bool is_sliver = seed % 5 == 0;
+            test_mesh_single(is_sliver ? TEST_SLIVER_TET : TEST_UNIT_TET, test_linear, &mesh);
+            for (uint64_t i = 0; i < 12; i++)
+                mesh.coordinates[i] += uniform(i, 100 * seed + 7, -0.25, 0.25) * (is_sliver ? 1e-5 : 1);
+            for (uint64_t i = 0; i < 4; i++) mesh.values[i] = uniform(i, 100 * seed + 8, -0.1, 1.1);
+            fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                           (const double[]){0, 0, 0});
+            fixture_look(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 15, 13);
+            set_segments(&f, 1, allowed);
+            set_random_function(&f, &function, 100 * seed + 9, seed % 3 ? 0.5 : 1,
+                                pow(10, uniform(0, 100 * seed + 10, -3, 4)));
+            double *truth = truth_of(&f);
+            worst = fmax(worst, error_of(&f, truth, NULL));
+            free(truth);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+        fprintf(stderr, "random tets, max_error 1e-%d: %.2g\n", digits, worst);
+        assert_true(worst <= allowed);
+    }
+}
+
+/* Rays and cells are the same, and segments as well: only the order of those that begin at one place may differ. */
+static void tiles_have_what_packets_have(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int with_surface = 0; with_surface < 2; with_surface++) {
+            static const double value = 0.5;
+            render_fixture f;
+            drawn_frame drawn[2];
+            double worst = 0;
+            fixture_create_lattice(&f, kind, 9, 0.2, test_wave);
+            fixture_look(&f, CAMERA_OUTSIDE, 61, 47);
+            set_segments(&f, 0.02, 0); /* more parts than a window has room for */
+            if (with_surface) fixture_add_surface(&f, &value, 1, 1);
+            f.job.traversal = RENDER_TILES;
+            fixture_draw(&f, &drawn[0]);
+            f.job.traversal = RENDER_PACKETS;
+            fixture_draw(&f, &drawn[1]);
+            for (int i = 0; i < 4 * 61 * 47; i++) {
+                const double off = fabs((double)drawn[0].picture.rgba[i] - (double)drawn[1].picture.rgba[i]);
+                if (!(off <= worst)) worst = off;
+            }
+            fprintf(stderr, "tiles and packets, %s: %.2g\n", test_mesh_kind_name(kind), worst);
+            assert_true(worst < 5e-7);
+            drawn_free(&drawn[0]);
+            drawn_free(&drawn[1]);
+            fixture_free(&f);
+        }
+}
+
 static void max_error_is_kept_on_every_kind(void **state)
 {
     (void)state;
@@ -356,6 +419,8 @@ int main(void)
         cmocka_unit_test(surfaces_cut_segments),
         cmocka_unit_test(orders_on_jittered_hexes),
         cmocka_unit_test(max_error_is_kept_on_every_kind),
+        cmocka_unit_test(random_tets_keep_max_error),
+        cmocka_unit_test(tiles_have_what_packets_have),
         cmocka_unit_test(parts_make_the_whole),
         cmocka_unit_test(overlapping_meshes_are_all_seen),
         cmocka_unit_test(pictures_do_not_depend_on_the_order_of_cells),

@@ -1,0 +1,215 @@
+/* Emission and absorption along a segment by sums over the transfer function's values, where an error may be made
+ * (max_error). Along a segment of length L on which the field goes from v0 to v1, optical depth and emission (as if
+ * nothing absorbed it) are
+ *     D = L (S(v1) - S(v0)) / (v1 - v0),    E = L (K(v1) - K(v0)) / (v1 - v0),
+ * S and K being the integrals of the extinction s and of s times the colour c over the values (Max, Hanrahan and
+ * Crawfis 1990; Engel, Kraus and Ertl 2001): two ends are looked up, and what is between them costs nothing, be it ever
+ * so many knots. Neighbouring segments share an end.
+ *
+ * What the segment itself absorbs of E. Were the colour c its mean E / D throughout, the light would be A E / D, with
+ * A = 1 - exp(-D). What that is too much by is the integral of c (m - exp(-t)) dt over the depth t from 0 to D, m = A /
+ * D. The bracket is negative first and positive then, so that of all c of a range R the one that leaps from the least
+ * to the most where it is zero makes the most of it: R (1 - m + m ln m), which for u = 1 - m is R u^2 (1 / 2 + u / 6 +
+ * u^2 / 12 + ...) <= R U / 2, U = u^2 (1 + u). If c runs in a line over the values, from c0 to c1, it is monotone in t
+ * however the depth is spread, so that the excess is between 0 and (c1 - c0) U / 2: half of that is taken off, and no
+ * more than |c1 - c0| U / 4 is wrong. Of a c that is off that line by no more than b, b U is missed beside that.
+ *
+ * The deviation b from a chord over an interval of width h: a bend of the colour table by k at x in it adds k times at
+ * most (x - low) (high - x) / h, which over bends a distance d apart sums to k (h^2 / (6 d) + h / 4), and at the ends
+ * of the table, beyond which colours are constant, to k h / 4 more.
+ *
+ * The tables. S and K are exact at the borders of bins and linear within: in a bin whose extinction varies by o it is
+ * off by no more than o, and S / w by o / 4, w the bin's width. So the mean over an interval of n bins is off by no
+ * more than the sum of both ends' o times min(1, 1 / (2 n)). K likewise. S and K are whole numbers, whose differences
+ * are exact; their own rounding is in o. The mean is taken as one of positive terms, so that nothing cancels however
+ * close the two ends are.
+ *
+ * The budget (docs/decisions.md). A segment may be wrong by 0.15 max_error A + 0.05 max_error L / reach, both times the
+ * light that gets there: summed over a ray no more than 0.2 max_error. A segment for which that does not suffice is cut
+ * into parts, equal in values; what is wrong of the absorption falls with the square of their number. Where they would
+ * be too many, and where a bin is not fine enough, kernel_integrate() has it. */
+#ifndef RENDER_KERNEL_PREINTEGRAL_H
+#define RENDER_KERNEL_PREINTEGRAL_H
+
+#include "kernel_integral.h"
+
+/* The most parts of a segment. */
+#define KERNEL_PRE_PARTS 32.0f
+
+/* A ray's place in the tables. */
+typedef struct kernel_pre_end {
+    vf value, bin, place; /* place in the bin: beyond 0 and 1 in the first and the last */
+    vf own[4], rough;     /* the bin's own sums: of the extinction, and of the emission */
+    vi before[4], colour; /* those of the bins before it */
+} kernel_pre_end;
+
+/* What a segment or a part of it is. */
+typedef struct kernel_pre_part {
+    vf colour[3], depth, absorbed;
+    vf error, rough, allowed; /* error: of the absorption within; rough: of the tables */
+} kernel_pre_part;
+
+SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_pre_end *e)
+{
+    const vf y = (value - t->low) * t->inverse + 1.0f;
+    const float *entries = (const float *)t->entries;
+    vf colour;
+    e->value = value;
+    e->bin = vf_clamp(vf_floor(y), vf_set(0), vf_set((float)(t->bin_count + 1)));
+    e->place = y - e->bin;
+    const vi index = vi_from_vf(e->bin) * (int)(sizeof *t->entries / sizeof(float));
+    for (int i = 0; i < 4; i++) {
+        vf before;
+        vf_gather_pair(entries + 2 * i, index, &before, &e->own[i]);
+        e->before[i] = vi_from_bits(before);
+    }
+    vf_gather_pair(entries + 8, index, &colour, &e->rough);
+    e->colour = vi_from_bits(colour);
+}
+
+/* 1 - exp(-y), and that over y. Near 0 by its own series, whose first term left out is y^6 / 5040. */
+SIMD_INLINE vf kernel_gone(vf y, vf *share)
+{
+    vf p = y * (-1.0f / 720) + 1.0f / 120;
+    p = p * y - 1.0f / 24;
+    p = p * y + 1.0f / 6;
+    p = p * y - 0.5f;
+    p = p * y + 1.0f;
+    const vm thick = vf_lt(vf_set(0.25f), y);
+    if (!vm_any(thick)) {
+        *share = p;
+        return p * y;
+    }
+    const vf gone = vf_select(thick, 1.0f - kernel_exp(-y), p * y);
+    *share = vf_select(thick, gone / y, p);
+    return gone;
+}
+
+SIMD_INLINE vf kernel_pre_channel(const kernel_preintegral *t, vi colour, int channel)
+{
+    return vf_from_vi(colour >> (10 * channel) & 1023) * t->colour_unit;
+}
+
+/* By how much a channel of the colour is off its chord between two values, at most. */
+SIMD_INLINE vf kernel_pre_bend(const kernel_preintegral *t, vf v0, vf v1)
+{
+    const vf width = vf_abs(v1 - v0), low = vf_min(v0, v1), high = vf_max(v0, v1);
+    const vm outside = vm_or(vf_lt(low, vf_set(0)), vf_lt(vf_set(1), high));
+    const vf bend = width * (width * t->bend_square + t->bend) + t->colour_error;
+    return bend + vf_select(outside, vf_min(width * t->bend_at_ends, vf_set(t->contrast)), vf_set(0));
+}
+
+SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pre_end *a, const kernel_pre_end *b,
+                                    vf length, kernel_pre_part *out)
+{
+    const vf one = vf_set(1), bins = vf_abs(b->bin - a->bin);
+    const vm same = vf_eq(a->bin, b->bin), rising = vf_lt(a->bin, b->bin);
+    const vf of_a = vf_select(same, one, vf_select(rising, one - a->place, a->place));
+    const vf of_b = vf_select(same, one, vf_select(rising, b->place, one - b->place));
+    const vf inverse = one / ((bins - one) + (of_a + of_b)), per_bin = length * inverse;
+    vf sum[4], change = vf_set(0), mean;
+    for (int i = 0; i < 4; i++) {
+        const vf all = vf_abs(vf_from_vi(b->before[i] - a->before[i])), own = vf_select(rising, a->own[i], b->own[i]);
+        sum[i] = ((all - own) + (of_a * a->own[i] + of_b * b->own[i])) * per_bin;
+    }
+    out->depth = sum[0] * t->depth_unit;
+    const vf gone = kernel_gone(0.5f * out->depth, &mean);
+    mean *= 1.0f - 0.5f * gone; /* A / D */
+    const vf lost = 1.0f - mean, square = lost * lost * (1.0f + lost);
+    mean *= t->light_unit;
+    out->absorbed = gone * (2.0f - gone);
+    for (int c = 0; c < 3; c++) {
+        const vf rise = kernel_pre_channel(t, b->colour, c) - kernel_pre_channel(t, a->colour, c);
+        change = vf_max(change, vf_abs(rise));
+        out->colour[c] = sum[1 + c] * mean - (0.25f * rise) * square;
+    }
+    const vf rough = (a->rough + b->rough) * vf_min(one, 0.5f * inverse);
+    out->error = (0.25f * change + kernel_pre_bend(t, a->value, b->value)) * square;
+    out->rough = rough * length;
+    out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
+}
+
+/* The segment in count parts, equal in values: each ray's own count, so that it does not depend on those beside it. */
+static __attribute__((noinline)) void kernel_pre_parts(const kernel_preintegral *t, const kernel_pre_end *from,
+                                                       vf v_out, vf length, vf count, int most, kernel_pre_part *all)
+{
+    const vf zero = vf_set(0), share = 1.0f / count, rise = (v_out - from->value) * share;
+    kernel_pre_end ends[2] = {*from};
+    vf clear = vf_set(1), rough = zero;
+    *all = (kernel_pre_part){{zero, zero, zero}, zero, zero, zero, zero, zero};
+    for (int n = 1; n <= most; n++) {
+        const vf number = vf_set((float)n);
+        const vm inner = vf_lt(number, count), open = vf_le(number, count);
+        kernel_pre_part part;
+        kernel_pre_find(t, vf_select(inner, from->value + rise * number, v_out), &ends[n & 1]);
+        kernel_pre_between(t, &ends[~n & 1], &ends[n & 1], vf_select(open, length * share, zero), &part);
+        for (int c = 0; c < 3; c++) all->colour[c] += clear * part.colour[c];
+        all->depth += part.depth;
+        all->error += clear * part.error;
+        rough += part.rough;
+        clear -= clear * part.absorbed;
+    }
+    all->absorbed = 1.0f - clear;
+    all->rough = all->absorbed * rough;
+}
+
+static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays, vf length, vf v_in,
+                                                             vf v_out, kernel_light *light)
+{
+    kernel_integrate(t, rays, length, v_in, v_out, light);
+}
+
+SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_part *part, const kernel_light *light)
+{
+    kernel_light out;
+    for (int c = 0; c < 3; c++) out.colour[c] = vf_select(m, part->colour[c], light->colour[c]);
+    out.depth = vf_select(m, part->depth, light->depth);
+    out.transmittance = vf_select(m, 1.0f - part->absorbed, light->transmittance);
+    return out;
+}
+
+/* Rays for which one part does not suffice. */
+static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pieces, vm rays,
+                                                        const kernel_pre_end *from, vf length, vf v_out,
+                                                        const kernel_pre_part *whole, kernel_light *light)
+{
+    const vf room = vf_max(whole->allowed - whole->rough, vf_set(1e-30f));
+    const vf wanted = vf_sqrt(vf_min(whole->error / room, vf_set(1e6f))) * 1.1f;
+    const vm few = vm_and(rays, vf_le(wanted, vf_set(KERNEL_PRE_PARTS)));
+    vm left = rays;
+    if (vm_any(few)) {
+        kernel_pre_part parts;
+        const vf count = vf_select(few, 1.0f + vf_floor(wanted), vf_set(1));
+        kernel_pre_parts(pieces->preintegral, from, v_out, length, count, (int)vf_reduce_max(count), &parts);
+        const vm good = vm_and(few, vf_le(parts.error + parts.rough, whole->allowed - whole->rough));
+        *light = kernel_light_select(good, &parts, light);
+        left = vm_andnot(rays, good);
+    }
+    if (!vm_any(left)) return;
+    kernel_light exact = kernel_clear();
+    kernel_integrate_apart(pieces, left, length, from->value, v_out, &exact);
+    const kernel_pre_part part = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]}, .depth = exact.depth};
+    *light = kernel_light_select(left, &part, light);
+    light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
+}
+
+/* What kernel_integrate() gives of the segment alone, within the budget. end: where the rays' last segments ended; then
+ * where this one ends. */
+SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, vf length, vf v_in, vf v_out,
+                                              kernel_pre_end *end)
+{
+    kernel_light light = kernel_clear();
+    kernel_pre_end next;
+    kernel_pre_part part;
+    if (vm_any(vm_andnot(rays, vf_eq(end->value, v_in)))) kernel_pre_find(pieces->preintegral, v_in, end);
+    kernel_pre_find(pieces->preintegral, v_out, &next);
+    kernel_pre_between(pieces->preintegral, end, &next, length, &part);
+    const vm good = vf_le(part.error + part.rough, part.allowed);
+    light = kernel_light_select(good, &part, &light);
+    if (vm_any(vm_andnot(rays, good)))
+        kernel_pre_finely(pieces, vm_andnot(rays, good), end, length, v_out, &part, &light);
+    *end = next;
+    return light;
+}
+
+#endif

@@ -1,0 +1,237 @@
+/* Segments of a volume for a whole tile: one traversal a window, for all the tile's blocks. A cell is fetched and
+ * placed once a window, and goes to the packets of the blocks that it may meet, whose rays keep the segments that begin
+ * in their window (kernel_segments.h), sort them when the window is whole, and integrate them.
+ *
+ * Windows are stretches of depth, such that a ray has most of its room filled: as many cells as possible lie in one
+ * window alone, and the lists of all of a tile's rays stay in the cache. A ray that has more than its room ends its
+ * window before the tile's does, and begins the next one there:
+ *
+ *     ray 0  |--s-s-s--s--s---s--|--s--s-...
+ *     ray 1  |ssssssssssss|ssssss|sssssss...   full: the rest comes in the tile's next window
+ *     ray 2  |--s---s--s--|--x  opaque hit       (which begins where the first of its rays' does)
+ *            ^ tile's window 1   ^ tile's window 2 would be here, and is ray 1's begin
+ *
+ * How deep they are is learnt from window to window and tile to tile; it does not show in the picture. */
+#ifndef RENDER_KERNEL_TILE_SEGMENTS_H
+#define RENDER_KERNEL_TILE_SEGMENTS_H
+
+#include "kernel_segments.h"
+#include "kernel_tile_volume.h"
+
+typedef struct kernel_tile_ray_segments {
+    kernel_segments list;
+    kernel_segment_state state;
+    kernel_blend blend;
+    vf t_last; /* where the ray ends: at what is opaque, or behind all cells */
+    vm active; /* of the packet, whose own is narrowed to the rays that are under way */
+} kernel_tile_ray_segments;
+
+typedef struct kernel_tile_segments {
+    kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
+    kernel_cell cell;
+    kernel_map map;
+    float depth; /* of windows; 0: not known yet */
+} kernel_tile_segments;
+
+/* Of the frame's thread memory. */
+SIMD_INLINE kernel_tile_segments *kernel_tile_segments_of(kernel_tile_trace *t);
+
+/* ---- cells ---- */
+
+/* A tet is one segment, cut by surfaces alone. */
+static __attribute__((noinline)) void kernel_tile_tet_segments(kernel_packet *p, kernel_segment_state *state,
+                                                               const kernel_cell *c)
+{
+    kernel_segments *list = state->list;
+    kernel_interval i;
+    kernel_tet_interval(p, c, p->active, false, &i);
+    const vm cut = vm_and(i.mask, vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out)));
+    if (__builtin_expect(vm_any(cut), 0)) {
+        const kernel_course course = {.interval = &i};
+        kernel_course_run(p, state, &course);
+        return;
+    }
+    const vm mine = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
+    kernel_segments_add(state->pieces, list, vm_and(vm_and(i.mask, mine), vf_lt(i.t_in, i.t_out)), i.t_in, i.t_out,
+                        i.v_in, i.v_out);
+}
+
+static __attribute__((noinline)) void kernel_tile_poly_segments(kernel_packet *p, kernel_segment_state *state,
+                                                                const kernel_cell *c, const kernel_map *map)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    kernel_course course = {.map = map};
+    const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
+    if (intervals && map) course.cost = kernel_course_cost(state, c->f, c->count);
+    for (int k = 0; k < intervals; k++) {
+        course.interval = &list[k];
+        kernel_course_run(p, state, &course);
+    }
+}
+
+/* The farthest of the block's rays' ends of the window. */
+SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kernel_tile_segments *s, int block)
+{
+    vf end = vf_set(-INFINITY);
+    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+        const int i = block * KERNEL_BLOCK_PACKETS + n;
+        end = vf_max(end, vf_select(t->packets[i].active, s->packets[i].list.t_end, vf_set(-INFINITY)));
+    }
+    return vf_reduce_max(end);
+}
+
+/* The cell's segments on the rays of the blocks; c NULL: a polyhedron. */
+SIMD_INLINE void kernel_tile_cell_segments(kernel_tile_trace *t, kernel_tile_segments *s, int part, uint32_t index,
+                                           const kernel_cell *c, unsigned blocks)
+{
+    for (; blocks; blocks &= blocks - 1) {
+        const int block = __builtin_ctz(blocks);
+        bool is_shortened = false;
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            const int i = block * KERNEL_BLOCK_PACKETS + n;
+            kernel_packet *p = &t->packets[i];
+            kernel_segment_state *state = &s->packets[i].state;
+            if (!c)
+                kernel_polyhedron_segments(p, state, part, index, p->active);
+            else if (c->type == GRID_TET)
+                kernel_tile_tet_segments(p, state, c);
+            else
+                kernel_tile_poly_segments(p, state, c, c->is_constant ? NULL : &s->map);
+            is_shortened = is_shortened || state->list->is_shortened;
+            state->list->is_shortened = false;
+        }
+        if (is_shortened) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_window_end(t, s, block);
+    }
+}
+
+static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
+{
+    kernel_tile_segments *s = kernel_tile_segments_of(t);
+    const kernel_transfer *transfer = &t->frame->volumes[0];
+    const grid_field *field = &t->frame->job->volumes[0].field.fields[part];
+    const grid *g = t->frame->job->parts[part].cells;
+    kernel_cell *c = &s->cell;
+    kernel_tile_prefetch(g, field, cells, count);
+    for (int n = 0; n < count; n++) {
+        kernel_cell_fetch(c, g, field, cells[n]);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_tile_cell_segments(t, s, part, cells[n], NULL, blocks);
+            continue;
+        }
+        const unsigned meets = kernel_tile_volume_cell(t, c, &s->map, g, transfer, false, blocks);
+        if (meets) kernel_tile_cell_segments(t, s, part, cells[n], c, meets);
+    }
+}
+
+static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
+                                       unsigned blocks)
+{
+    (void)unused;
+    kernel_tile_volume_trees(t, 0, parts, count, blocks, kernel_tile_segments_leaf);
+}
+
+/* ---- windows ---- */
+
+SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_segments *r, float far)
+{
+    const kernel_frame *f = p->frame;
+    kernel_lanes lanes;
+    kernel_packet_lanes(p, &lanes);
+    kernel_packet_samples(p, &lanes);
+    r->active = p->active;
+    r->blend = kernel_blend_begin();
+    r->t_last = vf_min(p->t_far, vf_set(far));
+    r->list.t_begin = p->t_near;
+    r->list.per_t = f->volumes[0].exponent / p->sample_step;
+    r->list.cuts.row_count = 0;
+    r->state = (kernel_segment_state){&r->list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
+}
+
+/* Where the first of the tile's rays that are under way is; those that are not leave. +inf: none is. */
+SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_segments *s, const int *packets,
+                                             int count)
+{
+    vf front = vf_set(INFINITY);
+    for (int n = 0; n < count; n++) {
+        kernel_packet *p = &t->packets[packets[n]];
+        const kernel_tile_ray_segments *r = &s->packets[packets[n]];
+        p->active =
+            vm_and(p->active, vm_and(vf_lt(r->list.t_begin, r->t_last), vf_lt(vf_set(KERNEL_DARK), r->blend.light)));
+        front = vf_min(front, vf_select(p->active, r->list.t_begin, vf_set(INFINITY)));
+    }
+    return vf_reduce_min(front);
+}
+
+/* The segments that begin before the end. */
+SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_segments *s, unsigned blocks, float end)
+{
+    const render_job *job = t->frame->job;
+    for (int b = 0; b < KERNEL_BLOCKS; b++) {
+        float far = -INFINITY;
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
+            kernel_tile_ray_segments *r = &s->packets[b * KERNEL_BLOCK_PACKETS + n];
+            kernel_segments_begin(&r->list, vf_max(r->list.t_begin, vf_min(r->t_last, vf_set(end))));
+        }
+        if (blocks >> b & 1) far = kernel_block_window_end(t, s, b);
+        t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
+    }
+    if (job->parent) {
+        kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, kernel_tile_segments_parts);
+        return;
+    }
+    for (uint32_t part = 0; part < (uint32_t)job->part_count; part++)
+        kernel_tile_segments_parts(t, 0, &part, 1, blocks);
+}
+
+/* Learn from the window how deep the next one is to be: so that some ray has three quarters of its room filled. */
+SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *packets, int count, float begin,
+                                            float end)
+{
+    int most = KERNEL_WINDOW / 16;
+    vf least = vf_set(end);
+    for (int n = 0; n < count; n++) {
+        const kernel_tile_ray_segments *r = &s->packets[packets[n]];
+        const vm is_full = vf_lt(r->list.t_end, r->t_last);
+        least = vf_min(least, vf_select(is_full, r->list.t_end, least));
+        for (int lane = 0; lane < SIMD_WIDTH; lane++) most = r->list.count[lane] > most ? r->list.count[lane] : most;
+    }
+    s->depth = (vf_reduce_min(least) - begin) * (0.75f * KERNEL_WINDOW) / (float)most;
+}
+
+/* Behind the tile's opaque surfaces, whose hits are in the packets. */
+static void kernel_tile_segments_trace(kernel_tile_trace *t)
+{
+    kernel_tile_segments *s = kernel_tile_segments_of(t);
+    const kernel_lie reach = kernel_tile_reach(t);
+    int packets[KERNEL_TILE_PACKETS], count = 0;
+    for (unsigned left = reach.blocks; left; left &= left - 1) {
+        const int block = __builtin_ctz(left);
+        kernel_block_begin(t, block);
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
+    }
+    for (int n = 0; n < count; n++) {
+        t->packets[packets[n]].is_pencil = false;
+        kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far);
+    }
+    for (;;) {
+        t->t_near = kernel_tile_segments_front(t, s, packets, count);
+        if (!(t->t_near < INFINITY)) break;
+        t->t_near = fmaxf(t->t_near, reach.near);
+        const float end = s->depth > 0 ? t->t_near + s->depth : reach.far;
+        kernel_tile_segments_find(t, s, reach.blocks, end);
+        kernel_tile_segments_learn(s, packets, count, t->t_near, fminf(end, reach.far));
+        for (int n = 0; n < count; n++) {
+            kernel_tile_ray_segments *r = &s->packets[packets[n]];
+            if (vm_any(t->packets[packets[n]].active))
+                kernel_blend_segments(&t->packets[packets[n]], &r->blend, r->state.pieces, &r->list);
+            r->list.t_begin = r->list.t_end;
+        }
+    }
+    for (int n = 0; n < count; n++) {
+        kernel_tile_ray_segments *r = &s->packets[packets[n]];
+        t->packets[packets[n]].active = r->active;
+        kernel_segments_close(&t->packets[packets[n]], &r->blend, r->active);
+    }
+}
+
+#endif

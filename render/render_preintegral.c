@@ -1,0 +1,235 @@
+/* The integrals of a transfer function over its values (kernel_preintegral.h): over each bin in double, piece by piece.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "render_pieces.h"
+
+enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 };
+
+/* The most that all bins' sums may be: differences are taken in 32 bits. */
+static const double most_units = 0x1p30;
+static const double steepest = 1e6; /* kernel_integral.h: KERNEL_OPAQUE */
+static const double absorbed_share = 0.15, length_share = 0.05;
+
+/* How close together the ends of a segment may be goes as the square of a bin's width, over the error. For 1e-2 it is
+ * 160 KB, which a core's second cache holds beside a tile's rays. */
+static int bin_count_for(double max_error)
+{
+    int count = LEAST_BINS;
+    while (count < MOST_BINS && count < 400 / sqrt(max_error)) count *= 2;
+    return count;
+}
+
+/* What a bin is, before units are known. */
+typedef struct bin_sums {
+    double sum[CHANNELS], low, high; /* extinctions */
+    double colour_low[3], colour_high[3];
+} bin_sums;
+
+static double entry_of(const kernel_piece *p, int entry)
+{
+    return (double)p->entry[entry];
+}
+
+static double within(double x, double low, double high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+static double clear_at(const kernel_piece *p, double x)
+{
+    const double along = (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_INVERSE);
+    const double low = entry_of(p, KERNEL_PIECE_CLEAR), high = entry_of(p, KERNEL_PIECE_CLEAR_HIGH);
+    return within(low + along * (high - low), 0, 1);
+}
+
+static double extinction_at(const kernel_piece *p, double x)
+{
+    return fmin(-log(fmax(clear_at(p, x), 1e-300)), steepest);
+}
+
+static double colour_at(const kernel_piece *p, double x, int c)
+{
+    return entry_of(p, KERNEL_PIECE_COLOUR + c) +
+           (x - entry_of(p, KERNEL_PIECE_LOW)) * entry_of(p, KERNEL_PIECE_COLOUR_SLOPE + c);
+}
+
+/* Three Gauss nodes, on halves and halves of halves towards an opacity of 1. */
+static void integrate(const kernel_piece *p, double from, double to, int depth, double sum[CHANNELS])
+{
+    static const double node[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
+    static const double weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+    const double a = clear_at(p, from), b = clear_at(p, to), middle = 0.5 * (from + to);
+    if (depth < 40 && fabs(a - b) > 0.25 * fmax(a, b)) {
+        integrate(p, from, middle, depth + 1, sum);
+        integrate(p, middle, to, depth + 1, sum);
+        return;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double x = from + node[i] * (to - from), s = extinction_at(p, x) * weight[i] * (to - from);
+        sum[0] += s;
+        for (int c = 0; c < 3; c++) sum[1 + c] += s * colour_at(p, x, c);
+    }
+}
+
+static void widen(bin_sums *bin, const kernel_piece *p, double x)
+{
+    const double extinction = extinction_at(p, x);
+    bin->low = fmin(bin->low, extinction);
+    bin->high = fmax(bin->high, extinction);
+    for (int c = 0; c < 3; c++) {
+        bin->colour_low[c] = fmin(bin->colour_low[c], colour_at(p, x, c));
+        bin->colour_high[c] = fmax(bin->colour_high[c], colour_at(p, x, c));
+    }
+}
+
+/* From begin to end; first: the piece that holds begin. Returns the one that holds the end. */
+static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, bin_sums *bin)
+{
+    *bin = (bin_sums){.low = INFINITY,
+                      .high = -INFINITY,
+                      .colour_low = {INFINITY, INFINITY, INFINITY},
+                      .colour_high = {-INFINITY, -INFINITY, -INFINITY}};
+    for (int i = first;; i++) {
+        const kernel_piece *p = &pieces->pieces[i];
+        const double from = fmax(begin, entry_of(p, KERNEL_PIECE_LOW)), to = fmin(end, entry_of(p, KERNEL_PIECE_HIGH));
+        if (from < to) {
+            integrate(p, from, to, 0, bin->sum);
+            widen(bin, p, from);
+            widen(bin, p, to);
+        }
+        if (i + 1 == pieces->count || entry_of(p, KERNEL_PIECE_HIGH) >= end) return i;
+    }
+}
+
+/* Before and behind all knots the function is constant; a width of it stands for what is endless. */
+static void fill_bins(const kernel_pieces *pieces, double low, double width, int count, bin_sums *bins)
+{
+    int piece = 0;
+    for (int i = 0; i < count + 2; i++)
+        piece = fill_bin(pieces, piece, low + (i - 1) * width, low + i * width, &bins[i]);
+    /* The border's rounding must not bring in a neighbour. */
+    for (int end = 0; end < 2; end++) {
+        const kernel_piece *p = &pieces->pieces[end ? pieces->count - 1 : 0];
+        const double x = end ? low + (count + 0.5) * width : low - 0.5 * width;
+        bin_sums *bin = &bins[end ? count + 1 : 0];
+        memset(bin->sum, 0, sizeof bin->sum);
+        integrate(p, x - 0.5 * width, x + 0.5 * width, 0, bin->sum);
+        bin->low = bin->high = extinction_at(p, x);
+        for (int c = 0; c < 3; c++) bin->colour_low[c] = bin->colour_high[c] = colour_at(p, x, c);
+    }
+}
+
+static int32_t pack_colour(const bin_sums *bin, double contrast)
+{
+    int32_t packed = 0;
+    for (int c = 0; c < 3; c++) {
+        const double middle = 0.5 * (bin->colour_low[c] + bin->colour_high[c]) / contrast;
+        packed |= (int32_t)(within(middle, 0, 1) * COLOUR_LEVELS + 0.5) << (10 * c);
+    }
+    return packed;
+}
+
+/* Of the widest of three channels. */
+static double colour_change(const bin_sums *bin)
+{
+    double change = 0;
+    for (int c = 0; c < 3; c++) change = fmax(change, bin->colour_high[c] - bin->colour_low[c]);
+    return change;
+}
+
+/* Sums in units; returns by how much the colour of a bin differs from that of its middle. */
+static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double width, double contrast)
+{
+    double total[2] = {0, 0}, before[CHANNELS] = {0}, change = 0;
+    for (int i = 0; i < out->bin_count + 2; i++) {
+        total[0] += bins[i].sum[0];
+        total[1] += fmax(bins[i].sum[1], fmax(bins[i].sum[2], bins[i].sum[3]));
+    }
+    const double units[2] = {fmax(total[0], 1e-30) / most_units, fmax(total[1], 1e-30) / most_units};
+    for (int i = 0; i < out->bin_count + 2; i++) {
+        const bin_sums *bin = &bins[i];
+        kernel_pre_entry *e = &out->entries[i];
+        for (int n = 0; n < CHANNELS; n++) {
+            const int32_t begin = (int32_t)(before[n] / units[n > 0]);
+            before[n] += bin->sum[n];
+            e->sums[n].before = begin;
+            e->sums[n].own = (float)((int32_t)(before[n] / units[n > 0]) - begin);
+        }
+        e->colour = pack_colour(bin, contrast);
+        const double rounding = 2 * (units[0] * contrast + units[1]) / width; /* what is nothing has none */
+        e->rough = (float)fmin((bin->high - bin->low) * 2 * contrast + bin->high * colour_change(bin) +
+                                   (bin->high > 0 ? rounding : 0),
+                               1e30);
+        change = fmax(change, colour_change(bin));
+    }
+    out->depth_unit = (float)(units[0] / width);
+    out->light_unit = (float)(units[1] / width);
+    return 0.5 * change;
+}
+
+/* Where the table's colours bend, and by how much. */
+static void fill_bends(kernel_preintegral *out, const render_transfer *t)
+{
+    const int last = t->colour_count - 1;
+    double inner = 0, ends = 0;
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < last; i++) {
+            const double slope = ((double)t->colours[3 * i + 3 + c] - (double)t->colours[3 * i + c]) * last;
+            if (i == 0 || i == last - 1) ends = fmax(ends, fabs(slope));
+            if (i == last - 1) continue;
+            const double next = ((double)t->colours[3 * i + 6 + c] - (double)t->colours[3 * i + 3 + c]) * last;
+            inner = fmax(inner, fabs(next - slope));
+        }
+    out->bend_square = (float)(inner * last / 6);
+    out->bend = (float)(inner / 4);
+    out->bend_at_ends = (float)(ends / 2);
+}
+
+static bool has_negative_colours(const render_transfer *t)
+{
+    for (int i = 0; i < 3 * t->colour_count; i++)
+        if (t->colours[i] < 0) return true;
+    return false;
+}
+
+static void fill(kernel_preintegral *out, const kernel_pieces *exact, const render_transfer *t, double max_error,
+                 double reach, bin_sums *bins)
+{
+    const double contrast = (double)exact->contrast, range = KERNEL_PIECE_BINS / (double)exact->bin_inverse;
+    const double low = (double)exact->bin_low, width = range / out->bin_count;
+    out->low = (float)low;
+    out->inverse = (float)(1 / width);
+    fill_bins(exact, low, width, out->bin_count, bins);
+    const double change = fill_entries(out, bins, width, contrast);
+    fill_bends(out, t);
+    out->contrast = (float)contrast;
+    out->colour_unit = (float)(contrast / COLOUR_LEVELS);
+    out->colour_error = (float)(change + contrast / COLOUR_LEVELS);
+    out->allowed_absorbed = (float)(absorbed_share * max_error);
+    out->allowed_length = (float)(length_share * max_error / reach);
+}
+
+insitu_status render_preintegral_build(kernel_pieces *pieces, const render_transfer *t, double max_error, double reach,
+                                       base_error *error)
+{
+    kernel_pieces exact;
+    if (has_negative_colours(t)) return INSITU_OK;
+    const insitu_status status = render_pieces_build(&exact, t, 0, error);
+    if (status != INSITU_OK) return status;
+    const int count = bin_count_for(max_error);
+    bin_sums *bins = base_calloc((size_t)count + 2, sizeof *bins);
+    pieces->preintegral = base_calloc(1, sizeof *pieces->preintegral);
+    if (pieces->preintegral) {
+        pieces->preintegral->bin_count = count;
+        pieces->preintegral->entries = base_calloc((size_t)count + 2, sizeof *pieces->preintegral->entries);
+    }
+    const bool has_room = bins && pieces->preintegral && pieces->preintegral->entries;
+    if (has_room) fill(pieces->preintegral, &exact, t, max_error, reach, bins);
+    base_free(bins);
+    render_pieces_free(&exact);
+    if (has_room) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the sums of a transfer function");
+}
