@@ -53,8 +53,7 @@ function exact(m,    i, count) {
 
 # A row that another row of the same picture stands for.
 function is_repeated(m, i) {
-    return method[m, i] == "sample group" || (method[m, i] == "frames" && setting[m, i] == "1") ||
-        (method[m, i] == "max_error" && exact(m))
+    return method[m, i] == "sample group" || (method[m, i] == "frames" && setting[m, i] == "1")
 }
 
 # The cheapest of our volume rows that is off by no more than these; 0 where there is none.
@@ -80,7 +79,8 @@ function heading(    i) {
     print "Drawn by `bench/run accuracy` from bench/results/accuracy-*.csv; do not edit."
     print note
     print "- **Isosurfaces:** leave `roots: robust`. It is the only setting that misses nothing, and is exact to rounding."
-    print "- **Volumes of tets or polyhedra:** `max_error: 1e-2`, whose errors are far below that; `method: segments` where it must be exact to rounding."
+    print "- **Volumes of tets or polyhedra:** `max_error: 1e-2`, which errors stay well below; `method: segments` where it must be"
+    print "  exact to rounding."
     print "- **Volumes of hexes, wedges, pyramids:** `max_error`: 1e-2 for pictures on a screen, 1e-3 where pictures are compared,"
     print "  1e-4 where numbers are taken from them. It is a bound that is kept without knowing the data, with much to spare; a step"
     print "  that has been tried out on them is cheaper for the same error, as the first table shows."

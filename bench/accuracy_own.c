@@ -205,7 +205,7 @@ static void frame_rows(studio *s)
 
 static void max_error_rows(studio *s)
 {
-    for (int digits = 2; digits <= 4; digits++) {
+    for (int digits = 1; digits <= 4; digits++) {
         accuracy_row row = {.layer = "volume", .method = "max_error"};
         s->scene.job.max_error = pow(10, -digits);
         snprintf(row.setting, sizeof row.setting, "1e-%d", digits);
