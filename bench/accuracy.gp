@@ -52,7 +52,7 @@ if (layer eq "volume") {
              keyentry with linespoints lc rgb "#1f5fbf" pt 7 ps 0.9 lw 1.5 title "samples, 4 to 1/16 cell", \
              keyentry with linespoints lc rgb "#7fb2e5" pt 6 ps 0.8 lw 1.2 title "samples a cell apart, 1, 2, 4 ... frames", \
              keyentry with linespoints lc rgb "#117733" pt 5 ps 0.9 lw 1.5 title "segments, 4 to 1/8 cell", \
-             keyentry with linespoints lc rgb "#44aa66" pt 9 ps 1.2 lw 1.2 dt 3 title "max\\_error 1e-2, 1e-3, 1e-4", \
+             keyentry with linespoints lc rgb "#44aa66" pt 9 ps 1.2 lw 1.2 dt 3 title "max\\_error 1e-1 to 1e-4", \
              keyentry with points lc rgb "#cc3311" pt 13 ps 1.7 title "VTK ray cast, partial pre-integration", \
              keyentry with points lc rgb "#cc3311" pt 12 ps 1.9 lw 1.5 title "VTK ray cast, linear integrator", \
              keyentry with points lc rgb "#aa4499" pt 15 ps 1.6 title "VTK Z-sweep", \
