@@ -1,7 +1,8 @@
-/* Adaptive integration. The ray is cut wherever a cell begins or ends; between cuts all cells that are there, of all
- * volume layers, emit and absorb together: extinctions add, and so does what is emitted. An interval is integrated by
- * Simpson's rule whole and in halves; where the two differ by more than the tolerance each half is taken in turn. Kinks
- * and steps of the transfer function are not known here: they are found by halving. */
+/* Adaptive integration. The ray is cut wherever a cell begins or ends, and where a polyhedron's profile bends: a peak
+ * there may be all of it that shows, and so narrow that no sample would meet it. Between cuts all cells that are there,
+ * of all volume layers, emit and absorb together: extinctions add, and so does what is emitted. An interval is
+ * integrated by Simpson's rule whole and in halves; where the two differ by more than the tolerance each half is taken
+ * in turn. Kinks and steps of the transfer function are not known here: they are found by halving. */
 #include "reference_integral.h"
 
 #include "reference_base.h"
@@ -238,14 +239,31 @@ static int compare_numbers(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Where something begins or ends, sorted. */
-static double *find_cuts(const stretch *list, int64_t count, const reference_hit *hits, int hit_count, int64_t *cuts)
+/* Where the stretch begins, bends and ends; returns how many. */
+static int stretch_cuts(const stretch *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
 {
-    double *z = reference_reserve(NULL, (size_t)(2 * count + hit_count) * sizeof *z);
+    z[0] = s->z_in;
+    z[1] = s->z_out;
+    if (s->cell->cell.type != GRID_POLYHEDRON) return 2;
+    double breaks[REFERENCE_MAX_BREAKS];
+    const int count = reference_profile_breaks(&s->cell->cell, line, s->ends, breaks);
+    int cuts = 2;
+    for (int i = 1; i + 1 < count; i++)
+        if (breaks[i] > s->z_in) z[cuts++] = breaks[i];
+    return cuts;
+}
+
+/* Where something begins, bends or ends, sorted. */
+static double *find_cuts(const stretch *list, int64_t count, const reference_line *line, const reference_hit *hits,
+                         int hit_count, int64_t *cuts)
+{
+    double *z = reference_reserve(NULL, (size_t)(hit_count + 1) * sizeof *z);
     *cuts = 0;
     for (int64_t i = 0; i < count; i++) {
-        z[(*cuts)++] = list[i].z_in;
-        z[(*cuts)++] = list[i].z_out;
+        double own[REFERENCE_MAX_BREAKS];
+        const int more = stretch_cuts(&list[i], line, own);
+        z = reference_reserve(z, (size_t)(*cuts + more + hit_count) * sizeof *z);
+        for (int k = 0; k < more; k++) z[(*cuts)++] = own[k];
     }
     for (int i = 0; i < hit_count; i++) z[(*cuts)++] = hits[i].depth;
     if (*cuts) qsort(z, (size_t)*cuts, sizeof *z, compare_numbers);
@@ -267,7 +285,7 @@ void reference_integral_trace(const reference_integral *scene, int x, int y, con
     int64_t count, cuts;
     int next = 0;
     stretch *list = collect(scene, &c.line, &count);
-    double *z = find_cuts(list, count, hits, hit_count, &cuts);
+    double *z = find_cuts(list, count, &c.line, hits, hit_count, &cuts);
     c.active = reference_reserve(NULL, (size_t)count * sizeof *c.active);
     for (int64_t i = 0; i < cuts && sum.transmittance > 0; i++) {
         for (; next < hit_count && hits[next].depth <= z[i]; next++) blend_hit(&sum, &hits[next]);

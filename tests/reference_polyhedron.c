@@ -26,13 +26,15 @@ static double determinant(const double *a, const double *b, const double *c)
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* 1 where the faces run along a common edge in opposite directions, -1 where in the same, 0 without one. */
+/* 1 where the faces run along a common edge in opposite directions, -1 where in the same, 0 without one. From a vertex
+ * to itself there is no direction: a collapsed face has such sides in common with its neighbours, which say nothing. */
 static int agreement(const reference_polyhedron *p, int one, int other)
 {
     for (int i = 0; i < p->face_size[one]; i++)
         for (int k = 0; k < p->face_size[other]; k++) {
             const int a = p->faces[one][i], b = p->faces[one][(i + 1) % p->face_size[one]];
             const int c = p->faces[other][k], d = p->faces[other][(k + 1) % p->face_size[other]];
+            if (a == b) continue;
             if (a == d && b == c) return 1;
             if (a == c && b == d) return -1;
         }

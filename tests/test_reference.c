@@ -177,6 +177,50 @@ static void linear_field_is_exact_in_every_cell(void **state)
     }
 }
 
+/* A prism of which one base is a single vertex, given with all its faces: a hexagon of one vertex, quads of three, each
+ * of them turned as the bits of turns say. */
+static void load_collapsed_prism(unsigned turns, reference_cell *cell, double values[REFERENCE_MAX_VERTICES])
+{
+    reference_polyhedron *p = &cell->poly;
+    cell->type = GRID_POLYHEDRON;
+    cell->count = 7;
+    p->face_count = 8;
+    p->face_size[0] = p->face_size[1] = 6;
+    for (int i = 0; i < 6; i++) {
+        const double angle = acos(-1) / 3 * i;
+        const double corner[3] = {cos(angle), sin(angle), 1};
+        memcpy(cell->position[i + 1], corner, sizeof corner);
+        p->faces[0][i] = 0;
+        p->faces[1][i] = i + 1;
+        const int left = i + 1, right = (i + 1) % 6 + 1, is_turned = turns >> i & 1;
+        p->face_size[i + 2] = 4;
+        p->faces[i + 2][0] = p->faces[i + 2][1] = 0;
+        p->faces[i + 2][2] = is_turned ? right : left;
+        p->faces[i + 2][3] = is_turned ? left : right;
+    }
+    memset(cell->position[0], 0, sizeof cell->position[0]);
+    memcpy(cell->world, cell->position, sizeof cell->world);
+    for (int i = 0; i < cell->count; i++) values[i] = test_linear(cell->position[i]);
+    reference_polyhedron_setup(cell);
+}
+
+/* A side from a vertex to itself has no direction by which to turn its faces alike. */
+static void collapsed_prisms_are_pyramids(void **state)
+{
+    (void)state;
+    for (unsigned turns = 0; turns < 64; turns++) {
+        reference_cell cell;
+        double values[REFERENCE_MAX_VERTICES];
+        load_collapsed_prism(turns, &cell, values);
+        for (uint64_t i = 0; i < 100; i++) {
+            double point[3], value;
+            inner_point(&cell, i, point);
+            assert_true(reference_interpolate(&cell, point, values, &value, NULL));
+            assert_true(fabs(value - test_linear(point)) < 1e-12);
+        }
+    }
+}
+
 static double cubic(const double p[3])
 {
     return p[0] * p[1] * p[2] + p[0] * p[1] - 2 * p[2] * p[0] + p[1];
@@ -403,6 +447,7 @@ int main(void)
         cmocka_unit_test(crossings_of_every_shape_are_even),
         cmocka_unit_test(intervals_of_lattices_tile_the_ray),
         cmocka_unit_test(linear_field_is_exact_in_every_cell),
+        cmocka_unit_test(collapsed_prisms_are_pyramids),
         cmocka_unit_test(trilinear_field_is_exact_in_a_box),
         cmocka_unit_test(gradient_agrees_with_differences),
         cmocka_unit_test(face_values_join_the_interior),
