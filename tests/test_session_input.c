@@ -333,13 +333,104 @@ static void bad_cell_of_a_mesh_of_one_type_is_named(void **context)
     everywhere(hand_over(session, &input) == INSITU_OK);
 }
 
+/* ---- cells of no volume -------------------------------------------------------------------------------------- */
+
+/* A cell is the affine image of its type's corners. Points, lines and repeated faces have a volume of 0 to the bit;
+ * what oblique ones have is rounding. */
+typedef enum flatness { GOOD, SLIVER, OBLIQUE, REPEATED_FACE, LINE, POINT, FLATNESS_COUNT } flatness;
+
+/* TILTED: the first cells, none of whose volumes is 0 by design: beside such a one, cells are not looked at several at
+ * once. */
+enum { FLAT_TYPES = 4, TILTED = 240, FLAT_CELLS = TILTED + 64, FLAT_CORNERS = 8 * FLAT_CELLS };
+
+static const insitu_cell_type flat_types[FLAT_TYPES] = {INSITU_TET, INSITU_HEX, INSITU_WEDGE, INSITU_PYRAMID};
+static const int flat_corner_count[FLAT_TYPES] = {4, 8, 6, 5};
+static const signed char flat_corners[FLAT_TYPES][8][3] = {
+    {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+    {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
+    {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
+    {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}},
+};
+
+static flatness flatness_of(int cell)
+{
+    return (flatness)(cell < TILTED ? cell % (OBLIQUE + 1) : cell % FLATNESS_COUNT);
+}
+
+/* Coordinates along x and y are multiples of 2^-40, along z of 2^-16, which a float has: sums are exact, and what is to
+ * be flat is so to the bit. */
+static double flat_coordinate(int type, int cell, int corner, int axis)
+{
+    const flatness how = flatness_of(cell);
+    const double unit = axis == 2 ? 0x1p-16 : 0x1p-40;
+    double v[4];
+    for (int i = 0; i < 4; i++)
+        v[i] = unit * floor((2 * test_uniform((uint64_t)(16 * cell + 4 * axis + i), 31) - 1) / unit);
+    if (how == SLIVER) v[3] = v[1] - v[2] + 0x1p-16 * floor(8 * v[3]); /* 1e-4 thin */
+    if (how == OBLIQUE) v[3] = v[1] - v[2];
+    if (how == REPEATED_FACE) v[3] = 0;
+    if (how == LINE) v[2] = v[3] = v[1];
+    if (how == POINT) v[1] = v[2] = v[3] = 0;
+    const signed char *at = flat_corners[type][corner];
+    return v[0] + at[0] * v[1] + at[1] * v[2] + at[2] * v[3];
+}
+
+/* Cells of one type are looked at several at once, with types one by one, of mixed coordinates in another way again;
+ * and the first eight alone, whose volumes are small, but not 0. */
+static void flat_cells_are_counted(void **context)
+{
+    (void)context;
+    static double xyz[FLAT_CORNERS][3], values[FLAT_CORNERS];
+    static float narrow_z[FLAT_CORNERS];
+    static int32_t indices[FLAT_CORNERS], offsets[FLAT_CELLS + 1];
+    static unsigned char types[FLAT_CELLS];
+    for (int type = 0; type < FLAT_TYPES; type++) {
+        const int corners = flat_corner_count[type], count = corners * FLAT_CELLS;
+        for (int i = 0; i < count; i++) {
+            for (int axis = 0; axis < 3; axis++) xyz[i][axis] = flat_coordinate(type, i / corners, i % corners, axis);
+            narrow_z[i] = (float)xyz[i][2];
+            indices[i] = i;
+        }
+        for (int i = 0; i <= FLAT_CELLS; i++) offsets[i] = corners * i;
+        memset(types, (int)flat_types[type], sizeof types);
+        for (int layout = 0; layout < 4; layout++) {
+            session_input flat = input;
+            const int cells = layout == 3 ? 8 : FLAT_CELLS;
+            int64_t expected = 0;
+            for (int cell = 0; cell < cells; cell++) expected += flatness_of(cell) >= OBLIQUE;
+            insitu_mesh_defaults(&flat.mesh);
+            flat.mesh.vertex_count = flat.field.count = count;
+            flat.mesh.cell_count = cells;
+            flat.mesh.connectivity_count = cells * corners;
+            flat.mesh.cell_type = flat_types[type];
+            flat.mesh.connectivity = (insitu_array){indices, INSITU_INT32, 0};
+            insitu_mesh_interleaved(&flat.mesh, xyz, INSITU_FLOAT64);
+            if (layout == 1) flat.mesh.cell_types = (insitu_array){types, INSITU_UINT8, 0};
+            if (layout == 1) flat.mesh.offsets = (insitu_array){offsets, INSITU_INT32, 0};
+            if (layout == 2) flat.mesh.coordinates[2] = (insitu_array){narrow_z, INSITU_FLOAT32, 0};
+            flat.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
+            everywhere(hand_over(session, &flat) == INSITU_OK);
+            step_is_good(session, 40 + 4 * type + layout);
+            everywhere(insitu_last_report(session)->cells_flat == expected);
+        }
+    }
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(session, 60);
+    everywhere(insitu_last_report(session)->cells_flat == 0);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spoilt_input_is_told_to_all),        cmocka_unit_test(call_without_a_mesh_is_told_once),
-        cmocka_unit_test(field_missing_on_one_rank_names_it), cmocka_unit_test(field_of_two_centrings_is_refused),
-        cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine), cmocka_unit_test(value_that_is_not_finite_is_counted),
-        cmocka_unit_test(inverse_maps_that_fail_are_counted), cmocka_unit_test(bad_cell_of_a_mesh_of_one_type_is_named),
+        cmocka_unit_test(spoilt_input_is_told_to_all),
+        cmocka_unit_test(call_without_a_mesh_is_told_once),
+        cmocka_unit_test(field_missing_on_one_rank_names_it),
+        cmocka_unit_test(field_of_two_centrings_is_refused),
+        cmocka_unit_test(nan_where_no_drawn_cell_is_is_fine),
+        cmocka_unit_test(value_that_is_not_finite_is_counted),
+        cmocka_unit_test(inverse_maps_that_fail_are_counted),
+        cmocka_unit_test(bad_cell_of_a_mesh_of_one_type_is_named),
+        cmocka_unit_test(flat_cells_are_counted),
     };
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     input_create(&input, TEST_HEXES, 4, TEST_RANDOM, own_rank, rank_count);

@@ -73,7 +73,7 @@ typedef struct session_mesh {
     bool is_topology_stale;    /* the tree is of other cells */
     bool is_geometry_stale;    /* the tree is of other coordinates */
     double lower[3], upper[3]; /* of the drawn cells; lower > upper: there are none */
-    int64_t drawn_count, ghost_count, inverted_count;
+    int64_t drawn_count, ghost_count, inverted_count, flat_count;
     double size_sum; /* of drawn cells: cube roots of volumes */
 
     bool is_needed; /* by an image of this step */

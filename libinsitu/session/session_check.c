@@ -198,6 +198,7 @@ insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *er
     mesh->drawn_count = tally.drawn;
     mesh->ghost_count = tally.ghosts;
     mesh->inverted_count = tally.inverted;
+    mesh->flat_count = tally.flat;
     mesh->size_sum = tally.sizes;
     mesh->is_check_stale = false;
     return INSITU_OK;

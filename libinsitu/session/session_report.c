@@ -118,6 +118,7 @@ static void report_mesh(insitu_session *session, const session_mesh *mesh)
     if (!mesh->is_check_stale) {
         report->cells_ghost += mesh->ghost_count;
         report->cells_inverted += mesh->inverted_count;
+        report->cells_flat += mesh->flat_count;
     }
     if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
     for (int i = 0; i < mesh->field_count; i++) report_field(session, mesh, i);

@@ -6,7 +6,7 @@
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
-    int64_t drawn, ghosts, inverted;
+    int64_t drawn, ghosts, inverted, flat;
     double sizes; /* sum of cube roots of volumes */
 } mesh_tally;
 

@@ -126,6 +126,8 @@ typedef struct insitu_report {
     int64_t cells_ghost;    /* not drawn: flagged as ghosts */
     int64_t cells_unusable; /* not drawn: a field value that is not finite */
     int64_t cells_inverted; /* drawn right all the same: left-handed, by the sign of the corner volumes' sum */
+    int64_t cells_flat;     /* of no volume, and so not seen: the corner volumes' sum is nothing beside the cell's box (at
+                               most 1.4e-14 of it, which is rounding). Polyhedra are not looked at. */
     int64_t rays;           /* primary rays traced */
     int64_t fragments;      /* sent to pixel owners, own ones included */
     int64_t map_failures;   /* inverse maps that did not converge and fell back to linear interpolation */
