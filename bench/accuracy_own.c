@@ -231,6 +231,6 @@ void accuracy_volume_rows(const accuracy_context *context)
     s.scene.job.integration = RENDER_SEGMENTS;
     /* Linear cells are one segment whatever the step. */
     step_rows(&s, "segments", is_linear || is_brief ? 1 : 4, is_linear || is_brief ? 1 : 1.0 / 8);
-    if (!is_brief) max_error_rows(&s);
+    max_error_rows(&s);
     close_studio(&s);
 }

@@ -12,7 +12,7 @@ typedef struct accuracy_effort {
     int frames;       /* accumulated at most */
     int resolution;   /* of the finest image that VTK samples */
     int peer_seconds; /* after which a peer is stopped */
-    bool is_brief;    /* only the exact setting, and no peer that takes minutes for such a picture */
+    bool is_brief;    /* only segments and max_error, and no peer that takes minutes for such a picture */
 } accuracy_effort;
 
 typedef struct accuracy_context {

@@ -133,12 +133,14 @@ static void measure_steps(bench_scene *scene, int runs)
     }
 }
 
-/* The frame alone, and its error. */
-static void measure_frames(bench_scene *scene, const char *name, render_integration integration, int runs)
+/* The frame alone, and its error. max_error: 0 for none. */
+static void measure_frames(bench_scene *scene, const char *name, render_integration integration, double max_error,
+                           int runs)
 {
     bench_series frames = {0};
     char measure[64];
     scene->job.integration = integration;
+    scene->job.max_error = max_error;
     for (int number = 0; number <= runs; number++) {
         const double began = bench_begin();
         bench_scene_frame(scene);
@@ -160,8 +162,10 @@ static void measure(const bench_command *command, test_mesh_kind kind, int n)
     bench_scene_show_volume(&scene);
     if (bench_vtk_is_there() && kind == TEST_TETS) measure_peers(&scene, kind, runs);
     measure_steps(&scene, runs);
-    measure_frames(&scene, "samples", RENDER_SAMPLES, runs);
-    measure_frames(&scene, "segments", RENDER_SEGMENTS, runs);
+    measure_frames(&scene, "samples", RENDER_SAMPLES, 0, runs);
+    measure_frames(&scene, "max_error 1e-1", RENDER_SEGMENTS, 1e-1, runs);
+    measure_frames(&scene, "max_error 1e-3", RENDER_SEGMENTS, 1e-3, runs);
+    measure_frames(&scene, "segments", RENDER_SEGMENTS, 0, runs);
     bench_scene_free(&scene);
 }
 
