@@ -4,12 +4,13 @@
  * is F(r*(u)). On a piece of the curve from a to b take the chord c(u) = a + u (b - a). F(c(u)) is a cubic (F is
  * trilinear), of which we know both ends and both end slopes, so its four Bernstein coefficients, which bound it. How
  * far is the curve from the chord? Let Y = J0^-1 X with J0 the Jacobian at the cell's centre: Y(r) = r + N(r) + const,
- * N's derivative at most theta (found at the corners of the cell's domain: a norm is convex along each axis). So |r1 -
- * r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) less the line between its
- * ends: again a cubic with known coefficients 0, e1, e2, 0, hence |c - r*| <= dev = L 3/4 max(|e1|, |e2|), |F(c) -
- * F(r*)| <= G dev, |c' - r*'| <= L (K dev |b - a| + |e'|) = dev',    |F(c)' - F(r*)'| <= H dev (|b - a| + dev') + G
- * dev', with G, H, K bounds of F's gradient, F's Hessian and N's. dev falls by four when a piece is halved, and is 0
- * where the map is affine: there F(c(u)) is the field itself.
+ * N's derivative at most theta (found at the corners of the cell's domain: a norm is convex along each axis).
+ * So |r1 - r2| <= L |Y(r1) - Y(r2)|, L = 1 / (1 - theta). And Y(c(u)) - Y(r*(u)) = e(u) is N(c(u)) less the line
+ * between its ends: again a cubic with known coefficients 0, e1, e2, 0, hence
+ *     |c - r*| <= dev = L 3/4 max(|e1|, |e2|),          |F(c) - F(r*)| <= G dev,
+ *     |c' - r*'| <= L (K dev |b - a| + |e'|) = dev',    |F(c)' - F(r*)'| <= H dev (|b - a| + dev') + G dev',
+ * with G, H, K bounds of F's gradient, F's Hessian and N's. dev falls by four when a piece is halved, and is 0 where
+ * the map is affine: there F(c(u)) is the field itself.
  *
  * A piece whose coefficients are all farther from 0 than G dev has no root; one whose derivative's coefficients are
  * all of one sign and farther from 0 than their bound has one root where the ends' signs differ, else none; any other
