@@ -417,6 +417,17 @@ kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf 
     return kernel_tet_choose(hit[0], hit[1], hit[2], hit[3], &sums[0], &sums[1], &sums[2], &sums[3]);
 }
 
+/* Which rays cross which of the faces, in kernel_tet_face's order. */
+SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, vm rays, vm hit[4])
+{
+    vf e[KERNEL_TET_EDGES];
+    kernel_tet_edges(p, c, e);
+    for (int n = 0; n < 4; n++) {
+        const signed char *f = kernel_tet_face[n];
+        hit[n] = kernel_inside(rays, e[f[3]], e[f[4]], e[f[5]]);
+    }
+}
+
 /* Without branches: all four faces' sums, of which each ray takes its first and its last crossed face's. */
 SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
                                      kernel_interval *out)

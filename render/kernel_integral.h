@@ -81,6 +81,17 @@ SIMD_INLINE kernel_light kernel_clear(void)
     return (kernel_light){{vf_set(0), vf_set(0), vf_set(0)}, vf_set(0), vf_set(1)};
 }
 
+/* A segment: its length in unit distances, and the values at its ends in the transfer's domain. Each is v + rest, where
+ * rest is what v lost to its rounding, as far as that is known: a step or a pole of the function magnifies it. */
+typedef struct kernel_run {
+    vf length, v_in, v_out, rest_in, rest_out;
+} kernel_run;
+
+SIMD_INLINE kernel_run kernel_run_of(vf length, vf v_in, vf v_out)
+{
+    return (kernel_run){length, v_in, v_out, vf_set(0), vf_set(0)};
+}
+
 /* Pieces that rays are in: most often one for all, which saves the gathers. */
 typedef struct kernel_piece_place {
     vi at;
@@ -124,7 +135,7 @@ typedef struct kernel_way {
     vf todo;         /* how far the value goes on in the piece */
     vf left;         /* the same in unit distances */
     vf shortest;     /* no step need be shorter, in unit distances */
-    vf edge;         /* the end ahead */
+    vf edge, rest;   /* the end ahead; at first where the segment begins, and what that lost to rounding */
     vm is_last;      /* the segment ends before it */
 } kernel_way;
 
@@ -132,24 +143,26 @@ typedef struct kernel_way {
 typedef struct kernel_leg {
     vm falling, level;
     vf turn; /* 1 or -1 */
-    vf v_out, length, per_value;
+    vf v_out, rest_out, length, per_value;
 } kernel_leg;
 
-SIMD_INLINE kernel_leg kernel_leg_of(vf length, vf v_in, vf v_out)
+SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
 {
-    const vf one = vf_set(1), rise = v_out - v_in, change = vf_abs(rise);
-    kernel_leg out = {.v_out = v_out, .length = length};
+    const vf one = vf_set(1), rise = (run->v_out - run->v_in) + (run->rest_out - run->rest_in), change = vf_abs(rise);
+    kernel_leg out = {.v_out = run->v_out, .rest_out = run->rest_out, .length = run->length};
     out.falling = vf_lt(rise, vf_set(0));
     out.level = vf_lt(change, vf_set(KERNEL_TINY));
     out.turn = vf_select(out.falling, -one, one);
-    out.per_value = length / vf_select(out.level, one, change);
+    out.per_value = run->length / vf_select(out.level, one, change);
     return out;
 }
 
-/* Rays of fresh enter their piece with value v. */
-SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, vf low, vf high, vf v)
+/* Rays of fresh enter their piece where they are. */
+SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, vf low, vf high)
 {
-    const vf below = v - low, above = high - v, ahead = vf_abs(leg->v_out - v);
+    const vf v = way->edge, zero = vf_set(0);
+    const vf below = vf_max((v - low) + way->rest, zero), above = vf_max((high - v) - way->rest, zero);
+    const vf ahead = vf_abs((leg->v_out - v) + (leg->rest_out - way->rest));
     const vf most = vf_select(leg->falling, below, above), todo = vf_min(most, ahead);
     way->below = vf_select(fresh, below, way->below);
     way->above = vf_select(fresh, above, way->above);
@@ -158,6 +171,7 @@ SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fre
     way->left = vf_select(fresh, left, way->left);
     way->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, way->shortest);
     way->edge = vf_select(fresh, vf_select(leg->falling, low, high), way->edge);
+    way->rest = vf_select(fresh, zero, way->rest);
     way->is_last = vm_or(vm_andnot(way->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
@@ -249,20 +263,19 @@ SIMD_INLINE void kernel_light_step(const kernel_pieces *t, const kernel_piece_pl
     light->transmittance = kernel_exp(-light->depth);
 }
 
-/* Add the segment of the given length (in unit distances) on which the value goes from v_in to v_out, behind what light
- * holds. Values are in the transfer's domain. */
-SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, vf length, vf v_in, vf v_out, kernel_light *light)
+/* Add the segment, behind what light holds. */
+SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_run *run, kernel_light *light)
 {
-    const kernel_leg leg = kernel_leg_of(length, v_in, v_out);
+    const kernel_leg leg = kernel_leg_of(run);
     const vf zero = vf_set(0);
-    kernel_way way = {zero, zero, zero, zero, zero, v_in, vm_none()};
-    vf piece = kernel_piece_find(t, rays, v_in, leg.falling);
+    kernel_way way = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
+    vf piece = kernel_piece_find(t, rays, run->v_in, leg.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
         const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
         if (vm_any(fresh))
             kernel_way_enter(&way, &leg, fresh, kernel_piece_entry(t, &at, KERNEL_PIECE_LOW),
-                             kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH), way.edge);
+                             kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH));
         kernel_stretch st = kernel_stretch_begin(t, &at, &way, leg.turn);
         kernel_stretch_limit(&st, way.left, way.shortest);
         const vf size = way.todo * st.share, move = leg.turn * size;

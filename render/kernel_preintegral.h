@@ -153,10 +153,10 @@ static __attribute__((noinline)) void kernel_pre_parts(const kernel_preintegral 
     all->rough = all->absorbed * rough;
 }
 
-static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays, vf length, vf v_in,
-                                                             vf v_out, kernel_light *light)
+static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces *t, vm rays, const kernel_run *run,
+                                                             kernel_light *light)
 {
-    kernel_integrate(t, rays, length, v_in, v_out, light);
+    kernel_integrate(t, rays, run, light);
 }
 
 SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_part *part, const kernel_light *light)
@@ -170,7 +170,7 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_part *part, 
 
 /* Rays for which one part does not suffice. */
 static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pieces, vm rays,
-                                                        const kernel_pre_end *from, vf length, vf v_out,
+                                                        const kernel_pre_end *from, const kernel_run *run,
                                                         const kernel_pre_part *whole, kernel_light *light)
 {
     const vf room = vf_max(whole->allowed - whole->rough, vf_set(1e-30f));
@@ -180,14 +180,14 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
     if (vm_any(few)) {
         kernel_pre_part parts;
         const vf count = vf_select(few, 1.0f + vf_floor(wanted), vf_set(1));
-        kernel_pre_parts(pieces->preintegral, from, v_out, length, count, (int)vf_reduce_max(count), &parts);
+        kernel_pre_parts(pieces->preintegral, from, run->v_out, run->length, count, (int)vf_reduce_max(count), &parts);
         const vm good = vm_and(few, vf_le(parts.error + parts.rough, whole->allowed - whole->rough));
         *light = kernel_light_select(good, &parts, light);
         left = vm_andnot(rays, good);
     }
     if (!vm_any(left)) return;
     kernel_light exact = kernel_clear();
-    kernel_integrate_apart(pieces, left, length, from->value, v_out, &exact);
+    kernel_integrate_apart(pieces, left, run, &exact);
     const kernel_pre_part part = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]}, .depth = exact.depth};
     *light = kernel_light_select(left, &part, light);
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
@@ -195,19 +195,19 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
 
 /* What kernel_integrate() gives of the segment alone, within the budget. end: where the rays' last segments ended; then
  * where this one ends. */
-SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, vf length, vf v_in, vf v_out,
+SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_run *run,
                                               kernel_pre_end *end)
 {
     kernel_light light = kernel_clear();
     kernel_pre_end next;
     kernel_pre_part part;
-    if (vm_any(vm_andnot(rays, vf_eq(end->value, v_in)))) kernel_pre_find(pieces->preintegral, v_in, end);
-    kernel_pre_find(pieces->preintegral, v_out, &next);
-    kernel_pre_between(pieces->preintegral, end, &next, length, &part);
+    if (vm_any(vm_andnot(rays, vf_eq(end->value, run->v_in)))) kernel_pre_find(pieces->preintegral, run->v_in, end);
+    kernel_pre_find(pieces->preintegral, run->v_out, &next);
+    kernel_pre_between(pieces->preintegral, end, &next, run->length, &part);
     const vm good = vf_le(part.error + part.rough, part.allowed);
     light = kernel_light_select(good, &part, &light);
     if (vm_any(vm_andnot(rays, good)))
-        kernel_pre_finely(pieces, vm_andnot(rays, good), end, length, v_out, &part, &light);
+        kernel_pre_finely(pieces, vm_andnot(rays, good), end, run, &part, &light);
     *end = next;
     return light;
 }

@@ -29,6 +29,7 @@
 #define RENDER_KERNEL_ROOTS_H
 
 #include "kernel_neubauer.h"
+#include "kernel_wide.h"
 
 #define KERNEL_ROOT_BAND 3e-7f /* rounding of F where the largest |F| at a vertex is near 1 */
 #define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */
@@ -406,18 +407,6 @@ SIMD_INLINE void kernel_bracket(kernel_packet *p, const kernel_search *s, vm ray
 }
 
 /* ---- the last step ---- */
-
-typedef double kernel_wide __attribute__((vector_size(8 * SIMD_WIDTH)));
-
-SIMD_INLINE kernel_wide kernel_widen(vf v)
-{
-    return __builtin_convertvector(v, kernel_wide);
-}
-
-SIMD_INLINE vf kernel_narrow(kernel_wide v)
-{
-    return __builtin_convertvector(v, vf);
-}
 
 SIMD_INLINE kernel_wide kernel_wide_value(const double c[8], const kernel_wide r[3], kernel_wide m)
 {

@@ -22,6 +22,7 @@
 #ifndef RENDER_KERNEL_SEGMENTS_H
 #define RENDER_KERNEL_SEGMENTS_H
 
+#include "kernel_fine.h"
 #include "kernel_integral.h"
 #include "kernel_preintegral.h"
 #include "kernel_volume.h"
@@ -31,6 +32,12 @@ enum { KERNEL_WINDOW = 128, KERNEL_LANE_CUTS = 32, KERNEL_MAX_PARTS = 256 };
 typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
+
+/* What a segment has beside that where no error is allowed: a lane of kernel_fine; as large, so that one index finds
+ * both. */
+typedef struct kernel_segment_fine {
+    float length, rest_in, rest_out, unused;
+} kernel_segment_fine;
 
 /* Crossings of transparent surfaces: the first of each ray in rows, sorted, +inf where there are no more. */
 typedef struct kernel_cuts {
@@ -43,6 +50,10 @@ typedef struct kernel_cuts {
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
     kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* each ray's, as they come */
+    kernel_segment_fine fine[SIMD_WIDTH][KERNEL_WINDOW];
+    bool is_fine; /* there are fine ones; */
+    int room;     /* for half as many segments then, so that a tile's lists stay in the cache */
+    kernel_fine_rays rays;
     /* Meshes that overlap to no end: of segments that begin at one place, where no order is meant, those for which
      * there is no room are integrated at once, and blended behind the window's. */
     kernel_light heap;
@@ -113,13 +124,27 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, 
 
 /* ---- a ray's segments ---- */
 
-static void kernel_items_sort(kernel_segment *items, int count)
+SIMD_INLINE void kernel_segments_set_fine(const kernel_packet *p, kernel_segments *list, bool is_fine)
 {
-    for (int n = 1; n < count; n++) {
+    list->is_fine = is_fine;
+    list->room = is_fine ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
+    if (is_fine) kernel_fine_rays_of(p, &list->rays);
+}
+
+static void kernel_items_sort(kernel_segments *list, int lane)
+{
+    kernel_segment *items = list->items[lane];
+    kernel_segment_fine *fine = list->fine[lane];
+    for (int n = 1; n < list->room; n++) {
         const kernel_segment s = items[n];
+        const kernel_segment_fine its = fine[n];
         int at = n;
-        for (; at > 0 && items[at - 1].t_in > s.t_in; at--) items[at] = items[at - 1];
+        for (; at > 0 && items[at - 1].t_in > s.t_in; at--) {
+            items[at] = items[at - 1];
+            fine[at] = fine[at - 1];
+        }
         items[at] = s;
+        fine[at] = its;
     }
 }
 
@@ -136,9 +161,9 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
                                                                     const kernel_segment *s)
 {
     kernel_segment *items = list->items[lane];
-    kernel_items_sort(items, KERNEL_WINDOW);
-    int count = KERNEL_WINDOW * 3 / 4;
-    const float first = items[0].t_in, last = items[KERNEL_WINDOW - 1].t_in;
+    kernel_items_sort(list, lane);
+    int count = list->room * 3 / 4;
+    const float first = items[0].t_in, last = items[list->room - 1].t_in;
     if (first == last) {
         if (s->t_in == first) return false;
         list->t_end[lane] = fmaxf(s->t_in, first);
@@ -157,35 +182,47 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
 }
 
 /* False where there is no room: more segments begin at one place than a window holds. */
-SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kernel_segment *s)
+SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kernel_segment *s,
+                                     const kernel_segment_fine *fine)
 {
-    if (__builtin_expect(list->count[lane] == KERNEL_WINDOW, 0)) {
+    if (__builtin_expect(list->count[lane] == list->room, 0)) {
         if (!kernel_segments_shorten(list, lane, s)) return false;
         if (!(s->t_in < list->t_end[lane])) return true;
     }
+    if (list->is_fine) list->fine[lane][list->count[lane]] = *fine;
     list->items[lane][list->count[lane]++] = *s;
     return true;
 }
 
-/* Of rays whose window they are of. */
-SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays, vf t_in, vf t_out,
-                                     vf v_in, vf v_out)
+/* Of rays whose window they are of. fine: NULL unless the list is. */
+SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays,
+                                     const kernel_interval *i, const kernel_fine *fine)
 {
     kernel_segment all[SIMD_WIDTH];
+    kernel_segment_fine fines[SIMD_WIDTH];
     float a[4][SIMD_WIDTH];
     unsigned bits = vm_bits(rays), left = 0;
     if (!bits) return;
-    vf_store(a[0], t_in);
-    vf_store(a[1], t_out);
-    vf_store(a[2], v_in);
-    vf_store(a[3], v_out);
-    for (int i = 0; i < SIMD_WIDTH; i++) all[i] = (kernel_segment){a[0][i], a[1][i], a[2][i], a[3][i]};
+    vf_store(a[0], i->t_in);
+    vf_store(a[1], i->t_out);
+    vf_store(a[2], i->v_in);
+    vf_store(a[3], i->v_out);
+    for (int n = 0; n < SIMD_WIDTH; n++) all[n] = (kernel_segment){a[0][n], a[1][n], a[2][n], a[3][n]};
+    if (fine) {
+        vf_store(a[0], fine->length);
+        vf_store(a[1], fine->rest_in);
+        vf_store(a[2], fine->rest_out);
+        for (int n = 0; n < SIMD_WIDTH; n++) fines[n] = (kernel_segment_fine){a[0][n], a[1][n], a[2][n], 0};
+    }
     for (; bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        if (!kernel_segments_put(list, lane, &all[lane])) left |= bits & -bits;
+        if (!kernel_segments_put(list, lane, &all[lane], &fines[lane])) left |= bits & -bits;
     }
-    if (__builtin_expect(left != 0, 0))
-        kernel_integrate(pieces, vm_from_bits(left), (t_out - t_in) * list->per_t, v_in, v_out, &list->heap);
+    if (__builtin_expect(left != 0, 0)) {
+        kernel_run run = kernel_run_of((i->t_out - i->t_in) * list->per_t, i->v_in, i->v_out);
+        if (fine) run = (kernel_run){fine->length * list->per_t, i->v_in, i->v_out, fine->rest_in, fine->rest_out};
+        kernel_integrate(pieces, vm_from_bits(left), &run, &list->heap);
+    }
 }
 
 /* The packet's segments by t_in: rows of the n-th of each ray. */
@@ -198,6 +235,11 @@ typedef struct kernel_sorted {
 SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi item)
 {
     return vf_gather(&list->items[0][0].t_in + member, item);
+}
+
+SIMD_INLINE vf kernel_fines_gather(const kernel_segments *list, int member, vi item)
+{
+    return vf_gather(&list->fine[0][0].length + member, item);
 }
 
 /* By insertion, all rays at once: cells come nearly in order, for the traversal is front to back. */
@@ -337,7 +379,8 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *st
                                 vf v_in, vf v_out)
 {
     kernel_light light = kernel_clear();
-    kernel_integrate(state->pieces, rays, (t_out - t_in) * state->list->per_t, v_in, v_out, &light);
+    const kernel_run run = kernel_run_of((t_out - t_in) * state->list->per_t, v_in, v_out);
+    kernel_integrate(state->pieces, rays, &run, &light);
     kernel_emit(p, vm_and(rays, vf_lt(light.transmittance, vf_set(1))), FRAGMENT_VOLUME, vf_set(0), t_in, t_out,
                 light.colour, light.transmittance);
 }
@@ -390,9 +433,12 @@ SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *
         s.next_bend = (s.before - s.after) + (s.ahead - s.after);
         const vf lift = kernel_parts_lift(&s, n == 1 ? rays : vm_none(), vm_not(inner));
         const vm mine = vm_and(vf_le(list->t_begin, s.from), vf_lt(s.from, list->t_end));
-        if (!(state->mixing > 0))
-            kernel_segments_add(state->pieces, list, vm_and(open, mine), s.from, s.to, s.before + lift, s.after + lift);
-        else if (vm_any(vm_and(open, mine)))
+        if (!(state->mixing > 0)) {
+            const kernel_interval part = {
+                .t_in = s.from, .t_out = s.to, .v_in = s.before + lift, .v_out = s.after + lift};
+            const kernel_fine fine = kernel_fine_of(&part);
+            kernel_segments_add(state->pieces, list, vm_and(open, mine), &part, list->is_fine ? &fine : NULL);
+        } else if (vm_any(vm_and(open, mine)))
             kernel_emit_segment(p, state, vm_and(open, mine), s.from, s.to, s.before + lift, s.after + lift);
         s.from = s.to;
         s.to = next;
@@ -422,6 +468,31 @@ SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state
     }
 }
 
+/* A tet is one segment, cut by surfaces alone. fine_cell is looked at where the list is fine. */
+static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segment_state *state,
+                                                          const kernel_cell *c, const kernel_fine_cell *fine_cell,
+                                                          vm rays)
+{
+    kernel_segments *list = state->list;
+    kernel_interval i;
+    kernel_fine fine;
+    kernel_tet_interval(p, c, rays, false, &i);
+    if (!vm_any(i.mask)) return;
+    vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out));
+    if (list->cuts.row_count) cut = vm_or(cut, vf_lt(kernel_next_cut(p, &list->cuts, i.t_in, true), i.t_out));
+    if (__builtin_expect(state->mixing > 0 || vm_any(vm_and(i.mask, cut)), 0)) {
+        const kernel_course course = {.interval = &i,
+                                      .cost = state->mixing > 0 ? kernel_course_cost(state, c->f, c->count) : 0};
+        kernel_course_run(p, state, &course);
+        return;
+    }
+    const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
+    const vm mine = vm_and(vm_and(i.mask, window), vf_lt(i.t_in, i.t_out));
+    if (!vm_any(mine)) return;
+    if (list->is_fine) fine = kernel_tet_fine(p, c, fine_cell, &list->rays, &i);
+    kernel_segments_add(state->pieces, list, mine, &i, list->is_fine ? &fine : NULL);
+}
+
 /* kernel_polyhedron_volume.h */
 static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index,
                                        vm rays);
@@ -444,19 +515,20 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
             kernel_cell_place(c, p, g);
             kernel_cell_domain(c, transfer);
         }
+        if (c->type == GRID_TET) {
+            kernel_fine_cell fine;
+            if (state->list->is_fine) kernel_fine_begin(p->frame, p->tile, c, transfer, &fine);
+            kernel_tet_segments(p, state, c, &fine, rays);
+            continue;
+        }
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
         kernel_course course = {.cost = state->mixing > 0 ? kernel_course_cost(state, c->f, c->count) : 0};
         kernel_map map;
-        int intervals = 1;
-        if (c->type == GRID_TET) {
-            kernel_tet_interval(p, c, rays, false, &list[0]);
-        } else {
-            intervals = kernel_poly_intervals(p, c, rays, false, list);
-            if (intervals && !c->is_constant) {
-                kernel_map_setup(&map, c);
-                course.map = &map;
-                course.cost = kernel_course_cost(state, c->f, c->count);
-            }
+        const int intervals = kernel_poly_intervals(p, c, rays, false, list);
+        if (intervals && !c->is_constant) {
+            kernel_map_setup(&map, c);
+            course.map = &map;
+            course.cost = kernel_course_cost(state, c->f, c->count);
         }
         for (int k = 0; k < intervals; k++) {
             course.interval = &list[k];
@@ -519,13 +591,18 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         const vm has = vm_and(vf_lt(t_in, vf_set(INFINITY)), vf_lt(vf_set(KERNEL_DARK), b->light));
         if (!vm_any(has)) break;
         const vf t_out = kernel_items_gather(list, 1, item);
-        const vf length = (t_out - t_in) * list->per_t;
-        const vf v_in = kernel_items_gather(list, 2, item), v_out = kernel_items_gather(list, 3, item);
+        kernel_run run = kernel_run_of((t_out - t_in) * list->per_t, kernel_items_gather(list, 2, item),
+                                       kernel_items_gather(list, 3, item));
         kernel_light light = kernel_clear();
+        if (list->is_fine) {
+            run.length = kernel_fines_gather(list, 0, item) * list->per_t;
+            run.rest_in = kernel_fines_gather(list, 1, item);
+            run.rest_out = kernel_fines_gather(list, 2, item);
+        }
         if (pieces->preintegral)
-            light = kernel_preintegrated(pieces, has, length, v_in, v_out, &end);
+            light = kernel_preintegrated(pieces, has, &run, &end);
         else
-            kernel_integrate(pieces, has, length, v_in, v_out, &light);
+            kernel_integrate(pieces, has, &run, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
         kernel_blend_light(b, has, t_in, t_out, &light);
     }
@@ -541,6 +618,7 @@ SIMD_INLINE void kernel_trace_apart(kernel_packet *p)
     list.t_begin = p->t_near;
     list.t_end = vf_set(INFINITY);
     list.cuts.row_count = 0;
+    kernel_segments_set_fine(p, &list, false);
     for (int v = 0; v < f->volume_count; v++) {
         kernel_segment_state state = {&list, &f->pieces[v], v, f->allowance, f->mixing, f->reach[v]};
         list.per_t = f->volumes[v].exponent / p->sample_step;
@@ -581,6 +659,7 @@ SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
     kernel_segment_state state = {&list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
     kernel_blend b = kernel_blend_begin();
     list.per_t = f->volumes[0].exponent / p->sample_step;
+    kernel_segments_set_fine(p, &list, f->job->max_error < KERNEL_FINE_ERROR);
     list.t_begin = p->t_near;
     kernel_cuts_find(p, first_fragment, &list.cuts);
     const vm active = p->active;

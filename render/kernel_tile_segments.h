@@ -30,6 +30,7 @@ typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
     kernel_cell cell;
     kernel_map map;
+    kernel_fine_cell fine;
     float depth; /* of windows; 0: not known yet */
 } kernel_tile_segments;
 
@@ -37,24 +38,6 @@ typedef struct kernel_tile_segments {
 SIMD_INLINE kernel_tile_segments *kernel_tile_segments_of(kernel_tile_trace *t);
 
 /* ---- cells ---- */
-
-/* A tet is one segment, cut by surfaces alone. */
-static __attribute__((noinline)) void kernel_tile_tet_segments(kernel_packet *p, kernel_segment_state *state,
-                                                               const kernel_cell *c)
-{
-    kernel_segments *list = state->list;
-    kernel_interval i;
-    kernel_tet_interval(p, c, p->active, false, &i);
-    const vm cut = vm_and(i.mask, vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out)));
-    if (__builtin_expect(vm_any(cut), 0)) {
-        const kernel_course course = {.interval = &i};
-        kernel_course_run(p, state, &course);
-        return;
-    }
-    const vm mine = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
-    kernel_segments_add(state->pieces, list, vm_and(vm_and(i.mask, mine), vf_lt(i.t_in, i.t_out)), i.t_in, i.t_out,
-                        i.v_in, i.v_out);
-}
 
 static __attribute__((noinline)) void kernel_tile_poly_segments(kernel_packet *p, kernel_segment_state *state,
                                                                 const kernel_cell *c, const kernel_map *map)
@@ -94,7 +77,7 @@ SIMD_INLINE void kernel_tile_cell_segments(kernel_tile_trace *t, kernel_tile_seg
             if (!c)
                 kernel_polyhedron_segments(p, state, part, index, p->active);
             else if (c->type == GRID_TET)
-                kernel_tile_tet_segments(p, state, c);
+                kernel_tet_segments(p, state, c, &s->fine, p->active);
             else
                 kernel_tile_poly_segments(p, state, c, c->is_constant ? NULL : &s->map);
             is_shortened = is_shortened || state->list->is_shortened;
@@ -119,6 +102,8 @@ static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint
             continue;
         }
         const unsigned meets = kernel_tile_volume_cell(t, c, &s->map, g, transfer, false, blocks);
+        if (meets && c->type == GRID_TET && t->frame->job->max_error < KERNEL_FINE_ERROR)
+            kernel_fine_begin(t->frame, &t->tile, c, transfer, &s->fine);
         if (meets) kernel_tile_cell_segments(t, s, part, cells[n], c, meets);
     }
 }
@@ -144,6 +129,7 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_seg
     r->list.t_begin = p->t_near;
     r->list.per_t = f->volumes[0].exponent / p->sample_step;
     r->list.cuts.row_count = 0;
+    kernel_segments_set_fine(p, &r->list, f->job->max_error < KERNEL_FINE_ERROR);
     r->state = (kernel_segment_state){&r->list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
 }
 
@@ -187,7 +173,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
 SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *packets, int count, float begin,
                                             float end)
 {
-    int most = KERNEL_WINDOW / 16;
+    const int room = s->packets[packets[0]].list.room;
+    int most = room / 16;
     vf least = vf_set(end);
     for (int n = 0; n < count; n++) {
         const kernel_tile_ray_segments *r = &s->packets[packets[n]];
@@ -195,7 +182,7 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
         least = vf_min(least, vf_select(is_full, r->list.t_end, least));
         for (int lane = 0; lane < SIMD_WIDTH; lane++) most = r->list.count[lane] > most ? r->list.count[lane] : most;
     }
-    s->depth = (vf_reduce_min(least) - begin) * (0.75f * KERNEL_WINDOW) / (float)most;
+    s->depth = (vf_reduce_min(least) - begin) * (0.75f * (float)room) / (float)most;
 }
 
 /* Behind the tile's opaque surfaces, whose hits are in the packets. */

@@ -1,0 +1,55 @@
+/* Vectors of doubles: a lane for each of a vf's, or for each of its half. A half fills a register; more than that
+ * compilers take apart, and comparisons lane by lane. */
+#ifndef RENDER_KERNEL_WIDE_H
+#define RENDER_KERNEL_WIDE_H
+
+#include <stdint.h>
+#include <string.h>
+
+#include "simd.h"
+
+typedef double kernel_wide __attribute__((vector_size(8 * SIMD_WIDTH)));
+
+SIMD_INLINE kernel_wide kernel_widen(vf v)
+{
+    return __builtin_convertvector(v, kernel_wide);
+}
+
+SIMD_INLINE vf kernel_narrow(kernel_wide v)
+{
+    return __builtin_convertvector(v, vf);
+}
+
+enum { KERNEL_HALF = SIMD_WIDTH / 2 };
+typedef double kernel_half __attribute__((vector_size(8 * KERNEL_HALF)));
+typedef int64_t kernel_half_mask __attribute__((vector_size(8 * KERNEL_HALF)));
+typedef float kernel_half_floats __attribute__((vector_size(4 * KERNEL_HALF)));
+
+SIMD_INLINE kernel_half kernel_half_widen(kernel_half_floats v)
+{
+    return __builtin_convertvector(v, kernel_half);
+}
+
+SIMD_INLINE kernel_half_floats kernel_half_narrow(kernel_half v)
+{
+    return __builtin_convertvector(v, kernel_half_floats);
+}
+
+/* The first half or the second. */
+SIMD_INLINE kernel_half_mask kernel_half_of_mask(vm m, int half)
+{
+    typedef int32_t kernel_half_ints __attribute__((vector_size(4 * KERNEL_HALF)));
+    int32_t lanes[SIMD_WIDTH];
+    kernel_half_ints ints;
+    const vi all = (vi)vf_select(m, (vf)vi_set(-1), (vf)vi_set(0));
+    memcpy(lanes, &all, sizeof all);
+    memcpy(&ints, lanes + half * KERNEL_HALF, sizeof ints);
+    return __builtin_convertvector(ints, kernel_half_mask);
+}
+
+SIMD_INLINE kernel_half kernel_half_select(kernel_half_mask m, kernel_half a, kernel_half b)
+{
+    return (kernel_half)(((kernel_half_mask)a & m) | ((kernel_half_mask)b & ~m));
+}
+
+#endif
