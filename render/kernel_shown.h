@@ -100,18 +100,18 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
         for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
 }
 
-/* The blocks of the pixels between, of so many pixels: false where there are none. A part in 1e5 of the cell and its
+/* The pixels between, of so many: false where there are none. A part in 1e5 of the cell and its
  * place, and a hundredth of a pixel, are more than rays are off by when they hit by a rounding; blur is what places may
  * be off by. */
-SIMD_INLINE bool kernel_block_range(kernel_extent e, float zero, float blur, int pixels, uint16_t *first,
-                                    uint16_t *last)
+SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int pixels, uint16_t *first,
+                                     uint16_t *last)
 {
     const float pad = 0.01f + 3e-5f * (fmaxf(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + blur;
     const float low = fmaxf(ceilf(e.low + zero - pad), 0);
     const float high = fminf(floorf(e.high + zero + pad), (float)(pixels - 1));
     if (!(low <= high)) return false;
-    *first = (uint16_t)((int)low / KERNEL_BLOCK);
-    *last = (uint16_t)((int)high / KERNEL_BLOCK);
+    *first = (uint16_t)low;
+    *last = (uint16_t)high;
     return true;
 }
 
@@ -127,13 +127,14 @@ SIMD_INLINE bool kernel_extents_shown(const kernel_finder *s, kernel_extent dept
     if (!(out->near > -INFINITY)) out->near = -INFINITY; /* not a number */
     if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
         out->x0 = out->y0 = 0;
-        out->x1 = (uint16_t)((camera->width - 1) / KERNEL_BLOCK);
-        out->y1 = (uint16_t)((camera->height - 1) / KERNEL_BLOCK);
+        out->x1 = (uint16_t)(camera->width - 1);
+        out->y1 = (uint16_t)(camera->height - 1);
         return true;
     }
     const float blur = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
-    return kernel_block_range(columns, s->column_0, blur * fabsf(s->column_scale), camera->width, &out->x0, &out->x1) &&
-           kernel_block_range(rows, s->row_0, blur * fabsf(s->row_scale), camera->height, &out->y0, &out->y1);
+    return kernel_extent_range(columns, s->column_0, blur * fabsf(s->column_scale), camera->width, &out->x0,
+                               &out->x1) &&
+           kernel_extent_range(rows, s->row_0, blur * fabsf(s->row_scale), camera->height, &out->y0, &out->y1);
 }
 
 SIMD_INLINE bool kernel_outline_shown(const kernel_finder *s, kernel_outline *o, kernel_shown *out)
@@ -243,7 +244,7 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_
     }
 }
 
-/* kernel_block_range() lane by lane: the first and last pixels. Returns the lanes that have any. */
+/* kernel_extent_range() lane by lane: the first and last pixels. Returns the lanes that have any. */
 SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, int pixels, vf *first, vf *last)
 {
     const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
@@ -286,10 +287,10 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigne
         list->items[list->count++] = (kernel_shown){.cell = cells[n],
                                                     .source = source,
                                                     .near = near[n],
-                                                    .x0 = (uint16_t)(ends[0][n] / KERNEL_BLOCK),
-                                                    .x1 = (uint16_t)(ends[1][n] / KERNEL_BLOCK),
-                                                    .y0 = (uint16_t)(ends[2][n] / KERNEL_BLOCK),
-                                                    .y1 = (uint16_t)(ends[3][n] / KERNEL_BLOCK)};
+                                                    .x0 = (uint16_t)ends[0][n],
+                                                    .x1 = (uint16_t)ends[1][n],
+                                                    .y0 = (uint16_t)ends[2][n],
+                                                    .y1 = (uint16_t)ends[3][n]};
     }
 }
 

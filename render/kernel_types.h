@@ -44,7 +44,7 @@ typedef struct kernel_surface {
     double value_scale;       /* a power of two that brings the field's range near 1: for differences */
 } kernel_surface;
 
-/* Where a cell's surface of an isovalue may show: its least depth, and blocks of the picture, ends included. */
+/* Where a cell's surface of an isovalue may show: its least depth, and pixels, ends included. */
 typedef struct kernel_shown {
     uint32_t cell;
     uint32_t source; /* part * RENDER_MAX_ISOVALUES + index into the frame's isovalues */
@@ -52,10 +52,12 @@ typedef struct kernel_shown {
     uint16_t x0, x1, y0, y1;
 } kernel_shown;
 
-/* The same for one tile: a bit a block. */
+/* The same for one tile: a bit a block; and the first and last column, first and last row of pixels, from the low bits
+ * on. */
 typedef struct kernel_tile_shown {
     float near;
-    uint32_t cell, source, blocks;
+    uint32_t cell, source;
+    uint16_t blocks, box;
 } kernel_tile_shown;
 
 /* A list is a chain of chunks, none of which moves. */

@@ -92,33 +92,48 @@ static int64_t tile_count(const kernel_frame *f)
     return tiles_across(f) * ((f->job->camera.height + KERNEL_TILE - 1) / KERNEL_TILE);
 }
 
-/* Blocks first .. last of a row or column, as bits of those of its n-th tile. */
-static unsigned bits_of(int first, int last, int tile)
+/* Pixels first .. last of a row or column, within its n-th tile. */
+typedef struct within {
+    unsigned first, last;
+} within;
+
+static within within_tile(int first, int last, int tile)
 {
-    const int from = first - tile * BLOCKS, to = last - tile * BLOCKS;
-    const unsigned not_before = ~0u << (from > 0 ? from : 0);
-    return not_before & ((1u << BLOCKS) - 1) >> (to < BLOCKS - 1 ? BLOCKS - 1 - to : 0);
+    const int from = first - tile * KERNEL_TILE, to = last - tile * KERNEL_TILE;
+    return (within){(unsigned)(from > 0 ? from : 0), (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
+}
+
+/* Their blocks, as bits. */
+static unsigned bits_of(within w)
+{
+    return ~0u << w.first / KERNEL_BLOCK & ((2u << w.last / KERNEL_BLOCK) - 1);
+}
+
+static kernel_tile_shown shown_within(const kernel_shown *s, within columns, within rows)
+{
+    /* A tile's rows of blocks, a bit each in the column of the first blocks. */
+    static const uint16_t spread[1 << BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
+                                                 0x1000, 0x1001, 0x1010, 0x1011, 0x1100, 0x1101, 0x1110, 0x1111};
+    return (kernel_tile_shown){
+        s->near, s->cell, s->source, (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
+        (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
 static void count_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *counts)
 {
     for (const kernel_shown *s = chunk->items, *end = s + chunk->count; s < end; s++)
-        for (int y = s->y0 / BLOCKS; y <= s->y1 / BLOCKS; y++)
-            for (int x = s->x0 / BLOCKS; x <= s->x1 / BLOCKS; x++) counts[y * across + x]++;
+        for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
+            for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++) counts[y * across + x]++;
 }
 
 /* at: where each tile's next one goes. */
 static void bin_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_shown *out)
 {
     for (const kernel_shown *s = chunk->items, *end = s + chunk->count; s < end; s++)
-        for (int y = s->y0 / BLOCKS; y <= s->y1 / BLOCKS; y++) {
-            const unsigned rows = bits_of(s->y0, s->y1, y);
-            for (int x = s->x0 / BLOCKS; x <= s->x1 / BLOCKS; x++) {
-                const unsigned columns = bits_of(s->x0, s->x1, x);
-                unsigned blocks = 0;
-                for (unsigned row = 0; row < BLOCKS; row++) blocks |= (rows >> row & 1 ? columns : 0) << BLOCKS * row;
-                out[at[y * across + x]++] = (kernel_tile_shown){s->near, s->cell, s->source, blocks};
-            }
+        for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++) {
+            const within rows = within_tile(s->y0, s->y1, y);
+            for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
+                out[at[y * across + x]++] = shown_within(s, within_tile(s->x0, s->x1, x), rows);
         }
 }
 

@@ -323,6 +323,22 @@ SIMD_INLINE float vf_reduce_max(vf a)
 
 #endif
 
+/* v[index], lane by lane; each index is below SIMD_WIDTH. */
+SIMD_INLINE vf vf_permute(vf v, vi index)
+{
+#if defined(SIMD_AVX512)
+    return (vf)_mm512_permutexvar_ps((__m512i)index, (__m512)v);
+#elif defined(SIMD_AVX2)
+    return (vf)_mm256_permutevar8x32_ps((__m256)v, (__m256i)index);
+#elif defined(SIMD_SSE42)
+    return (vf)_mm_shuffle_epi8((__m128i)v, (__m128i)(index * 0x04040404 + 0x03020100));
+#else
+    vf out;
+    for (int i = 0; i < SIMD_WIDTH; i++) out[i] = v[index[i]];
+    return out;
+#endif
+}
+
 /* base[index] and base[index + 1]. */
 SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *second)
 {
