@@ -48,6 +48,15 @@ static inline void kernel_plain_begin(kernel_plain *p, const kernel_frame *f, co
     }
 }
 
+SIMD_INLINE void kernel_plain_prefetch(const kernel_plain *p, int32_t vertex)
+{
+    const int64_t at = (int64_t)vertex * p->stride;
+    __builtin_prefetch(p->values + (int64_t)vertex * p->value_stride);
+    __builtin_prefetch(p->coordinates[0] + at);
+    if (!p->is_interleaved) __builtin_prefetch(p->coordinates[1] + at);
+    __builtin_prefetch(p->coordinates[2] + at);
+}
+
 /* A tet with finite values, as kernel_cell_fetch() and kernel_cell_move() make it. */
 SIMD_INLINE void kernel_plain_cell(kernel_cell *c, const kernel_plain *p, const kernel_frame *f,
                                    const kernel_tile *tile, uint32_t index)

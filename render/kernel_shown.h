@@ -406,12 +406,8 @@ static void kernel_find_coming_plain(kernel_finder *s)
         const int32_t *vertices = p->connectivity + 4 * (int64_t)s->coming[n];
         s->tets.cell[n] = s->coming[n];
         for (int i = 0; i < 4; i++) {
-            const int64_t at = (int64_t)vertices[i] * p->stride;
             s->tets.plain[i][n] = vertices[i];
-            __builtin_prefetch(p->values + (int64_t)vertices[i] * p->value_stride);
-            __builtin_prefetch(p->coordinates[0] + at);
-            if (!p->is_interleaved) __builtin_prefetch(p->coordinates[1] + at);
-            __builtin_prefetch(p->coordinates[2] + at);
+            kernel_plain_prefetch(p, vertices[i]);
         }
     }
     s->tets.count = s->coming_count;
@@ -467,7 +463,13 @@ static void kernel_find_rest(kernel_finder *s)
 }
 
 /* A node is looked at beside others, each of which has what it needs on its way from memory while they wait. */
-enum { KERNEL_FRONT = 8, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
+enum { KERNEL_FRONT = 16, KERNEL_FRONT_ROOM = KERNEL_FRONT * MMBVH_MAX_DEPTH };
+
+/* Nodes, as 2 nodes + 1 where it lies in the picture. */
+typedef struct kernel_front {
+    int count;
+    int64_t entries[KERNEL_FRONT];
+} kernel_front;
 
 /* May it show in the picture? Children of one that lies in it need not be asked. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
@@ -481,8 +483,45 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
     return kernel_blocks_of(sides) && !(lie.far < s->t_near);
 }
 
-/* Depth first, from the left, KERNEL_FRONT nodes at once: about in the order in which leaves lie in memory. Entries are
- * 2 nodes + 1 where it lies in the picture. One node at once needs no more room than the tree is deep. */
+/* Those of the entries whose values and whose boxes show. About half of them do by their values, which no branch
+ * foresees. */
+SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                     kernel_front *front, const int64_t *entries, int count)
+{
+    int64_t shown[KERNEL_FRONT];
+    int left = 0;
+    for (int n = 0; n < count; n++) {
+        shown[left] = entries[n];
+        left += kernel_node_shows(&s->surface->interest, ranges, entries[n] >> 1);
+    }
+    front->count = 0;
+    for (int n = 0; n < left; n++) {
+        bool is_inside = shown[n] & 1;
+        if (kernel_node_in_picture(s, tree, shown[n] >> 1, &is_inside))
+            front->entries[front->count++] = shown[n] | is_inside;
+    }
+}
+
+/* The leaves among them, whose cells are asked for, and the inner nodes' left children, likewise. */
+SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges, const kernel_front *front,
+                                   kernel_front *leaves, kernel_front *children)
+{
+    leaves->count = children->count = 0;
+    for (int n = 0; n < front->count; n++) {
+        const int64_t node = front->entries[n] >> 1, ref = mmbvh_node_ref(tree, node);
+        const bool is_leaf = mmbvh_node_count(tree, node);
+        const char *next = ranges->low + ref * ranges->stride;
+        leaves->entries[leaves->count] = node;
+        leaves->count += is_leaf;
+        children->entries[children->count] = 2 * ref | (front->entries[n] & 1);
+        children->count += !is_leaf;
+        __builtin_prefetch(is_leaf ? (const char *)(tree->cells + ref) : next);
+        __builtin_prefetch(is_leaf ? (const char *)(tree->cells + ref + MMBVH_MAX_LEAF) : next + ranges->stride);
+    }
+}
+
+/* Depth first, from the left, KERNEL_FRONT nodes at once: about in the order in which leaves lie in memory. One node at
+ * once needs no more room than the tree is deep. */
 static void kernel_find_shown(kernel_finder *s, int64_t root)
 {
     const mmbvh *tree = s->frame->job->parts[s->part].tree;
@@ -491,26 +530,19 @@ static void kernel_find_shown(kernel_finder *s, int64_t root)
     int top = 0;
     stack[top++] = 2 * root;
     while (top && !s->list->is_full) {
-        int64_t front[KERNEL_FRONT];
+        kernel_front front, leaves, children;
         const int most = top < KERNEL_FRONT_ROOM - MMBVH_MAX_DEPTH ? KERNEL_FRONT : 1;
-        int open = 0;
-        for (int n = 0; n < most && top; n++) {
-            const int64_t entry = stack[--top], node = entry >> 1;
-            bool is_inside = entry & 1;
-            if (!kernel_node_shows(&s->surface->interest, ranges, node)) continue;
-            if (!kernel_node_in_picture(s, tree, node, &is_inside)) continue;
-            const int count = mmbvh_node_count(tree, node);
-            const int64_t ref = mmbvh_node_ref(tree, node);
-            if (count) {
-                kernel_find_leaf(s, tree->cells + ref, count);
-                continue;
-            }
-            __builtin_prefetch(ranges->low + ref * ranges->stride);
-            __builtin_prefetch(ranges->low + (ref + 1) * ranges->stride);
-            front[open++] = 2 * ref + is_inside;
+        const int count = top < most ? top : most;
+        int64_t next[KERNEL_FRONT];
+        for (int n = 0; n < count; n++) next[n] = stack[--top];
+        kernel_front_choose(s, tree, ranges, &front, next, count);
+        kernel_front_open(tree, ranges, &front, &leaves, &children);
+        for (int n = 0; n < leaves.count; n++) {
+            const int64_t leaf = leaves.entries[n];
+            kernel_find_leaf(s, tree->cells + mmbvh_node_ref(tree, leaf), mmbvh_node_count(tree, leaf));
         }
-        while (open) {
-            const int64_t left = front[--open];
+        while (children.count) {
+            const int64_t left = children.entries[--children.count];
             stack[top++] = left + 2;
             stack[top++] = left;
         }
