@@ -116,7 +116,7 @@ static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, 
 
 /* Lanes of a packet under construction: plain arrays and one loop a quantity, which compilers vectorize. */
 typedef struct kernel_lanes {
-    double px[SIMD_WIDTH], py[SIMD_WIDTH], inverse[SIMD_WIDTH];
+    double px[SIMD_WIDTH], py[SIMD_WIDTH];
     float value[SIMD_WIDTH];
 } kernel_lanes;
 
@@ -177,18 +177,24 @@ static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
 static inline void kernel_packet_view(kernel_packet *p)
 {
     if (p->has_view) return;
-    kernel_lanes lanes, *l = &lanes;
+    kernel_lanes lanes;
+    double inverse[SIMD_WIDTH];
+    float view[3][SIMD_WIDTH];
     p->has_view = true;
-    kernel_packet_lanes(p, l);
-    const bool flat = p->frame->job->camera.is_orthographic;
-    for (int i = 0; i < SIMD_WIDTH; i++)
-        l->inverse[i] = flat ? 1 : 1 / sqrt(1 + l->px[i] * l->px[i] + l->py[i] * l->py[i]);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->px[i] * l->inverse[i]);
-    p->view[0] = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = flat ? 0 : (float)(-l->py[i] * l->inverse[i]);
-    p->view[1] = vf_load(l->value);
-    for (int i = 0; i < SIMD_WIDTH; i++) l->value[i] = (float)-l->inverse[i];
-    p->view[2] = vf_load(l->value);
+    if (p->frame->job->camera.is_orthographic) {
+        p->view[0] = p->view[1] = vf_set(0);
+        p->view[2] = vf_set(-1);
+        return;
+    }
+    kernel_packet_lanes(p, &lanes);
+    const double *px = lanes.px, *py = lanes.py;
+    for (int i = 0; i < SIMD_WIDTH; i++) inverse[i] = 1 / sqrt(1 + px[i] * px[i] + py[i] * py[i]);
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        view[0][i] = (float)(-px[i] * inverse[i]);
+        view[1][i] = (float)(-py[i] * inverse[i]);
+        view[2][i] = (float)-inverse[i];
+    }
+    for (int a = 0; a < 3; a++) p->view[a] = vf_load(view[a]);
 }
 
 /* Number the samples from one near the depth origin, so that float32 holds their places well; the number depends on
