@@ -22,7 +22,7 @@ enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSIN
 typedef struct kernel_cell {
     uint32_t serial, index; /* the cache's key: tile, cell, */
     int part, layer;        /* mesh, and whose values these are */
-    bool is_finite, is_placed, is_constant, has_lines;
+    bool is_finite, is_placed, is_constant, has_lines, has_normal;
     int type, count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
     double world[GRID_MAX_CELL_VERTICES][3];
@@ -34,6 +34,7 @@ typedef struct kernel_cell {
     kernel_line lines[KERNEL_MAX_LINES]; /* of the edges, then of the quads' diagonals */
     float doubt;                         /* of a tet: the largest of its lines' bounds */
     float least[4];                      /* kernel_least_weight() of a tet's faces; [0]: no less than of any triangle */
+    float normal[3];                     /* of a tet: kernel_tet_normal(), where has_normal */
 } kernel_cell;
 
 /* Where rays go through a face: v of f, w of g, at the cell's own coordinates r (for tets not set). */
@@ -256,7 +257,7 @@ SIMD_INLINE void kernel_cell_move(kernel_cell *c, const kernel_frame *f, const k
     else
         for (int i = 0; i < c->count; i++) kernel_place_in(f, tile, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
     c->is_placed = true;
-    c->has_lines = false;
+    c->has_lines = c->has_normal = false;
 }
 
 SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile, const grid *g)

@@ -66,7 +66,7 @@ SIMD_INLINE void kernel_plain_cell(kernel_cell *c, const kernel_plain *p, const 
     c->type = GRID_TET;
     c->count = 4;
     c->is_finite = c->is_placed = true;
-    c->has_lines = false;
+    c->has_lines = c->has_normal = false;
     for (int i = 0; i < 4; i++) {
         const int64_t vertex = vertices[i];
         c->vertices[i] = vertex;

@@ -1,7 +1,7 @@
 /* Isosurfaces by one traversal a frame: the trees are gone down once for the whole picture, and each cell that the
  * surface crosses is fetched and placed once, to find the pixels that it may show in; the cells are then binned
  * by tile (render_shown.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace them from the nearest on,
- * blocks that know of something nearer left out:
+ * blocks that know of something nearer left out (kernel_tile_shown.h, kernel_batch.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
@@ -14,6 +14,7 @@
 #ifndef RENDER_KERNEL_SHOWN_H
 #define RENDER_KERNEL_SHOWN_H
 
+#include "kernel_plain.h"
 #include "kernel_tile_surface.h"
 
 /* Tets, one a lane. */
@@ -100,9 +101,8 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
         for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
 }
 
-/* The pixels between, of so many: false where there are none. A part in 1e5 of the cell and its
- * place, and a hundredth of a pixel, are more than rays are off by when they hit by a rounding; blur is what places may
- * be off by. */
+/* The pixels between, of so many: false where there are none. A part in 1e5 of the cell and its place, and a hundredth
+ * of a pixel, are more than rays are off by when they hit by a rounding; blur is what places may be off by. */
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int pixels, uint16_t *first,
                                      uint16_t *last)
 {
@@ -548,169 +548,6 @@ static void kernel_find_shown(kernel_finder *s, int64_t root)
         }
     }
     kernel_find_rest(s);
-}
-
-/* ---- a tile's ---- */
-
-/* A tile's cells by depth, sorted no further than they are asked for: quicksort, the nearer part first, down to pieces
- * of a few, sorted by insertion. */
-enum { KERNEL_PIECE = 8, KERNEL_PIECES = 32 };
-
-typedef struct kernel_by_depth {
-    kernel_tile_shown *items;
-    int begin;                    /* of what has not been handed out */
-    int ends[KERNEL_PIECES], top; /* of the parts, the nearest last */
-} kernel_by_depth;
-
-/* Items before the returned index are no farther than those from it on; neither part is empty. */
-static inline int kernel_part_by_depth(kernel_tile_shown *items, int begin, int end)
-{
-    const float a = items[begin].near, b = items[begin + (end - begin) / 2].near, c = items[end - 1].near;
-    const float least = a < b ? a : b, most = a < b ? b : a;
-    const float pivot = c < least ? least : c < most ? c : most;
-    int i = begin - 1, j = end;
-    for (;;) {
-        do i++;
-        while (items[i].near < pivot);
-        do j--;
-        while (pivot < items[j].near);
-        if (i >= j) return j + 1 < end ? j + 1 : j;
-        const kernel_tile_shown moved = items[i];
-        items[i] = items[j];
-        items[j] = moved;
-    }
-}
-
-static inline void kernel_insert_by_depth(kernel_tile_shown *items, int begin, int end)
-{
-    for (int i = begin + 1; i < end; i++) {
-        const kernel_tile_shown moved = items[i];
-        int j = i;
-        for (; j > begin && moved.near < items[j - 1].near; j--) items[j] = items[j - 1];
-        items[j] = moved;
-    }
-}
-
-/* The next nearest ones: from *first on, as many as returned. 0: there are no more. */
-static inline int kernel_next_by_depth(kernel_by_depth *q, const kernel_tile_shown **first)
-{
-    while (q->top && q->ends[q->top - 1] == q->begin) q->top--;
-    if (!q->top) return 0;
-    while (q->ends[q->top - 1] - q->begin > KERNEL_PIECE && q->top < KERNEL_PIECES) {
-        const int middle = kernel_part_by_depth(q->items, q->begin, q->ends[q->top - 1]);
-        q->ends[q->top++] = middle;
-    }
-    const int end = q->ends[--q->top], count = end - q->begin;
-    if (count <= KERNEL_PIECE) kernel_insert_by_depth(q->items, q->begin, end);
-    *first = q->items + q->begin;
-    q->begin = end;
-    return count;
-}
-
-/* The farthest that a block knows of. */
-SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
-{
-    const unsigned lanes = (1u << SIMD_WIDTH) - 1;
-    vf far = vf_set(-INFINITY);
-    for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) {
-        const vm wanted = vm_from_bits(t->wanted >> v * SIMD_WIDTH & lanes);
-        far = vf_max(far, vf_select(wanted, t->far[v], vf_set(-INFINITY)));
-    }
-    return vf_reduce_max(far);
-}
-
-static void kernel_tile_meet(kernel_tile_trace *t, const kernel_tile_shown *shown, int part, int value, unsigned blocks)
-{
-    const render_surface_layer *layer = t->surface->layer;
-    const grid *g = t->frame->job->parts[part].cells;
-    kernel_cell *c = &t->cell;
-    if (t->plain_layer != t->layer || t->plain_part != part) {
-        t->plain_layer = t->layer;
-        t->plain_part = part;
-        kernel_plain_begin(&t->plain, t->frame, g, &layer->field.fields[part]);
-    }
-    if (t->plain.is_so) {
-        kernel_plain_cell(c, &t->plain, t->frame, &t->tile, shown->cell);
-    } else {
-        kernel_cell_fetch(c, g, &layer->field.fields[part], shown->cell);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_blocks_meet(t, blocks, part, shown->cell, NULL, 0);
-            return;
-        }
-        kernel_cell_move(c, t->frame, &t->tile, g);
-    }
-    kernel_cell_relative(c, layer->values[value]);
-    kernel_tile_ready(t, part);
-    t->poly.is_set_up = false;
-    kernel_blocks_meet(t, blocks, part, c->index, c, value);
-}
-
-/* Set the layer of the tile by the source; returns the isovalue's number in it. */
-SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
-{
-    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
-    *part = (int)(source / RENDER_MAX_ISOVALUES);
-    t->layer = isovalue->surface;
-    t->surface = &t->frame->surfaces[isovalue->surface];
-    return isovalue->value;
-}
-
-/* What some of the next cells are made of, on its way from memory: their vertices, whose indices have come, and the
- * indices of those that follow. */
-SIMD_INLINE void kernel_tile_prefetch_shown(kernel_tile_trace *t, const kernel_tile_shown *items, int count, int more)
-{
-    for (int pass = 0; pass < 2; pass++)
-        for (int n = 0; n < (pass ? count : count + more); n++) {
-            int part;
-            if (!(items[n].blocks & t->wanted & kernel_blocks_beyond(t, items[n].near))) continue;
-            kernel_tile_source(t, items[n].source, &part);
-            const grid *g = t->frame->job->parts[part].cells;
-            if (pass)
-                kernel_tile_prefetch_vertices(g, &t->surface->layer->field.fields[part], items[n].cell);
-            else
-                kernel_tile_prefetch_indices(g, items[n].cell);
-        }
-}
-
-/* The tile's opaque surfaces, or the transparent ones, for which those must be known. */
-SIMD_INLINE void kernel_tile_trace_shown(kernel_tile_trace *t, kernel_tile_shown *items, int count, bool transparent)
-{
-    kernel_by_depth queue = {.items = items, .ends = {count}, .top = 1};
-    const kernel_tile_shown *next;
-    float far = kernel_tile_far(t);
-    for (int left; (left = kernel_next_by_depth(&queue, &next)) != 0; far = kernel_tile_far(t)) {
-        if (left <= KERNEL_PIECE) {
-            if (next->near > far) return;
-            const int after = (int)(items + count - next) - left;
-            kernel_tile_prefetch_shown(t, next, left, after < KERNEL_PIECE ? after : KERNEL_PIECE);
-        }
-        for (; left; left--, next++) {
-            int part;
-            const int value = kernel_tile_source(t, next->source, &part);
-            if ((t->layer >= t->frame->opaque_count) != transparent) continue;
-            const unsigned blocks = next->blocks & t->wanted & kernel_blocks_beyond(t, next->near);
-            if (blocks) kernel_tile_meet(t, next, part, value, blocks);
-        }
-    }
-}
-
-/* The tile's cells; returns how many they are. */
-SIMD_INLINE int kernel_shown_in_tile(const kernel_frame *f, int x0, int y0, kernel_tile_shown **items)
-{
-    const int columns = (f->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
-    const uint32_t *starts = f->shown_starts + (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE);
-    *items = f->shown + starts[0];
-    return (int)(starts[1] - starts[0]);
-}
-
-SIMD_INLINE void kernel_tile_surfaces_shown(kernel_tile_trace *t)
-{
-    const kernel_frame *f = t->frame;
-    kernel_tile_shown *items;
-    const int count = kernel_shown_in_tile(f, t->tile.x0, t->tile.y0, &items);
-    if (!count) return;
-    if (f->opaque_count) kernel_tile_trace_shown(t, items, count, false);
-    if (f->opaque_count < f->surface_count) kernel_tile_trace_shown(t, items, count, true);
 }
 
 #endif

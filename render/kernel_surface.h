@@ -176,6 +176,10 @@ SIMD_INLINE vm kernel_visible(const kernel_packet *p, vm hit, vf t)
 SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
 {
     double d[3][3], df[3], g[3];
+    if (c->has_normal) {
+        for (int a = 0; a < 3; a++) out[a] = vf_set(c->normal[a]);
+        return;
+    }
     for (int i = 0; i < 3; i++) {
         df[i] = (double)c->f[i + 1] - (double)c->f[0];
         for (int a = 0; a < 3; a++) d[i][a] = (c->world[i + 1][a] - c->world[0][a]) * p->frame->job->space.scale;

@@ -6,7 +6,6 @@
 #define RENDER_KERNEL_TILE_SURFACE_H
 
 #include "kernel_outline.h"
-#include "kernel_plain.h"
 #include "kernel_surface.h"
 
 typedef struct kernel_tile_trace {
@@ -23,8 +22,6 @@ typedef struct kernel_tile_trace {
     int layer;
     kernel_cell cell;
     kernel_poly poly;
-    kernel_plain plain; /* of the layer's field on the part: */
-    int plain_layer, plain_part;
     kernel_packet packets[KERNEL_TILE_PACKETS]; /* block by block */
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
@@ -281,7 +278,6 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     t->thread = thread;
     t->wanted = wanted;
     t->begun = 0;
-    t->plain_layer = -1;
     t->t_near = (float)-f->depth_shift;
     for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) t->far[v] = vf_set(INFINITY);
     kernel_tile_setup(&t->tile, f, x0, y0);

@@ -9,6 +9,7 @@
 #include "kernel_shown.h"
 #include "kernel_spmd.h"
 #include "kernel_tile_segments.h"
+#include "kernel_tile_shown.h"
 #include "kernel_tile_surface.h"
 #include "kernel_tile_volume.h"
 

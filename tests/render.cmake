@@ -22,6 +22,12 @@ insitu_render_program(test_render_invariance)
 add_test(NAME render_invariance COMMAND test_render_invariance)
 set_tests_properties(render_invariance PROPERTIES TIMEOUT 120)
 
+insitu_render_program(test_render_batches)
+foreach(isa plain sse4.2 avx2 avx512)
+  add_test(NAME render_batches_${isa} COMMAND test_render_batches)
+  set_tests_properties(render_batches_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 120)
+endforeach()
+
 insitu_render_program(test_render_isa)
 add_test(NAME render_isa COMMAND test_render_isa)
 set_tests_properties(render_isa PROPERTIES TIMEOUT 120)

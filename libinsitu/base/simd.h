@@ -323,6 +323,15 @@ SIMD_INLINE float vf_reduce_max(vf a)
 
 #endif
 
+SIMD_INLINE void vm_set_lane(vm *m, int lane)
+{
+#if defined(SIMD_AVX512)
+    *m |= (vm)(1u << lane);
+#else
+    (*m)[lane] = -1;
+#endif
+}
+
 /* v[index], lane by lane; each index is below SIMD_WIDTH. */
 SIMD_INLINE vf vf_permute(vf v, vi index)
 {

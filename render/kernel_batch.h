@@ -1,0 +1,550 @@
+/* Tets of a plain mesh, as many at once as there are lanes, in a tile that traces what is binned there:
+ *
+ *     lanes are cells:     fetched, ordered, placed, edge functions' lines          (once a batch)
+ *     lanes are pixels:    each with the lines of its own cell                      (cells of few pixels)
+ *                          a packet of a block's rays, all with one cell's lines    (other cells)
+ *
+ * Where cells are small a block's packet would be asked for rays most of which lie beside the cell. Pixels of several
+ * cells' boxes are put side by side instead, and a lane takes its cell's numbers out of the batch's vectors by a
+ * permutation. Every operation is that of a cell alone (kernel_cell.h, kernel_line.h, kernel_surface.h) in the same
+ * order, so that a hit has the same bits however it came to be found. */
+#ifndef RENDER_KERNEL_BATCH_H
+#define RENDER_KERNEL_BATCH_H
+
+#include "kernel_plain.h"
+#include "kernel_tile_surface.h"
+#include "kernel_wide.h"
+
+enum {
+    KERNEL_BATCH_PIXELS = 32, /* of a cell's box: with more of them, the cell is traced block by block */
+    KERNEL_BATCH_RAYS = SIMD_WIDTH * KERNEL_BATCH_PIXELS
+};
+
+typedef struct kernel_batch {
+    int count, layer, part; /* -1: of none yet */
+    kernel_plain plain;     /* of the layer's field on the part */
+    bool is_for_it;         /* its cells may be put into batches */
+    /* cell by cell */
+    uint32_t cell[SIMD_WIDTH];
+    uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
+    float near[SIMD_WIDTH];
+    int value[SIMD_WIDTH];
+    int32_t vertex[4][SIMD_WIDTH];
+    double isovalue[SIMD_WIDTH];
+    /* cells in lanes, vertices in the order of coordinates; f: field less the isovalue, scaled */
+    vf world[3][4], place[3][4], f[4], field[4];
+    vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
+    vf doubt, least[4];
+    bool has_normals;
+    vf normal[3];
+    /* Rays to trace: pixel of the tile, row by row, and the cell's lane. */
+    int ray_count;
+    uint8_t pixel[KERNEL_BATCH_RAYS + KERNEL_TILE], lane[KERNEL_BATCH_RAYS + KERNEL_TILE];
+} kernel_batch;
+
+/* ---- doubles, in two halves ---- */
+
+SIMD_INLINE kernel_half kernel_half_of(const vf *v, int half)
+{
+    kernel_half_floats f;
+    memcpy(&f, (const char *)v + half * (int)sizeof f, sizeof f);
+    return kernel_half_widen(f);
+}
+
+SIMD_INLINE void kernel_half_put(vf *v, int half, kernel_half d)
+{
+    const kernel_half_floats f = kernel_half_narrow(d);
+    memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
+}
+
+SIMD_INLINE kernel_half kernel_half_abs(kernel_half a)
+{
+    return (kernel_half)((kernel_half_mask)a & INT64_MAX);
+}
+
+SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
+{
+    return kernel_half_select((kernel_half_mask)(b < a), a, b);
+}
+
+/* ---- lanes are cells ---- */
+
+static void kernel_batch_begin(kernel_batch *b)
+{
+    b->count = 0;
+    b->layer = b->part = -1;
+}
+
+SIMD_INLINE void kernel_batch_fetch(kernel_batch *b)
+{
+    const kernel_plain *p = &b->plain;
+    for (int n = b->count; n < SIMD_WIDTH; n++) {
+        for (int i = 0; i < 4; i++) b->vertex[i][n] = b->vertex[i][0];
+        b->isovalue[n] = b->isovalue[0];
+    }
+    for (int i = 0; i < 4; i++) {
+        vi vertex;
+        memcpy(&vertex, b->vertex[i], sizeof vertex);
+        b->field[i] = vf_gather(p->values, vertex * p->value_stride);
+        for (int a = 0; a < 3; a++) b->world[a][i] = vf_gather(p->coordinates[a], vertex * p->stride);
+    }
+}
+
+/* kernel_position_before(). */
+SIMD_INLINE vm kernel_batch_before(const kernel_batch *b, int i, int j)
+{
+    vm before = vf_lt(b->world[2][i], b->world[2][j]);
+    for (int a = 1; a >= 0; a--)
+        before = vm_or(vf_lt(b->world[a][i], b->world[a][j]), vm_and(vf_eq(b->world[a][i], b->world[a][j]), before));
+    return before;
+}
+
+/* kernel_cell_order(). */
+SIMD_INLINE void kernel_batch_order(kernel_batch *b)
+{
+    vf *const lists[4] = {b->world[0], b->world[1], b->world[2], b->field}, rank[4] = {{0}};
+    const vf one = vf_set(1), none = vf_set(0);
+    for (int i = 0; i < 4; i++)
+        for (int j = i + 1; j < 4; j++) {
+            const vm after = kernel_batch_before(b, j, i);
+            rank[i] += vf_select(after, one, none);
+            rank[j] += vf_select(after, none, one);
+        }
+    vm is[4][3];
+    for (int k = 0; k < 4; k++)
+        for (int i = 0; i < 3; i++) is[k][i] = vf_eq(rank[i], vf_set((float)k));
+    for (int n = 0; n < 4; n++) {
+        vf v[4];
+        for (int i = 0; i < 4; i++) v[i] = lists[n][i];
+        for (int k = 0; k < 4; k++)
+            lists[n][k] = vf_select(is[k][0], v[0], vf_select(is[k][1], v[1], vf_select(is[k][2], v[2], v[3])));
+    }
+}
+
+/* kernel_cell_relative(). */
+SIMD_INLINE void kernel_batch_relative(kernel_batch *b)
+{
+    for (int half = 0; half < 2; half++) {
+        kernel_half isovalue, v[4], largest;
+        memcpy(&isovalue, b->isovalue + half * KERNEL_HALF, sizeof isovalue);
+        for (int i = 0; i < 4; i++) v[i] = kernel_half_of(&b->field[i], half) - isovalue;
+        largest = kernel_half_max(kernel_half_max(kernel_half_abs(v[0]), kernel_half_abs(v[1])),
+                                  kernel_half_max(kernel_half_abs(v[2]), kernel_half_abs(v[3])));
+        /* kernel_mirrored_power() */
+        kernel_half_mask exponent = (kernel_half_mask)largest >> 52;
+        const kernel_half_mask low = exponent < 23;
+        const kernel_half_mask high = exponent > 2023;
+        exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
+        const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
+        for (int i = 0; i < 4; i++) kernel_half_put(&b->f[i], half, v[i] * scale);
+    }
+}
+
+/* kernel_place_in(). */
+SIMD_INLINE void kernel_batch_place(kernel_batch *b, const kernel_frame *f, const kernel_tile *tile)
+{
+    const double *eye = f->job->camera.eye;
+    for (int half = 0; half < 2; half++)
+        for (int i = 0; i < 4; i++) {
+            kernel_half d[3], place[3];
+            for (int a = 0; a < 3; a++) d[a] = kernel_half_of(&b->world[a][i], half) - eye[a];
+            for (int a = 0; a < 3; a++)
+                place[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
+            const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * place[2] : place[2];
+            kernel_half_put(&b->place[0][i], half, place[0] - tile->centre_x * depth);
+            kernel_half_put(&b->place[1][i], half, place[1] - tile->centre_y * depth);
+            kernel_half_put(&b->place[2][i], half, place[2] - tile->depth_shift);
+        }
+}
+
+/* Of a kernel_four_lines()'s edge. */
+SIMD_INLINE void kernel_batch_line(kernel_batch *b, const kernel_frame *f, int n)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
+    for (int half = 0; half < 2; half++) {
+        const kernel_half ax = kernel_half_of(&b->place[0][i], half), ay = kernel_half_of(&b->place[1][i], half);
+        const kernel_half bx = kernel_half_of(&b->place[0][j], half), by = kernel_half_of(&b->place[1][j], half);
+        kernel_half da = kernel_half_of(&b->place[2][i], half) + f->depth_shift;
+        kernel_half db = kernel_half_of(&b->place[2][j], half) + f->depth_shift;
+        if (flat) da = db = (kernel_half){0} + 1;
+        kernel_half_put(&b->c[n], half, ax * by - bx * ay);
+        kernel_half_put(&b->cu[n], half, db * ay - da * by);
+        kernel_half_put(&b->cv[n], half, da * bx - db * ax);
+    }
+}
+
+/* kernel_tet_lines(). */
+SIMD_INLINE void kernel_batch_lines(kernel_batch *b, const kernel_frame *f, const kernel_tile *tile)
+{
+    vf size[4], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
+    for (int i = 0; i < 4; i++) {
+        vf depth = vf_abs(b->place[2][i]) + fabsf((float)f->depth_shift);
+        if (f->job->camera.is_orthographic) depth = vf_set(1);
+        size[i] = 2 * vf_max(vf_abs(b->place[0][i]), vf_abs(b->place[1][i])) + 5 * tile->radius * depth;
+    }
+    b->doubt = vf_set(0);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
+        vf apart[3];
+        kernel_batch_line(b, f, n);
+        b->bound[n] = 6 * 6e-8f * (size[i] * size[j]);
+        b->doubt = vf_max(b->doubt, b->bound[n]);
+        for (int a = 0; a < 3; a++) apart[a] = vf_abs(b->place[a][i] - b->place[a][j]);
+        error[n] = 6e-8f * (3 * vf_abs(b->c[n]) + tile->radius * (4 * vf_abs(b->cu[n]) + 3 * vf_abs(b->cv[n])));
+        extent[n] = apart[2] + 0.25f * (apart[0] + apart[1]);
+    }
+    for (int n = 0; n < 4; n++) {
+        const int ij = kernel_tet_face[n][3], jk = kernel_tet_face[n][4], ik = kernel_tet_face[n][5];
+        b->least[n] = ((error[ij] + error[jk]) + error[ik]) * ((extent[ij] + extent[jk]) + extent[ik]) *
+                      (0.5f / KERNEL_WEIGHT_ERROR);
+    }
+}
+
+/* kernel_tet_normal(), for the cells that are hit first. */
+static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, const kernel_frame *f)
+{
+    const double scale = f->job->space.scale;
+    for (int half = 0; half < 2; half++) {
+        kernel_half d[3][3], df[3], g[3], largest = {0};
+        for (int i = 0; i < 3; i++) {
+            df[i] = kernel_half_of(&b->f[i + 1], half) - kernel_half_of(&b->f[0], half);
+            for (int a = 0; a < 3; a++)
+                d[i][a] = (kernel_half_of(&b->world[a][i + 1], half) - kernel_half_of(&b->world[a][0], half)) * scale;
+        }
+        for (int a = 0; a < 3; a++) {
+            const int p = (a + 1) % 3, q = (a + 2) % 3;
+            g[a] = df[0] * (d[1][p] * d[2][q] - d[1][q] * d[2][p]) + df[1] * (d[2][p] * d[0][q] - d[2][q] * d[0][p]) +
+                   df[2] * (d[0][p] * d[1][q] - d[0][q] * d[1][p]);
+            largest = kernel_half_max(kernel_half_abs(g[a]), largest);
+        }
+        const kernel_half inverse =
+            kernel_half_select((kernel_half_mask)(largest > 0), 1 / (largest * scale), (kernel_half){0});
+        for (int a = 0; a < 3; a++) {
+            const double *axis = f->scaled_axes[a];
+            kernel_half_put(&b->normal[a], half, (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * inverse);
+        }
+    }
+    b->has_normals = true;
+}
+
+/* ---- a cell out of the batch, for blocks ---- */
+
+/* Without world coordinates: the normal is known. */
+static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, int n, kernel_cell *c)
+{
+    float *const places[3] = {c->x, c->y, c->z};
+    c->index = b->cell[n];
+    c->type = GRID_TET;
+    c->count = 4;
+    c->is_finite = c->is_placed = c->has_lines = c->has_normal = true;
+    c->doubt = b->doubt[n];
+    for (int i = 0; i < 4; i++) {
+        for (int a = 0; a < 3; a++) places[a][i] = b->place[a][i][n];
+        c->f[i] = b->f[i][n];
+        c->least[i] = b->least[i][n];
+    }
+    for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
+    for (int e = 0; e < KERNEL_TET_EDGES; e++)
+        c->lines[e] = (kernel_line){b->c[e][n], b->cu[e][n], b->cv[e][n], b->bound[e][n]};
+}
+
+/* ---- lanes are pixels ---- */
+
+/* Rays with their cells' numbers. */
+typedef struct kernel_batch_rays {
+    vm active;
+    vi lane, column, row; /* in the batch; of the tile */
+    vf far;
+    vf u, v, x[4], y[4], z[4], f[4];
+    int32_t at[SIMD_WIDTH]; /* packet of the tile * SIMD_WIDTH + lane in it */
+} kernel_batch_rays;
+
+SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
+{
+    typedef uint8_t kernel_byte_lanes __attribute__((vector_size(SIMD_WIDTH)));
+    kernel_byte_lanes lanes;
+    memcpy(&lanes, bytes, sizeof lanes);
+    return __builtin_convertvector(lanes, vi);
+}
+
+/* A tile's entry by column or row. */
+SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
+{
+    return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
+}
+
+/* Where a pixel of the tile is in its packets. */
+SIMD_INLINE vi kernel_batch_at(vi column, vi row)
+{
+    const vi block = (row & ~3) + (column >> 2);
+    const vi within = SIMD_WIDTH == 4 ? ((row & 2) << 2) + ((column & 2) << 1) + ((row & 1) << 1) + (column & 1)
+                                      : ((row & 3) << 2) + (column & 3);
+    return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
+}
+
+SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
+{
+    const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
+    return vf_gather((const float *)(const void *)&t->packets[0].t_far,
+                     at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
+}
+
+SIMD_INLINE void kernel_batch_project(const kernel_batch *b, const kernel_tile *tile, const kernel_batch_rays *r,
+                                      vf x[4], vf y[4])
+{
+    const vf origin_x = kernel_batch_of_tile(tile->origin_x, r->column);
+    const vf origin_y = kernel_batch_of_tile(tile->origin_y, r->row);
+    const vf slope_x = kernel_batch_of_tile(tile->slope_x, r->column);
+    const vf slope_y = kernel_batch_of_tile(tile->slope_y, r->row);
+    for (int i = 0; i < 4; i++) {
+        const vf z = vf_permute(b->place[2][i], r->lane);
+        x[i] = (vf_permute(b->place[0][i], r->lane) - origin_x) - slope_x * z;
+        y[i] = (vf_permute(b->place[1][i], r->lane) - origin_y) - slope_y * z;
+    }
+}
+
+/* kernel_tet_edges_exactly(). */
+static __attribute__((noinline)) void kernel_batch_edges_exactly(const kernel_batch *b, const kernel_tile *tile,
+                                                                 const kernel_batch_rays *r, vf e[KERNEL_TET_EDGES])
+{
+    vf x[4], y[4];
+    kernel_batch_project(b, tile, r, x, y);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
+        const vm doubt = vm_and(r->active, vm_not(vf_lt(vf_permute(b->bound[n], r->lane), vf_abs(e[n]))));
+        if (vm_any(doubt)) e[n] = vf_select(doubt, kernel_edge_between(x[i], y[i], x[j], y[j]), e[n]);
+    }
+}
+
+SIMD_INLINE kernel_sums kernel_batch_sums(const kernel_batch_rays *r, const signed char face[3], vf ij, vf jk, vf ik)
+{
+    const vf *z = r->z, *f = r->f;
+    const int i = face[0], j = face[1], k = face[2];
+    return (kernel_sums){.depth = vf_muladd(ij, z[k], vf_muladd(-ik, z[j], jk * z[i])),
+                         .value = vf_muladd(ij, f[k], vf_muladd(-ik, f[j], jk * f[i])),
+                         .weight = kernel_weight(ij, jk, ik)};
+}
+
+/* kernel_tet_mend(). */
+static __attribute__((noinline)) void kernel_batch_mend(const kernel_batch *b, const kernel_tile *tile,
+                                                        const kernel_batch_rays *r, const vf e[KERNEL_TET_EDGES],
+                                                        const vm weak[4], kernel_sums sums[4])
+{
+    vf x[4], y[4];
+    kernel_batch_project(b, tile, r, x, y);
+    for (int n = 0; n < 4; n++) {
+        if (!vm_any(weak[n])) continue;
+        const signed char *face = kernel_tet_face[n];
+        const int i = face[0], j = face[1], k = face[2];
+        const vf ij = vf_select(weak[n], kernel_edge_between(x[i], y[i], x[j], y[j]), e[face[3]]);
+        const vf jk = vf_select(weak[n], kernel_edge_between(x[j], y[j], x[k], y[k]), e[face[4]]);
+        const vf ik = vf_select(weak[n], kernel_edge_between(x[i], y[i], x[k], y[k]), e[face[5]]);
+        sums[n] = kernel_batch_sums(r, face, ij, jk, ik);
+    }
+}
+
+/* kernel_tet_interval() and kernel_tet_surface(): rays that hit, and where. */
+SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, float t_near, kernel_batch_rays *r,
+                                vf *out)
+{
+    vf e[KERNEL_TET_EDGES], least = vf_set(INFINITY);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        e[n] = vf_muladd(vf_permute(b->cv[n], r->lane), r->v,
+                         vf_muladd(vf_permute(b->cu[n], r->lane), r->u, vf_permute(b->c[n], r->lane)));
+        least = vf_min(vf_abs(e[n]), least);
+    }
+    const vm sure = vf_lt(vf_permute(b->doubt, r->lane), least);
+    if (__builtin_expect(vm_any(vm_andnot(r->active, sure)), 0)) kernel_batch_edges_exactly(b, tile, r, e);
+    vm hit[4], weak[4], any_hit = vm_none(), any_weak = vm_none();
+    for (int n = 0; n < 4; n++) {
+        const signed char *face = kernel_tet_face[n];
+        hit[n] = kernel_inside(r->active, e[face[3]], e[face[4]], e[face[5]]);
+        any_hit = vm_or(any_hit, hit[n]);
+    }
+    if (!vm_any(any_hit)) return any_hit;
+    kernel_sums sums[4];
+    for (int i = 0; i < 4; i++) {
+        r->z[i] = vf_permute(b->place[2][i], r->lane);
+        r->f[i] = vf_permute(b->f[i], r->lane);
+    }
+    for (int n = 0; n < 4; n++) {
+        const signed char *face = kernel_tet_face[n];
+        sums[n] = kernel_batch_sums(r, face, e[face[3]], e[face[4]], e[face[5]]);
+        weak[n] = vm_and(hit[n], vf_lt(vf_abs(sums[n].weight), vf_permute(b->least[n], r->lane)));
+        any_weak = vm_or(any_weak, weak[n]);
+    }
+    if (__builtin_expect(vm_any(any_weak), 0)) kernel_batch_mend(b, tile, r, e, weak, sums);
+    const kernel_ends ends = kernel_tet_choose(hit[0], hit[1], hit[2], hit[3], &sums[0], &sums[1], &sums[2], &sums[3]);
+    const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
+    const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
+    const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
+    const vm swap = vf_lt(t_b, t_a);
+    const vf t_in = vf_select(swap, t_b, t_a), t_out = vf_select(swap, t_a, t_b);
+    const vf v_in = vf_select(swap, v_b, v_a), v_out = vf_select(swap, v_a, v_b);
+    const vm near = vm_and(any_hit, vm_and(vf_le(t_in, r->far), vf_le(vf_set(t_near), t_out)));
+    const vm change = vm_and(near, vm_xor(vf_lt(v_in, vf_set(0)), vf_lt(v_out, vf_set(0))));
+    if (!vm_any(change)) return change;
+    *out = kernel_secant(t_in, v_in, t_out, v_out);
+    return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, r->far)));
+}
+
+/* kernel_accept(), ray by ray: two of them may be of one pixel. Returns the blocks in which something is nearer. */
+static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, const kernel_batch_rays *r,
+                                    const uint8_t *lanes, unsigned hit, vf depth)
+{
+    const kernel_surface *s = t->surface;
+    unsigned blocks = 0;
+    if (!b->has_normals) kernel_batch_normals(b, t->frame);
+    for (; hit; hit &= hit - 1) {
+        const int i = __builtin_ctz(hit), at = r->at[i], ray = at % SIMD_WIDTH, n = lanes[i];
+        const float *colour = s->layer->colours + 3 * b->value[n];
+        kernel_packet *p = &t->packets[at / SIMD_WIDTH];
+        kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
+        const float far = p->t_far[ray];
+        if (!(depth[i] <= far)) continue;
+        if (depth[i] == far && far < INFINITY) {
+            const vf normal[3] = {vf_set(b->normal[0][n]), vf_set(b->normal[1][n]), vf_set(b->normal[2][n])};
+            const vf own[3] = {vf_set(colour[0]), vf_set(colour[1]), vf_set(colour[2])};
+            kernel_emit_tied(p, s, b->value[n], vm_from_bits(1u << ray), vf_set(depth[i]), normal, own);
+            continue;
+        }
+        p->t_far[ray] = depth[i];
+        vm_set_lane(&hits->found, ray);
+        for (int a = 0; a < 3; a++) {
+            hits->normal[a][ray] = b->normal[a][n];
+            hits->colour[a][ray] = colour[a];
+        }
+        hits->kind[ray] = (float)((int)s->first_kind + b->value[n]);
+        blocks |= 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
+    }
+    return blocks;
+}
+
+SIMD_INLINE void kernel_batch_trace(kernel_tile_trace *t, kernel_batch *b)
+{
+    const kernel_tile *tile = &t->tile;
+    const bool flat = t->frame->job->camera.is_orthographic;
+    unsigned nearer = 0;
+    for (int first = 0; first < b->ray_count; first += SIMD_WIDTH) {
+        const int left = b->ray_count - first;
+        kernel_batch_rays r;
+        vf depth;
+        r.active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
+        r.lane = kernel_bytes(b->lane + first) & (SIMD_WIDTH - 1);
+        const vi pixel = kernel_bytes(b->pixel + first);
+        r.column = pixel & (KERNEL_TILE - 1);
+        r.row = pixel >> 4;
+        const vi at = kernel_batch_at(r.column, r.row);
+        r.far = kernel_batch_far(t, at);
+        r.active = vm_and(r.active, vf_le(vf_permute(vf_load(b->near), r.lane), r.far));
+        if (!vm_any(r.active)) continue;
+        r.u = kernel_batch_of_tile(flat ? tile->origin_x : tile->slope_x, r.column);
+        r.v = kernel_batch_of_tile(flat ? tile->origin_y : tile->slope_y, r.row);
+        const vm hit = kernel_batch_hit(b, tile, t->t_near, &r, &depth);
+        if (!vm_any(hit)) continue;
+        memcpy(r.at, &at, sizeof r.at);
+        nearer |= kernel_batch_accept(t, b, &r, b->lane + first, vm_bits(hit), depth);
+    }
+    for (; nearer; nearer &= nearer - 1) {
+        const int block = __builtin_ctz(nearer);
+        t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
+    }
+    b->ray_count = 0;
+}
+
+/* ---- batches ---- */
+
+/* The pixels of a box, row by row, are the rays to come. */
+SIMD_INLINE void kernel_batch_rays_of(kernel_batch *b, int n, int columns, int rows)
+{
+    static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    typedef uint8_t kernel_row_bytes __attribute__((vector_size(KERNEL_TILE)));
+    kernel_row_bytes row;
+    const unsigned box = b->box[n];
+    memcpy(&row, ramp, sizeof row);
+    row += (uint8_t)((box & 15) | (box >> 8 & 15) << 4);
+    const kernel_row_bytes lane = (kernel_row_bytes){0} + (uint8_t)n;
+    for (int y = 0; y < rows; y++, row += KERNEL_TILE) {
+        memcpy(b->pixel + b->ray_count, &row, sizeof row);
+        memcpy(b->lane + b->ray_count, &lane, sizeof lane);
+        b->ray_count += columns;
+    }
+}
+
+static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b)
+{
+    kernel_batch_fetch(b);
+    kernel_batch_order(b);
+    kernel_batch_relative(b);
+    kernel_batch_place(b, t->frame, &t->tile);
+    kernel_batch_lines(b, t->frame, &t->tile);
+    b->has_normals = false;
+    b->ray_count = 0;
+    for (int n = 0; n < b->count; n++) {
+        const unsigned box = b->box[n], blocks = b->blocks[n] & kernel_blocks_beyond(t, b->near[n]);
+        const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
+        const int rows = (int)(box >> 12) - (int)(box >> 8 & 15) + 1;
+        if (columns * rows <= KERNEL_BATCH_PIXELS) {
+            if (blocks) kernel_batch_rays_of(b, n, columns, rows);
+            continue;
+        }
+        if (!blocks) continue;
+        if (!b->has_normals) kernel_batch_normals(b, t->frame);
+        kernel_batch_cell(b, n, &t->cell);
+        kernel_blocks_meet(t, blocks, b->part, t->cell.index, &t->cell, b->value[n]);
+    }
+    kernel_batch_trace(t, b);
+    b->count = 0;
+}
+
+static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
+{
+    t->layer = layer;
+    t->surface = &t->frame->surfaces[layer];
+}
+
+/* What is added from now on is of the part and the layer under way: what waits, of others, is traced. */
+SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int part)
+{
+    const int layer = t->layer;
+    const render_surface_layer *l = t->surface->layer;
+    if (b->layer == layer && b->part == part) return;
+    if (b->count) {
+        kernel_tile_set_layer(t, b->layer);
+        kernel_batch_run(t, b);
+        kernel_tile_set_layer(t, layer);
+    }
+    b->layer = layer;
+    b->part = part;
+    kernel_plain_begin(&b->plain, t->frame, t->frame->job->parts[part].cells, &l->field.fields[part]);
+    b->is_for_it =
+        b->plain.is_so && layer < t->frame->opaque_count && !l->colour_map && l->normal != RENDER_DIFFERENCES;
+}
+
+/* The last ones. */
+SIMD_INLINE void kernel_batch_end(kernel_tile_trace *t, kernel_batch *b)
+{
+    if (!b->count) return;
+    kernel_tile_set_layer(t, b->layer);
+    kernel_batch_run(t, b);
+}
+
+SIMD_INLINE void kernel_batch_add(kernel_tile_trace *t, kernel_batch *b, const kernel_tile_shown *shown, int value)
+{
+    if (b->count == SIMD_WIDTH) kernel_batch_run(t, b);
+    const int n = b->count++;
+    const int32_t *vertices = b->plain.connectivity + 4 * (int64_t)shown->cell;
+    b->cell[n] = shown->cell;
+    b->blocks[n] = shown->blocks;
+    b->box[n] = shown->box;
+    b->near[n] = shown->near;
+    b->value[n] = value;
+    b->isovalue[n] = t->surface->layer->values[value];
+    for (int i = 0; i < 4; i++) b->vertex[i][n] = vertices[i];
+    for (int i = 0; i < 4; i++) kernel_plain_prefetch(&b->plain, vertices[i]);
+    for (unsigned blocks = shown->blocks & ~t->begun; blocks; blocks &= blocks - 1)
+        kernel_block_begin(t, __builtin_ctz(blocks));
+}
+
+#endif

@@ -1,0 +1,179 @@
+/* A tile's share of an isosurface's cells as they were found and binned (kernel_shown.h), traced from the nearest on;
+ * blocks that know of something nearer are left out, and so in the end are the tile's farther cells. */
+#ifndef RENDER_KERNEL_TILE_SHOWN_H
+#define RENDER_KERNEL_TILE_SHOWN_H
+
+#include "kernel_batch.h"
+
+/* A tile's cells by depth, as far as it takes to leave out what is hidden: in so many parts of the tile's depth, in any
+ * order within each. */
+enum { KERNEL_DEPTHS = 32 };
+
+typedef struct kernel_by_depth {
+    kernel_tile_shown *items;
+    float low, scale;
+    int ends[KERNEL_DEPTHS]; /* of each part's items, the nearest first */
+} kernel_by_depth;
+
+/* The part; less for nothing that is farther. */
+SIMD_INLINE int kernel_depth_part(const kernel_by_depth *q, float near)
+{
+    const float part = (near - q->low) * q->scale;
+    return part > 0 ? part < KERNEL_DEPTHS - 1 ? (int)part : KERNEL_DEPTHS - 1 : 0;
+}
+
+/* In place: each item that is not in its part takes the place of one there, which is next. */
+static inline void kernel_sort_by_depth(kernel_by_depth *q, kernel_tile_shown *items, int count)
+{
+    int next[KERNEL_DEPTHS];
+    float high = items[0].near;
+    q->items = items;
+    q->low = items[0].near;
+    for (int i = 1; i < count; i++) {
+        q->low = items[i].near < q->low ? items[i].near : q->low;
+        high = items[i].near > high ? items[i].near : high;
+    }
+    q->scale = high > q->low ? KERNEL_DEPTHS / (high - q->low) : 0;
+    memset(q->ends, 0, sizeof q->ends);
+    for (int i = 0; i < count; i++) q->ends[kernel_depth_part(q, items[i].near)]++;
+    for (int part = 0, end = 0; part < KERNEL_DEPTHS; part++) {
+        next[part] = end;
+        q->ends[part] = end += q->ends[part];
+    }
+    for (int part = 0; part < KERNEL_DEPTHS; part++)
+        while (next[part] < q->ends[part]) {
+            kernel_tile_shown item = items[next[part]];
+            for (int own; (own = kernel_depth_part(q, item.near)) != part;) {
+                kernel_tile_shown *place = &items[next[own]++];
+                const kernel_tile_shown moved = *place;
+                *place = item;
+                item = moved;
+            }
+            items[next[part]++] = item;
+        }
+}
+
+/* The farthest that a block knows of. */
+SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
+{
+    const unsigned lanes = (1u << SIMD_WIDTH) - 1;
+    vf far = vf_set(-INFINITY);
+    for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) {
+        const vm wanted = vm_from_bits(t->wanted >> v * SIMD_WIDTH & lanes);
+        far = vf_max(far, vf_select(wanted, t->far[v], vf_set(-INFINITY)));
+    }
+    return vf_reduce_max(far);
+}
+
+static void kernel_tile_meet(kernel_tile_trace *t, const kernel_plain *plain, const kernel_tile_shown *shown, int part,
+                             int value, unsigned blocks)
+{
+    const render_surface_layer *layer = t->surface->layer;
+    const grid *g = t->frame->job->parts[part].cells;
+    kernel_cell *c = &t->cell;
+    if (plain->is_so) {
+        kernel_plain_cell(c, plain, t->frame, &t->tile, shown->cell);
+    } else {
+        kernel_cell_fetch(c, g, &layer->field.fields[part], shown->cell);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_blocks_meet(t, blocks, part, shown->cell, NULL, 0);
+            return;
+        }
+        kernel_cell_move(c, t->frame, &t->tile, g);
+    }
+    kernel_cell_relative(c, layer->values[value]);
+    kernel_tile_ready(t, part);
+    t->poly.is_set_up = false;
+    kernel_blocks_meet(t, blocks, part, c->index, c, value);
+}
+
+/* Set the layer of the tile by the source; returns the isovalue's number in it. */
+SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
+{
+    const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
+    *part = (int)(source / RENDER_MAX_ISOVALUES);
+    kernel_tile_set_layer(t, isovalue->surface);
+    return isovalue->value;
+}
+
+/* Cells whose vertices' indices are on their way from memory. */
+typedef struct kernel_waiting {
+    int count;
+    const kernel_tile_shown *items[SIMD_WIDTH];
+} kernel_waiting;
+
+SIMD_INLINE unsigned kernel_shown_blocks(const kernel_tile_trace *t, const kernel_tile_shown *shown)
+{
+    return shown->blocks & t->wanted & kernel_blocks_beyond(t, shown->near);
+}
+
+/* Vertices of all that wait come from memory while those that came before are traced. */
+static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace *t, kernel_batch *b, kernel_waiting *w)
+{
+    for (int n = 0; n < w->count; n++) {
+        int part;
+        kernel_tile_source(t, w->items[n]->source, &part);
+        if (!b->count) kernel_batch_turn(t, b, part);
+        if (b->is_for_it && b->layer == t->layer && b->part == part) continue; /* batches ask for theirs */
+        kernel_tile_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
+                                      w->items[n]->cell);
+    }
+    for (int n = 0; n < w->count; n++) {
+        int part;
+        const int value = kernel_tile_source(t, w->items[n]->source, &part);
+        const unsigned blocks = kernel_shown_blocks(t, w->items[n]);
+        if (!blocks) continue;
+        kernel_batch_turn(t, b, part);
+        if (b->is_for_it)
+            kernel_batch_add(t, b, w->items[n], value);
+        else
+            kernel_tile_meet(t, &b->plain, w->items[n], part, value, blocks);
+    }
+    w->count = 0;
+}
+
+/* The tile's opaque surfaces, or the transparent ones, for which those must be known. */
+static __attribute__((noinline)) void kernel_tile_trace_shown(kernel_tile_trace *t, const kernel_by_depth *q,
+                                                              bool transparent)
+{
+    kernel_batch batch;
+    kernel_waiting waiting = {0};
+    int next = 0;
+    kernel_batch_begin(&batch);
+    for (int part = 0; part < KERNEL_DEPTHS && part <= kernel_depth_part(q, kernel_tile_far(t)); part++)
+        for (; next < q->ends[part]; next++) {
+            const kernel_tile_shown *shown = &q->items[next];
+            const uint32_t source = shown->source;
+            const bool is_transparent =
+                t->frame->isovalues[source % RENDER_MAX_ISOVALUES].surface >= t->frame->opaque_count;
+            if (is_transparent != transparent || !kernel_shown_blocks(t, shown)) continue;
+            kernel_tile_prefetch_indices(t->frame->job->parts[source / RENDER_MAX_ISOVALUES].cells, shown->cell);
+            waiting.items[waiting.count++] = shown;
+            if (waiting.count == SIMD_WIDTH) kernel_tile_meet_waiting(t, &batch, &waiting);
+        }
+    kernel_tile_meet_waiting(t, &batch, &waiting);
+    kernel_batch_end(t, &batch);
+}
+
+/* The tile's cells; returns how many they are. */
+SIMD_INLINE int kernel_shown_in_tile(const kernel_frame *f, int x0, int y0, kernel_tile_shown **items)
+{
+    const int columns = (f->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
+    const uint32_t *starts = f->shown_starts + (y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE);
+    *items = f->shown + starts[0];
+    return (int)(starts[1] - starts[0]);
+}
+
+SIMD_INLINE void kernel_tile_surfaces_shown(kernel_tile_trace *t)
+{
+    const kernel_frame *f = t->frame;
+    kernel_tile_shown *items;
+    const int count = kernel_shown_in_tile(f, t->tile.x0, t->tile.y0, &items);
+    if (!count) return;
+    kernel_by_depth by_depth;
+    kernel_sort_by_depth(&by_depth, items, count);
+    if (f->opaque_count) kernel_tile_trace_shown(t, &by_depth, false);
+    if (f->opaque_count < f->surface_count) kernel_tile_trace_shown(t, &by_depth, true);
+}
+
+#endif

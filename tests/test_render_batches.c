@@ -1,0 +1,100 @@
+/* Tets of plain meshes, which tiles trace as many at once as there are lanes (kernel_batch.h), against the same tets in
+ * traversals that take them one by one: the same bits. Cells are of some pixels, of many and of one; the last ones lie
+ * beside each other in one vector, and may hit one pixel. */
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+enum { WIDTH = 61, HEIGHT = 47 };
+
+static const float other_colours[2][3] = {{0.9f, 0.9f, 0.1f}, {0.1f, 0.9f, 0.9f}};
+static const double values[4] = {-0.2, 0.3, 0.1, -0.5};
+
+static void create(render_fixture *f, const test_mesh *meshes, int count, int n, fixture_camera camera)
+{
+    fixture_create(f, meshes, count, (test_layout){.is_interleaved = n % 2}, 2.0 / n, 1, (const double[]){0, 0, 0});
+    fixture_look(f, camera, WIDTH, HEIGHT);
+}
+
+static void compare(render_fixture *f)
+{
+    drawn_frame binned, packets;
+    f->job.traversal = RENDER_BINNED;
+    fixture_draw(f, &binned);
+    f->job.traversal = RENDER_PACKETS;
+    fixture_draw(f, &packets);
+    assert_true(binned.list.count > 100);
+    assert_int_equal(binned.list.count, packets.list.count);
+    drawn_assert_same(&binned, &packets);
+    drawn_free(&binned);
+    drawn_free(&packets);
+    fixture_free(f);
+}
+
+static void batches_draw_what_single_tets_do(void **state)
+{
+    (void)state;
+    static const struct {
+        int n;
+        test_function *field;
+    } lattices[] = {{2, test_wave}, {4, test_wave}, {7, test_wave}, {13, test_wave}, {16, test_linear}};
+    for (size_t i = 0; i < sizeof lattices / sizeof *lattices; i++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++)
+            for (int jittered = 0; jittered < 2; jittered++) {
+                render_fixture f;
+                test_mesh mesh;
+                test_mesh_lattice(TEST_TETS, lattices[i].n, 0.2 * jittered, lattices[i].field, &mesh);
+                create(&f, &mesh, 1, lattices[i].n, camera);
+                fixture_add_surface(&f, values, 1 + jittered, 1);
+                compare(&f);
+                test_mesh_free(&mesh);
+            }
+}
+
+/* What waits for a batch is of one mesh and one layer. */
+static void meshes_and_layers_take_turns(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 2; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+            render_fixture f;
+            test_mesh meshes[2];
+            test_mesh_lattice(TEST_TETS, 7, 0.2, test_wave, &meshes[0]);
+            test_mesh_lattice(kind ? TEST_TETS : TEST_HEXES, 8, 0.1, test_linear, &meshes[1]);
+            create(&f, meshes, 2, 7, camera);
+            fixture_add_surface(&f, values, 2, 1);
+            fixture_add_surface(&f, values + 2, 2, kind ? 1 : 0.4f);
+            f.surfaces[1].colours = other_colours[0];
+            compare(&f);
+            for (int i = 0; i < 2; i++) test_mesh_free(&meshes[i]);
+        }
+}
+
+/* Each hit stands there twice. */
+static void ties_are_kept(void **state)
+{
+    (void)state;
+    for (int n = 4; n <= 16; n *= 4) {
+        render_fixture f;
+        test_mesh meshes[2];
+        for (int i = 0; i < 2; i++) test_mesh_lattice(TEST_TETS, n, 0.2, test_linear, &meshes[i]);
+        create(&f, meshes, 2, n, CAMERA_OUTSIDE);
+        fixture_add_surface(&f, values, 1, 1);
+        compare(&f);
+        for (int i = 0; i < 2; i++) test_mesh_free(&meshes[i]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(batches_draw_what_single_tets_do),
+        cmocka_unit_test(meshes_and_layers_take_turns),
+        cmocka_unit_test(ties_are_kept),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
