@@ -190,12 +190,8 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = kernel_tile_segments_of(t);
     const kernel_lie reach = kernel_tile_reach(t);
-    int packets[KERNEL_TILE_PACKETS], count = 0;
-    for (unsigned left = reach.blocks; left; left &= left - 1) {
-        const int block = __builtin_ctz(left);
-        kernel_block_begin(t, block);
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
-    }
+    int packets[KERNEL_TILE_PACKETS];
+    const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     for (int n = 0; n < count; n++) {
         t->packets[packets[n]].is_pencil = false;
         kernel_ray_segments_begin(&t->packets[packets[n]], &s->packets[packets[n]], reach.far);

@@ -7,12 +7,14 @@
 
 #include "kernel_outline.h"
 #include "kernel_surface.h"
+#include "kernel_tile_blocks.h"
 
 typedef struct kernel_tile_trace {
     const kernel_frame *frame;
     kernel_thread *thread;
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
+    kernel_block_rays block_rays; /* for volumes */
     unsigned wanted; /* blocks that have pixels to trace */
     unsigned begun;  /* blocks whose packets are set up */
     float t_near;

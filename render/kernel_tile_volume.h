@@ -84,8 +84,9 @@ SIMD_INLINE unsigned kernel_tile_volume_cell(kernel_tile_trace *t, kernel_cell *
     if (!meets) return 0;
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);
-    if (is_pencil) kernel_cell_lines(c, t->frame, &t->tile);
-    if (c->type != GRID_TET && !c->is_constant) kernel_map_setup(map, c);
+    if (is_pencil || c->type == GRID_TET) kernel_cell_lines(c, t->frame, &t->tile);
+    if (c->type == GRID_TET) return meets & kernel_tet_blocks(&t->block_rays, c);
+    if (!c->is_constant) kernel_map_setup(map, c);
     return meets;
 }
 
@@ -143,6 +144,19 @@ SIMD_INLINE kernel_lie kernel_tile_reach(const kernel_tile_trace *t)
         all.far = fmaxf(all.far, lie.far);
     }
     return all;
+}
+
+/* Set up the blocks; returns how many packets they have, which are listed. */
+SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
+{
+    int count = 0;
+    for (; blocks; blocks &= blocks - 1) {
+        const int block = __builtin_ctz(blocks);
+        kernel_block_begin(t, block);
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
+    }
+    if (count) kernel_block_rays_setup(&t->block_rays, t->frame, &t->tile);
+    return count;
 }
 
 /* Set up the packet; what of sample numbers its rays have between the depths is added to first .. last. */
@@ -213,12 +227,8 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
     kernel_tile_volume *v = kernel_tile_volume_of(t);
     const kernel_lie reach = kernel_tile_reach(t);
     const unsigned blocks = reach.blocks;
-    int packets[KERNEL_TILE_PACKETS], count = 0, first = INT_MAX, last = INT_MIN;
-    for (unsigned left = blocks; left; left &= left - 1) {
-        const int block = __builtin_ctz(left);
-        kernel_block_begin(t, block);
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
-    }
+    int packets[KERNEL_TILE_PACKETS], first = INT_MAX, last = INT_MIN;
+    const int count = kernel_tile_volume_begin(t, blocks, packets);
     for (int n = 0; n < count; n++)
         kernel_ray_samples_begin(&t->packets[packets[n]], &v->packets[packets[n]], reach.near, reach.far, &first,
                                  &last);

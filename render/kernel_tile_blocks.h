@@ -1,0 +1,67 @@
+/* Which of a tile's blocks a tet's outline meets, all of them at once: a block is a lane. The bounds of the outline
+ * (kernel_outline_lie()) leave blocks that lie beside its slanted edges; two of five packets would be asked for nothing.
+ *
+ * An edge function is affine over the tile (kernel_line.h), so that over a block it is that of the block's middle, give
+ * or take its slopes times half of what the block's rays span. A block in which no face can have the signs that a ray
+ * inside has of its three edges, holds no ray that crosses the tet. */
+#ifndef RENDER_KERNEL_TILE_BLOCKS_H
+#define RENDER_KERNEL_TILE_BLOCKS_H
+
+#include "kernel_cell.h"
+#include "kernel_tile.h"
+
+enum { KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH };
+
+/* Block by block: the middle of u and v, and half of what they span. */
+typedef struct kernel_block_rays {
+    vf u[KERNEL_BLOCK_VECTORS], v[KERNEL_BLOCK_VECTORS];
+    float half_u, half_v;
+} kernel_block_rays;
+
+/* The tile's rays must be there. Halves are those of the widest block, and a thousandth more for all rounding. */
+static inline void kernel_block_rays_setup(kernel_block_rays *r, const kernel_frame *f, const kernel_tile *tile)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const float *u = flat ? tile->origin_x : tile->slope_x, *v = flat ? tile->origin_y : tile->slope_y;
+    float middle[2][KERNEL_BLOCKS];
+    r->half_u = r->half_v = 0;
+    for (int b = 0; b < KERNEL_BLOCKS; b++) {
+        const int column = b % KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK, row = b / KERNEL_BLOCKS_ACROSS * KERNEL_BLOCK;
+        const float *first_u = u + column, *first_v = v + row;
+        middle[0][b] = 0.5f * (first_u[0] + first_u[KERNEL_BLOCK - 1]);
+        middle[1][b] = 0.5f * (first_v[0] + first_v[KERNEL_BLOCK - 1]);
+        r->half_u = fmaxf(r->half_u, 0.5005f * fabsf(first_u[KERNEL_BLOCK - 1] - first_u[0]));
+        r->half_v = fmaxf(r->half_v, 0.5005f * fabsf(first_v[KERNEL_BLOCK - 1] - first_v[0]));
+    }
+    for (int n = 0; n < KERNEL_BLOCK_VECTORS; n++) {
+        r->u[n] = vf_load(middle[0] + n * SIMD_WIDTH);
+        r->v[n] = vf_load(middle[1] + n * SIMD_WIDTH);
+    }
+}
+
+/* The blocks that may have a ray inside, of a tet that has its lines. The middle's edge function errs by no more than a
+ * ray's, and what decides the sign on a ray of doubt, or one that is projected, by less than the bound: twice the bound
+ * is more than all of it. What is not a number is anywhere. */
+SIMD_INLINE unsigned kernel_tet_blocks(const kernel_block_rays *r, const kernel_cell *c)
+{
+    unsigned blocks = 0;
+    for (int i = 0; i < KERNEL_BLOCK_VECTORS; i++) {
+        vm above[KERNEL_TET_EDGES], below[KERNEL_TET_EDGES], met = vm_none();
+        for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+            const kernel_line *l = &c->lines[n];
+            const float reach = fabsf(l->cu) * r->half_u + fabsf(l->cv) * r->half_v + 2 * l->bound;
+            const vf e = vf_muladd(vf_set(l->cv), r->v[i], vf_muladd(vf_set(l->cu), r->u[i], vf_set(l->c)));
+            above[n] = vm_not(vf_lt(e, vf_set(-reach)));
+            below[n] = vm_not(vf_lt(vf_set(reach), e));
+        }
+        for (int n = 0; n < 4; n++) { /* kernel_inside() of each face */
+            const signed char *edge = kernel_tet_face[n] + 3;
+            met = vm_or(met, vm_and(vm_and(above[edge[0]], above[edge[1]]), below[edge[2]]));
+            met = vm_or(met, vm_and(vm_and(below[edge[0]], below[edge[1]]), above[edge[2]]));
+        }
+        blocks |= vm_bits(met) << i * SIMD_WIDTH;
+    }
+    return blocks;
+}
+
+#endif
