@@ -1,7 +1,8 @@
 /* Isosurfaces by one traversal a frame: the trees are gone down once for the whole picture, and each cell that the
- * surface crosses is fetched and placed once, to find the pixels that it may show in; the cells are then binned
- * by tile (render_shown.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace them from the nearest on,
- * blocks that know of something nearer left out (kernel_tile_shown.h, kernel_batch.h):
+ * surface crosses, or that shows in the volume, is fetched and placed once, to find the pixels that it may show in; the
+ * cells are then binned by tile (render_shown.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace them
+ * from the nearest on, blocks that know of something nearer left out (kernel_tile_shown.h, kernel_batch.h; of the volume
+ * kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
@@ -16,6 +17,7 @@
 
 #include "kernel_plain.h"
 #include "kernel_tile_surface.h"
+#include "kernel_volume.h"
 
 /* Tets, one a lane. */
 typedef struct kernel_tets {
@@ -28,7 +30,10 @@ typedef struct kernel_tets {
 /* One subtree's search. */
 typedef struct kernel_finder {
     const kernel_frame *frame;
-    const kernel_surface *surface;
+    const kernel_surface *surface;   /* NULL: */
+    const kernel_transfer *transfer; /* the volume's */
+    const render_field *field;
+    const kernel_interest *interest;
     kernel_shown_list *list;
     bool (*grow)(kernel_shown_list *list);
     int part;
@@ -60,12 +65,19 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
 {
     kernel_borders borders;
     s->frame = f;
-    s->surface = &f->surfaces[subtree->surface];
     s->part = subtree->part;
-    s->source = (uint32_t)subtree->part * RENDER_MAX_ISOVALUES;
-    while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
+    s->source = (uint32_t)subtree->part;
+    s->surface = NULL;
+    s->transfer = &f->volumes[0];
+    if (subtree->surface >= 0) {
+        s->surface = &f->surfaces[subtree->surface];
+        s->source *= RENDER_MAX_ISOVALUES;
+        while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
+    }
+    s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
+    s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
     s->coming_count = s->tets.count = 0;
-    kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->surface->layer->field.fields[s->part]);
+    kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);
@@ -124,7 +136,9 @@ SIMD_INLINE bool kernel_extents_shown(const kernel_finder *s, kernel_extent dept
     const float pad = KERNEL_OUTLINE_PAD * size;
     if (depth.high + pad < s->t_near) return false;
     out->near = depth.low - pad;
+    out->far = depth.high + pad;
     if (!(out->near > -INFINITY)) out->near = -INFINITY; /* not a number */
+    if (!(out->far < INFINITY)) out->far = INFINITY;
     if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
         out->x0 = out->y0 = 0;
         out->x1 = (uint16_t)(camera->width - 1);
@@ -200,6 +214,29 @@ static void kernel_find_value(kernel_finder *s, int value)
     if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
 }
 
+/* All of the fetched cell, in the volume. */
+static void kernel_find_volume(kernel_finder *s)
+{
+    kernel_cell *c = &s->cell;
+    kernel_outline o;
+    kernel_shown shown = {.cell = c->index, .source = s->source};
+    if (!kernel_cell_shows(c, s->transfer)) return;
+    kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    kernel_vertex_outline(c, &o);
+    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+}
+
+/* What of the fetched cell shows. */
+static void kernel_find_cell(kernel_finder *s)
+{
+    if (!s->cell.is_finite) return;
+    if (!s->surface) {
+        kernel_find_volume(s);
+        return;
+    }
+    for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_value(s, value);
+}
+
 /* ---- tets, as many at once as there are lanes ----
  *
  * In float32 from the eye on: positions err by 8 roundings of their distance from it, and so do X, Y and depth; all of
@@ -215,32 +252,50 @@ typedef struct kernel_tet_lanes {
     vm negative[4];
 } kernel_tet_lanes;
 
-SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_lanes *l, kernel_tet_ends *e)
+/* The vertices along the camera's axes. */
+SIMD_INLINE void kernel_tet_lanes_turn(const kernel_finder *s, const kernel_tet_lanes *l, vf at[4][3])
 {
     const render_camera *camera = &s->frame->job->camera;
     const double *axes[3] = {camera->right, camera->up, camera->forward};
-    const vf most = vf_set(INFINITY);
-    vf at[4][3];
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < 3; a++)
             at[i][a] =
                 (l->at[0][i] * (float)axes[a][0] + l->at[1][i] * (float)axes[a][1]) + l->at[2][i] * (float)axes[a][2];
-    *e = (kernel_tet_ends){most, -most, most, -most, most, -most};
+}
+
+/* Ends that take in the point, in the lanes that are meant. */
+SIMD_INLINE void kernel_tet_ends_add(const kernel_finder *s, kernel_tet_ends *e, const vf point[3], vm lanes)
+{
+    const vf most = vf_set(INFINITY);
+    vf inverse = vf_set(1);
+    if (!s->frame->job->camera.is_orthographic) inverse = 1.0f / point[2];
+    const vf x = (point[0] * inverse) * s->column_scale, y = (point[1] * inverse) * s->row_scale;
+    e->near = vf_min(e->near, vf_select(lanes, point[2], most));
+    e->far = vf_max(e->far, vf_select(lanes, point[2], -most));
+    e->left = vf_min(e->left, vf_select(lanes, x, most));
+    e->right = vf_max(e->right, vf_select(lanes, x, -most));
+    e->top = vf_min(e->top, vf_select(lanes, y, most));
+    e->bottom = vf_max(e->bottom, vf_select(lanes, y, -most));
+}
+
+SIMD_INLINE kernel_tet_ends kernel_tet_no_ends(void)
+{
+    const vf most = vf_set(INFINITY);
+    return (kernel_tet_ends){most, -most, most, -most, most, -most};
+}
+
+SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_lanes *l, kernel_tet_ends *e)
+{
+    vf at[4][3];
+    kernel_tet_lanes_turn(s, l, at);
+    *e = kernel_tet_no_ends();
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm crossed = vm_xor(l->negative[i], l->negative[j]);
         const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* not 0 / 0 */
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = at[i][a] + along * (at[j][a] - at[i][a]);
-        vf inverse = vf_set(1);
-        if (!camera->is_orthographic) inverse = 1.0f / point[2];
-        const vf x = (point[0] * inverse) * s->column_scale, y = (point[1] * inverse) * s->row_scale;
-        e->near = vf_min(e->near, vf_select(crossed, point[2], most));
-        e->far = vf_max(e->far, vf_select(crossed, point[2], -most));
-        e->left = vf_min(e->left, vf_select(crossed, x, most));
-        e->right = vf_max(e->right, vf_select(crossed, x, -most));
-        e->top = vf_min(e->top, vf_select(crossed, y, most));
-        e->bottom = vf_max(e->bottom, vf_select(crossed, y, -most));
+        kernel_tet_ends_add(s, e, point, crossed);
     }
 }
 
@@ -261,7 +316,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigne
     const bool flat = camera->is_orthographic;
     kernel_shown_list *list = s->list;
     vf first[2], last[2];
-    float near[SIMD_WIDTH];
+    float near[SIMD_WIDTH], far[SIMD_WIDTH];
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
     /* The largest blur of any lane stands for all. */
@@ -281,12 +336,14 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigne
         memcpy(ends[2 * a + 1], &to, sizeof to);
     }
     vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* not a number: that */
+    vf_store(far, -vf_max(-((e->far + s->t_near) + pad), vf_set(-INFINITY)));
     if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         list->items[list->count++] = (kernel_shown){.cell = cells[n],
                                                     .source = source,
                                                     .near = near[n],
+                                                    .far = far[n],
                                                     .x0 = (uint16_t)ends[0][n],
                                                     .x1 = (uint16_t)ends[1][n],
                                                     .y0 = (uint16_t)ends[2][n],
@@ -322,9 +379,37 @@ SIMD_INLINE void kernel_plain_value(kernel_finder *s, const vf v[4], kernel_tet_
         kernel_add_lanes(s, &e, good, s->tets.cell, s->source + (uint32_t)value);
     }
     for (unsigned odd = crossed & ~good; odd; odd &= odd - 1) {
-        kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->surface->layer->field.fields[s->part],
+        kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part],
                           s->tets.cell[__builtin_ctz(odd)]);
         if (s->cell.is_finite) kernel_find_value(s, value);
+    }
+}
+
+/* The same of all that shows of them in the volume. */
+SIMD_INLINE void kernel_plain_volume(kernel_finder *s, const vf v[4], const kernel_tet_lanes *l)
+{
+    const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3])),
+             high = vf_max(vf_max(v[0], v[1]), vf_max(v[2], v[3]));
+    vm usual = vm_all_lanes(), shows = vm_none();
+    for (int i = 0; i < 4; i++) {
+        usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
+        for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(l->at[a][i]), vf_set(1e15f)));
+    }
+    for (int i = 0; i < s->interest->count; i++)
+        shows =
+            vm_or(shows, vm_and(vf_le(low, vf_set(s->interest->high[i])), vf_le(vf_set(s->interest->low[i]), high)));
+    const unsigned all = (1u << s->tets.count) - 1, good = all & vm_bits(vm_and(usual, shows));
+    if (good) {
+        kernel_tet_ends e = kernel_tet_no_ends();
+        vf at[4][3];
+        kernel_tet_lanes_turn(s, l, at);
+        for (int i = 0; i < 4; i++) kernel_tet_ends_add(s, &e, at[i], vm_all_lanes());
+        kernel_add_lanes(s, &e, good, s->tets.cell, s->source);
+    }
+    for (unsigned odd = all & ~vm_bits(usual); odd; odd &= odd - 1) {
+        kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part],
+                          s->tets.cell[__builtin_ctz(odd)]);
+        kernel_find_cell(s);
     }
 }
 
@@ -345,13 +430,16 @@ static void kernel_find_plain_tets(kernel_finder *s)
         for (int a = 0; a < 3; a++)
             l.at[a][i] = ((vf_gather(p->coordinates[a], vertex) - p->eye[a][0]) - p->eye[a][1]) * p->scale;
     }
-    for (int value = 0; value < s->surface->layer->value_count; value++) kernel_plain_value(s, v, &l, value);
+    if (!s->surface) kernel_plain_volume(s, v, &l);
+    for (int value = 0; s->surface && value < s->surface->layer->value_count; value++)
+        kernel_plain_value(s, v, &l, value);
     t->count = 0;
 }
 
 /* Tets of any other mesh, one by one until they are in lanes. */
 static void kernel_find_any_tets(kernel_finder *s)
 {
+    if (!s->tets.count) return;
     const render_surface_layer *layer = s->surface->layer;
     const grid_field *field = &layer->field.fields[s->part];
     const grid *g = s->frame->job->parts[s->part].cells;
@@ -422,10 +510,10 @@ static void kernel_find_coming(kernel_finder *s)
         return;
     }
     const grid *g = s->frame->job->parts[s->part].cells;
-    const grid_field *field = &s->surface->layer->field.fields[s->part];
+    const grid_field *field = &s->field->fields[s->part];
     for (int n = 0; n < s->coming_count; n++) {
         const uint32_t cell = s->coming[n];
-        if (grid_cell_type(g, cell) == GRID_TET) {
+        if (s->surface && grid_cell_type(g, cell) == GRID_TET) {
             int64_t *vertices = s->tets.vertices[s->tets.count];
             s->tets.cell[s->tets.count++] = cell;
             grid_cell_vertices(g, cell, vertices);
@@ -435,8 +523,8 @@ static void kernel_find_coming(kernel_finder *s)
         kernel_cell_fetch(&s->cell, g, field, cell);
         if (s->cell.type == GRID_POLYHEDRON)
             kernel_find_polyhedron(s, cell);
-        else if (s->cell.is_finite)
-            for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_value(s, value);
+        else
+            kernel_find_cell(s);
     }
     s->coming_count = 0;
 }
@@ -492,7 +580,7 @@ SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, 
     int left = 0;
     for (int n = 0; n < count; n++) {
         shown[left] = entries[n];
-        left += kernel_node_shows(&s->surface->interest, ranges, entries[n] >> 1);
+        left += kernel_node_shows(s->interest, ranges, entries[n] >> 1);
     }
     front->count = 0;
     for (int n = 0; n < left; n++) {
@@ -525,7 +613,7 @@ SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges
 static void kernel_find_shown(kernel_finder *s, int64_t root)
 {
     const mmbvh *tree = s->frame->job->parts[s->part].tree;
-    const mmbvh_ranges *ranges = &s->surface->layer->field.ranges[s->part];
+    const mmbvh_ranges *ranges = &s->field->ranges[s->part];
     int64_t stack[KERNEL_FRONT_ROOM + 2 * KERNEL_FRONT];
     int top = 0;
     stack[top++] = 2 * root;

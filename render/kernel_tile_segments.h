@@ -28,8 +28,6 @@ typedef struct kernel_tile_ray_segments {
 
 typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
-    kernel_cell cell;
-    kernel_map map;
     kernel_fine_cell fine;
     float depth; /* of windows; 0: not known yet */
 } kernel_tile_segments;
@@ -63,10 +61,13 @@ SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kern
     return vf_reduce_max(end);
 }
 
-/* The cell's segments on the rays of the blocks; c NULL: a polyhedron. */
-SIMD_INLINE void kernel_tile_cell_segments(kernel_tile_trace *t, kernel_tile_segments *s, int part, uint32_t index,
-                                           const kernel_cell *c, unsigned blocks)
+/* The cell's segments on the rays of the blocks. */
+static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
+                                      unsigned blocks)
 {
+    kernel_tile_segments *s = kernel_tile_segments_of(t);
+    if (c->type == GRID_TET && t->frame->job->max_error < KERNEL_FINE_ERROR)
+        kernel_fine_begin(t->frame, &t->tile, c, &t->frame->volumes[0], &s->fine);
     for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
         bool is_shortened = false;
@@ -74,12 +75,12 @@ SIMD_INLINE void kernel_tile_cell_segments(kernel_tile_trace *t, kernel_tile_seg
             const int i = block * KERNEL_BLOCK_PACKETS + n;
             kernel_packet *p = &t->packets[i];
             kernel_segment_state *state = &s->packets[i].state;
-            if (!c)
-                kernel_polyhedron_segments(p, state, part, index, p->active);
+            if (c->type == GRID_POLYHEDRON)
+                kernel_polyhedron_segments(p, state, part, c->index, p->active);
             else if (c->type == GRID_TET)
                 kernel_tet_segments(p, state, c, &s->fine, p->active);
             else
-                kernel_tile_poly_segments(p, state, c, c->is_constant ? NULL : &s->map);
+                kernel_tile_poly_segments(p, state, c, map);
             is_shortened = is_shortened || state->list->is_shortened;
             state->list->is_shortened = false;
         }
@@ -89,23 +90,7 @@ SIMD_INLINE void kernel_tile_cell_segments(kernel_tile_trace *t, kernel_tile_seg
 
 static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_tile_segments *s = kernel_tile_segments_of(t);
-    const kernel_transfer *transfer = &t->frame->volumes[0];
-    const grid_field *field = &t->frame->job->volumes[0].field.fields[part];
-    const grid *g = t->frame->job->parts[part].cells;
-    kernel_cell *c = &s->cell;
-    kernel_tile_prefetch(g, field, cells, count);
-    for (int n = 0; n < count; n++) {
-        kernel_cell_fetch(c, g, field, cells[n]);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_tile_cell_segments(t, s, part, cells[n], NULL, blocks);
-            continue;
-        }
-        const unsigned meets = kernel_tile_volume_cell(t, c, &s->map, g, transfer, false, blocks);
-        if (meets && c->type == GRID_TET && t->frame->job->max_error < KERNEL_FINE_ERROR)
-            kernel_fine_begin(t->frame, &t->tile, c, transfer, &s->fine);
-        if (meets) kernel_tile_cell_segments(t, s, part, cells[n], c, meets);
-    }
+    kernel_tile_meet_leaf(t, 0, part, cells, count, false, blocks, kernel_tile_cell_segments);
 }
 
 static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
@@ -151,7 +136,6 @@ SIMD_INLINE float kernel_tile_segments_front(kernel_tile_trace *t, kernel_tile_s
 /* The segments that begin before the end. */
 SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_segments *s, unsigned blocks, float end)
 {
-    const render_job *job = t->frame->job;
     for (int b = 0; b < KERNEL_BLOCKS; b++) {
         float far = -INFINITY;
         for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
@@ -161,12 +145,10 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         if (blocks >> b & 1) far = kernel_block_window_end(t, s, b);
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
     }
-    if (job->parent) {
-        kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, kernel_tile_segments_parts);
-        return;
-    }
-    for (uint32_t part = 0; part < (uint32_t)job->part_count; part++)
-        kernel_tile_segments_parts(t, 0, &part, 1, blocks);
+    if (t->frame->volume_shown)
+        kernel_tile_meet_shown(t, false, blocks, kernel_tile_cell_segments);
+    else
+        kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts);
 }
 
 /* Learn from the window how deep the next one is to be: so that some ray has three quarters of its room filled. */
@@ -189,6 +171,7 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = kernel_tile_segments_of(t);
+    if (!kernel_tile_cells_begin(t)) return;
     const kernel_lie reach = kernel_tile_reach(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);

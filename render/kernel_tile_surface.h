@@ -15,8 +15,8 @@ typedef struct kernel_tile_trace {
     kernel_tile tile;
     kernel_planes tree_planes, tile_planes;
     kernel_block_rays block_rays; /* for volumes */
-    unsigned wanted; /* blocks that have pixels to trace */
-    unsigned begun;  /* blocks whose packets are set up */
+    unsigned wanted;              /* blocks that have pixels to trace */
+    unsigned begun;               /* blocks whose packets are set up */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* each block's farthest t_far */
     /* of the surface under way */

@@ -15,8 +15,7 @@
 
 #include <limits.h>
 
-#include "kernel_tile_surface.h"
-#include "kernel_volume.h"
+#include "kernel_tile_cells.h"
 
 typedef struct kernel_tile_ray_samples {
     kernel_samples samples;
@@ -27,8 +26,6 @@ typedef struct kernel_tile_ray_samples {
 typedef struct kernel_tile_volume {
     kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
     int volume; /* under way */
-    kernel_cell cell;
-    kernel_map map;
 } kernel_tile_volume;
 
 /* Of the frame's thread memory, which holds both. */
@@ -52,74 +49,29 @@ static __attribute__((noinline)) void kernel_tile_poly_samples(kernel_packet *p,
     for (int k = 0; k < intervals; k++) kernel_fill(p, state, map, &list[k]);
 }
 
-/* The cell's samples on the rays of the blocks; c NULL: a polyhedron. */
-SIMD_INLINE void kernel_tile_samples(kernel_tile_trace *t, kernel_tile_volume *v, int part, uint32_t index,
-                                     const kernel_cell *c, unsigned blocks)
+/* The cell's samples on the rays of the blocks. */
+static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
+                                unsigned blocks)
 {
+    kernel_tile_volume *v = kernel_tile_volume_of(t);
     for (; blocks; blocks &= blocks - 1) {
         const int first = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
         for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
             kernel_packet *p = &t->packets[i];
             kernel_volume_state state = {v->volume, &v->packets[i].samples};
-            if (!c)
-                kernel_polyhedron_volume(p, &state, part, index, p->active);
+            if (c->type == GRID_POLYHEDRON)
+                kernel_polyhedron_volume(p, &state, part, c->index, p->active);
             else if (c->type == GRID_TET)
                 kernel_tile_tet_samples(p, &state, c);
             else
-                kernel_tile_poly_samples(p, &state, c, c->is_constant ? NULL : &v->map);
+                kernel_tile_poly_samples(p, &state, c, map);
         }
     }
-}
-
-/* Ready the fetched cell for rays of blocks, which are a pencil or are not, and its map; returns the blocks that it may
- * show in. */
-SIMD_INLINE unsigned kernel_tile_volume_cell(kernel_tile_trace *t, kernel_cell *c, kernel_map *map, const grid *g,
-                                             const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
-{
-    kernel_outline outline;
-    if (!c->is_finite || !kernel_cell_shows(c, transfer)) return 0;
-    kernel_cell_move(c, t->frame, &t->tile, g);
-    kernel_vertex_outline(c, &outline);
-    const unsigned meets = kernel_tile_keep(t, &outline, blocks);
-    if (!meets) return 0;
-    kernel_cell_order(c);
-    kernel_cell_domain(c, transfer);
-    if (is_pencil || c->type == GRID_TET) kernel_cell_lines(c, t->frame, &t->tile);
-    if (c->type == GRID_TET) return meets & kernel_tet_blocks(&t->block_rays, c);
-    if (!c->is_constant) kernel_map_setup(map, c);
-    return meets;
 }
 
 static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_tile_volume *v = kernel_tile_volume_of(t);
-    const kernel_transfer *transfer = &t->frame->volumes[v->volume];
-    const grid_field *field = &t->frame->job->volumes[v->volume].field.fields[part];
-    const grid *g = t->frame->job->parts[part].cells;
-    kernel_cell *c = &v->cell;
-    kernel_tile_prefetch(g, field, cells, count);
-    for (int n = 0; n < count; n++) {
-        kernel_cell_fetch(c, g, field, cells[n]);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_tile_samples(t, v, part, cells[n], NULL, blocks);
-            continue;
-        }
-        const unsigned meets = kernel_tile_volume_cell(t, c, &v->map, g, transfer, true, blocks);
-        if (meets) kernel_tile_samples(t, v, part, cells[n], c, meets);
-    }
-}
-
-/* The trees of the parts, with the volume's ranges. */
-SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, const uint32_t *parts, int count,
-                                          unsigned blocks, kernel_tile_visit *visit)
-{
-    const render_field *field = &t->frame->job->volumes[volume].field;
-    for (int n = 0; n < count; n++) {
-        const int part = (int)parts[n];
-        if (field->ranges[part].low)
-            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
-                                 &t->frame->volumes[volume].interest, blocks, part, visit);
-    }
+    kernel_tile_meet_leaf(t, kernel_tile_volume_of(t)->volume, part, cells, count, true, blocks, kernel_tile_samples);
 }
 
 static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
@@ -211,12 +163,10 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     }
     if (!is_lit) return false;
     for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
-        if (job->parent) {
-            kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, kernel_tile_volume_parts);
-            continue;
-        }
-        for (uint32_t part = 0; part < (uint32_t)job->part_count; part++)
-            kernel_tile_volume_parts(t, 0, &part, 1, blocks);
+        if (t->frame->volume_shown)
+            kernel_tile_meet_shown(t, true, blocks, kernel_tile_samples);
+        else
+            kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts);
     }
     return true;
 }
@@ -225,6 +175,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = kernel_tile_volume_of(t);
+    if (!kernel_tile_cells_begin(t)) return;
     const kernel_lie reach = kernel_tile_reach(t);
     const unsigned blocks = reach.blocks;
     int packets[KERNEL_TILE_PACKETS], first = INT_MAX, last = INT_MIN;

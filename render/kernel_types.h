@@ -44,18 +44,18 @@ typedef struct kernel_surface {
     double value_scale;       /* a power of two that brings the field's range near 1: for differences */
 } kernel_surface;
 
-/* Where a cell's surface of an isovalue may show: its least depth, and pixels, ends included. */
+/* Where a cell's surface of an isovalue, or its volume, may show: its depths, and pixels, ends included. */
 typedef struct kernel_shown {
     uint32_t cell;
-    uint32_t source; /* part * RENDER_MAX_ISOVALUES + index into the frame's isovalues */
-    float near;
+    uint32_t source; /* part * RENDER_MAX_ISOVALUES + index into the frame's isovalues; of a volume: part */
+    float near, far;
     uint16_t x0, x1, y0, y1;
 } kernel_shown;
 
 /* The same for one tile: a bit a block; and the first and last column, first and last row of pixels, from the low bits
  * on. */
 typedef struct kernel_tile_shown {
-    float near;
+    float near, far;
     uint32_t cell, source;
     uint16_t blocks, box;
 } kernel_tile_shown;
@@ -77,7 +77,7 @@ typedef struct kernel_shown_list {
 
 /* A subtree to look for them in. */
 typedef struct kernel_subtree {
-    int surface, part;
+    int surface, part; /* surface -1: cells of the first volume */
     int64_t node;
 } kernel_subtree;
 
@@ -93,6 +93,8 @@ typedef struct kernel_frame {
     kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
     kernel_tile_shown *shown; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
     uint32_t *shown_starts;
+    kernel_tile_shown *volume_shown; /* the same of the volume's cells */
+    uint32_t *volume_starts;
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3];  /* right, up, forward, each times the space's scale */
     double depth_shift;        /* depth_origin * scale: t + depth_shift is the scaled depth from the eye's plane */
@@ -101,7 +103,8 @@ typedef struct kernel_frame {
     double scaled_step;                          /* step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
     bool has_transparent;
-    bool is_binned;     /* surfaces' cells are binned by tile, where that pays */
+    bool is_binned;     /* surfaces' cells are binned by tile, where that pays; */
+    bool bins_volume;   /* those of the only volume */
     bool needs_planes;  /* tiles go down the trees */
     bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */

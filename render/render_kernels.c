@@ -57,6 +57,7 @@ typedef struct kernel_memory {
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
+    kernel_tile_cells cells;
     kernel_finder finder;
 } kernel_memory;
 
@@ -68,6 +69,11 @@ SIMD_INLINE kernel_tile_volume *kernel_tile_volume_of(kernel_tile_trace *t)
 SIMD_INLINE kernel_tile_segments *kernel_tile_segments_of(kernel_tile_trace *t)
 {
     return &((kernel_memory *)t->thread->cache)->segments;
+}
+
+SIMD_INLINE kernel_tile_cells *kernel_tile_cells_of(kernel_tile_trace *t)
+{
+    return &((kernel_memory *)t->thread->cache)->cells;
 }
 
 static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)

@@ -263,7 +263,9 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     const insitu_status segments = prepare_segments(frame, error);
     if (segments != INSITU_OK) render_unprepare(frame);
     frame->by_tiles = job->traversal <= RENDER_TILES && !(frame->has_segments && frame->has_transparent);
-    frame->is_binned = frame->by_tiles && job->traversal == RENDER_BINNED && frame->surface_count && !job->pixels &&
-                       job->camera.width <= UINT16_MAX && job->camera.height <= UINT16_MAX;
+    const bool bins = frame->by_tiles && job->traversal == RENDER_BINNED && !job->pixels &&
+                      job->camera.width <= UINT16_MAX && job->camera.height <= UINT16_MAX;
+    frame->is_binned = bins && frame->surface_count;
+    frame->bins_volume = bins && job->volume_count == 1 && !(frame->has_segments && job->separate_samples);
     return segments;
 }

@@ -1,6 +1,7 @@
 /* Subtrees are dealt to threads, each of which lists the cells it finds; then cells are counted tile by tile, room is
  * made for each tile, and every thread bins its own cells. The bound on cells is a bound on memory and on time lost:
- * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. */
+ * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. Of a volume nothing is
+ * hidden: there a million may be listed in any case. */
 #include "render_shown.h"
 
 #include <omp.h>
@@ -9,7 +10,13 @@
 #include "memory.h"
 #include "render_isa.h"
 
-enum { SUBTREES = 128, ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
+enum {
+    SUBTREES = 128,
+    ITEMS = 1024,
+    MOST_ITEMS = 64 * ITEMS,
+    VOLUME_ITEMS = 1024 * ITEMS,
+    BLOCKS = KERNEL_TILE / KERNEL_BLOCK
+};
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
@@ -36,16 +43,20 @@ static void cut_tree(const mmbvh *tree, int surface, int part, subtree_list *lis
     }
 }
 
-static bool cut_trees(const kernel_frame *f, subtree_list *list)
+/* Those of all surfaces, or of the volume. */
+static bool cut_trees(const kernel_frame *f, bool is_volume, subtree_list *list)
 {
     const render_job *job = f->job;
-    const int64_t trees = (int64_t)f->surface_count * job->part_count;
+    const int first = is_volume ? -1 : 0, end = is_volume ? 0 : f->surface_count;
+    const int64_t trees = (int64_t)(end - first) * job->part_count;
     *list = (subtree_list){base_alloc((size_t)(trees * SUBTREES) * sizeof *list->items), 0};
     if (!list->items) return false;
-    for (int s = 0; s < f->surface_count; s++)
+    for (int s = first; s < end; s++) {
+        const render_field *field = is_volume ? &job->volumes[0].field : &f->surfaces[s].layer->field;
         for (int part = 0; part < job->part_count; part++)
-            if (f->surfaces[s].layer->field.ranges[part].low && job->parts[part].tree->node_count)
+            if (field->ranges[part].low && job->parts[part].tree->node_count)
                 cut_tree(job->parts[part].tree, s, part, list);
+    }
     return true;
 }
 
@@ -114,7 +125,7 @@ static kernel_tile_shown shown_within(const kernel_shown *s, within columns, wit
     /* A tile's rows of blocks, a bit each in the column of the first blocks. */
     static const uint16_t spread[1 << BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
                                                  0x1000, 0x1001, 0x1010, 0x1011, 0x1100, 0x1101, 0x1110, 0x1111};
-    return (kernel_tile_shown){s->near, s->cell, s->source, (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
+    return (kernel_tile_shown){s->near, s->far, s->cell, s->source, (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
                                (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
@@ -191,14 +202,17 @@ static void run(search *s, kernel_thread *thread_of, int threads)
     }
 }
 
-void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
+/* What the search has found, or NULL. */
+static kernel_tile_shown *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads,
+                               uint32_t **starts)
 {
     const int64_t tiles = tile_count(frame), pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
-    search s = {.frame = frame, .bound = pixels + ITEMS * (int64_t)threads};
+    const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
+    search s = {.frame = frame, .bound = cells + ITEMS * (int64_t)threads};
     s.lists = base_calloc((size_t)threads, sizeof *s.lists);
     s.counts = base_calloc((size_t)(threads * tiles), sizeof *s.counts);
     s.starts = base_alloc((size_t)(tiles + 1) * sizeof *s.starts);
-    if (s.lists && s.counts && s.starts && cut_trees(frame, &s.subtrees)) {
+    if (s.lists && s.counts && s.starts && cut_trees(frame, is_volume, &s.subtrees)) {
         for (int t = 0; t < threads; t++) s.lists[t].bound = &s.bound;
         run(&s, thread_of, threads);
     }
@@ -206,18 +220,27 @@ void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int thread
     base_free(s.lists);
     base_free(s.counts);
     base_free(s.subtrees.items);
-    if (!s.shown) {
-        base_free(s.starts);
-        return;
-    }
-    frame->shown = s.shown;
-    frame->shown_starts = s.starts;
+    if (!s.shown) base_free(s.starts);
+    *starts = s.shown ? s.starts : NULL;
+    return s.shown;
+}
+
+void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
+{
+    frame->shown = find(frame, false, thread_of, threads, &frame->shown_starts);
+}
+
+void render_shown_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
+{
+    frame->volume_shown = find(frame, true, thread_of, threads, &frame->volume_starts);
 }
 
 void render_shown_free(kernel_frame *frame)
 {
     base_free(frame->shown);
     base_free(frame->shown_starts);
-    frame->shown = NULL;
-    frame->shown_starts = NULL;
+    base_free(frame->volume_shown);
+    base_free(frame->volume_starts);
+    frame->shown = frame->volume_shown = NULL;
+    frame->shown_starts = frame->volume_starts = NULL;
 }

@@ -1,4 +1,4 @@
-/* The cells whose isosurfaces may show, binned by tile of the picture (kernel_shown.h). */
+/* The cells whose isosurfaces or volume may show, binned by tile of the picture (kernel_shown.h). */
 #ifndef RENDER_RENDER_SHOWN_H
 #define RENDER_RENDER_SHOWN_H
 
@@ -7,6 +7,8 @@
 /* Fill frame->shown, which render_shown_free() frees; thread_of is one state a thread. Where more cells show than pay,
  * or there is no memory for them, it stays NULL, and tiles go down the trees themselves. */
 void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
+/* The same of the only volume's cells, as frame->volume_shown. */
+void render_shown_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
 void render_shown_free(kernel_frame *frame);
 
 #endif

@@ -1,0 +1,188 @@
+/* A volume's cells, for a whole tile and one window of depth: each is placed once and goes to the packets of the blocks
+ * that it may meet. Which cells those are is known beforehand, where the picture has gone down the trees at once
+ * (kernel_shown.h): they wait by depth, and a window has those that are in it. Else the tile goes down the trees for
+ * each window.
+ *
+ *     cells, by where they begin   |--a--|  |---b---|    |-c-|
+ *                                     |--d--|   |--e--|
+ *     window                                |=========|          d, b and e; a has left, c comes later */
+#ifndef RENDER_KERNEL_TILE_CELLS_H
+#define RENDER_KERNEL_TILE_CELLS_H
+
+#include "kernel_tile_shown.h"
+#include "kernel_volume.h"
+
+/* Cells are asked for so many ahead. */
+enum { KERNEL_AHEAD = 8 };
+
+/* The tile's cells of a volume. Of items, the first open_count begin before the last window's end, and do not end
+ * before its begin; next is the first that is still to come. */
+typedef struct kernel_tile_cells {
+    kernel_tile_shown *items;
+    int count, open_count, next;
+    kernel_cell cell; /* the one under way, */
+    kernel_map map;   /* and its map */
+} kernel_tile_cells;
+
+/* What is to be done with a cell that is ready; of a polyhedron it has the index alone. map NULL: needs none. */
+typedef void kernel_tile_take(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
+                              unsigned blocks);
+
+/* Of the frame's thread memory. */
+SIMD_INLINE kernel_tile_cells *kernel_tile_cells_of(kernel_tile_trace *t);
+
+/* Ready the fetched cell for rays of blocks, which are a pencil or are not; returns the blocks that it may show in. */
+SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
+                                            const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
+{
+    kernel_cell *c = &cells->cell;
+    kernel_outline outline;
+    if (!c->is_finite || !kernel_cell_shows(c, transfer)) return 0;
+    kernel_cell_move(c, t->frame, &t->tile, g);
+    kernel_vertex_outline(c, &outline);
+    const unsigned meets = kernel_tile_keep(t, &outline, blocks);
+    if (!meets) return 0;
+    kernel_cell_order(c);
+    kernel_cell_domain(c, transfer);
+    if (is_pencil || c->type == GRID_TET) kernel_cell_lines(c, t->frame, &t->tile);
+    if (c->type == GRID_TET) return meets & kernel_tet_blocks(&t->block_rays, c);
+    if (!c->is_constant) kernel_map_setup(&cells->map, c);
+    return meets;
+}
+
+SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
+                                       unsigned blocks, kernel_tile_take *take)
+{
+    kernel_tile_cells *cells = kernel_tile_cells_of(t);
+    kernel_cell *c = &cells->cell;
+    const grid *g = t->frame->job->parts[part].cells;
+    kernel_cell_fetch(c, g, &t->frame->job->volumes[volume].field.fields[part], index);
+    if (c->type != GRID_POLYHEDRON)
+        blocks = kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, blocks);
+    if (blocks) take(t, part, c, c->type == GRID_TET || c->is_constant ? NULL : &cells->map, blocks);
+}
+
+/* ---- from trees ---- */
+
+SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, int volume, int part, const uint32_t *cells, int count,
+                                       bool is_pencil, unsigned blocks, kernel_tile_take *take)
+{
+    const grid_field *field = &t->frame->job->volumes[volume].field.fields[part];
+    kernel_tile_prefetch(t->frame->job->parts[part].cells, field, cells, count);
+    for (int n = 0; n < count; n++) kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
+}
+
+/* The trees of the parts, with the volume's ranges. */
+SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, const uint32_t *parts, int count,
+                                          unsigned blocks, kernel_tile_visit *visit)
+{
+    const render_field *field = &t->frame->job->volumes[volume].field;
+    for (int n = 0; n < count; n++) {
+        const int part = (int)parts[n];
+        if (field->ranges[part].low)
+            kernel_tile_traverse(t, t->frame->job->parts[part].tree, &field->ranges[part],
+                                 &t->frame->volumes[volume].interest, blocks, part, visit);
+    }
+}
+
+/* All trees of the frame, by way of the tree over them where there is one. */
+SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts)
+{
+    const render_job *job = t->frame->job;
+    if (job->parent) {
+        kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, parts);
+        return;
+    }
+    for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
+}
+
+/* ---- those that are known ---- */
+
+/* Items before the returned index are no farther than those from it on; neither part is empty. */
+static inline int kernel_part_by_depth(kernel_tile_shown *items, int count)
+{
+    const float a = items[0].near, b = items[count / 2].near, c = items[count - 1].near;
+    const float least = a < b ? a : b, most = a < b ? b : a;
+    const float pivot = c < least ? least : c < most ? c : most;
+    int i = -1, j = count;
+    for (;;) {
+        do i++;
+        while (items[i].near < pivot);
+        do j--;
+        while (pivot < items[j].near);
+        if (i >= j) return j + 1 < count ? j + 1 : j;
+        const kernel_tile_shown moved = items[i];
+        items[i] = items[j];
+        items[j] = moved;
+    }
+}
+
+/* All of them, by quicksort down to pieces of a few; the shorter part is called for, so that calls stay few. */
+static void kernel_order_by_depth(kernel_tile_shown *items, int count)
+{
+    enum { PIECE = 8 };
+    while (count > PIECE) {
+        const int middle = kernel_part_by_depth(items, count);
+        const bool is_first = middle < count - middle;
+        kernel_order_by_depth(is_first ? items : items + middle, is_first ? middle : count - middle);
+        items += is_first ? middle : 0;
+        count = is_first ? count - middle : middle;
+    }
+    for (int i = 1; i < count; i++) {
+        const kernel_tile_shown moved = items[i];
+        int j = i;
+        for (; j > 0 && moved.near < items[j - 1].near; j--) items[j] = items[j - 1];
+        items[j] = moved;
+    }
+}
+
+/* Before the first window; false where it is known that there are none. */
+SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
+{
+    const kernel_frame *f = t->frame;
+    kernel_tile_cells *cells = kernel_tile_cells_of(t);
+    if (!f->volume_shown) return true;
+    cells->count = kernel_bin(f, f->volume_shown, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
+    cells->open_count = cells->next = 0;
+    kernel_order_by_depth(cells->items, cells->count);
+    return cells->count > 0;
+}
+
+/* Those of the window are open. */
+SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_cells *cells)
+{
+    kernel_tile_shown *items = cells->items;
+    const float far = kernel_tile_far(t);
+    int count = 0;
+    for (int n = 0; n < cells->open_count; n++)
+        if (!(items[n].far < t->t_near)) items[count++] = items[n];
+    for (; cells->next < cells->count && items[cells->next].near <= far; cells->next++)
+        if (!(items[cells->next].far < t->t_near)) items[count++] = items[cells->next];
+    cells->open_count = count;
+}
+
+/* The window's cells. */
+SIMD_INLINE void kernel_tile_meet_shown(kernel_tile_trace *t, bool is_pencil, unsigned blocks, kernel_tile_take *take)
+{
+    kernel_tile_cells *cells = kernel_tile_cells_of(t);
+    const render_job *job = t->frame->job;
+    kernel_tile_cells_open(t, cells);
+    for (int n = 0; n < cells->open_count; n++) {
+        const kernel_tile_shown *item = &cells->items[n];
+        if (n % KERNEL_AHEAD == 0)
+            for (int i = n; i < n + 2 * KERNEL_AHEAD && i < cells->open_count; i++) {
+                const grid *g = job->parts[cells->items[i].source].cells;
+                kernel_tile_prefetch_indices(g, cells->items[i].cell);
+            }
+        if (n % KERNEL_AHEAD == 0)
+            for (int i = n; i < n + KERNEL_AHEAD && i < cells->open_count; i++) {
+                const uint32_t part = cells->items[i].source;
+                kernel_tile_prefetch_vertices(job->parts[part].cells, &job->volumes[0].field.fields[part],
+                                              cells->items[i].cell);
+            }
+        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
+        if (met) kernel_tile_meet_cell(t, 0, (int)item->source, item->cell, is_pencil, met, take);
+    }
+}
+
+#endif
