@@ -206,8 +206,7 @@ SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm ra
     kernel_pre_between(pieces->preintegral, end, &next, run->length, &part);
     const vm good = vf_le(part.error + part.rough, part.allowed);
     light = kernel_light_select(good, &part, &light);
-    if (vm_any(vm_andnot(rays, good)))
-        kernel_pre_finely(pieces, vm_andnot(rays, good), end, run, &part, &light);
+    if (vm_any(vm_andnot(rays, good))) kernel_pre_finely(pieces, vm_andnot(rays, good), end, run, &part, &light);
     *end = next;
     return light;
 }

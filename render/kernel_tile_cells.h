@@ -9,19 +9,27 @@
 #ifndef RENDER_KERNEL_TILE_CELLS_H
 #define RENDER_KERNEL_TILE_CELLS_H
 
+#include "kernel_fine.h"
+#include "kernel_placed.h"
 #include "kernel_tile_shown.h"
 #include "kernel_volume.h"
 
-/* Cells are asked for so many ahead. */
-enum { KERNEL_AHEAD = 8 };
+enum { KERNEL_OPEN_PIECE = 16 };
 
 /* The tile's cells of a volume. Of items, the first open_count begin before the last window's end, and do not end
  * before its begin; next is the first that is still to come. */
 typedef struct kernel_tile_cells {
     kernel_tile_shown *items;
     int count, open_count, next;
-    kernel_cell cell; /* the one under way, */
-    kernel_map map;   /* and its map */
+    kernel_cell cell;   /* the one under way, */
+    kernel_map map;     /* and its map */
+    kernel_plain plain; /* of the volume's field on the part: */
+    int plain_part;
+    kernel_placed placed;
+    /* Tets that wait to be placed together, with the blocks that they may meet. */
+    int waiting;
+    uint32_t wait_cell[SIMD_WIDTH], wait_blocks[SIMD_WIDTH];
+    int32_t wait_vertices[4][SIMD_WIDTH];
 } kernel_tile_cells;
 
 /* What is to be done with a cell that is ready; of a polyhedron it has the index alone. map NULL: needs none. */
@@ -143,7 +151,8 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
     kernel_tile_cells *cells = kernel_tile_cells_of(t);
     if (!f->volume_shown) return true;
     cells->count = kernel_bin(f, f->volume_shown, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
-    cells->open_count = cells->next = 0;
+    cells->open_count = cells->next = cells->waiting = 0;
+    cells->plain_part = -1;
     kernel_order_by_depth(cells->items, cells->count);
     return cells->count > 0;
 }
@@ -161,28 +170,78 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
     cells->open_count = count;
 }
 
+/* The tets that wait. */
+SIMD_INLINE void kernel_tile_take_waiting(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
+{
+    const int count = cells->waiting;
+    const bool is_fine = t->frame->has_segments && t->frame->job->max_error < KERNEL_FINE_ERROR;
+    if (!count) return;
+    cells->waiting = 0;
+    for (int n = count; n < SIMD_WIDTH; n++)
+        for (int i = 0; i < 4; i++) cells->wait_vertices[i][n] = cells->wait_vertices[i][0];
+    kernel_place_tets(&cells->placed, &cells->plain, t->frame, &t->tile, &t->frame->volumes[0],
+                      (const int32_t(*)[SIMD_WIDTH])cells->wait_vertices);
+    for (int n = 0; n < count; n++) {
+        kernel_placed_cell(&cells->placed, n, &cells->cell);
+        if (is_fine) kernel_placed_exactly(&cells->placed, n, &cells->cell);
+        const unsigned blocks = cells->wait_blocks[n] & kernel_tet_blocks(&t->block_rays, &cells->cell);
+        cells->cell.index = cells->wait_cell[n];
+        if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
+    }
+}
+
+/* One of the window's cells: tets of plain meshes wait until a vector is full. */
+SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells, const kernel_tile_shown *item,
+                                       bool is_pencil, unsigned blocks, kernel_tile_take *take)
+{
+    const int part = (int)item->source;
+    if (part != cells->plain_part) {
+        kernel_tile_take_waiting(t, cells, take);
+        kernel_plain_begin(&cells->plain, t->frame, t->frame->job->parts[part].cells,
+                           &t->frame->job->volumes[0].field.fields[part]);
+        cells->plain_part = part;
+    }
+    if (!cells->plain.is_so) {
+        kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
+        return;
+    }
+    const int32_t *vertices = cells->plain.connectivity + 4 * (int64_t)item->cell;
+    const int n = cells->waiting++;
+    for (int i = 0; i < 4; i++) cells->wait_vertices[i][n] = vertices[i];
+    cells->wait_cell[n] = item->cell;
+    cells->wait_blocks[n] = blocks;
+    if (cells->waiting == SIMD_WIDTH) kernel_tile_take_waiting(t, cells, take);
+}
+
+/* What the next of the open cells are made of, on its way from memory: the indices of more, the vertices of some. */
+SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
+{
+    const render_job *job = t->frame->job;
+    for (int pass = 0; pass < 2; pass++) {
+        const int end = first + (pass ? KERNEL_OPEN_PIECE : 2 * KERNEL_OPEN_PIECE);
+        for (int n = first; n < end && n < cells->open_count; n++) {
+            const kernel_tile_shown *item = &cells->items[n];
+            const grid *g = job->parts[item->source].cells;
+            if (pass)
+                kernel_tile_prefetch_vertices(g, &job->volumes[0].field.fields[item->source], item->cell);
+            else
+                kernel_tile_prefetch_indices(g, item->cell);
+        }
+    }
+}
+
 /* The window's cells. */
 SIMD_INLINE void kernel_tile_meet_shown(kernel_tile_trace *t, bool is_pencil, unsigned blocks, kernel_tile_take *take)
 {
     kernel_tile_cells *cells = kernel_tile_cells_of(t);
-    const render_job *job = t->frame->job;
     kernel_tile_cells_open(t, cells);
     for (int n = 0; n < cells->open_count; n++) {
         const kernel_tile_shown *item = &cells->items[n];
-        if (n % KERNEL_AHEAD == 0)
-            for (int i = n; i < n + 2 * KERNEL_AHEAD && i < cells->open_count; i++) {
-                const grid *g = job->parts[cells->items[i].source].cells;
-                kernel_tile_prefetch_indices(g, cells->items[i].cell);
-            }
-        if (n % KERNEL_AHEAD == 0)
-            for (int i = n; i < n + KERNEL_AHEAD && i < cells->open_count; i++) {
-                const uint32_t part = cells->items[i].source;
-                kernel_tile_prefetch_vertices(job->parts[part].cells, &job->volumes[0].field.fields[part],
-                                              cells->items[i].cell);
-            }
+        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
         const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
-        if (met) kernel_tile_meet_cell(t, 0, (int)item->source, item->cell, is_pencil, met, take);
+        if (met) kernel_tile_meet_item(t, cells, item, is_pencil, met, take);
     }
+    kernel_tile_take_waiting(t, cells, take);
 }
 
 #endif
