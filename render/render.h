@@ -121,8 +121,8 @@ typedef struct render_part {
  * 16 x 16 rays wherever that can be had; packets are taken instead where segments are to be cut by transparent
  * surfaces. Segments are traced by packets always. */
 typedef enum render_traversal {
-    RENDER_BINNED,  /* isosurfaces: the picture goes down the trees at once, and cells are binned by tile, unless more
-                      show than pay; samples as by RENDER_TILES */
+    RENDER_BINNED,  /* isosurfaces and a single volume: the picture goes down the trees at once, and cells are binned by
+                      tile, unless more show than pay; several volumes as by RENDER_TILES */
     RENDER_TILES,   /* a tile of the picture goes down the trees at once */
     RENDER_PACKETS, /* as many rays as a vector has lanes, together (thesis, 4.3.1) */
     RENDER_SPMD     /* every lane on its own */

@@ -149,12 +149,25 @@ static void refused_tiles_end_the_frame(void **state)
 }
 
 /* The picture at once, a tile, a packet, each ray on its own: the same cells are met, or at least those that have a
- * hit. Cells are of ten pixels and of three, and some of the pixels are left out. */
+ * hit, or samples. */
+static void draw_by_traversals(render_fixture *f)
+{
+    enum { TRAVERSALS = 4 };
+    drawn_frame drawn[TRAVERSALS];
+    for (int i = 0; i < TRAVERSALS; i++) {
+        f->job.traversal = (render_traversal)i;
+        fixture_draw(f, &drawn[i]);
+        drawn_assert_same(&drawn[0], &drawn[i]);
+        assert_int_equal(drawn[0].list.count, drawn[i].list.count);
+    }
+    for (int i = 0; i < TRAVERSALS; i++) drawn_free(&drawn[i]);
+}
+
+/* Cells are of ten pixels and of three, and some of the pixels are left out. */
 static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fixture_camera camera, bool all)
 {
-    enum { WIDTH = 61, HEIGHT = 47, TRAVERSALS = 4 };
+    enum { WIDTH = 61, HEIGHT = 47 };
     render_fixture f;
-    drawn_frame drawn[TRAVERSALS];
     unsigned char pixels[(WIDTH * HEIGHT + 7) / 8] = {0};
     for (int64_t p = 0; p < WIDTH * HEIGHT; p++)
         if (p * p % 7 < 3) pixel_set_add(pixels, p);
@@ -166,13 +179,7 @@ static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fix
         f.surfaces[0].difference = 1;
     }
     f.job.pixels = all ? NULL : pixels;
-    for (int i = 0; i < TRAVERSALS; i++) {
-        f.job.traversal = (render_traversal)i;
-        fixture_draw(&f, &drawn[i]);
-        drawn_assert_same(&drawn[0], &drawn[i]);
-        assert_int_equal(drawn[0].list.count, drawn[i].list.count);
-    }
-    for (int i = 0; i < TRAVERSALS; i++) drawn_free(&drawn[i]);
+    draw_by_traversals(&f);
     fixture_free(&f);
 }
 
@@ -363,6 +370,33 @@ static void compare_dealt(test_mesh_kind kind, scene_kind scene, test_partition_
         test_mesh_free(&dealt[i]);
     }
     test_mesh_free(&mesh);
+}
+
+/* Of two meshes that lie through each other: windows of three samples, so that most cells lie in several, and of all.
+ * Tets of narrow arrays go through vectors from their indices on. */
+static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fixture_camera camera, test_layout layout)
+{
+    render_fixture f;
+    test_mesh mesh, parts[2];
+    test_mesh_lattice(kind, 5, 0.2, test_wave, &mesh);
+    deal(&mesh, TEST_CHECKERBOARD, 5, 2, false, parts);
+    fixture_create(&f, parts, 2, layout, 0.4, 1, origin);
+    fixture_look(&f, camera, 61, 47);
+    add_layers(&f, scene);
+    for (f.job.sample_group = 3; f.job.sample_group <= 64; f.job.sample_group += 61) draw_by_traversals(&f);
+    fixture_free(&f);
+    for (int i = 0; i < 2; i++) test_mesh_free(&parts[i]);
+    test_mesh_free(&mesh);
+}
+
+static void traversals_of_volumes_do_not_change_a_bit(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+            compare_volume_traversals(kind, VOLUME, camera, wide);
+            compare_volume_traversals(kind, OPAQUE_VOLUME, camera, (test_layout){0});
+        }
 }
 
 static void parts_and_ranks_draw_the_whole(void **state)
@@ -602,6 +636,7 @@ int main(void)
         cmocka_unit_test(order_and_numbering_do_not_change_a_bit),
         cmocka_unit_test(turned_cells_draw_the_same),
         cmocka_unit_test(layouts_do_not_change_a_bit),
+        cmocka_unit_test(traversals_of_volumes_do_not_change_a_bit),
         cmocka_unit_test(parts_and_ranks_draw_the_whole),
         cmocka_unit_test(samples_on_faces_have_one_owner),
         cmocka_unit_test(ghosts_change_nothing),
