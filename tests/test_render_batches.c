@@ -3,6 +3,7 @@
  * beside each other in one vector, and may hit one pixel. */
 #include "test_render_fixture.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -89,12 +90,39 @@ static void ties_are_kept(void **state)
     }
 }
 
+/* Values of no usual size, from nearly nothing to what is no number: such tets are found one by one, and in one vector
+ * with others. */
+static void odd_values_are_found_one_by_one(void **state)
+{
+    static const float opacity[1] = {0.3f};
+    static const double odd[] = {3e31, -3e31, 1e-41, (double)INFINITY, (double)NAN, 3e38};
+    (void)state;
+    for (int as_volume = 0; as_volume < 2; as_volume++) {
+        render_fixture f;
+        test_mesh mesh;
+        test_mesh_lattice(TEST_TETS, 7, 0.2, test_wave, &mesh);
+        for (int64_t v = 5; v < mesh.vertex_count; v += 37)
+            mesh.values[v] = odd[v / 37 % (int64_t)(sizeof odd / sizeof *odd)];
+        create(&f, &mesh, 1, 7, CAMERA_OUTSIDE);
+        if (as_volume) {
+            fixture_set_volume(&f, 0.1);
+            f.transfer.opacity_count = 1; /* the same for all values, however large */
+            f.transfer.opacities = opacity;
+        } else {
+            fixture_add_surface(&f, values, 1, 1); /* of two, many hits would be tied */
+        }
+        compare(&f);
+        test_mesh_free(&mesh);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_draw_what_single_tets_do),
         cmocka_unit_test(meshes_and_layers_take_turns),
         cmocka_unit_test(ties_are_kept),
+        cmocka_unit_test(odd_values_are_found_one_by_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
