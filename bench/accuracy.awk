@@ -196,7 +196,7 @@ function verdicts(    i, m) {
     print "Why not ten times everywhere:"
     print ""
     print "- VTK's **ray caster** walks from tet to tet over a list of all faces, with no search at all; libinsitu keeps no"
-    print "  neighbours, and finds and places the cells of every tile of 16 x 16 pixels anew. It gains as more rays share a cell, in larger"
+    print "  neighbours, finds its cells once a frame, and places them anew for every tile of 16 x 16 pixels. It gains as more rays share a cell, in larger"
     print "  pictures and coarser meshes; VTK's time goes with the pixels alone. And libinsitu's cheapest setting is nearer by far than what"
     print "  it is compared with: below `max_error: 1e-1` there is nothing left to save."
     print "- A **resampled** image is drawn without cells: whoever accepts its error and has a standing field to look at from many sides"

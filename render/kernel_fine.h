@@ -11,17 +11,13 @@
  * vertices' depths and values weighed by the opposite edges, N: nine coefficients a face, once a cell and tile. A ray
  * meets the face's plane at N / D. It may be beside the face there, by as much as the decision rounds, which is some
  * 1e-7 of the edges' terms. Where D is not KERNEL_FINE_EDGE of these at least, the face is seen so nearly edge on that
- * the plane is left far beside it, and the float32 ends stay. All of it comes from the face's vertices in their order
- * and from the ray, and so both cells of a face have the same bits. */
+ * the plane is left far beside it, and both float32 ends of the segment stay. All of it comes from the face's vertices
+ * in their order and from the ray, so that a face is in one place for both its cells where both take it so. */
 #ifndef RENDER_KERNEL_FINE_H
 #define RENDER_KERNEL_FINE_H
 
 #include "kernel_cell.h"
 #include "kernel_wide.h"
-
-/* Below it max_error asks for more than float32 ends promise: of random tets with functions that step and rise to an
- * opacity of 1 they were off by 3.4e-5 at most. */
-#define KERNEL_FINE_ERROR 2e-4
 
 /* The plane is left by no more than 1e-7 / KERNEL_FINE_EDGE of the face's extent. */
 #define KERNEL_FINE_EDGE 1e-3
@@ -38,7 +34,7 @@ typedef struct kernel_affine {
 
 typedef struct kernel_fine_face {
     kernel_affine depth, value, weight;
-    double least; /* the face is not seen edge on where the weight is no less */
+    double least; /* the face is not seen edge on where the weight is more */
 } kernel_fine_face;
 
 /* A tet's, by kernel_tet_face. */
@@ -117,7 +113,7 @@ static __attribute__((noinline)) void kernel_fine_begin(const kernel_frame *f, c
     kernel_affine edges[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
         spots[i] = kernel_fine_place(f, tile, c->world[i]);
-        spots[i].value = (c->values[i] - transfer->low) * transfer->inverse_width;
+        spots[i].value = fmax(fmin((c->values[i] - transfer->low) * transfer->inverse_width, 1e18), -1e18);
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++)
         edges[n] = kernel_fine_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]]);
@@ -146,7 +142,7 @@ SIMD_INLINE kernel_fine_end kernel_fine_meet(const kernel_fine_face *face, kerne
     const kernel_half weight = kernel_affine_at(&face->weight, u, v), inverse = 1.0 / weight;
     return (kernel_fine_end){kernel_affine_at(&face->depth, u, v) * inverse,
                              kernel_affine_at(&face->value, u, v) * inverse,
-                             (kernel_half_mask)(weight * weight >= face->least * face->least)};
+                             (kernel_half_mask)(weight * weight > face->least * face->least)};
 }
 
 SIMD_INLINE void kernel_fine_take(kernel_half_mask m, const kernel_fine_end *from, kernel_fine_end *to)

@@ -411,7 +411,7 @@ SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
     kernel_segment_state state = {&list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
     kernel_blend b = kernel_blend_begin();
     list.per_t = f->volumes[0].exponent / p->sample_step;
-    kernel_segments_set_fine(p, &list, f->job->max_error < KERNEL_FINE_ERROR);
+    kernel_segments_set_fine(p, &list, f->is_fine);
     list.t_begin = p->t_near;
     kernel_cuts_find(p, first_fragment, &list.cuts);
     const vm active = p->active;

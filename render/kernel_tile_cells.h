@@ -174,7 +174,7 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
 SIMD_INLINE void kernel_tile_take_waiting(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
 {
     const int count = cells->waiting;
-    const bool is_fine = t->frame->has_segments && t->frame->job->max_error < KERNEL_FINE_ERROR;
+    const bool is_fine = t->frame->is_fine;
     if (!count) return;
     cells->waiting = 0;
     for (int n = count; n < SIMD_WIDTH; n++)

@@ -1,6 +1,6 @@
-/* Segments of a volume for a whole tile: one traversal a window, for all the tile's blocks. A cell is fetched and
- * placed once a window, and goes to the packets of the blocks that it may meet, whose rays keep the segments that begin
- * in their window (kernel_segments.h), sort them when the window is whole, and integrate them.
+/* Segments of a volume for a whole tile: a window at a time, for all the tile's blocks. A cell is fetched and placed
+ * once a window (kernel_tile_cells.h), and goes to the packets of the blocks that it may meet, whose rays keep the
+ * segments that begin in their window (kernel_segments.h), sort them when the window is whole, and integrate them.
  *
  * Windows are stretches of depth, such that a ray has most of its room filled: as many cells as possible lie in one
  * window alone, and the lists of all of a tile's rays stay in the cache. A ray that has more than its room ends its
@@ -66,7 +66,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
                                       unsigned blocks)
 {
     kernel_tile_segments *s = kernel_tile_segments_of(t);
-    if (c->type == GRID_TET && t->frame->job->max_error < KERNEL_FINE_ERROR)
+    if (c->type == GRID_TET && t->frame->is_fine)
         kernel_fine_begin(t->frame, &t->tile, c, &t->frame->volumes[0], &s->fine);
     for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
@@ -114,7 +114,7 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_seg
     r->list.t_begin = p->t_near;
     r->list.per_t = f->volumes[0].exponent / p->sample_step;
     r->list.cuts.row_count = 0;
-    kernel_segments_set_fine(p, &r->list, f->job->max_error < KERNEL_FINE_ERROR);
+    kernel_segments_set_fine(p, &r->list, f->is_fine);
     r->state = (kernel_segment_state){&r->list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
 }
 

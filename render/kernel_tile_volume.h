@@ -1,5 +1,5 @@
-/* Samples of volumes for a whole tile: one traversal a window of samples, for all the tile's blocks. A cell is fetched,
- * placed and given its lines once a window, and goes to the packets of the blocks that it may meet, whose samples it
+/* Samples of volumes for a whole tile: a window of samples at a time, for all the tile's blocks. A cell is fetched,
+ * placed and given its lines once a window (kernel_tile_cells.h), and goes to the packets of the blocks that it may meet, whose samples it
  * owns it fills. A window is so many samples that most rays have one or two:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...

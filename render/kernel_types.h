@@ -108,7 +108,8 @@ typedef struct kernel_frame {
     bool needs_planes;  /* tiles go down the trees */
     bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
-    bool has_segments;  /* volumes are integrated by segments, else sampled */
+    bool has_segments;  /* volumes are integrated by segments, else sampled; */
+    bool is_fine;       /* their ends are taken in double (kernel_fine.h) */
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
     float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_segments.h */
     bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there

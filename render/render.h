@@ -119,7 +119,7 @@ typedef struct render_part {
 
 /* How rays find isosurfaces and the cells of samples: the same picture to the last bit, at different speed. By tiles of
  * 16 x 16 rays wherever that can be had; packets are taken instead where segments are to be cut by transparent
- * surfaces. Segments are traced by packets always. */
+ * surfaces. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most. */
 typedef enum render_traversal {
     RENDER_BINNED,  /* isosurfaces and a single volume: the picture goes down the trees at once, and cells are binned by
                       tile, unless more show than pay; several volumes as by RENDER_TILES */
@@ -144,7 +144,7 @@ typedef struct render_job {
     const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
     const render_surface_layer *surfaces;
     int surface_count;          /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
-    render_traversal traversal; /* of surfaces and samples */
+    render_traversal traversal;
     const render_volume_layer *volumes;
     int volume_count;
     const render_light *lights;

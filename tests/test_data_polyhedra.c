@@ -55,7 +55,7 @@ static void segments_are_the_integral(void **state)
     for (int p = 0; p < WIDTH * HEIGHT; p += 3) {
         double rgba[4];
         reference_integral_trace(scene, p % WIDTH, p / WIDTH, fixture_background, NULL, 0, rgba);
-        for (int c = 0; c < 4; c++) worst = fmax(worst, fabs((double)drawn.picture.rgba[4 * p + c] - rgba[c]));
+        for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs((double)drawn.picture.rgba[4 * p + c] - rgba[c]));
     }
     reference_integral_free(scene);
     fprintf(stderr, "segments: %.2g\n", worst);

@@ -420,7 +420,7 @@ static int check(const data_set *set, const opacity_shape *shape)
             for (int c = 0; c < 4; c++) {
                 const double off = fabs((double)pictures[e].rgba[4 * pixels[i] + c] - truth[c]);
                 if (off <= worst[e]) continue;
-                worst[e] = off;
+                worst[e] = test_worse(worst[e], off);
                 worst_at[e] = pixels[i];
             }
     }

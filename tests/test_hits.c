@@ -308,7 +308,7 @@ static void differences_of_a_linear_field_are_exact(void **state)
                 add_differences(&f, values, 3, opaque ? 1 : 0.5f, 0.5, lights);
                 fixture_draw(&f, &drawn);
                 for (int64_t i = 0; i < drawn.list.count; i++)
-                    worst = fmax(worst, normal_error(&f, &drawn.list.items[i], gradient));
+                    worst = test_worse(worst, normal_error(&f, &drawn.list.items[i], gradient));
                 assert_true(drawn.list.count > 100);
                 if (!(worst <= 2e-5)) fail_msg("%s: normal off by %g", test_mesh_kind_name(kind), worst);
                 drawn_free(&drawn);

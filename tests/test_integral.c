@@ -138,6 +138,7 @@ static void oracle(const render_transfer *t, double length, double v_in, double 
     const int count = collect_cuts(t, v0, v1, cuts);
     for (int i = 0; i < 5; i++) out[i] = 0;
     for (int i = 0; i + 1 < count; i++) {
+        if (cuts[i] == cuts[i + 1]) continue; /* of a point where the extinction is infinite there is no integral */
         const long double x0 = v0 + cuts[i] * (v1 - v0), x1 = v0 + cuts[i + 1] * (v1 - v0), m = 0.5L * (x0 + x1);
         piece p = {.a0 = opacity_near(t, m, x0), .a1 = opacity_near(t, m, x1)};
         p.length = (long double)length * (cuts[i + 1] - cuts[i]);
@@ -236,7 +237,7 @@ static void opaque_points_are_integrated(void **state)
         double found[4];
         oracle(&r.transfer, length, v_in, v_out, 1e-10L, truth);
         integral_on_floats(&r.transfer, length, v_in, v_out, found);
-        for (int c = 0; c < 4; c++) worst = fmax(worst, fabs(found[c] - (double)truth[c]));
+        for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs(found[c] - (double)truth[c]));
     }
     fprintf(stderr, "opaque points: %.2g\n", worst);
     assert_true(worst < 1e-6);

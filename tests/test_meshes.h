@@ -7,6 +7,8 @@
 #ifndef TEST_MESHES_H
 #define TEST_MESHES_H
 
+#include <math.h>
+
 #include "grid.h"
 
 typedef double test_function(const double position[3]);
@@ -132,6 +134,12 @@ void test_view_free(test_view *view);
 double test_wave(const double position[3]);
 /* 0.3 x - 0.7 y + 0.5 z + 0.1, exact on every cell */
 double test_linear(const double position[3]);
+
+/* The larger error. What is not a number counts as infinite, so that no later one hides it. */
+static inline double test_worse(double worst, double off)
+{
+    return off <= worst ? worst : off == off ? off : (double)INFINITY;
+}
 
 /* A uniform number in [0, 1) of an index and a seed. */
 double test_uniform(uint64_t index, uint64_t seed);

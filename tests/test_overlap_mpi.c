@@ -180,7 +180,7 @@ static bool same_images(const image *whole, const image *other, const drawing *d
         depths += memcmp(whole->depth + p, other->depth + p, sizeof(float)) != 0;
         for (int c = 0; c < 4; c++) {
             const double off = fabs((double)whole->rgba[4 * p + c] - (double)other->rgba[4 * p + c]);
-            if (!(off <= colour)) colour = off;
+            colour = test_worse(colour, off);
         }
     }
     if (depths || !(colour <= bound))
@@ -220,7 +220,7 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
             continue;
         }
         wrong += !(off <= fixture_usual_bounds.colour);
-        worst = fmax(worst, off);
+        worst = test_worse(worst, off);
     }
     reference_free(scene);
     fixture_free(&s.f);
@@ -249,7 +249,7 @@ static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const imag
             continue;
         }
         reference_integral_trace(scene, p % WIDTH, p / WIDTH, fixture_background, ray.hits, ray.hit_count, rgba);
-        for (int c = 0; c < 4; c++) worst = fmax(worst, fabs((double)drawn->rgba[4 * p + c] - rgba[c]));
+        for (int c = 0; c < 4; c++) worst = test_worse(worst, fabs((double)drawn->rgba[4 * p + c] - rgba[c]));
     }
     reference_integral_free(scene);
     reference_free(surfaces);

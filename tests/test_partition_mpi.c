@@ -60,7 +60,7 @@ static bool same_images(const image *whole, const image *other, scene_kind scene
         depths += memcmp(whole->depth + p, other->depth + p, sizeof(float)) != 0;
         for (int c = 0; c < 4; c++) {
             const double off = fabs((double)whole->rgba[4 * p + c] - (double)other->rgba[4 * p + c]);
-            if (!(off <= colour)) colour = off;
+            colour = test_worse(colour, off);
         }
     }
     const double bound = scene == OPAQUE || scene == TRANSPARENT ? 0 : 1e-6;

@@ -124,31 +124,37 @@ static double ray_linear(const render_camera *camera, int pixel, double *at_base
     return 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
 }
 
-/* Plane-faced cells of a linear field: the surface is its plane. Float32 positions and values err by a few 6e-8 of the
- * mesh's size (value 1.6 at most); the ray's slope turns that into depth. */
+/* The surface of a linear field is its plane: in plane-faced cells by Neubauer's method, in warped ones by robust
+ * roots. Float32 positions and values err by a few 6e-8 of the mesh's size (value 1.6 at most); the ray's slope turns
+ * that into depth. */
+static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_robust)
+{
+    render_fixture f;
+    drawn_frame drawn;
+    fixture_create_lattice(&f, kind, 3, is_robust || kind == TEST_TETS ? 0.2 : 0, test_linear);
+    fixture_look(&f, camera, 41, 37);
+    fixture_add_surface(&f, linear_values, 3, 0.5f);
+    f.surfaces[0].root = is_robust ? RENDER_ROBUST : RENDER_NEUBAUER;
+    f.surfaces[0].root_steps = 2;
+    fixture_draw(&f, &drawn);
+    for (int64_t i = 0; i < drawn.list.count; i++) {
+        const fragment *hit = &drawn.list.items[i];
+        double at_base;
+        const double slope = ray_linear(&f.job.camera, (int)hit->pixel, &at_base);
+        const double value = at_base + slope * fixture_depth(&f, hit->t_in);
+        assert_true(fabs(value - linear_values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope));
+    }
+    assert_true(drawn.list.count > 300);
+    drawn_free(&drawn);
+    fixture_free(&f);
+}
+
 static void linear_surface_is_a_plane_in_every_kind(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
-        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++) {
-            render_fixture f;
-            drawn_frame drawn;
-            fixture_create_lattice(&f, kind, 3, kind == TEST_TETS ? 0.2 : 0, test_linear);
-            fixture_look(&f, camera, 41, 37);
-            fixture_add_surface(&f, linear_values, 3, 0.5f);
-            f.surfaces[0].root_steps = 2;
-            fixture_draw(&f, &drawn);
-            for (int64_t i = 0; i < drawn.list.count; i++) {
-                const fragment *hit = &drawn.list.items[i];
-                double at_base;
-                const double slope = ray_linear(&f.job.camera, (int)hit->pixel, &at_base);
-                const double value = at_base + slope * fixture_depth(&f, hit->t_in);
-                assert_true(fabs(value - linear_values[hit->kind - FRAGMENT_SURFACE]) < 2e-6 + 1e-6 * fabs(slope));
-            }
-            assert_true(drawn.list.count > 300);
-            drawn_free(&drawn);
-            fixture_free(&f);
-        }
+        for (fixture_camera camera = 0; camera < CAMERA_PLANE; camera++)
+            for (int is_robust = 0; is_robust < 2; is_robust++) compare_plane(kind, camera, is_robust);
 }
 
 /* A constant opacity: every ray's transmittance is that of the number of samples in the cube, on lattice lines as well:

@@ -230,7 +230,7 @@ double drawn_difference(const drawn_frame *a, const drawn_frame *b)
     double worst = 0;
     for (int64_t i = 0; i < numbers; i++) {
         const double off = fabs((double)a->picture.rgba[i] - (double)b->picture.rgba[i]);
-        if (!(off <= worst)) worst = off;
+        worst = test_worse(worst, off);
     }
     return worst;
 }
@@ -304,7 +304,7 @@ static void compare_hits(comparison *c, int x, int y, const reference_ray *ray)
         const double grazing = fmax(5e-7 * ray->hits[i].conditioning - c->bounds->depth, 0);
         const double off = fabs(fixture_depth(c->f, hits[i]->t_in) - ray->hits[i].depth);
         c->outcome.total_depth += off / c->f->cell_size;
-        worst = fmax(worst, (off - slack * ray->hits[i].falsi_error) / c->f->cell_size - grazing);
+        worst = test_worse(worst, (off - slack * ray->hits[i].falsi_error) / c->f->cell_size - grazing);
     }
     double *kept = ray->ambiguous ? &c->outcome.worst_ambiguous : &c->outcome.worst_depth;
     if (worst > *kept && !ray->ambiguous && worst > c->bounds->depth) tell_hits(c, x, y, ray, count, hits);
@@ -317,7 +317,7 @@ static void compare_colour(comparison *c, int x, int y, const reference_ray *ray
     double worst = 0;
     for (int i = 0; i < 4; i++) {
         const double off = fabs((double)rgba[i] - ray->rgba[i]);
-        if (!(off <= worst)) worst = off;
+        worst = test_worse(worst, off);
     }
     if (!(worst <= c->bounds->colour) && !(worst <= c->outcome.worst_colour))
         fprintf(stderr, "%s, pixel %d, %d: %.7g %.7g %.7g %.7g, reference %.7g %.7g %.7g %.7g, %d samples\n", c->what,

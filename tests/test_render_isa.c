@@ -84,7 +84,7 @@ static double worst_difference(const float *a, const float *b, int first, int la
             const double x = (double)a[frame * NUMBERS + i], y = (double)b[frame * NUMBERS + i];
             if (isinf(x) && isinf(y)) continue;
             const double off = fabs(x - y);
-            if (!(off <= worst)) worst = off;
+            worst = test_worse(worst, off);
         }
     return worst;
 }

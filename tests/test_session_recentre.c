@@ -261,7 +261,7 @@ static void compare_with_alone(const char *scene, double bound)
             is_same = memcmp(&alone.depth[i], &caught[0].depth[i], sizeof(float)) == 0;
             covered += isfinite(alone.depth[i]);
             for (int c = 0; c < 4; c++)
-                worst = fmax(worst, fabs((double)(alone.rgba[4 * i + c] - caught[0].rgba[4 * i + c])));
+                worst = test_worse(worst, fabs((double)(alone.rgba[4 * i + c] - caught[0].rgba[4 * i + c])));
         }
         everywhere(is_same);
         everywhere(worst <= bound);

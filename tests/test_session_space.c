@@ -91,7 +91,7 @@ static double difference(const caught_picture *a, const caught_picture *b)
     double worst = 0;
     for (int i = 0; i < 4 * WIDTH * HEIGHT; i++) {
         const double off = fabs((double)a->rgba[i] - (double)b->rgba[i]);
-        if (!(off <= worst)) worst = isnan(off) ? (double)INFINITY : off;
+        worst = test_worse(worst, off);
     }
     return worst;
 }
