@@ -11,9 +11,8 @@
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
 
-#include "kernel_plain.h"
+#include "kernel_placed.h"
 #include "kernel_tile_surface.h"
-#include "kernel_wide.h"
 
 enum {
     KERNEL_BATCH_PIXELS = 32, /* of a cell's box: with more of them, the cell is traced block by block */
@@ -31,41 +30,13 @@ typedef struct kernel_batch {
     int value[SIMD_WIDTH];
     int32_t vertex[4][SIMD_WIDTH];
     double isovalue[SIMD_WIDTH];
-    /* cells in lanes, vertices in the order of coordinates; f: field less the isovalue, scaled */
-    vf world[3][4], place[3][4], f[4], field[4];
-    vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
-    vf doubt, least[4];
+    kernel_placed tets; /* f: field less the isovalue, scaled */
     bool has_normals;
     vf normal[3];
     /* Rays to trace: pixel of the tile, row by row, and the cell's lane. */
     int ray_count;
     uint8_t pixel[KERNEL_BATCH_RAYS + KERNEL_TILE], lane[KERNEL_BATCH_RAYS + KERNEL_TILE];
 } kernel_batch;
-
-/* ---- doubles, in two halves ---- */
-
-SIMD_INLINE kernel_half kernel_half_of(const vf *v, int half)
-{
-    kernel_half_floats f;
-    memcpy(&f, (const char *)v + half * (int)sizeof f, sizeof f);
-    return kernel_half_widen(f);
-}
-
-SIMD_INLINE void kernel_half_put(vf *v, int half, kernel_half d)
-{
-    const kernel_half_floats f = kernel_half_narrow(d);
-    memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
-}
-
-SIMD_INLINE kernel_half kernel_half_abs(kernel_half a)
-{
-    return (kernel_half)((kernel_half_mask)a & INT64_MAX);
-}
-
-SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
-{
-    return kernel_half_select((kernel_half_mask)(b < a), a, b);
-}
 
 /* ---- lanes are cells ---- */
 
@@ -75,59 +46,14 @@ static void kernel_batch_begin(kernel_batch *b)
     b->layer = b->part = -1;
 }
 
-SIMD_INLINE void kernel_batch_fetch(kernel_batch *b)
-{
-    const kernel_plain *p = &b->plain;
-    for (int n = b->count; n < SIMD_WIDTH; n++) {
-        for (int i = 0; i < 4; i++) b->vertex[i][n] = b->vertex[i][0];
-        b->isovalue[n] = b->isovalue[0];
-    }
-    for (int i = 0; i < 4; i++) {
-        vi vertex;
-        memcpy(&vertex, b->vertex[i], sizeof vertex);
-        b->field[i] = vf_gather(p->values, vertex * p->value_stride);
-        for (int a = 0; a < 3; a++) b->world[a][i] = vf_gather(p->coordinates[a], vertex * p->stride);
-    }
-}
-
-/* kernel_position_before(). */
-SIMD_INLINE vm kernel_batch_before(const kernel_batch *b, int i, int j)
-{
-    vm before = vf_lt(b->world[2][i], b->world[2][j]);
-    for (int a = 1; a >= 0; a--)
-        before = vm_or(vf_lt(b->world[a][i], b->world[a][j]), vm_and(vf_eq(b->world[a][i], b->world[a][j]), before));
-    return before;
-}
-
-/* kernel_cell_order(). */
-SIMD_INLINE void kernel_batch_order(kernel_batch *b)
-{
-    vf *const lists[4] = {b->world[0], b->world[1], b->world[2], b->field}, rank[4] = {{0}};
-    const vf one = vf_set(1), none = vf_set(0);
-    for (int i = 0; i < 4; i++)
-        for (int j = i + 1; j < 4; j++) {
-            const vm after = kernel_batch_before(b, j, i);
-            rank[i] += vf_select(after, one, none);
-            rank[j] += vf_select(after, none, one);
-        }
-    vm is[4][3];
-    for (int k = 0; k < 4; k++)
-        for (int i = 0; i < 3; i++) is[k][i] = vf_eq(rank[i], vf_set((float)k));
-    for (int n = 0; n < 4; n++) {
-        vf v[4];
-        for (int i = 0; i < 4; i++) v[i] = lists[n][i];
-        for (int k = 0; k < 4; k++)
-            lists[n][k] = vf_select(is[k][0], v[0], vf_select(is[k][1], v[1], vf_select(is[k][2], v[2], v[3])));
-    }
-}
-
 /* kernel_cell_relative(). */
 SIMD_INLINE void kernel_batch_relative(kernel_batch *b)
 {
+    for (int n = b->count; n < SIMD_WIDTH; n++) b->isovalue[n] = b->isovalue[0];
     for (int half = 0; half < 2; half++) {
         kernel_half isovalue, v[4], largest;
         memcpy(&isovalue, b->isovalue + half * KERNEL_HALF, sizeof isovalue);
-        for (int i = 0; i < 4; i++) v[i] = kernel_half_of(&b->field[i], half) - isovalue;
+        for (int i = 0; i < 4; i++) v[i] = kernel_half_of(&b->tets.values[i], half) - isovalue;
         largest = kernel_half_max(kernel_half_max(kernel_half_abs(v[0]), kernel_half_abs(v[1])),
                                   kernel_half_max(kernel_half_abs(v[2]), kernel_half_abs(v[3])));
         /* kernel_mirrored_power() */
@@ -136,68 +62,7 @@ SIMD_INLINE void kernel_batch_relative(kernel_batch *b)
         const kernel_half_mask high = exponent > 2023;
         exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
         const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
-        for (int i = 0; i < 4; i++) kernel_half_put(&b->f[i], half, v[i] * scale);
-    }
-}
-
-/* kernel_place_in(). */
-SIMD_INLINE void kernel_batch_place(kernel_batch *b, const kernel_frame *f, const kernel_tile *tile)
-{
-    const double *eye = f->job->camera.eye;
-    for (int half = 0; half < 2; half++)
-        for (int i = 0; i < 4; i++) {
-            kernel_half d[3], place[3];
-            for (int a = 0; a < 3; a++) d[a] = kernel_half_of(&b->world[a][i], half) - eye[a];
-            for (int a = 0; a < 3; a++)
-                place[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-            const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * place[2] : place[2];
-            kernel_half_put(&b->place[0][i], half, place[0] - tile->centre_x * depth);
-            kernel_half_put(&b->place[1][i], half, place[1] - tile->centre_y * depth);
-            kernel_half_put(&b->place[2][i], half, place[2] - tile->depth_shift);
-        }
-}
-
-/* Of a kernel_four_lines()'s edge. */
-SIMD_INLINE void kernel_batch_line(kernel_batch *b, const kernel_frame *f, int n)
-{
-    const bool flat = f->job->camera.is_orthographic;
-    const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-    for (int half = 0; half < 2; half++) {
-        const kernel_half ax = kernel_half_of(&b->place[0][i], half), ay = kernel_half_of(&b->place[1][i], half);
-        const kernel_half bx = kernel_half_of(&b->place[0][j], half), by = kernel_half_of(&b->place[1][j], half);
-        kernel_half da = kernel_half_of(&b->place[2][i], half) + f->depth_shift;
-        kernel_half db = kernel_half_of(&b->place[2][j], half) + f->depth_shift;
-        if (flat) da = db = (kernel_half){0} + 1;
-        kernel_half_put(&b->c[n], half, ax * by - bx * ay);
-        kernel_half_put(&b->cu[n], half, db * ay - da * by);
-        kernel_half_put(&b->cv[n], half, da * bx - db * ax);
-    }
-}
-
-/* kernel_tet_lines(). */
-SIMD_INLINE void kernel_batch_lines(kernel_batch *b, const kernel_frame *f, const kernel_tile *tile)
-{
-    vf size[4], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
-    for (int i = 0; i < 4; i++) {
-        vf depth = vf_abs(b->place[2][i]) + fabsf((float)f->depth_shift);
-        if (f->job->camera.is_orthographic) depth = vf_set(1);
-        size[i] = 2 * vf_max(vf_abs(b->place[0][i]), vf_abs(b->place[1][i])) + 5 * tile->radius * depth;
-    }
-    b->doubt = vf_set(0);
-    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        vf apart[3];
-        kernel_batch_line(b, f, n);
-        b->bound[n] = 6 * 6e-8f * (size[i] * size[j]);
-        b->doubt = vf_max(b->doubt, b->bound[n]);
-        for (int a = 0; a < 3; a++) apart[a] = vf_abs(b->place[a][i] - b->place[a][j]);
-        error[n] = 6e-8f * (3 * vf_abs(b->c[n]) + tile->radius * (4 * vf_abs(b->cu[n]) + 3 * vf_abs(b->cv[n])));
-        extent[n] = apart[2] + 0.25f * (apart[0] + apart[1]);
-    }
-    for (int n = 0; n < 4; n++) {
-        const int ij = kernel_tet_face[n][3], jk = kernel_tet_face[n][4], ik = kernel_tet_face[n][5];
-        b->least[n] = ((error[ij] + error[jk]) + error[ik]) * ((extent[ij] + extent[jk]) + extent[ik]) *
-                      (0.5f / KERNEL_WEIGHT_ERROR);
+        for (int i = 0; i < 4; i++) kernel_half_put(&b->tets.f[i], half, v[i] * scale);
     }
 }
 
@@ -208,9 +73,11 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
     for (int half = 0; half < 2; half++) {
         kernel_half d[3][3], df[3], g[3], largest = {0};
         for (int i = 0; i < 3; i++) {
-            df[i] = kernel_half_of(&b->f[i + 1], half) - kernel_half_of(&b->f[0], half);
+            df[i] = kernel_half_of(&b->tets.f[i + 1], half) - kernel_half_of(&b->tets.f[0], half);
             for (int a = 0; a < 3; a++)
-                d[i][a] = (kernel_half_of(&b->world[a][i + 1], half) - kernel_half_of(&b->world[a][0], half)) * scale;
+                d[i][a] =
+                    (kernel_half_of(&b->tets.world[a][i + 1], half) - kernel_half_of(&b->tets.world[a][0], half)) *
+                    scale;
         }
         for (int a = 0; a < 3; a++) {
             const int p = (a + 1) % 3, q = (a + 2) % 3;
@@ -233,20 +100,10 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 /* Without world coordinates: the normal is known. */
 static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, int n, kernel_cell *c)
 {
-    float *const places[3] = {c->x, c->y, c->z};
+    kernel_placed_cell(&b->tets, n, c);
     c->index = b->cell[n];
-    c->type = GRID_TET;
-    c->count = 4;
-    c->is_finite = c->is_placed = c->has_lines = c->has_normal = true;
-    c->doubt = b->doubt[n];
-    for (int i = 0; i < 4; i++) {
-        for (int a = 0; a < 3; a++) places[a][i] = b->place[a][i][n];
-        c->f[i] = b->f[i][n];
-        c->least[i] = b->least[i][n];
-    }
+    c->has_normal = true;
     for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
-    for (int e = 0; e < KERNEL_TET_EDGES; e++)
-        c->lines[e] = (kernel_line){b->c[e][n], b->cu[e][n], b->cv[e][n], b->bound[e][n]};
 }
 
 /* ---- lanes are pixels ---- */
@@ -298,9 +155,9 @@ SIMD_INLINE void kernel_batch_project(const kernel_batch *b, const kernel_tile *
     const vf slope_x = kernel_batch_of_tile(tile->slope_x, r->column);
     const vf slope_y = kernel_batch_of_tile(tile->slope_y, r->row);
     for (int i = 0; i < 4; i++) {
-        const vf z = vf_permute(b->place[2][i], r->lane);
-        x[i] = (vf_permute(b->place[0][i], r->lane) - origin_x) - slope_x * z;
-        y[i] = (vf_permute(b->place[1][i], r->lane) - origin_y) - slope_y * z;
+        const vf z = vf_permute(b->tets.at[2][i], r->lane);
+        x[i] = (vf_permute(b->tets.at[0][i], r->lane) - origin_x) - slope_x * z;
+        y[i] = (vf_permute(b->tets.at[1][i], r->lane) - origin_y) - slope_y * z;
     }
 }
 
@@ -312,7 +169,7 @@ static __attribute__((noinline)) void kernel_batch_edges_exactly(const kernel_ba
     kernel_batch_project(b, tile, r, x, y);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const vm doubt = vm_and(r->active, vm_not(vf_lt(vf_permute(b->bound[n], r->lane), vf_abs(e[n]))));
+        const vm doubt = vm_and(r->active, vm_not(vf_lt(vf_permute(b->tets.bound[n], r->lane), vf_abs(e[n]))));
         if (vm_any(doubt)) e[n] = vf_select(doubt, kernel_edge_between(x[i], y[i], x[j], y[j]), e[n]);
     }
 }
@@ -350,11 +207,11 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
 {
     vf e[KERNEL_TET_EDGES], least = vf_set(INFINITY);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
-        e[n] = vf_muladd(vf_permute(b->cv[n], r->lane), r->v,
-                         vf_muladd(vf_permute(b->cu[n], r->lane), r->u, vf_permute(b->c[n], r->lane)));
+        e[n] = vf_muladd(vf_permute(b->tets.cv[n], r->lane), r->v,
+                         vf_muladd(vf_permute(b->tets.cu[n], r->lane), r->u, vf_permute(b->tets.c[n], r->lane)));
         least = vf_min(vf_abs(e[n]), least);
     }
-    const vm sure = vf_lt(vf_permute(b->doubt, r->lane), least);
+    const vm sure = vf_lt(vf_permute(b->tets.doubt, r->lane), least);
     if (__builtin_expect(vm_any(vm_andnot(r->active, sure)), 0)) kernel_batch_edges_exactly(b, tile, r, e);
     vm hit[4], weak[4], any_hit = vm_none(), any_weak = vm_none();
     for (int n = 0; n < 4; n++) {
@@ -365,13 +222,13 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
     if (!vm_any(any_hit)) return any_hit;
     kernel_sums sums[4];
     for (int i = 0; i < 4; i++) {
-        r->z[i] = vf_permute(b->place[2][i], r->lane);
-        r->f[i] = vf_permute(b->f[i], r->lane);
+        r->z[i] = vf_permute(b->tets.at[2][i], r->lane);
+        r->f[i] = vf_permute(b->tets.f[i], r->lane);
     }
     for (int n = 0; n < 4; n++) {
         const signed char *face = kernel_tet_face[n];
         sums[n] = kernel_batch_sums(r, face, e[face[3]], e[face[4]], e[face[5]]);
-        weak[n] = vm_and(hit[n], vf_lt(vf_abs(sums[n].weight), vf_permute(b->least[n], r->lane)));
+        weak[n] = vm_and(hit[n], vf_lt(vf_abs(sums[n].weight), vf_permute(b->tets.least[n], r->lane)));
         any_weak = vm_or(any_weak, weak[n]);
     }
     if (__builtin_expect(vm_any(any_weak), 0)) kernel_batch_mend(b, tile, r, e, weak, sums);
@@ -474,11 +331,8 @@ SIMD_INLINE void kernel_batch_rays_of(kernel_batch *b, int n, int columns, int r
 
 static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b)
 {
-    kernel_batch_fetch(b);
-    kernel_batch_order(b);
+    kernel_place_tets(&b->tets, &b->plain, t->frame, &t->tile, b->vertex, b->count);
     kernel_batch_relative(b);
-    kernel_batch_place(b, t->frame, &t->tile);
-    kernel_batch_lines(b, t->frame, &t->tile);
     b->has_normals = false;
     b->ray_count = 0;
     for (int n = 0; n < b->count; n++) {

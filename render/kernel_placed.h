@@ -1,19 +1,19 @@
 /* Tets of a plain mesh, one a lane, placed for a tile and given their lines: the operations of kernel_tet_place(),
- * kernel_cell_order(), kernel_cell_domain() and kernel_tet_lines(), and so the same bits, for as many tets at once as a
- * vector has lanes. Vertices are put in order first, by coordinates that float32 has as they are, so that all else
- * comes in order; what is computed in double are plain arrays and one loop a quantity, which compilers vectorize. */
+ * kernel_cell_order() and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes.
+ * Vertices are put in order first, by coordinates that float32 has as they are, so that all else comes in order. What
+ * is computed in double is computed in two halves. */
 #ifndef RENDER_KERNEL_PLACED_H
 #define RENDER_KERNEL_PLACED_H
 
 #include "kernel_plain.h"
-#include "kernel_volume.h"
+#include "kernel_wide.h"
 
-/* Lane by lane what kernel_cell has. */
+/* Lane by lane what kernel_cell has; f is for the caller to set. */
 typedef struct kernel_placed {
-    float world[3][4][SIMD_WIDTH], values[4][SIMD_WIDTH]; /* as they were handed over */
-    float at[3][4][SIMD_WIDTH], f[4][SIMD_WIDTH];
-    float c[KERNEL_TET_EDGES][SIMD_WIDTH], cu[KERNEL_TET_EDGES][SIMD_WIDTH], cv[KERNEL_TET_EDGES][SIMD_WIDTH];
-    float bound[KERNEL_TET_EDGES][SIMD_WIDTH], least[4][SIMD_WIDTH], doubt[SIMD_WIDTH];
+    vf world[3][4], values[4]; /* as they were handed over */
+    vf at[3][4], f[4];
+    vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
+    vf doubt, least[4];
 } kernel_placed;
 
 /* Vertices on their way into order. */
@@ -21,11 +21,6 @@ typedef struct kernel_ordered {
     vf at[3];
     vi vertex;
 } kernel_ordered;
-
-SIMD_INLINE vi vi_select(vm m, vi a, vi b)
-{
-    return vi_from_bits(vf_select(m, vf_from_bits(a), vf_from_bits(b)));
-}
 
 /* In the lanes in which b is before a, they change places. */
 SIMD_INLINE void kernel_ordered_swap(kernel_ordered *a, kernel_ordered *b)
@@ -42,11 +37,13 @@ SIMD_INLINE void kernel_ordered_swap(kernel_ordered *a, kernel_ordered *b)
     b->vertex = vi_select(before, was.vertex, b->vertex);
 }
 
-/* Neighbours alone change places, and equal ones do not: vertices in one place stay as they came. */
-SIMD_INLINE void kernel_ordered_fetch(const kernel_plain *p, const int32_t vertices[4][SIMD_WIDTH],
+/* Neighbours alone change places, and equal ones do not: vertices in one place stay as they came. Lanes from count on
+ * are as the first. */
+SIMD_INLINE void kernel_ordered_fetch(const kernel_plain *p, int32_t vertices[4][SIMD_WIDTH], int count,
                                       kernel_ordered spots[4])
 {
     for (int i = 0; i < 4; i++) {
+        for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
         memcpy(&spots[i].vertex, vertices[i], sizeof spots[i].vertex);
         for (int a = 0; a < 3; a++) spots[i].at[a] = vf_gather(p->coordinates[a], spots[i].vertex * p->stride);
     }
@@ -54,95 +51,81 @@ SIMD_INLINE void kernel_ordered_fetch(const kernel_plain *p, const int32_t verti
         for (int i = 0; i < last; i++) kernel_ordered_swap(&spots[i], &spots[i + 1]);
 }
 
-/* kernel_tet_place() of one of the vertices. */
-SIMD_INLINE void kernel_placed_spot(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile,
-                                    const kernel_ordered *spot, int i)
+/* kernel_tet_place(). */
+SIMD_INLINE void kernel_placed_spots(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
 {
-    const bool flat = f->job->camera.is_orthographic;
-    const double *eye = f->job->camera.eye, (*axes)[3] = (const double(*)[3])f->scaled_axes;
-    const double scale = f->job->space.scale;
-    for (int a = 0; a < 3; a++) vf_store(out->world[a][i], spot->at[a]);
-    for (int n = 0; n < SIMD_WIDTH; n++) {
-        const double d0 = (double)out->world[0][i][n] - eye[0], d1 = (double)out->world[1][i][n] - eye[1],
-                     d2 = (double)out->world[2][i][n] - eye[2];
-        const double x = axes[0][0] * d0 + axes[0][1] * d1 + axes[0][2] * d2;
-        const double y = axes[1][0] * d0 + axes[1][1] * d1 + axes[1][2] * d2;
-        const double z = axes[2][0] * d0 + axes[2][1] * d1 + axes[2][2] * d2;
-        const double depth = flat ? scale : z;
-        out->at[0][i][n] = (float)(x - tile->centre_x * depth);
-        out->at[1][i][n] = (float)(y - tile->centre_y * depth);
-        out->at[2][i][n] = (float)(z - tile->depth_shift);
-    }
-}
-
-/* kernel_cell_domain() of one of the vertices. */
-SIMD_INLINE void kernel_placed_value(kernel_placed *out, const kernel_plain *p, const kernel_transfer *t, vi vertex,
-                                     int i)
-{
-    vf_store(out->values[i], vf_gather(p->values, vertex * p->value_stride));
-    for (int n = 0; n < SIMD_WIDTH; n++)
-        out->f[i][n] = kernel_hold(((double)out->values[i][n] - t->low) * t->inverse_width, 1e18);
+    const double *eye = f->job->camera.eye;
+    for (int half = 0; half < 2; half++)
+        for (int i = 0; i < 4; i++) {
+            kernel_half d[3], at[3];
+            for (int a = 0; a < 3; a++) d[a] = kernel_half_of(&out->world[a][i], half) - eye[a];
+            for (int a = 0; a < 3; a++)
+                at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
+            const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+            kernel_half_put(&out->at[0][i], half, at[0] - tile->centre_x * depth);
+            kernel_half_put(&out->at[1][i], half, at[1] - tile->centre_y * depth);
+            kernel_half_put(&out->at[2][i], half, at[2] - tile->depth_shift);
+        }
 }
 
 /* kernel_line_between() of one of the edges, without its bound. */
 SIMD_INLINE void kernel_placed_line(kernel_placed *out, const kernel_frame *f, int edge)
 {
-    const int a = kernel_tet_edge[edge][0], b = kernel_tet_edge[edge][1];
     const bool flat = f->job->camera.is_orthographic;
-    for (int n = 0; n < SIMD_WIDTH; n++) {
-        const double ax = (double)out->at[0][a][n], ay = (double)out->at[1][a][n];
-        const double bx = (double)out->at[0][b][n], by = (double)out->at[1][b][n];
-        const double da = flat ? 1 : (double)out->at[2][a][n] + f->depth_shift;
-        const double db = flat ? 1 : (double)out->at[2][b][n] + f->depth_shift;
-        out->c[edge][n] = (float)(ax * by - bx * ay);
-        out->cu[edge][n] = (float)(db * ay - da * by);
-        out->cv[edge][n] = (float)(da * bx - db * ax);
+    const int i = kernel_tet_edge[edge][0], j = kernel_tet_edge[edge][1];
+    for (int half = 0; half < 2; half++) {
+        const kernel_half ax = kernel_half_of(&out->at[0][i], half), ay = kernel_half_of(&out->at[1][i], half);
+        const kernel_half bx = kernel_half_of(&out->at[0][j], half), by = kernel_half_of(&out->at[1][j], half);
+        kernel_half da = kernel_half_of(&out->at[2][i], half) + f->depth_shift;
+        kernel_half db = kernel_half_of(&out->at[2][j], half) + f->depth_shift;
+        if (flat) da = db = (kernel_half){0} + 1;
+        kernel_half_put(&out->c[edge], half, ax * by - bx * ay);
+        kernel_half_put(&out->cu[edge], half, db * ay - da * by);
+        kernel_half_put(&out->cv[edge], half, da * bx - db * ax);
     }
 }
 
-/* Bounds of the lines, and the faces' least weights. */
-SIMD_INLINE void kernel_placed_bounds(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
+/* kernel_tet_lines(). */
+SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, const kernel_tile *tile)
 {
     const bool flat = f->job->camera.is_orthographic;
-    vf at[4][3], size[4], errors[KERNEL_TET_EDGES], extents[KERNEL_TET_EDGES], doubt = vf_set(0);
+    vf size[4], error[KERNEL_TET_EDGES], extent[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
-        for (int a = 0; a < 3; a++) at[i][a] = vf_load(out->at[a][i]);
         vf depth = vf_set(1);
-        if (!flat) depth = vf_abs(at[i][2]) + fabsf((float)f->depth_shift);
-        size[i] = 2 * vf_max(vf_abs(at[i][0]), vf_abs(at[i][1])) + (5 * tile->radius) * depth;
+        if (!flat) depth = vf_abs(out->at[2][i]) + fabsf((float)f->depth_shift);
+        size[i] = 2 * vf_max(vf_abs(out->at[0][i]), vf_abs(out->at[1][i])) + 5 * tile->radius * depth;
     }
+    out->doubt = vf_set(0);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
-        const vf bound = (6 * 6e-8f) * (size[i] * size[j]);
-        const vf x = vf_abs(at[i][0] - at[j][0]), y = vf_abs(at[i][1] - at[j][1]), z = vf_abs(at[i][2] - at[j][2]);
-        vf_store(out->bound[n], bound);
-        doubt = vf_max(bound, doubt);
-        errors[n] = 6e-8f * (3 * vf_abs(vf_load(out->c[n])) +
-                             tile->radius * (4 * vf_abs(vf_load(out->cu[n])) + 3 * vf_abs(vf_load(out->cv[n]))));
-        extents[n] = z + 0.25f * (x + y);
+        vf apart[3];
+        kernel_placed_line(out, f, n);
+        out->bound[n] = 6 * 6e-8f * (size[i] * size[j]);
+        out->doubt = vf_max(out->doubt, out->bound[n]);
+        for (int a = 0; a < 3; a++) apart[a] = vf_abs(out->at[a][i] - out->at[a][j]);
+        error[n] = 6e-8f * (3 * vf_abs(out->c[n]) + tile->radius * (4 * vf_abs(out->cu[n]) + 3 * vf_abs(out->cv[n])));
+        extent[n] = apart[2] + 0.25f * (apart[0] + apart[1]);
     }
-    vf_store(out->doubt, doubt);
     for (int n = 0; n < 4; n++) {
         const signed char *edge = kernel_tet_face[n] + 3;
-        const vf error = (errors[edge[0]] + errors[edge[1]]) + errors[edge[2]];
-        const vf extent = (extents[edge[0]] + extents[edge[1]]) + extents[edge[2]];
-        vf_store(out->least[n], (error * extent) * (0.5f / KERNEL_WEIGHT_ERROR));
+        out->least[n] = ((error[edge[0]] + error[edge[1]]) + error[edge[2]]) *
+                        ((extent[edge[0]] + extent[edge[1]]) + extent[edge[2]]) * (0.5f / KERNEL_WEIGHT_ERROR);
     }
 }
 
-/* vertices: 0 to 3 of each lane's tet. */
+/* Lane by lane the four vertices of count tets; lanes from count on are set to the first's. */
 static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_plain *p,
                                                         const kernel_frame *f, const kernel_tile *tile,
-                                                        const kernel_transfer *t, const int32_t vertices[4][SIMD_WIDTH])
+                                                        int32_t vertices[4][SIMD_WIDTH], int count)
 {
     kernel_ordered spots[4];
-    kernel_ordered_fetch(p, vertices, spots);
+    kernel_ordered_fetch(p, vertices, count, spots);
     for (int i = 0; i < 4; i++) {
-        kernel_placed_spot(out, f, tile, &spots[i], i);
-        kernel_placed_value(out, p, t, spots[i].vertex, i);
+        out->values[i] = vf_gather(p->values, spots[i].vertex * p->value_stride);
+        for (int a = 0; a < 3; a++) out->world[a][i] = spots[i].at[a];
     }
-    for (int n = 0; n < KERNEL_TET_EDGES; n++) kernel_placed_line(out, f, n);
-    kernel_placed_bounds(out, f, tile);
+    kernel_placed_spots(out, f, tile);
+    kernel_placed_lines(out, f, tile);
 }
 
 /* Lane n as a cell, with all that rays ask of a tet in float32. */

@@ -170,6 +170,19 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
     cells->open_count = count;
 }
 
+/* kernel_cell_domain(). */
+SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
+{
+    const kernel_half limit = (kernel_half){0} + 1e18;
+    for (int half = 0; half < 2; half++)
+        for (int i = 0; i < 4; i++) {
+            kernel_half f = (kernel_half_of(&placed->values[i], half) - t->low) * t->inverse_width;
+            f = kernel_half_select((kernel_half_mask)(f < -limit), -limit, f);
+            f = kernel_half_select((kernel_half_mask)(limit < f), limit, f);
+            kernel_half_put(&placed->f[i], half, f);
+        }
+}
+
 /* The tets that wait. */
 SIMD_INLINE void kernel_tile_take_waiting(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
 {
@@ -177,10 +190,8 @@ SIMD_INLINE void kernel_tile_take_waiting(kernel_tile_trace *t, kernel_tile_cell
     const bool is_fine = t->frame->is_fine;
     if (!count) return;
     cells->waiting = 0;
-    for (int n = count; n < SIMD_WIDTH; n++)
-        for (int i = 0; i < 4; i++) cells->wait_vertices[i][n] = cells->wait_vertices[i][0];
-    kernel_place_tets(&cells->placed, &cells->plain, t->frame, &t->tile, &t->frame->volumes[0],
-                      (const int32_t(*)[SIMD_WIDTH])cells->wait_vertices);
+    kernel_place_tets(&cells->placed, &cells->plain, t->frame, &t->tile, cells->wait_vertices, count);
+    kernel_placed_domain(&cells->placed, &t->frame->volumes[0]);
     for (int n = 0; n < count; n++) {
         kernel_placed_cell(&cells->placed, n, &cells->cell);
         if (is_fine) kernel_placed_exactly(&cells->placed, n, &cells->cell);

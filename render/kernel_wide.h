@@ -52,4 +52,28 @@ SIMD_INLINE kernel_half kernel_half_select(kernel_half_mask m, kernel_half a, ke
     return (kernel_half)(((kernel_half_mask)a & m) | ((kernel_half_mask)b & ~m));
 }
 
+/* The first half of v's lanes or the second. */
+SIMD_INLINE kernel_half kernel_half_of(const vf *v, int half)
+{
+    kernel_half_floats f;
+    memcpy(&f, (const char *)v + half * (int)sizeof f, sizeof f);
+    return kernel_half_widen(f);
+}
+
+SIMD_INLINE void kernel_half_put(vf *v, int half, kernel_half d)
+{
+    const kernel_half_floats f = kernel_half_narrow(d);
+    memcpy((char *)v + half * (int)sizeof f, &f, sizeof f);
+}
+
+SIMD_INLINE kernel_half kernel_half_abs(kernel_half a)
+{
+    return (kernel_half)((kernel_half_mask)a & INT64_MAX);
+}
+
+SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
+{
+    return kernel_half_select((kernel_half_mask)(b < a), a, b);
+}
+
 #endif

@@ -406,6 +406,10 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
+SIMD_INLINE vi vi_select(vm m, vi a, vi b)
+{
+    return vi_from_bits(vf_select(m, vf_from_bits(a), vf_from_bits(b)));
+}
 SIMD_INLINE vf vf_abs(vf a)
 {
     return vf_from_bits(vi_from_bits(a) & vi_set(0x7fffffff));
