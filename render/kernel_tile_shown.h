@@ -12,7 +12,7 @@ enum { KERNEL_DEPTHS = 32 };
 typedef struct kernel_by_depth {
     kernel_tile_shown *items;
     float low, scale;
-    int ends[KERNEL_DEPTHS]; /* of each part's items, the nearest first */
+    int first[KERNEL_DEPTHS]; /* of each part's items, the nearest part first; each knows the next, -1 is none */
 } kernel_by_depth;
 
 /* The part; less for nothing that is farther. */
@@ -22,35 +22,22 @@ SIMD_INLINE int kernel_depth_part(const kernel_by_depth *q, float near)
     return part > 0 ? part < KERNEL_DEPTHS - 1 ? (int)part : KERNEL_DEPTHS - 1 : 0;
 }
 
-/* In place: each item that is not in its part takes the place of one there, which is next. */
 static inline void kernel_sort_by_depth(kernel_by_depth *q, kernel_tile_shown *items, int count)
 {
-    int next[KERNEL_DEPTHS];
-    float high = items[0].near;
-    q->items = items;
-    q->low = items[0].near;
+    float low = items[0].near, high = low;
     for (int i = 1; i < count; i++) {
-        q->low = items[i].near < q->low ? items[i].near : q->low;
+        low = items[i].near < low ? items[i].near : low;
         high = items[i].near > high ? items[i].near : high;
     }
-    q->scale = high > q->low ? KERNEL_DEPTHS / (high - q->low) : 0;
-    memset(q->ends, 0, sizeof q->ends);
-    for (int i = 0; i < count; i++) q->ends[kernel_depth_part(q, items[i].near)]++;
-    for (int part = 0, end = 0; part < KERNEL_DEPTHS; part++) {
-        next[part] = end;
-        q->ends[part] = end += q->ends[part];
+    q->items = items;
+    q->low = low;
+    q->scale = high > low ? KERNEL_DEPTHS / (high - low) : 0;
+    for (int part = 0; part < KERNEL_DEPTHS; part++) q->first[part] = -1;
+    for (int i = count - 1; i >= 0; i--) {
+        int *first = &q->first[kernel_depth_part(q, items[i].near)];
+        items[i].next = *first;
+        *first = i;
     }
-    for (int part = 0; part < KERNEL_DEPTHS; part++)
-        while (next[part] < q->ends[part]) {
-            kernel_tile_shown item = items[next[part]];
-            for (int own; (own = kernel_depth_part(q, item.near)) != part;) {
-                kernel_tile_shown *place = &items[next[own]++];
-                const kernel_tile_shown moved = *place;
-                *place = item;
-                item = moved;
-            }
-            items[next[part]++] = item;
-        }
 }
 
 /* The farthest that a block knows of. */
@@ -138,11 +125,10 @@ static __attribute__((noinline)) void kernel_tile_trace_shown(kernel_tile_trace 
 {
     kernel_batch batch;
     kernel_waiting waiting = {0};
-    int next = 0;
     kernel_batch_begin(&batch);
     for (int part = 0; part < KERNEL_DEPTHS && part <= kernel_depth_part(q, kernel_tile_far(t)); part++)
-        for (; next < q->ends[part]; next++) {
-            const kernel_tile_shown *shown = &q->items[next];
+        for (int i = q->first[part]; i >= 0; i = q->items[i].next) {
+            const kernel_tile_shown *shown = &q->items[i];
             const uint32_t source = shown->source;
             const bool is_transparent =
                 t->frame->isovalues[source % RENDER_MAX_ISOVALUES].surface >= t->frame->opaque_count;

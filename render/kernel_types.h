@@ -55,7 +55,11 @@ typedef struct kernel_shown {
 /* The same for one tile: a bit a block; and the first and last column, first and last row of pixels, from the low bits
  * on. */
 typedef struct kernel_tile_shown {
-    float near, far;
+    float near;
+    union {
+        float far;
+        int32_t next; /* of a surface's, in the tile: kernel_tile_shown.h */
+    };
     uint32_t cell, source;
     uint16_t blocks, box;
 } kernel_tile_shown;

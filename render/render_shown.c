@@ -125,8 +125,13 @@ static kernel_tile_shown shown_within(const kernel_shown *s, within columns, wit
     /* A tile's rows of blocks, a bit each in the column of the first blocks. */
     static const uint16_t spread[1 << BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
                                                  0x1000, 0x1001, 0x1010, 0x1011, 0x1100, 0x1101, 0x1110, 0x1111};
-    return (kernel_tile_shown){s->near, s->far, s->cell, s->source, (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
-                               (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
+    return (kernel_tile_shown){.near = s->near,
+                               .far = s->far,
+                               .cell = s->cell,
+                               .source = s->source,
+                               .blocks = (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
+                               .box =
+                                   (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
 static void count_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *counts)
