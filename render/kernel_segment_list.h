@@ -145,7 +145,7 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
     const float first = items[0].t_in, last = items[list->room - 1].t_in;
     if (first == last) {
         if (s->t_in == first) return false;
-        list->t_end[lane] = fmaxf(s->t_in, first);
+        list->t_end[lane] = simd_max(s->t_in, first);
         if (s->t_in < first) {
             list->count[lane] = 0;
             kernel_heap_clear(&list->heap, lane);

@@ -54,19 +54,19 @@ SIMD_INLINE float kernel_course_cost(const kernel_segment_state *state, const fl
     float low = values[0], high = low;
     if (!(state->allowance > 0) && !(state->mixing > 0)) return 0;
     for (int i = 1; i < count; i++) {
-        low = fminf(low, values[i]);
-        high = fmaxf(high, values[i]);
+        low = simd_min(values[i], low);
+        high = simd_max(values[i], high);
     }
     const float last = KERNEL_BOUND_BINS - 1;
-    const int from = (int)fminf(fmaxf((low - t->bin_low) * t->bound_inverse, 0), last);
-    const int to = (int)fminf(fmaxf((high - t->bin_low) * t->bound_inverse, 0), last);
+    const int from = (int)simd_min(simd_max((low - t->bin_low) * t->bound_inverse, 0), last);
+    const int to = (int)simd_min(simd_max((high - t->bin_low) * t->bound_inverse, 0), last);
     kernel_bound b = t->bounds[from];
     for (int i = from + 1; i <= to; i++) {
-        b.extinction_high = fmaxf(b.extinction_high, t->bounds[i].extinction_high);
-        b.extinction_slope = fmaxf(b.extinction_slope, t->bounds[i].extinction_slope);
-        b.colour_slope = fmaxf(b.colour_slope, t->bounds[i].colour_slope);
+        b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
+        b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
+        b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
     }
-    return fminf(t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope, 1e30f);
+    return simd_min(t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope, 1e30f);
 }
 
 SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)

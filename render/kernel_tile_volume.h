@@ -1,6 +1,6 @@
 /* Samples of volumes for a whole tile: a window of samples at a time, for all the tile's blocks. A cell is fetched,
- * placed and given its lines once a window (kernel_tile_cells.h), and goes to the packets of the blocks that it may meet, whose samples it
- * owns it fills. A window is so many samples that most rays have one or two:
+ * placed and given its lines once a window (kernel_tile_cells.h), and goes to the packets of the blocks that it may
+ * meet, whose samples it owns it fills. A window is so many samples that most rays have one or two:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
  *     block 1  |--s--s--s--s--s--s--|--s--s--x  opaque hit: its far ends here
@@ -140,7 +140,7 @@ SIMD_INLINE float kernel_ray_window(kernel_packet *p, kernel_tile_ray_samples *r
     if (!vm_any(p->active)) return -INFINITY;
     for (int v = 0; v < volumes; v++)
         for (int n = 0; n < s->count; n++) s->value[v][n] = nothing;
-    *near = fminf(*near, vf_reduce_min(vf_select(p->active, t_first, vf_set(INFINITY))));
+    *near = simd_min(vf_reduce_min(vf_select(p->active, t_first, vf_set(INFINITY))), *near);
     return vf_reduce_max(vf_select(p->active, t_end, vf_set(-INFINITY)));
 }
 
@@ -156,7 +156,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
             const int i = b * KERNEL_BLOCK_PACKETS + n;
             v->packets[i].samples.first = first;
             v->packets[i].samples.count = last - first + 1;
-            far = fmaxf(far, kernel_ray_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near));
+            far = simd_max(kernel_ray_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near), far);
         }
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
         is_lit = is_lit || far > -INFINITY;

@@ -75,8 +75,8 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
     const vf to = (i->t_out - p->sample_base) * p->sample_inverse;
     const float low = vf_reduce_min(vf_select(i->mask, from, vf_set(INFINITY)));
     const float high = vf_reduce_max(vf_select(i->mask, to, vf_set(-INFINITY)));
-    const float first = fminf(fmaxf(low - (float)s->first - 0.5f, 0), KERNEL_MAX_GROUP);
-    const float last = fminf(fmaxf(high - (float)s->first + 1.5f, 0), (float)s->count);
+    const float first = simd_min(simd_max(low - (float)s->first - 0.5f, 0), KERNEL_MAX_GROUP);
+    const float last = simd_min(simd_max(high - (float)s->first + 1.5f, 0), (float)s->count);
     *begin = (int)first;
     *end = (int)last;
 }

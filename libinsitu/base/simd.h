@@ -406,6 +406,16 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
+/* vf_min() and vf_max() of single numbers: the latter of the two where one is not a number. fminf() takes more than one
+ * instruction, for it has another rule there. */
+SIMD_INLINE float simd_min(float a, float b)
+{
+    return a < b ? a : b;
+}
+SIMD_INLINE float simd_max(float a, float b)
+{
+    return b < a ? a : b;
+}
 SIMD_INLINE vi vi_select(vm m, vi a, vi b)
 {
     return vi_from_bits(vf_select(m, vf_from_bits(a), vf_from_bits(b)));
