@@ -24,7 +24,7 @@ typedef struct kernel_tile_cells {
     kernel_cell cell;   /* the one under way, */
     kernel_map map;     /* and its map */
     kernel_plain plain; /* of the volume's field on the part: */
-    int plain_part;
+    int plain_volume, plain_part;
     kernel_placed placed;
     /* Tets that wait to be placed together, with the blocks that they may meet. */
     int waiting;
@@ -70,14 +70,102 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
     if (blocks) take(t, part, c, c->type == GRID_TET || c->is_constant ? NULL : &cells->map, blocks);
 }
 
+/* ---- tets of plain meshes, as many at once as there are lanes ---- */
+
+/* kernel_cell_domain(). */
+SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
+{
+    const kernel_half limit = (kernel_half){0} + 1e18;
+    for (int half = 0; half < 2; half++)
+        for (int i = 0; i < 4; i++) {
+            kernel_half f = (kernel_half_of(&placed->values[i], half) - t->low) * t->inverse_width;
+            f = kernel_half_select((kernel_half_mask)(f < -limit), -limit, f);
+            f = kernel_half_select((kernel_half_mask)(limit < f), limit, f);
+            kernel_half_put(&placed->f[i], half, f);
+        }
+}
+
+/* Lanes whose cells show and reach into the window, and where these begin. */
+SIMD_INLINE unsigned kernel_placed_shown(const kernel_tile_trace *t, const kernel_placed *placed,
+                                         const kernel_interest *interest, float near[SIMD_WIDTH])
+{
+    const vf *z = placed->at[2], *v = placed->values;
+    const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3]));
+    const vf high = vf_max(vf_max(v[0], v[1]), vf_max(v[2], v[3]));
+    vm is_finite = vm_all_lanes(), shows = vm_none();
+    for (int i = 0; i < 4; i++) is_finite = vm_and(is_finite, vf_lt(vf_abs(v[i]), vf_set(INFINITY)));
+    for (int i = 0; i < interest->count; i++)
+        shows = vm_or(shows, vm_and(vf_le(low, vf_set(interest->high[i])), vf_le(vf_set(interest->low[i]), high)));
+    const vf front = vf_min(vf_min(z[0], z[1]), vf_min(z[2], z[3]));
+    const vf back = vf_max(vf_max(z[0], z[1]), vf_max(z[2], z[3]));
+    const vf pad = KERNEL_OUTLINE_PAD * vf_max(vf_abs(front), vf_abs(back));
+    vf_store(near, front - pad);
+    return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
+}
+
+/* The tets that wait. */
+static __attribute__((noinline)) void kernel_tile_take_waiting(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                                               kernel_tile_take *take)
+{
+    const int count = cells->waiting;
+    const bool is_fine = t->frame->is_fine;
+    if (!count) return;
+    const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
+    float near[SIMD_WIDTH];
+    cells->waiting = 0;
+    kernel_place_tets(&cells->placed, &cells->plain, t->frame, &t->tile, cells->wait_vertices, count);
+    kernel_placed_domain(&cells->placed, transfer);
+    unsigned shown = kernel_placed_shown(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
+    for (; shown; shown &= shown - 1) {
+        const int n = __builtin_ctz(shown);
+        unsigned blocks = cells->wait_blocks[n] & kernel_blocks_beyond(t, near[n]);
+        if (!blocks) continue;
+        kernel_placed_cell(&cells->placed, n, &cells->cell);
+        if (is_fine) kernel_placed_exactly(&cells->placed, n, &cells->cell);
+        blocks &= kernel_tet_blocks(&t->block_rays, &cells->cell);
+        cells->cell.index = cells->wait_cell[n];
+        if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
+    }
+}
+
+/* What waits from now on is of this volume and part. True where their tets do. */
+SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
+                                      kernel_tile_take *take)
+{
+    if (part != cells->plain_part || volume != cells->plain_volume) {
+        kernel_tile_take_waiting(t, cells, take);
+        kernel_plain_begin(&cells->plain, t->frame, t->frame->job->parts[part].cells,
+                           &t->frame->job->volumes[volume].field.fields[part]);
+        cells->plain_volume = volume;
+        cells->plain_part = part;
+    }
+    return cells->plain.is_so;
+}
+
+/* Until a vector is full. */
+SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
+                                  kernel_tile_take *take)
+{
+    const int32_t *vertices = cells->plain.connectivity + 4 * (int64_t)cell;
+    const int n = cells->waiting++;
+    for (int i = 0; i < 4; i++) cells->wait_vertices[i][n] = vertices[i];
+    cells->wait_cell[n] = cell;
+    cells->wait_blocks[n] = blocks;
+    if (cells->waiting == SIMD_WIDTH) kernel_tile_take_waiting(t, cells, take);
+}
+
 /* ---- from trees ---- */
 
 SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, int volume, int part, const uint32_t *cells, int count,
                                        bool is_pencil, unsigned blocks, kernel_tile_take *take)
 {
-    const grid_field *field = &t->frame->job->volumes[volume].field.fields[part];
-    kernel_tile_prefetch(t->frame->job->parts[part].cells, field, cells, count);
-    for (int n = 0; n < count; n++) kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
+    const grid *g = t->frame->job->parts[part].cells;
+    kernel_tile_cells *waiting = kernel_tile_cells_of(t);
+    kernel_tile_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
+    if (kernel_tile_wait_for(t, waiting, volume, part, take))
+        for (int n = 0; n < count; n++) kernel_tile_wait(t, waiting, cells[n], blocks, take);
+    else
+        for (int n = 0; n < count; n++) kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
 }
 
 /* The trees of the parts, with the volume's ranges. */
@@ -93,15 +181,16 @@ SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, cons
     }
 }
 
-/* All trees of the frame, by way of the tree over them where there is one. */
-SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts)
+/* All trees of the frame, by way of the tree over them where there is one. take: what their cells are for. */
+SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts,
+                                       kernel_tile_take *take)
 {
     const render_job *job = t->frame->job;
-    if (job->parent) {
+    if (job->parent)
         kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, parts);
-        return;
-    }
-    for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
+    else
+        for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
+    kernel_tile_take_waiting(t, kernel_tile_cells_of(t), take);
 }
 
 /* ---- those that are known ---- */
@@ -149,10 +238,11 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = kernel_tile_cells_of(t);
+    cells->waiting = 0;
+    cells->plain_part = -1;
     if (!f->volume_shown) return true;
     cells->count = kernel_bin(f, f->volume_shown, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
-    cells->open_count = cells->next = cells->waiting = 0;
-    cells->plain_part = -1;
+    cells->open_count = cells->next = 0;
     kernel_order_by_depth(cells->items, cells->count);
     return cells->count > 0;
 }
@@ -170,58 +260,15 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
     cells->open_count = count;
 }
 
-/* kernel_cell_domain(). */
-SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
-{
-    const kernel_half limit = (kernel_half){0} + 1e18;
-    for (int half = 0; half < 2; half++)
-        for (int i = 0; i < 4; i++) {
-            kernel_half f = (kernel_half_of(&placed->values[i], half) - t->low) * t->inverse_width;
-            f = kernel_half_select((kernel_half_mask)(f < -limit), -limit, f);
-            f = kernel_half_select((kernel_half_mask)(limit < f), limit, f);
-            kernel_half_put(&placed->f[i], half, f);
-        }
-}
-
-/* The tets that wait. */
-SIMD_INLINE void kernel_tile_take_waiting(kernel_tile_trace *t, kernel_tile_cells *cells, kernel_tile_take *take)
-{
-    const int count = cells->waiting;
-    const bool is_fine = t->frame->is_fine;
-    if (!count) return;
-    cells->waiting = 0;
-    kernel_place_tets(&cells->placed, &cells->plain, t->frame, &t->tile, cells->wait_vertices, count);
-    kernel_placed_domain(&cells->placed, &t->frame->volumes[0]);
-    for (int n = 0; n < count; n++) {
-        kernel_placed_cell(&cells->placed, n, &cells->cell);
-        if (is_fine) kernel_placed_exactly(&cells->placed, n, &cells->cell);
-        const unsigned blocks = cells->wait_blocks[n] & kernel_tet_blocks(&t->block_rays, &cells->cell);
-        cells->cell.index = cells->wait_cell[n];
-        if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
-    }
-}
-
-/* One of the window's cells: tets of plain meshes wait until a vector is full. */
+/* One of the window's cells. */
 SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells, const kernel_tile_shown *item,
                                        bool is_pencil, unsigned blocks, kernel_tile_take *take)
 {
     const int part = (int)item->source;
-    if (part != cells->plain_part) {
-        kernel_tile_take_waiting(t, cells, take);
-        kernel_plain_begin(&cells->plain, t->frame, t->frame->job->parts[part].cells,
-                           &t->frame->job->volumes[0].field.fields[part]);
-        cells->plain_part = part;
-    }
-    if (!cells->plain.is_so) {
+    if (kernel_tile_wait_for(t, cells, 0, part, take))
+        kernel_tile_wait(t, cells, item->cell, blocks, take);
+    else
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
-        return;
-    }
-    const int32_t *vertices = cells->plain.connectivity + 4 * (int64_t)item->cell;
-    const int n = cells->waiting++;
-    for (int i = 0; i < 4; i++) cells->wait_vertices[i][n] = vertices[i];
-    cells->wait_cell[n] = item->cell;
-    cells->wait_blocks[n] = blocks;
-    if (cells->waiting == SIMD_WIDTH) kernel_tile_take_waiting(t, cells, take);
 }
 
 /* What the next of the open cells are made of, on its way from memory: the indices of more, the vertices of some. */

@@ -148,7 +148,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
     if (t->frame->volume_shown)
         kernel_tile_meet_shown(t, false, blocks, kernel_tile_cell_segments);
     else
-        kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts);
+        kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
 }
 
 /* Learn from the window how deep the next one is to be: so that some ray has three quarters of its room filled. */

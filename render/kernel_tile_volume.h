@@ -166,7 +166,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
         if (t->frame->volume_shown)
             kernel_tile_meet_shown(t, true, blocks, kernel_tile_samples);
         else
-            kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts);
+            kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts, kernel_tile_samples);
     }
     return true;
 }
