@@ -258,8 +258,7 @@ static insitu_status make(build *b, base_error *error)
 
 static void finish(build *b, const sweep *ranges, mmbvh *out)
 {
-    sweep s = sweep_of_bounds(&b->tree, &b->source);
-    s.then = ranges;
+    const sweep s = sweep_of_both(&b->tree, &b->source, ranges);
     b->tree.unusable_cells = sweep_tree(&s, b->threads);
     b->tree.built_cost = cost_of_tree(&b->tree, b->threads);
     *out = b->tree;

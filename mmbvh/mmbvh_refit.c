@@ -18,11 +18,26 @@ static int64_t run_all(const sweep *s, int64_t first, int64_t end)
     return s->then ? run_all(s->then, first, end) : sum;
 }
 
-/* All below node is nodes[ref .. end): in parts of at most RUN_MAX by tasks, then the pair at ref itself. */
+/* Where what is below the right one of a pair begins. */
+static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
+{
+    return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
+}
+
+/* A pair and all below it is nodes[first .. end): in runs that are not too long for the sweep. */
+static int64_t sweep_runs(const sweep *s, int64_t first, int64_t end)
+{
+    if (!s->run_max || end - first <= s->run_max) return run_all(s, first, end);
+    const int64_t right_first = right_begin(s, first, end);
+    const int64_t right = sweep_runs(s, right_first, end), left = sweep_runs(s, first + 2, right_first);
+    return left + right + run_all(s, first, first + 2);
+}
+
+/* The same by tasks of at most RUN_MAX nodes, then the pair itself. */
 static int64_t sweep_below(const sweep *s, int64_t first, int64_t end)
 {
-    if (end - first <= RUN_MAX) return run_all(s, first, end);
-    const int64_t right_first = mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
+    if (end - first <= RUN_MAX) return sweep_runs(s, first, end);
+    const int64_t right_first = right_begin(s, first, end);
     int64_t left = 0, right = 0;
 #pragma omp task default(none) firstprivate(s, first, right_first) shared(left)
     left = sweep_below(s, first + 2, right_first);
@@ -36,39 +51,11 @@ int64_t sweep_tree(const sweep *s, int threads)
     int64_t unusable = 0;
     const int64_t node_count = s->tree->node_count;
     if (!node_count) return 0;
-    if (node_count <= RUN_MAX) return run_all(s, 0, node_count);
+    if (node_count <= RUN_MAX) return sweep_runs(s, 1, node_count) + run_all(s, 0, 1);
 #pragma omp parallel num_threads(threads)
 #pragma omp single
     unusable = sweep_below(s, 1, node_count);
     return unusable + run_all(s, 0, 1);
-}
-
-typedef struct range {
-    float low, high;
-} range;
-
-static const range empty_range = {INFINITY, -INFINITY};
-
-static inline range get_range(const sweep *s, int64_t node)
-{
-    return (range){*(const float *)(const void *)(s->ranges.low + node * s->ranges.stride),
-                   *(const float *)(const void *)(s->ranges.high + node * s->ranges.stride)};
-}
-
-static inline void set_range(const sweep *s, int64_t node, range r)
-{
-    *(float *)(void *)(uintptr_t)(s->ranges.low + node * s->ranges.stride) = r.low;
-    *(float *)(void *)(uintptr_t)(s->ranges.high + node * s->ranges.stride) = r.high;
-}
-
-static inline range united(range a, range b)
-{
-    return (range){a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
-}
-
-static inline range children_range(const sweep *s, int64_t left)
-{
-    return united(get_range(s, left), get_range(s, left + 1));
 }
 
 /* Doubles that grow by whole cells; rounded once at the end. */
@@ -89,7 +76,7 @@ static inline void span_add(span *to, fetch_range cell)
 
 static inline range span_range(const span *s)
 {
-    return s->low <= s->high ? (range){round_down(s->low), round_up(s->high)} : empty_range;
+    return s->low <= s->high ? (range){round_down(s->low), round_up(s->high)} : range_empty();
 }
 
 /* The sweep goes down through the cells too: fetch what later leaves will ask for, connectivity first, values after. */
@@ -168,7 +155,7 @@ static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
 {
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
-        range r = count ? empty_range : children_range(s, ref);
+        range r = count ? range_empty() : children_range(s, ref);
         for (int64_t k = 0; k < count; k++) {
             const float *of_box = s->box_ranges + 2 * (int64_t)s->tree->cells[ref + k];
             r = united((range){of_box[0], of_box[1]}, r);
@@ -178,10 +165,21 @@ static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
     return 0;
 }
 
+/* Can the instances read it? */
+static bool is_plain(const grid *g, const grid_field *field)
+{
+    return !field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !grid_has_faces(g);
+}
+
+bool sweep_reads_floats(const sweep *ranges)
+{
+    return ranges->field && is_plain(ranges->g, ranges->field) && !ranges->values.is_wide;
+}
+
 static sweep_run choose_run(const grid *g, const grid_field *field)
 {
     if (!field) return run_infinite;
-    if (field->is_cell_centred || field->component < 0 || field->values.is_integer || grid_has_faces(g)) return run_any;
+    if (!is_plain(g, field)) return run_any;
     return run_ranges_table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
 }
 

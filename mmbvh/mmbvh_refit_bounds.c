@@ -6,24 +6,6 @@
 
 enum { PREFETCH_CELLS = 24 };
 
-static void decode(const mmbvh *tree, int64_t index, vec4 *lower, vec4 *upper)
-{
-    if (tree->compact) {
-        compact_decode(&tree->compact[index], &tree->grid, lower, upper);
-        return;
-    }
-    const mmbvh_node *node = &tree->nodes[index];
-    *lower = (vec4){node->lower[0], node->lower[1], node->lower[2], 0};
-    *upper = (vec4){node->upper[0], node->upper[1], node->upper[2], 0};
-}
-
-static bool store_union(const mmbvh *tree, int64_t index, int64_t pair)
-{
-    vec4 lower[2], upper[2];
-    for (int side = 0; side < 2; side++) decode(tree, pair + side, &lower[side], &upper[side]);
-    return store_box(tree, index, vec4_min(lower[0], lower[1]), vec4_max(upper[0], upper[1]));
-}
-
 static bool store_cells(const mmbvh *tree, const bounds_source *source, int64_t index, int64_t first, int count)
 {
     fetch_box box;

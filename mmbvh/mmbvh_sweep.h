@@ -5,12 +5,15 @@
 #ifndef MMBVH_SWEEP_H
 #define MMBVH_SWEEP_H
 
+#include <math.h>
+
 #include "mmbvh.h"
 
 typedef struct sweep sweep;
 typedef struct bounds_source bounds_source;
 
-/* Nodes end - 1 down to first; returns how many cells were found unusable, or boxes that the nodes do not hold. */
+/* Nodes end - 1 down to first: the root, a pair, or a pair and all below it; nothing where there are none. Returns how
+ * many cells were found unusable, or boxes that the nodes do not hold. */
 typedef int64_t (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {
@@ -22,6 +25,7 @@ struct sweep {
     const float *box_ranges;     /* of a parent tree */
     const bounds_source *source; /* of a sweep of bounds */
     mmbvh_ranges ranges;         /* written by a sweep of ranges */
+    int64_t run_max;             /* nodes of a run; 0: as many as are worth a task */
     const sweep *then; /* NULL, or one of the same tree that runs where this one has just been, in the cache */
 };
 
@@ -37,7 +41,47 @@ sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 /* The sweep that writes the bounds. */
 sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source);
 
+/* Are its values floats, at the vertices? */
+bool sweep_reads_floats(const sweep *ranges);
+
+/* Both sweeps' work for a grid's cells in one, so that a cell is read once; ranges as sweep_of_ranges() made it for the
+ * same tree. Where either cannot be read as floats it is one after the other. */
+sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
+
 /* How many threads options ask for. */
 int sweep_threads(const mmbvh_options *options);
+
+/* ---- the ranges that sweeps write ------------------------------------------------------------------------------- */
+
+typedef struct range {
+    float low, high;
+} range;
+
+static inline range range_empty(void)
+{
+    return (range){INFINITY, -INFINITY};
+}
+
+static inline range get_range(const sweep *s, int64_t node)
+{
+    return (range){*(const float *)(const void *)(s->ranges.low + node * s->ranges.stride),
+                   *(const float *)(const void *)(s->ranges.high + node * s->ranges.stride)};
+}
+
+static inline void set_range(const sweep *s, int64_t node, range r)
+{
+    *(float *)(void *)(uintptr_t)(s->ranges.low + node * s->ranges.stride) = r.low;
+    *(float *)(void *)(uintptr_t)(s->ranges.high + node * s->ranges.stride) = r.high;
+}
+
+static inline range united(range a, range b)
+{
+    return (range){a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
+}
+
+static inline range children_range(const sweep *s, int64_t left)
+{
+    return united(get_range(s, left), get_range(s, left + 1));
+}
 
 #endif

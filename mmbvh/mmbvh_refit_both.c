@@ -1,0 +1,168 @@
+/* Bounds and ranges in one sweep, of meshes whose coordinates and values are floats, as most are: a vertex is then one
+ * vector, its value in the lane that the coordinates leave, and each cell is read once, in one run with its
+ * neighbours' whatever the leaves' sizes. */
+#include "mmbvh_bounds.h"
+#include "mmbvh_store.h"
+
+enum {
+    PART_NODES = 256,                                   /* whose cells are read at a time */
+    PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* at most: pairs have one leaf more than inner nodes */
+    PREFETCH_CELLS = 24,
+    PREFETCH_VERTICES = 12
+};
+
+/* The spans of the cells from first on in the tree's list, lane 3 the values'. */
+typedef struct part {
+    int64_t first;
+    int64_t unusable;
+    fetch_span spans[PART_CELLS];
+} part;
+
+/* Constants of a pass, but for the arrays. */
+typedef struct reading {
+    fetch_shape shape;
+    bool wide_index, is_packed;
+} reading;
+
+MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading how, int64_t *unusable)
+{
+    const grid *g = s->g;
+    const int64_t stride = how.is_packed ? 4 : g->coordinates[0].stride;
+    const int64_t value_stride = how.is_packed ? 4 : s->values.stride;
+    const char *const x = g->coordinates[0].data, *const y = g->coordinates[1].data, *const z = g->coordinates[2].data;
+    const int count = fetch_vertex_count(g, cell, how.shape);
+    const int64_t first = fetch_first(g, cell, count, how.shape);
+    fetch_span span = fetch_span_empty();
+    vec4 poison = {0};
+    for (int i = 0; i < count; i++) {
+        const int64_t vertex = fetch_index(&g->connectivity, first + i, how.wide_index);
+        const vec4 p = {*(const float *)(const void *)(x + vertex * stride),
+                        *(const float *)(const void *)(y + vertex * stride),
+                        *(const float *)(const void *)(z + vertex * stride),
+                        *(const float *)(const void *)(s->values.data + vertex * value_stride)};
+        span.lower = vec4_min(p, span.lower);
+        span.upper = vec4_max(p, span.upper);
+        poison += p - p; /* 0 while all are finite, then not a number */
+    }
+    if (poison[3] == 0) return span;
+    ++*unusable;
+    span.lower[3] = INFINITY;
+    span.upper[3] = -INFINITY;
+    return span;
+}
+
+/* Of a cell whose connectivity has been asked for before: a vertex, near which the others are. Tets come in such
+ * numbers to a vertex that theirs are there already. */
+MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const reading how)
+{
+    const grid *g = s->g;
+    if (how.shape != FETCH_HEXES) return;
+    const int64_t vertex = fetch_index(&g->connectivity, fetch_first(g, cell, 8, how.shape), how.wide_index);
+    for (int axis = 0; axis < 3; axis++) {
+        __builtin_prefetch(g->coordinates[axis].data + vertex * (how.is_packed ? 4 : g->coordinates[0].stride));
+    }
+    __builtin_prefetch(s->values.data + vertex * (how.is_packed ? 4 : s->values.stride));
+}
+
+MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
+{
+    const grid_array *connectivity = &s->g->connectivity;
+    const uint32_t *cells = s->tree->cells;
+    p->first = first;
+    for (int64_t i = end - 1; i >= first; i--) {
+        const int64_t later = cells[i > PREFETCH_CELLS ? i - PREFETCH_CELLS : 0]; /* the sweep goes down */
+        const int64_t entry = fetch_first(s->g, later, fetch_vertex_count(s->g, later, how.shape), how.shape);
+        __builtin_prefetch(connectivity->data + entry * connectivity->stride);
+        prefetch_vertex(s, cells[i > PREFETCH_VERTICES ? i - PREFETCH_VERTICES : 0], how);
+        p->spans[i - first] = read_cell(s, cells[i], how, &p->unusable);
+    }
+}
+
+static void store_leaf(const sweep *s, const part *p, int64_t node, int64_t first, int count)
+{
+    const mmbvh *tree = s->tree;
+    const fetch_span *spans = p->spans + (first - p->first);
+    fetch_span all = spans[0];
+    for (int i = 1; i < count; i++) fetch_span_unite(&all, &spans[i]);
+    float lower[3], upper[3];
+    const fetch_box box = fetch_span_box(&all);
+    fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
+    store_box(tree, node, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0});
+    set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f}); /* zero positive, as bounds have it */
+}
+
+static void store_nodes(const sweep *s, const part *p, int64_t first, int64_t end)
+{
+    for (int64_t i = end - 1; i >= first; i--) {
+        const int count = mmbvh_node_count(s->tree, i);
+        const int64_t ref = mmbvh_node_ref(s->tree, i);
+        if (count) {
+            store_leaf(s, p, i, ref, count);
+        } else {
+            store_union(s->tree, i, ref);
+            set_range(s, i, children_range(s, ref));
+        }
+    }
+}
+
+/* A pair, or the root, whatever is below. */
+MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
+{
+    for (int64_t i = first; i < end; i++) {
+        const int count = mmbvh_node_count(s->tree, i);
+        const int64_t ref = mmbvh_node_ref(s->tree, i);
+        if (count) read_cells(s, p, ref, ref + count, how);
+        store_nodes(s, p, i, i + 1);
+    }
+}
+
+/* The first cell below a node, and where its cells end. */
+static int64_t first_cell(const mmbvh *tree, int64_t node)
+{
+    while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node);
+    return mmbvh_node_ref(tree, node);
+}
+
+static int64_t end_of_cells(const mmbvh *tree, int64_t node)
+{
+    while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node) + 1;
+    return mmbvh_node_ref(tree, node) + mmbvh_node_count(tree, node);
+}
+
+MMBVH_INLINE int64_t run_both(const sweep *s, int64_t first, int64_t end, const reading how)
+{
+    part p;
+    p.unusable = 0;
+    if (end - first <= 2) {
+        run_nodes(s, &p, first, end, how);
+    } else {
+        read_cells(s, &p, first_cell(s->tree, first), end_of_cells(s->tree, first + 1), how);
+        store_nodes(s, &p, first, end);
+    }
+    return p.unusable;
+}
+
+#define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
+    static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
+    {                                                                                                                  \
+        const bool is_packed = s->g->coordinates[0].stride == 4 && s->values.stride == 4;                              \
+        return is_packed ? run_both(s, first, end, (reading){shape, wide_index, true})                                 \
+                         : run_both(s, first, end, (reading){shape, wide_index, false});                               \
+    }
+FETCH_FLOAT_INSTANCES(DEFINE_RUN, run_both)
+
+static const sweep_run run_both_table[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(run_both);
+
+sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges)
+{
+    if (source->read_spans && sweep_reads_floats(ranges)) {
+        sweep both = *ranges;
+        both.source = source;
+        both.run = run_both_table[fetch_grid_shape(source->g)][source->g->connectivity.is_wide];
+        both.run_max = PART_NODES;
+        return both;
+    }
+    sweep bounds = sweep_of_bounds(tree, source);
+    bounds.then = ranges;
+    return bounds;
+}
