@@ -94,7 +94,7 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
 }
 
 /* The span of the finite numbers of an array. */
-static void span_of(const grid_array *a, int64_t count, int threads, double *least, double *most)
+static void span_of_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     double low = INFINITY, high = -INFINITY;
 #pragma omp parallel for num_threads(threads) reduction(min : low) reduction(max : high)
@@ -106,6 +106,52 @@ static void span_of(const grid_array *a, int64_t count, int threads, double *lea
     }
     *least = low;
     *most = high;
+}
+
+/* Of floats, four at a time; what is not a number is passed over. */
+MMBVH_INLINE void span_of_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
+{
+    enum { LANES = 4 };
+    vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY);
+    const char *p = data;
+    for (int64_t i = 0; i + LANES <= count; i += LANES, p += LANES * stride) {
+        vec4 x;
+        for (int lane = 0; lane < LANES; lane++) x[lane] = *(const float *)(const void *)(p + lane * stride);
+        low = vec4_min(x, low);
+        high = vec4_max(x, high);
+    }
+    for (int64_t i = count / LANES * LANES; i < count; i++, p += stride) {
+        const vec4 x = vec4_set1(*(const float *)(const void *)p);
+        low = vec4_min(x, low);
+        high = vec4_max(x, high);
+    }
+    for (int lane = 0; lane < LANES; lane++) {
+        *least = low[lane] < *least ? low[lane] : *least;
+        *most = high[lane] > *most ? high[lane] : *most;
+    }
+}
+
+static void span_of(const grid_array *a, int64_t count, int threads, double *least, double *most)
+{
+    enum { BLOCK = 65536 };
+    float low = INFINITY, high = -INFINITY;
+    if (a->is_wide || a->is_integer) {
+        span_of_any(a, count, threads, least, most);
+        return;
+    }
+#pragma omp parallel for num_threads(threads) reduction(min : low) reduction(max : high)
+    for (int64_t begin = 0; begin < count; begin += BLOCK) {
+        const int64_t n = count - begin < BLOCK ? count - begin : BLOCK;
+        const char *data = a->data + begin * a->stride;
+        if (a->stride == sizeof(float)) {
+            span_of_floats(data, sizeof(float), n, &low, &high);
+        } else {
+            span_of_floats(data, a->stride, n, &low, &high);
+        }
+    }
+    *least = (double)low;
+    *most = (double)high;
+    if (!(low > -INFINITY && high < INFINITY)) span_of_any(a, count, threads, least, most);
 }
 
 fetch_box bounds_guess(const bounds_source *source, int threads)
