@@ -168,12 +168,7 @@ static topology *build_morton(build *b, topology_build *t)
     b->other_keys = base_alloc((size_t)b->count * sizeof *b->other_keys);
     if (!b->coder || !b->keys || !b->other_keys) return NULL;
     fill_fitting(b);
-    uint64_t *sorted = morton_sort(b->coder, b->keys, b->other_keys, b->count, t->threads);
-    if (!sorted) return NULL;
-    if (sorted != b->keys) {
-        b->other_keys = b->keys;
-        b->keys = sorted;
-    }
+    if (!morton_sort(b->coder, b->keys, b->other_keys, b->count, t->threads)) return NULL;
     base_free(b->other_keys);
     b->other_keys = NULL;
     return morton_build(t, b->keys, b->count);

@@ -11,7 +11,11 @@ enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
     DIGIT_BITS = 11, /* as many streams as a core's cache can hold the ends of */
     DIGITS = 1 << DIGIT_BITS,
-    SORT_CHUNKS_MAX = 64
+    SORT_CHUNKS_MAX = 64,
+    SORT_LARGE = 16, /* a part of all keys so large is sorted by all threads, */
+    SORT_LARGE_MIN = 16384,
+    SORT_INSERTED = 24, /* and one so small by insertion */
+    SORT_LEFT_BITS = 2  /* a digit's keys: 2 to the power of these at most, where they are evenly spread */
 };
 
 static int bits_of(uint64_t x)
@@ -133,80 +137,132 @@ void morton_place(const bounds_source *source, const morton_coder *coder, uint64
     fetch_box_unite(exact, &all);
 }
 
-/* ---- sorting by the digits of the code, the lowest first -------------------------------------------------------- */
+/* ---- sorting ---------------------------------------------------------------------------------------------------- */
 
+/* By the highest digit first: a mesh's neighbours are mostly neighbours in its numbering too, so their keys leave by
+ * few streams, and what goes to one digit fits a core's cache, where it is sorted to the end. */
 typedef struct digit_counts {
     int64_t of[SORT_CHUNKS_MAX][DIGITS];
 } digit_counts;
 
 typedef struct sorting {
-    const uint64_t *from;
-    uint64_t *to;
-    int64_t count;
-    int chunks, threads, shift;
+    int64_t large; /* more keys than these are worth all threads */
+    int chunks, threads;
     digit_counts *counts;
 } sorting;
 
-static inline int digit_of(const sorting *s, uint64_t key)
+static inline int digit_of(uint64_t key, int shift)
 {
-    return (int)(key >> s->shift & (DIGITS - 1));
+    return (int)(key >> shift & (DIGITS - 1));
 }
 
-static void count_digits(const sorting *s)
+static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, int shift)
 {
 #pragma omp parallel for num_threads(s->threads) schedule(static)
     for (int chunk = 0; chunk < s->chunks; chunk++) {
         int64_t *of = s->counts->of[chunk];
         memset(of, 0, sizeof s->counts->of[chunk]);
-        const int64_t end = s->count * (chunk + 1) / s->chunks;
-        for (int64_t i = s->count * chunk / s->chunks; i < end; i++) of[digit_of(s, s->from[i])]++;
+        const int64_t end = count * (chunk + 1) / s->chunks;
+        for (int64_t i = count * chunk / s->chunks; i < end; i++) of[digit_of(keys[i], shift)]++;
     }
 }
 
-/* From how many to where they begin. False where all have one digit. */
-static bool sum_digits(const sorting *s)
+/* From how many to where they begin. */
+static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
 {
-    int64_t sum = 0, most = 0;
+    int64_t sum = 0;
     for (int digit = 0; digit < DIGITS; digit++) {
-        const int64_t before = sum;
+        starts[digit] = sum;
         for (int chunk = 0; chunk < s->chunks; chunk++) {
             const int64_t count = s->counts->of[chunk][digit];
             s->counts->of[chunk][digit] = sum;
             sum += count;
         }
-        most = sum - before > most ? sum - before : most;
     }
-    return most < s->count;
+    starts[DIGITS] = sum;
 }
 
-static void move_digits(const sorting *s)
+static void move_digits(const sorting *s, const uint64_t *from, uint64_t *to, int64_t count, int shift)
 {
 #pragma omp parallel for num_threads(s->threads) schedule(static)
     for (int chunk = 0; chunk < s->chunks; chunk++) {
         int64_t *places = s->counts->of[chunk];
-        const int64_t end = s->count * (chunk + 1) / s->chunks;
-        for (int64_t i = s->count * chunk / s->chunks; i < end; i++) {
-            s->to[places[digit_of(s, s->from[i])]++] = s->from[i];
-        }
+        const int64_t end = count * (chunk + 1) / s->chunks;
+        for (int64_t i = count * chunk / s->chunks; i < end; i++) to[places[digit_of(from[i], shift)]++] = from[i];
     }
 }
 
-uint64_t *morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads)
+static void insert(uint64_t *keys, int64_t count)
 {
-    sorting s = {.from = keys, .to = other, .count = count, .threads = threads};
-    s.chunks = threads < SORT_CHUNKS_MAX ? threads : SORT_CHUNKS_MAX;
-    s.counts = base_alloc((size_t)s.chunks * sizeof s.counts->of[0]);
-    if (!s.counts) return NULL;
-    for (int bit = 0; bit < coder->code_bits; bit += DIGIT_BITS) {
-        s.shift = coder->index_bits + bit;
-        count_digits(&s);
-        if (!sum_digits(&s)) continue;
-        move_digits(&s);
-        s.to = s.from == keys ? keys : other;
-        s.from = s.from == keys ? other : keys;
+    for (int64_t i = 1; i < count; i++) {
+        const uint64_t key = keys[i];
+        int64_t place = i;
+        for (; place > 0 && keys[place - 1] > key; place--) keys[place] = keys[place - 1];
+        keys[place] = key;
     }
+}
+
+/* Keys at from, to there or to other, by a digit of as many values as leave a few keys each. No two are equal. */
+static void sort_alone(uint64_t *from, uint64_t *other, int64_t count, bool to_other)
+{
+    if (count <= SORT_INSERTED) {
+        insert(from, count);
+        if (to_other) memcpy(other, from, (size_t)count * sizeof *from);
+        return;
+    }
+    uint64_t differing = 0;
+    for (int64_t i = 1; i < count; i++) differing |= from[i] ^ from[0];
+    const int top = bits_of(differing), wanted = bits_of((uint64_t)count) - SORT_LEFT_BITS;
+    const int bits = wanted < DIGIT_BITS ? wanted : DIGIT_BITS, shift = top > bits ? top - bits : 0;
+    const uint64_t mask = (UINT64_C(1) << bits) - 1;
+    uint32_t ends[DIGITS];
+    memset(ends, 0, sizeof *ends << bits);
+    for (int64_t i = 0; i < count; i++) ends[from[i] >> shift & mask]++;
+    uint32_t sum = 0;
+    for (uint64_t digit = 0; digit <= mask; digit++) {
+        const uint32_t of = ends[digit];
+        ends[digit] = sum;
+        sum += of;
+    }
+    for (int64_t i = 0; i < count; i++) other[ends[from[i] >> shift & mask]++] = from[i];
+    for (uint64_t digit = 0, begin = 0; digit <= mask; begin = ends[digit++]) {
+        sort_alone(other + begin, from + begin, ends[digit] - (int64_t)begin, !to_other);
+    }
+}
+
+/* The same by all threads; top: how many bits differ at most. */
+static void sort_together(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
+{
+    int64_t starts[DIGITS + 1];
+    const int shift = top > DIGIT_BITS ? top - DIGIT_BITS : 0;
+    count_digits(s, from, count, shift);
+    sum_digits(s, starts);
+    move_digits(s, from, other, count, shift);
+#pragma omp parallel for num_threads(s->threads) schedule(dynamic, 8)
+    for (int digit = 0; digit < DIGITS; digit++) {
+        const int64_t begin = starts[digit], size = starts[digit + 1] - begin;
+        if (size <= s->large) sort_alone(other + begin, from + begin, size, !to_other);
+    }
+    for (int digit = 0; digit < DIGITS; digit++) {
+        const int64_t begin = starts[digit], size = starts[digit + 1] - begin;
+        if (size > s->large) sort_together(s, other + begin, from + begin, size, shift, !to_other);
+    }
+}
+
+bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads)
+{
+    if (count <= SORT_LARGE_MIN) {
+        sort_alone(keys, other, count, false);
+        return true;
+    }
+    sorting s = {.threads = threads};
+    s.chunks = threads < SORT_CHUNKS_MAX ? threads : SORT_CHUNKS_MAX;
+    s.large = count / SORT_LARGE > SORT_LARGE_MIN ? count / SORT_LARGE : SORT_LARGE_MIN;
+    s.counts = base_alloc((size_t)s.chunks * sizeof s.counts->of[0]);
+    if (!s.counts) return false;
+    sort_together(&s, keys, other, count, coder->index_bits + coder->code_bits, false);
     base_free(s.counts);
-    return s.from == keys ? keys : other;
+    return true;
 }
 
 /* ---- the tree --------------------------------------------------------------------------------------------------- */

@@ -25,8 +25,8 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
 void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
                   fetch_box *exact);
 
-/* By the code; where the indices ascended, keys then ascend. Returns where they are: in keys or in other. */
-uint64_t *morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads);
+/* To ascending order, with as much room in other. False: out of memory. */
+bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads);
 
 /* The tree over ascending keys. NULL where an allocation failed. */
 topology *morton_build(topology_build *build, const uint64_t *keys, int64_t count);
