@@ -3,6 +3,8 @@
 
 #include <omp.h>
 
+enum { READ_AHEAD = 512 }; /* entries of the connectivity: what a core asks for by itself comes too late */
+
 #define DEFINE_READ(name, shape, wide_index, wide_number)                                                              \
     static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)                  \
     {                                                                                                                  \
@@ -13,12 +15,25 @@
     }
 FETCH_INSTANCES(DEFINE_READ, read)
 
+MMBVH_INLINE void read_spans(const grid *g, const uint32_t *cells, int count, fetch_span *spans,
+                             const fetch_shape shape, const bool wide_index, const bool is_packed)
+{
+    for (int i = 0; i < count; i++) {
+        fetch_span span = fetch_span_empty();
+        const int64_t soon = fetch_first(g, cells[i], fetch_vertex_count(g, cells[i], shape), shape) + READ_AHEAD;
+        __builtin_prefetch(g->connectivity.data + soon * g->connectivity.stride);
+        fetch_span_cell(&span, g, cells[i], shape, wide_index, is_packed);
+        spans[i] = span;
+    }
+}
+
 #define DEFINE_READ_SPANS(name, shape, wide_index, wide_number)                                                        \
     static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans)                 \
     {                                                                                                                  \
-        for (int i = 0; i < count; i++) {                                                                              \
-            spans[i] = fetch_span_empty();                                                                             \
-            fetch_span_cell(&spans[i], source->g, cells[i], shape, wide_index);                                        \
+        if (fetch_is_packed(&source->g->coordinates[0])) {                                                             \
+            read_spans(source->g, cells, count, spans, shape, wide_index, true);                                       \
+        } else {                                                                                                       \
+            read_spans(source->g, cells, count, spans, shape, wide_index, false);                                      \
         }                                                                                                              \
     }
 FETCH_FLOAT_INSTANCES(DEFINE_READ_SPANS, read_spans)

@@ -98,24 +98,6 @@ static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *
     return range;
 }
 
-/* The largest float not above x, and the smallest not below it. A double beyond the floats' range goes to the largest
- * finite float or to infinity, whichever lies outward. Zero comes out positive, so that equal bounds are equal bits. */
-static inline float round_down(double x)
-{
-    float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    const uint32_t step = bits >> 31 ? 1u : UINT32_MAX; /* towards -inf: a negative float's bits grow */
-    bits += (double)f > x ? step : 0u;                  /* f is never +0 here: a tiny negative x rounds to -0 */
-    memcpy(&f, &bits, sizeof f);
-    return f + 0.0f;
-}
-
-static inline float round_up(double x)
-{
-    return 0.0f - round_down(-x);
-}
-
 /* A box of doubles that grows, in the grid's own coordinates. */
 typedef struct fetch_box {
     double lower[3];
@@ -170,18 +152,24 @@ MMBVH_INLINE const char *fetch_vertex(const grid *g, int64_t entry, const bool w
     return g->coordinates[0].data + fetch_index(&g->connectivity, entry, wide_index) * g->coordinates[0].stride;
 }
 
+/* Are an axis's floats one after the other? A stride that is a constant is part of an address. */
+static inline bool fetch_is_packed(const grid_array *a)
+{
+    return a->stride == (int64_t)sizeof(float);
+}
+
 /* The box grows by a cell whose coordinates are floats. */
 MMBVH_INLINE void fetch_span_cell(fetch_span *span, const grid *g, int64_t cell, const fetch_shape shape,
-                                  const bool wide_index)
+                                  const bool wide_index, const bool is_packed)
 {
-    const int64_t y = g->coordinates[1].data - g->coordinates[0].data;
-    const int64_t z = g->coordinates[2].data - g->coordinates[0].data;
+    const char *const x = g->coordinates[0].data, *const y = g->coordinates[1].data, *const z = g->coordinates[2].data;
+    const int64_t stride = is_packed ? (int64_t)sizeof(float) : g->coordinates[0].stride;
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
     for (int i = 0; i < count; i++) {
-        const char *at = fetch_vertex(g, first + i, wide_index);
-        const vec4 p = {*(const float *)(const void *)at, *(const float *)(const void *)(at + y),
-                        *(const float *)(const void *)(at + z), 0};
+        const int64_t at = fetch_index(&g->connectivity, first + i, wide_index) * stride;
+        const vec4 p = {*(const float *)(const void *)(x + at), *(const float *)(const void *)(y + at),
+                        *(const float *)(const void *)(z + at), 0};
         span->lower = vec4_min(p, span->lower);
         span->upper = vec4_max(p, span->upper);
     }
@@ -217,10 +205,10 @@ MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t 
     }
     fetch_span even = fetch_span_empty(), odd = even;
     for (int k = 0; k < cell_count / 2; k++) {
-        fetch_span_cell(&even, g, cells[2 * k], shape, wide_index);
-        fetch_span_cell(&odd, g, cells[2 * k + 1], shape, wide_index);
+        fetch_span_cell(&even, g, cells[2 * k], shape, wide_index, false);
+        fetch_span_cell(&odd, g, cells[2 * k + 1], shape, wide_index, false);
     }
-    if (cell_count & 1) fetch_span_cell(&even, g, cells[cell_count - 1], shape, wide_index);
+    if (cell_count & 1) fetch_span_cell(&even, g, cells[cell_count - 1], shape, wide_index, false);
     fetch_span_unite(&even, &odd);
     const fetch_box floats = fetch_span_box(&even);
     fetch_box_unite(box, &floats);
@@ -234,6 +222,15 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
         lower[axis] = round_down((box->lower[axis] - origin[axis]) * scale);
         upper[axis] = round_up((box->upper[axis] - origin[axis]) * scale);
     }
+}
+
+/* The same of a box of floats: the same bits. Lanes 3 may hold anything. */
+MMBVH_INLINE void fetch_span_round(const fetch_span *span, const double origin[3], double scale, vec4 *lower,
+                                   vec4 *upper)
+{
+    const double from[4] = {origin[0], origin[1], origin[2], 0};
+    *lower = vec4_xyz(vec4_place_down(span->lower, from, scale));
+    *upper = vec4_xyz(0.0f - vec4_place_down(span->upper, from, -scale));
 }
 
 /* Where the coordinates are not all floats or all doubles, or not of one stride, or cells may be polyhedra,

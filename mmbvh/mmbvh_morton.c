@@ -68,20 +68,53 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
     }
 }
 
-/* Of a cell whose box's centre is this, in the source's coordinates. */
-static inline uint64_t code_of(const bounds_source *source, const morton_coder *coder, const double centre[3])
+static inline uint64_t code_of_steps(const morton_coder *coder, const int32_t steps[])
 {
     uint64_t code = 0;
     for (int axis = 0; axis < 3; axis++) {
-        const double x = (centre[axis] - source->origin[axis]) * source->scale;
-        const double place = (x - coder->origin[axis]) * coder->factor[axis];
-        const unsigned step = (unsigned)(place > 0 ? place < coder->most[axis] ? place : coder->most[axis] : 0);
         for (int part = 0; part < MORTON_PARTS; part++) {
-            const unsigned bits = step >> part * MORTON_PART_BITS & ((1 << MORTON_PART_BITS) - 1);
+            const int bits = steps[axis] >> part * MORTON_PART_BITS & ((1 << MORTON_PART_BITS) - 1);
             code |= coder->parts[axis][part][bits];
         }
     }
     return code;
+}
+
+/* Of a cell whose box's centre is this, in the source's coordinates. */
+static inline uint64_t code_of(const bounds_source *source, const morton_coder *coder, const double centre[3])
+{
+    int32_t steps[3];
+    for (int axis = 0; axis < 3; axis++) {
+        const double x = (centre[axis] - source->origin[axis]) * source->scale;
+        const double place = (x - coder->origin[axis]) * coder->factor[axis];
+        steps[axis] = (int32_t)(place > 0 ? place < coder->most[axis] ? place : coder->most[axis] : 0);
+    }
+    return code_of_steps(coder, steps);
+}
+
+/* From the sum of a box's corners, floats in the source's coordinates, to steps. */
+typedef struct sum_mapping {
+    vec4 origin, factor, most;
+} sum_mapping;
+
+static sum_mapping sum_mapping_make(const bounds_source *source, const morton_coder *coder)
+{
+    sum_mapping m = {.factor = {0}};
+    for (int axis = 0; axis < 3; axis++) {
+        m.origin[axis] = (float)(source->origin[axis] + coder->origin[axis] / source->scale);
+        m.factor[axis] = (float)(source->scale * coder->factor[axis]);
+        m.most[axis] = (float)coder->most[axis];
+    }
+    return m;
+}
+
+/* What is not a number goes to 0. */
+static inline uint64_t code_of_span(const sum_mapping *m, const morton_coder *coder, const fetch_span *span)
+{
+    const vec4 place = ((span->lower + span->upper) * 0.5f - m->origin) * m->factor;
+    _Alignas(16) int32_t steps[4];
+    *(ivec4 *)(void *)steps = vec4_truncate(vec4_min(vec4_max(place, (vec4){0}), m->most));
+    return code_of_steps(coder, steps);
 }
 
 static int list_block(const morton_coder *coder, const uint64_t *keys, int64_t count, uint32_t cells[BOUNDS_BLOCK])
@@ -96,16 +129,13 @@ static fetch_box place_spans(const bounds_source *source, const morton_coder *co
 {
     uint32_t cells[BOUNDS_BLOCK];
     fetch_span spans[BOUNDS_BLOCK], all = fetch_span_empty();
+    const sum_mapping m = sum_mapping_make(source, coder);
     for (int64_t begin = 0; begin < count; begin += BOUNDS_BLOCK) {
         const int n = list_block(coder, keys + begin, count - begin, cells);
         source->read_spans(source, cells, n, spans);
         for (int i = 0; i < n; i++) {
-            double centre[3];
-            for (int axis = 0; axis < 3; axis++) {
-                centre[axis] = 0.5 * ((double)spans[i].lower[axis] + (double)spans[i].upper[axis]);
-            }
             fetch_span_unite(&all, &spans[i]);
-            keys[begin + i] = code_of(source, coder, centre) | cells[i];
+            keys[begin + i] = code_of_span(&m, coder, &spans[i]) | cells[i];
         }
     }
     return fetch_span_box(&all);

@@ -7,8 +7,8 @@
 enum {
     PART_NODES = 256,                                   /* whose cells are read at a time */
     PART_CELLS = (PART_NODES / 2 + 1) * MMBVH_MAX_LEAF, /* at most: pairs have one leaf more than inner nodes */
-    PREFETCH_CELLS = 24,
-    PREFETCH_VERTICES = 12
+    PREFETCH_CELLS = 64,
+    PREFETCH_VERTICES = 24
 };
 
 /* The spans of the cells from first on in the tree's list, lane 3 the values'. */
@@ -84,10 +84,9 @@ static void store_leaf(const sweep *s, const part *p, int64_t node, int64_t firs
     const fetch_span *spans = p->spans + (first - p->first);
     fetch_span all = spans[0];
     for (int i = 1; i < count; i++) fetch_span_unite(&all, &spans[i]);
-    float lower[3], upper[3];
-    const fetch_box box = fetch_span_box(&all);
-    fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
-    store_box(tree, node, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0});
+    vec4 lower, upper;
+    fetch_span_round(&all, tree->origin, tree->scale, &lower, &upper);
+    store_box(tree, node, lower, upper);
     set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f}); /* zero positive, as bounds have it */
 }
 
@@ -145,7 +144,7 @@ MMBVH_INLINE int64_t run_both(const sweep *s, int64_t first, int64_t end, const 
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
     static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
     {                                                                                                                  \
-        const bool is_packed = s->g->coordinates[0].stride == 4 && s->values.stride == 4;                              \
+        const bool is_packed = fetch_is_packed(&s->g->coordinates[0]) && fetch_is_packed(&s->values);                  \
         return is_packed ? run_both(s, first, end, (reading){shape, wide_index, true})                                 \
                          : run_both(s, first, end, (reading){shape, wide_index, false});                               \
     }

@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <string.h>
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #endif
@@ -61,6 +62,45 @@ static inline vec4 vec4_from_int(ivec4 a)
     return (vec4)_mm_cvtepi32_ps((__m128i)a);
 #else
     return __builtin_convertvector(a, vec4);
+#endif
+}
+
+/* The largest float not above x, and the smallest not below it. A double beyond the floats' range goes to the largest
+ * finite float or to infinity, whichever lies outward. Zero comes out positive, so that equal bounds are equal bits. */
+static inline float round_down(double x)
+{
+    float f = (float)x;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    const uint32_t step = bits >> 31 ? 1u : UINT32_MAX; /* towards -inf: a negative float's bits grow */
+    bits += (double)f > x ? step : 0u;                  /* f is never +0 here: a tiny negative x rounds to -0 */
+    memcpy(&f, &bits, sizeof f);
+    return f + 0.0f;
+}
+
+static inline float round_up(double x)
+{
+    return 0.0f - round_down(-x);
+}
+
+/* (a - origin) scale as doubles have it, then round_down(). */
+static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
+{
+#if defined(__SSE2__)
+    const __m128 both = (__m128)a;
+    const __m128d factor = _mm_set1_pd(scale);
+    const __m128d x01 = (_mm_cvtps_pd(both) - _mm_loadu_pd(origin)) * factor;
+    const __m128d x23 = (_mm_cvtps_pd(_mm_movehl_ps(both, both)) - _mm_loadu_pd(origin + 2)) * factor;
+    const __m128 nearest = _mm_movelh_ps(_mm_cvtpd_ps(x01), _mm_cvtpd_ps(x23));
+    const __m128d over01 = _mm_cmpgt_pd(_mm_cvtps_pd(nearest), x01);
+    const __m128d over23 = _mm_cmpgt_pd(_mm_cvtps_pd(_mm_movehl_ps(nearest, nearest)), x23);
+    const ivec4 over = (ivec4)_mm_shuffle_ps((__m128)over01, (__m128)over23, 0x88);
+    const ivec4 sign = (ivec4)nearest >> 31; /* a negative float's bits grow towards -inf */
+    return (vec4)((ivec4)nearest + (over & ~(sign + sign))) + 0.0f;
+#else
+    vec4 placed;
+    for (int i = 0; i < 4; i++) placed[i] = round_down(((double)a[i] - origin[i]) * scale);
+    return placed;
 #endif
 }
 
