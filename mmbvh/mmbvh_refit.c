@@ -5,7 +5,7 @@
 
 #include "mmbvh_fetch.h"
 
-enum { RUN_MAX = 4096, PREFETCH_CELLS = 24, PREFETCH_VALUES = 12 };
+enum { RUN_MAX = 4096, PREFETCH_CELLS = 48, PREFETCH_VALUES = 16 };
 
 int sweep_threads(const mmbvh_options *options)
 {

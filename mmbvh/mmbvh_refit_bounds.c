@@ -4,7 +4,7 @@
 #include "mmbvh_bounds.h"
 #include "mmbvh_store.h"
 
-enum { PREFETCH_CELLS = 24 };
+enum { PREFETCH_CELLS = 48 };
 
 static bool store_cells(const mmbvh *tree, const bounds_source *source, int64_t index, int64_t first, int count)
 {
@@ -32,7 +32,9 @@ static int64_t run_bounds(const sweep *s, int64_t first, int64_t end)
 
 sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source)
 {
-    return (sweep){.tree = tree, .source = source, .run = run_bounds};
+    sweep s = {.tree = tree, .source = source, .run = run_bounds};
+    sweep_bounds_as_floats(&s);
+    return s;
 }
 
 /* Of all the tree's cells, in the source's coordinates. */

@@ -41,6 +41,9 @@ sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 /* The sweep that writes the bounds. */
 sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source);
 
+/* Makes a sweep of bounds read cells by runs, if their coordinates are floats. */
+void sweep_bounds_as_floats(sweep *bounds);
+
 /* Are its values floats, at the vertices? */
 bool sweep_reads_floats(const sweep *ranges);
 

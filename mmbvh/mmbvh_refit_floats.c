@@ -1,5 +1,5 @@
-/* Bounds and ranges in one sweep, of meshes whose coordinates and values are floats, as most are: a vertex is then one
- * vector, its value in the lane that the coordinates leave, and each cell is read once, in one run with its
+/* Bounds, and ranges with them if asked for, of meshes whose coordinates and values are floats, as most are: a vertex
+ * is then one vector, its value in the lane that the coordinates leave, and each cell is read once, in one run with its
  * neighbours' whatever the leaves' sizes. */
 #include "mmbvh_bounds.h"
 #include "mmbvh_store.h"
@@ -14,19 +14,20 @@ enum {
 /* The spans of the cells from first on in the tree's list, lane 3 the values'. */
 typedef struct part {
     int64_t first;
-    int64_t unusable;
+    int64_t unusable; /* cells */
+    int64_t misfits;  /* boxes that the tree's grid does not hold */
     fetch_span spans[PART_CELLS];
 } part;
 
 /* Constants of a pass, but for the arrays. */
 typedef struct reading {
     fetch_shape shape;
-    bool wide_index, is_packed;
+    bool wide_index, with_values, is_packed;
 } reading;
 
 MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading how, int64_t *unusable)
 {
-    const grid *g = s->g;
+    const grid *g = s->source->g;
     const int64_t stride = how.is_packed ? 4 : g->coordinates[0].stride;
     const int64_t value_stride = how.is_packed ? 4 : s->values.stride;
     const char *const x = g->coordinates[0].data, *const y = g->coordinates[1].data, *const z = g->coordinates[2].data;
@@ -39,10 +40,10 @@ MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading ho
         const vec4 p = {*(const float *)(const void *)(x + vertex * stride),
                         *(const float *)(const void *)(y + vertex * stride),
                         *(const float *)(const void *)(z + vertex * stride),
-                        *(const float *)(const void *)(s->values.data + vertex * value_stride)};
+                        how.with_values ? *(const float *)(const void *)(s->values.data + vertex * value_stride) : 0};
         span.lower = vec4_min(p, span.lower);
         span.upper = vec4_max(p, span.upper);
-        poison += p - p; /* 0 while all are finite, then not a number */
+        if (how.with_values) poison += p - p; /* 0 while all are finite, then not a number */
     }
     if (poison[3] == 0) return span;
     ++*unusable;
@@ -55,30 +56,31 @@ MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading ho
  * numbers to a vertex that theirs are there already. */
 MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const reading how)
 {
-    const grid *g = s->g;
+    const grid *g = s->source->g;
     if (how.shape != FETCH_HEXES) return;
     const int64_t vertex = fetch_index(&g->connectivity, fetch_first(g, cell, 8, how.shape), how.wide_index);
     for (int axis = 0; axis < 3; axis++) {
         __builtin_prefetch(g->coordinates[axis].data + vertex * (how.is_packed ? 4 : g->coordinates[0].stride));
     }
-    __builtin_prefetch(s->values.data + vertex * (how.is_packed ? 4 : s->values.stride));
+    if (how.with_values) __builtin_prefetch(s->values.data + vertex * (how.is_packed ? 4 : s->values.stride));
 }
 
 MMBVH_INLINE void read_cells(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
 {
-    const grid_array *connectivity = &s->g->connectivity;
+    const grid_array *connectivity = &s->source->g->connectivity;
     const uint32_t *cells = s->tree->cells;
     p->first = first;
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t later = cells[i > PREFETCH_CELLS ? i - PREFETCH_CELLS : 0]; /* the sweep goes down */
-        const int64_t entry = fetch_first(s->g, later, fetch_vertex_count(s->g, later, how.shape), how.shape);
+        const int64_t entry =
+            fetch_first(s->source->g, later, fetch_vertex_count(s->source->g, later, how.shape), how.shape);
         __builtin_prefetch(connectivity->data + entry * connectivity->stride);
         prefetch_vertex(s, cells[i > PREFETCH_VERTICES ? i - PREFETCH_VERTICES : 0], how);
         p->spans[i - first] = read_cell(s, cells[i], how, &p->unusable);
     }
 }
 
-static void store_leaf(const sweep *s, const part *p, int64_t node, int64_t first, int count)
+MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t first, int count, const reading how)
 {
     const mmbvh *tree = s->tree;
     const fetch_span *spans = p->spans + (first - p->first);
@@ -86,20 +88,21 @@ static void store_leaf(const sweep *s, const part *p, int64_t node, int64_t firs
     for (int i = 1; i < count; i++) fetch_span_unite(&all, &spans[i]);
     vec4 lower, upper;
     fetch_span_round(&all, tree->origin, tree->scale, &lower, &upper);
-    store_box(tree, node, lower, upper);
-    set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f}); /* zero positive, as bounds have it */
+    p->misfits += !store_box(tree, node, lower, upper);
+    if (how.with_values)
+        set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f}); /* zero positive, as bounds have it */
 }
 
-static void store_nodes(const sweep *s, const part *p, int64_t first, int64_t end)
+MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
 {
     for (int64_t i = end - 1; i >= first; i--) {
         const int count = mmbvh_node_count(s->tree, i);
         const int64_t ref = mmbvh_node_ref(s->tree, i);
         if (count) {
-            store_leaf(s, p, i, ref, count);
+            store_leaf(s, p, i, ref, count, how);
         } else {
-            store_union(s->tree, i, ref);
-            set_range(s, i, children_range(s, ref));
+            p->misfits += !store_union(s->tree, i, ref);
+            if (how.with_values) set_range(s, i, children_range(s, ref));
         }
     }
 }
@@ -111,7 +114,7 @@ MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end,
         const int count = mmbvh_node_count(s->tree, i);
         const int64_t ref = mmbvh_node_ref(s->tree, i);
         if (count) read_cells(s, p, ref, ref + count, how);
-        store_nodes(s, p, i, i + 1);
+        store_nodes(s, p, i, i + 1, how);
     }
 }
 
@@ -128,29 +131,47 @@ static int64_t end_of_cells(const mmbvh *tree, int64_t node)
     return mmbvh_node_ref(tree, node) + mmbvh_node_count(tree, node);
 }
 
-MMBVH_INLINE int64_t run_both(const sweep *s, int64_t first, int64_t end, const reading how)
+MMBVH_INLINE int64_t run(const sweep *s, int64_t first, int64_t end, const reading how)
 {
     part p;
-    p.unusable = 0;
+    p.unusable = p.misfits = 0;
     if (end - first <= 2) {
         run_nodes(s, &p, first, end, how);
     } else {
         read_cells(s, &p, first_cell(s->tree, first), end_of_cells(s->tree, first + 1), how);
-        store_nodes(s, &p, first, end);
+        store_nodes(s, &p, first, end, how);
     }
-    return p.unusable;
+    return how.with_values ? p.unusable : p.misfits;
 }
 
-#define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
+#define DEFINE_RUN_BOUNDS(name, shape, wide_index, wide_number)                                                        \
     static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
     {                                                                                                                  \
-        const bool is_packed = fetch_is_packed(&s->g->coordinates[0]) && fetch_is_packed(&s->values);                  \
-        return is_packed ? run_both(s, first, end, (reading){shape, wide_index, true})                                 \
-                         : run_both(s, first, end, (reading){shape, wide_index, false});                               \
+        return fetch_is_packed(&s->source->g->coordinates[0])                                                          \
+                   ? run(s, first, end, (reading){shape, wide_index, false, true})                                     \
+                   : run(s, first, end, (reading){shape, wide_index, false, false});                                   \
     }
-FETCH_FLOAT_INSTANCES(DEFINE_RUN, run_both)
+FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOUNDS, run_bounds)
 
+#define DEFINE_RUN_BOTH(name, shape, wide_index, wide_number)                                                          \
+    static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
+    {                                                                                                                  \
+        return fetch_is_packed(&s->source->g->coordinates[0]) && fetch_is_packed(&s->values)                           \
+                   ? run(s, first, end, (reading){shape, wide_index, true, true})                                      \
+                   : run(s, first, end, (reading){shape, wide_index, true, false});                                    \
+    }
+FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOTH, run_both)
+
+static const sweep_run run_bounds_table[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(run_bounds);
 static const sweep_run run_both_table[FETCH_SHAPES][2] = FETCH_FLOAT_TABLE(run_both);
+
+void sweep_bounds_as_floats(sweep *bounds)
+{
+    const grid *g = bounds->source->g;
+    if (!bounds->source->read_spans) return;
+    bounds->run = run_bounds_table[fetch_grid_shape(g)][g->connectivity.is_wide];
+    bounds->run_max = PART_NODES;
+}
 
 sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges)
 {
