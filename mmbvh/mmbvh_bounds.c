@@ -154,7 +154,7 @@ static void span_of(const grid_array *a, int64_t count, int threads, double *lea
         span_of_any(a, count, threads, least, most);
         return;
     }
-#pragma omp parallel for num_threads(threads) reduction(min : low) reduction(max : high)
+#pragma omp parallel for num_threads(threads) schedule(dynamic) reduction(min : low) reduction(max : high)
     for (int64_t begin = 0; begin < count; begin += BLOCK) {
         const int64_t n = count - begin < BLOCK ? count - begin : BLOCK;
         const char *data = a->data + begin * a->stride;

@@ -14,7 +14,7 @@
 #include "mmbvh_morton.h"
 #include "mmbvh_store.h"
 
-enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096 };
+enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 
 /* What a build holds until it ends. */
 typedef struct build {
@@ -180,7 +180,7 @@ static bool list_cells(build *b)
     if (!cells) return false;
     b->tree.cell_count = b->count;
     const uint64_t mask = b->coder ? (UINT64_C(1) << b->coder->index_bits) - 1 : 0;
-#pragma omp parallel for num_threads(b->threads) schedule(static)
+#pragma omp parallel for num_threads(b->threads) schedule(dynamic, LIST_CELLS)
     for (int64_t i = 0; i < b->count; i++) {
         cells[i] = b->coder ? (uint32_t)(b->keys[i] & mask) : item_index(b->items[i]);
     }

@@ -37,7 +37,7 @@ double cost_of_tree(const mmbvh *tree, int threads)
     mmbvh_node_box(tree, 0, lower, upper);
     const double root_area = cost_half_area(lower, upper);
     double sums[PARTS];
-#pragma omp parallel for num_threads(threads)
+#pragma omp parallel for num_threads(threads) schedule(dynamic)
     for (int part = 0; part < PARTS; part++) {
         const int64_t begin = tree->node_count * part / PARTS, end = tree->node_count * (part + 1) / PARTS;
         sums[part] = cost_of_nodes(tree, begin, end, root_area);

@@ -11,6 +11,7 @@ enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
     DIGIT_BITS = 11, /* as many streams as a core's cache can hold the ends of */
     DIGITS = 1 << DIGIT_BITS,
+    SORT_CHUNKS = 4, /* a thread: one that is held up leaves its own to others */
     SORT_CHUNKS_MAX = 64,
     SORT_LARGE = 16, /* a part of all keys so large is sorted by all threads, */
     SORT_LARGE_MIN = 16384,
@@ -188,7 +189,7 @@ static inline int digit_of(uint64_t key, int shift)
 
 static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, int shift)
 {
-#pragma omp parallel for num_threads(s->threads) schedule(static)
+#pragma omp parallel for num_threads(s->threads) schedule(dynamic)
     for (int chunk = 0; chunk < s->chunks; chunk++) {
         int64_t *of = s->counts->of[chunk];
         memset(of, 0, sizeof s->counts->of[chunk]);
@@ -214,7 +215,7 @@ static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
 
 static void move_digits(const sorting *s, const uint64_t *from, uint64_t *to, int64_t count, int shift)
 {
-#pragma omp parallel for num_threads(s->threads) schedule(static)
+#pragma omp parallel for num_threads(s->threads) schedule(dynamic)
     for (int chunk = 0; chunk < s->chunks; chunk++) {
         int64_t *places = s->counts->of[chunk];
         const int64_t end = count * (chunk + 1) / s->chunks;
@@ -286,7 +287,7 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
         return true;
     }
     sorting s = {.threads = threads};
-    s.chunks = threads < SORT_CHUNKS_MAX ? threads : SORT_CHUNKS_MAX;
+    s.chunks = SORT_CHUNKS * threads < SORT_CHUNKS_MAX ? SORT_CHUNKS * threads : SORT_CHUNKS_MAX;
     s.large = count / SORT_LARGE > SORT_LARGE_MIN ? count / SORT_LARGE : SORT_LARGE_MIN;
     s.counts = base_alloc((size_t)s.chunks * sizeof s.counts->of[0]);
     if (!s.counts) return false;

@@ -1,0 +1,116 @@
+/* Morton keys come out in ascending order, whatever they are: against qsort(). */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "memory.h"
+#include "mmbvh_morton.h"
+
+enum { COUNT = 300000 /* several digits' keys are then more than one thread sorts alone */ };
+
+static uint64_t next_random(uint64_t *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return *state;
+}
+
+static int compare(const void *a, const void *b)
+{
+    uint64_t x, y;
+    memcpy(&x, a, sizeof x);
+    memcpy(&y, b, sizeof y);
+    return (x > y) - (x < y);
+}
+
+/* A code of so many bits, of which a mesh may use any part. */
+typedef uint64_t code_maker(uint64_t random, int64_t i, int bits);
+
+static uint64_t even(uint64_t random, int64_t i, int bits)
+{
+    (void)i;
+    return random & ((UINT64_C(1) << bits) - 1);
+}
+
+/* Smaller and smaller cells towards a corner: half the keys in half the box, and so on. */
+static uint64_t refined(uint64_t random, int64_t i, int bits)
+{
+    return even(random, i, bits) >> (random >> 58) % (unsigned)bits;
+}
+
+/* All in one place but for one. */
+static uint64_t outlier(uint64_t random, int64_t i, int bits)
+{
+    return i ? even(random, i, bits) >> bits / 2 : (UINT64_C(1) << bits) - 1;
+}
+
+static uint64_t equal(uint64_t random, int64_t i, int bits)
+{
+    (void)random;
+    (void)i;
+    return bits ? 1 : 0;
+}
+
+static uint64_t descending(uint64_t random, int64_t i, int bits)
+{
+    (void)random;
+    return ((UINT64_C(1) << bits) - 1) - (uint64_t)i;
+}
+
+static void check(code_maker *make, int64_t count, int threads)
+{
+    const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1};
+    morton_coder coder;
+    morton_coder_init(&coder, lower, upper, COUNT);
+    const size_t bytes = (size_t)count * sizeof(uint64_t);
+    uint64_t *keys = malloc(bytes), *other = malloc(bytes), *right = malloc(bytes), state = 88172645463325252u;
+    assert_true(keys && other && right);
+    for (int64_t i = 0; i < count; i++) {
+        const uint64_t code = make(next_random(&state), i, coder.code_bits);
+        keys[i] = right[i] = code << coder.index_bits | (uint64_t)i;
+    }
+    qsort(right, (size_t)count, sizeof *right, compare);
+    assert_true(morton_sort(&coder, keys, other, count, threads));
+    assert_memory_equal(keys, right, bytes);
+    free(keys);
+    free(other);
+    free(right);
+}
+
+static void keys_ascend(void **state)
+{
+    static code_maker *const makers[] = {even, refined, outlier, equal, descending};
+    static const int64_t counts[] = {1, 2, 24, 25, 1000, 16384, 16385, COUNT};
+    (void)state;
+    for (size_t maker = 0; maker < sizeof makers / sizeof *makers; maker++) {
+        for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+            for (int threads = 1; threads <= 3; threads++) check(makers[maker], counts[i], threads);
+        }
+    }
+}
+
+static void lack_of_memory_is_told(void **state)
+{
+    static uint64_t keys[20000], other[20000];
+    const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1};
+    morton_coder coder;
+    (void)state;
+    morton_coder_init(&coder, lower, upper, COUNT);
+    base_memory_fail_nth(1);
+    assert_false(morton_sort(&coder, keys, other, 20000, 1));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(keys_ascend),
+        cmocka_unit_test(lack_of_memory_is_told),
+    };
+    return cmocka_run_group_tests_name("mmbvh_sort", tests, NULL, NULL);
+}
