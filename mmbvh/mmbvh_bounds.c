@@ -123,6 +123,11 @@ static void span_of_any(const grid_array *a, int64_t count, int threads, double 
     *most = high;
 }
 
+static inline float float_at(const char *p)
+{
+    return *(const float *)(const void *)p;
+}
+
 /* Of floats, four at a time; what is not a number is passed over. */
 MMBVH_INLINE void span_of_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
 {
@@ -130,13 +135,12 @@ MMBVH_INLINE void span_of_floats(const char *data, const int64_t stride, int64_t
     vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY);
     const char *p = data;
     for (int64_t i = 0; i + LANES <= count; i += LANES, p += LANES * stride) {
-        vec4 x;
-        for (int lane = 0; lane < LANES; lane++) x[lane] = *(const float *)(const void *)(p + lane * stride);
+        const vec4 x = {float_at(p), float_at(p + stride), float_at(p + 2 * stride), float_at(p + 3 * stride)};
         low = vec4_min(x, low);
         high = vec4_max(x, high);
     }
     for (int64_t i = count / LANES * LANES; i < count; i++, p += stride) {
-        const vec4 x = vec4_set1(*(const float *)(const void *)p);
+        const vec4 x = vec4_set1(float_at(p));
         low = vec4_min(x, low);
         high = vec4_max(x, high);
     }

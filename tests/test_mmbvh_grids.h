@@ -14,7 +14,7 @@ typedef enum lattice_kind { LATTICE_TETS, LATTICE_HEXES, LATTICE_MIXED } lattice
 
 typedef struct lattice_layout {
     bool wide_coordinates, wide_indices, wide_values;
-    bool strided; /* all arrays with gaps between their elements, else packed */
+    bool strided; /* all arrays with gaps between their elements, else packed: floats of coordinates axis by axis */
 } lattice_layout;
 
 typedef struct lattice {
@@ -65,13 +65,15 @@ static inline void make_points(lattice *l, int n, lattice_layout layout)
     const int64_t side = n + 1;
     grid *g = &l->g;
     g->vertex_count = side * side * side;
-    const int64_t size = layout.wide_coordinates ? 8 : 4, stride = (layout.strided ? 5 : 3) * size;
-    l->coordinates = calloc((size_t)g->vertex_count, (size_t)stride);
+    const bool is_apart = !layout.wide_coordinates && !layout.strided;
+    const int64_t size = layout.wide_coordinates ? 8 : 4, stride = (layout.strided ? 5 : is_apart ? 1 : 3) * size;
+    const int64_t next = is_apart ? g->vertex_count * size : size; /* axis */
+    l->coordinates = calloc((size_t)g->vertex_count, (size_t)(is_apart ? 3 * stride : stride));
     l->field.values = make_array(&l->values, g->vertex_count, layout.wide_values, false, layout.strided);
     l->field.component_count = 1;
     l->field.component_stride = 4;
     for (int axis = 0; axis < 3; axis++) {
-        g->coordinates[axis] = (grid_array){l->coordinates + axis * size, stride, layout.wide_coordinates, false};
+        g->coordinates[axis] = (grid_array){l->coordinates + axis * next, stride, layout.wide_coordinates, false};
     }
     for (int64_t v = 0; v < g->vertex_count; v++) {
         const int64_t ijk[3] = {v % side, v / side % side, v / side / side};
