@@ -401,7 +401,7 @@ function section_scaling(    p, t) {
     p = "scaling avx512 " most_threads
     if (!most_threads) return
     print "\n## Instruction sets and threads\n"
-    print "On " mesh[p, 1] " " side[p, 1] ".\n"
+    print "On " mesh[p, 1] " " side[p, 1] ". Where the time of an isosurface goes by lanes, and what does not gain from them: docs/decisions.md.\n"
     print "| lanes | threads | isosurface, Mrays/s | error in depth | volume, Mrays/s | error |"
     print "|---|--:|--:|--:|--:|--:|"
     for (t = most_threads; t >= 1; t = t > 1 ? 1 : 0) {
