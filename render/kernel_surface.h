@@ -23,17 +23,33 @@ typedef struct kernel_hits {
     vf colour[3]; /* unlit */
     vf reach;     /* of differences; only where asked for */
     vf kind;
-    int cut_count; /* more than KERNEL_MAX_CUTS: the list is not whole */
-    vm cut_mask[KERNEL_MAX_CUTS];
-    vf cut[KERNEL_MAX_CUTS];
+    int cut_count;           /* rows: the n-th that was found of each ray, +inf where it has fewer */
+    vf cut[KERNEL_MAX_CUTS]; /* in the order in which they were found */
+    vm crowded;              /* rays that have more */
 } kernel_hits;
 
 static inline void kernel_hits_begin(kernel_hits *hits)
 {
-    hits->found = vm_none();
+    hits->found = hits->crowded = vm_none();
     hits->cut_count = 0;
     hits->kind = hits->reach = vf_set(0);
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
+}
+
+/* A row holds each ray's own n-th crossing, whichever rays met their cells together: where fragments are cut depends
+ * neither on the traversal nor on the other rays of the packet. */
+SIMD_INLINE void kernel_hits_cut(kernel_hits *hits, vm hit, vf t)
+{
+    for (int n = 0; vm_any(hit); n++) {
+        if (n == KERNEL_MAX_CUTS) {
+            hits->crowded = vm_or(hits->crowded, hit);
+            return;
+        }
+        if (n == hits->cut_count) hits->cut[hits->cut_count++] = vf_set(INFINITY);
+        const vm room = vm_andnot(hit, vf_lt(hits->cut[n], vf_set(INFINITY)));
+        hits->cut[n] = vf_select(room, t, hits->cut[n]);
+        hit = vm_andnot(hit, room);
+    }
 }
 
 typedef struct kernel_surface_state {
@@ -148,11 +164,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     kernel_shade(p, &s->layer->material, normal, colour);
     for (int a = 0; a < 3; a++) colour[a] *= s->layer->opacity;
     kernel_emit(p, hit, s->first_kind + (uint32_t)value, vf_set(0), t, t, colour, vf_set(1 - s->layer->opacity));
-    if (hits->cut_count < KERNEL_MAX_CUTS) {
-        hits->cut_mask[hits->cut_count] = hit;
-        hits->cut[hits->cut_count] = t;
-    }
-    hits->cut_count++;
+    kernel_hits_cut(hits, hit, t);
 }
 
 /* Rays on which the sign changes between the interval's faces. */

@@ -184,11 +184,9 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
 SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
                                    const kernel_hits *hits, vf t)
 {
-    if (hits->cut_count > KERNEL_MAX_CUTS) return b->open;
-    vm broken = vm_none();
+    vm broken = hits->crowded;
     for (int i = 0; i < hits->cut_count; i++)
-        broken =
-            vm_or(broken, vm_and(hits->cut_mask[i], vm_and(vf_lt(b->t_last, hits->cut[i]), vf_le(hits->cut[i], t))));
+        broken = vm_or(broken, vm_and(vf_lt(b->t_last, hits->cut[i]), vf_le(hits->cut[i], t)));
     if (p->frame->needs_contact) {
         const vm touch = vm_or(vf_eq(s->t_in[n], b->contact_out), vf_eq(s->t_in[n], b->contact_in));
         broken = vm_or(broken, vm_not(touch));

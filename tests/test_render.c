@@ -114,6 +114,42 @@ static void volume_and_surfaces_are_the_reference_together(void **state)
             }
 }
 
+static double short_wave(const double p[3])
+{
+    return test_wave((const double[]){2 * p[0], 2 * p[1], 2 * p[2]});
+}
+
+/* Rays that cross more surfaces than a packet keeps: their fragments of volume end at every sample. */
+static void volume_between_many_surfaces_is_the_reference(void **state)
+{
+    static const float colours[48] = {0.8f, 0.2f, 0.1f};
+    double values[16];
+    (void)state;
+    for (int i = 0; i < 16; i++) values[i] = -1.17 + 0.171 * i;
+    for (int alone = 0; alone < 2; alone++) {
+        render_fixture f;
+        drawn_frame drawn;
+        int crowded = 0;
+        fixture_create_lattice(&f, TEST_TETS, 7, 0.2, short_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, 29, 27);
+        fixture_add_surface(&f, values, 16, 0.03f);
+        f.surfaces[0].colours = colours;
+        fixture_set_volume(&f, 0.2);
+        f.job.is_alone = alone;
+        fixture_draw(&f, &drawn);
+        for (int p = 0; p < 29 * 27; p++) {
+            int hits = 0;
+            for (int64_t i = drawn.first[p]; i < drawn.first[p + 1]; i++)
+                hits += drawn.list.items[i].kind >= FRAGMENT_SURFACE;
+            crowded += hits > 32 && hits <= REFERENCE_MAX_HITS;
+        }
+        assert_true(crowded > 10);
+        fixture_compare(&f, &fixture_usual_bounds, "many surfaces");
+        drawn_free(&drawn);
+        fixture_free(&f);
+    }
+}
+
 /* ---- closed forms ---- */
 
 static double ray_linear(const render_camera *camera, int pixel, double *at_base)
@@ -448,6 +484,7 @@ int main(void)
         cmocka_unit_test(transparent_surfaces_before_an_opaque_one_are_the_reference),
         cmocka_unit_test(volume_is_the_reference_for_every_kind_and_camera),
         cmocka_unit_test(volume_and_surfaces_are_the_reference_together),
+        cmocka_unit_test(volume_between_many_surfaces_is_the_reference),
         cmocka_unit_test(linear_surface_is_a_plane_in_every_kind),
         cmocka_unit_test(constant_volume_counts_every_sample_once),
         cmocka_unit_test(lattice_lines_have_no_holes),

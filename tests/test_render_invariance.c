@@ -192,6 +192,7 @@ static void traversals_do_not_change_a_bit(void **state)
             compare_traversals(kind, 13, OPAQUE, camera, camera % 2);
             compare_traversals(kind, 4, TRANSPARENT, camera, true);
             compare_traversals(kind, 4, OPAQUE_VOLUME, camera, false);
+            compare_traversals(kind, 4, TRANSPARENT_VOLUME, camera, true);
         }
 }
 
