@@ -399,6 +399,20 @@ static int choose_pixels(const data_set *set, const picture *pictures, int pixel
 
 /* ---- the test ------------------------------------------------------------------------------------------------ */
 
+/* How many of the pixels may have no truth. The crushed can alone has folded cells, and a seventh of all its pixels at
+ * most meets one (63 of 612, and 58 of 459); the half of a sample in which pictures differ most may all be such. */
+static int most_left_out(const data_set *set, int count)
+{
+    if (strcmp(set->file, "can_2") != 0) return 0;
+    return pixel_count == 0 ? count / 7 : count * 3 / 4;
+}
+
+/* Before anything has happened to it the can's field is 0 throughout, where the shells are clear. */
+static bool shows_nothing(const data_set *set, const opacity_shape *shape)
+{
+    return strcmp(set->file, "can_0") == 0 && strcmp(shape->name, "shells") == 0;
+}
+
 static int check(const data_set *set, const opacity_shape *shape)
 {
     subject s = {0};
@@ -433,6 +447,8 @@ static int check(const data_set *set, const opacity_shape *shape)
         broken += !is_kept;
     }
     fprintf(stderr, "\n");
+    if (folded > most_left_out(set, count)) fail_msg("%d of %d pixels have no truth", folded, count);
+    if (count == 0 && !shows_nothing(set, shape)) fail_msg("nothing to compare");
     subject_free(&s);
     free(pictures);
     free(pixels);
