@@ -238,12 +238,13 @@ function line(what, which, is_exact,    i, j, m, cell, text, label) {
     said[label] = 1
 }
 
-function surfaces(    i, j, m) {
+function surfaces(    i, j, m, way) {
     print "\n## Isosurfaces\n"
     print "Depth against the reference in sizes of the cell hit, RMS and at most, where both are on the same sheet; pixels that miss,"
     print "or are on another sheet, of those compared; the largest |field at the hit - isovalue| over the range of the cell's values"
     print "(not taken in polyhedra); milliseconds a frame. On tets and in polyhedra all settings solve the same linear equation. Left"
-    print "out are rays on which a polyhedron's quad and the tets behind it are on different sides of the isovalue.\n"
+    print "out are rays on which a polyhedron's quad and the tets behind it are on different sides of the isovalue. Packets and"
+    print "SPMD are the thesis's traversals, on two lattices beside the picture as a whole, which is what frames are drawn by.\n"
     print "| mesh | setting | depth | wrong | residual | frame, ms |"
     print "|---|---|--:|--:|--:|--:|"
     for (i = 1; i <= meshes; i++)
@@ -251,7 +252,9 @@ function surfaces(    i, j, m) {
             m = mesh[i]
             if (is_volume(m, j)) continue
             if (exact(m) && setting[m, j] ~ /N = [134]/) continue
-            printf "| %s | %s | %s, %s | %d of %d | %s | %s |\n", m, setting[m, j], number(rms[m, j]), number(most[m, j]),
+            way = method[m, j]
+            way = sub(/^[^ ]* /, ", ", way) ? way : ""
+            printf "| %s | %s | %s, %s | %d of %d | %s | %s |\n", m, setting[m, j] way, number(rms[m, j]), number(most[m, j]),
                 wrong[m, j], pixels[m, j], residual[m, j] == "nan" ? "-" : number(residual[m, j]), number(frame[m, j])
         }
     figure("accuracy_isosurfaces", "depth error over time: isosurfaces")
