@@ -221,6 +221,13 @@ SIMD_INLINE vf kernel_fines_gather(const kernel_segments *list, int member, vi i
     return vf_gather(&list->fine[0][0].length + member, item);
 }
 
+/* Rays whose two segments begin at one place, and the first of them, of no length in float32, ends there. */
+static __attribute__((noinline, cold)) vm kernel_segments_tied(const kernel_segments *list, vm same, vi item,
+                                                               vi earlier)
+{
+    return vm_and(same, vf_lt(kernel_items_gather(list, 1, item), kernel_items_gather(list, 1, earlier)));
+}
+
 /* By insertion, all rays at once: cells come nearly in order, for the traversal is front to back. */
 static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out)
 {
@@ -243,7 +250,12 @@ static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out
         for (; at > 0; at--) {
             const vf before = out->t_in[at - 1];
             const vi earlier = out->item[at - 1];
-            const vm moves = vf_lt(t_in, before);
+            vm moves = vf_lt(t_in, before);
+            if (list->is_fine) {
+                const vm same = vm_and(vf_eq(t_in, before), vf_lt(t_in, vf_set(INFINITY)));
+                if (__builtin_expect(vm_any(same), 0))
+                    moves = vm_or(moves, kernel_segments_tied(list, same, item, earlier));
+            }
             if (!vm_any(moves)) break;
             out->t_in[at] = vf_select(moves, before, t_in);
             out->item[at] = (vi)vf_select(moves, (vf)earlier, (vf)item);

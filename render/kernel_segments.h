@@ -239,9 +239,14 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
         return;
     }
     const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
-    const vm mine = vm_and(vm_and(i.mask, window), vf_lt(i.t_in, i.t_out));
+    vm mine = vm_and(i.mask, window);
+    if (!list->is_fine) mine = vm_and(mine, vf_lt(i.t_in, i.t_out));
     if (!vm_any(mine)) return;
-    if (list->is_fine) fine = kernel_tet_fine(p, c, fine_cell, &list->rays, &i);
+    if (list->is_fine) {
+        /* Of segments whose ends float32 does not tell apart, many may lie on one ray. */
+        fine = kernel_tet_fine(p, c, fine_cell, &list->rays, &i);
+        mine = vm_and(mine, vf_lt(vf_set(0), fine.length));
+    }
     kernel_segments_add(state->pieces, list, mine, &i, list->is_fine ? &fine : NULL);
 }
 
