@@ -627,7 +627,7 @@ SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, con
     for (int i = 0; i < 4; i++) {
         out->x[i] = q->x[corner[i]];
         out->y[i] = q->y[corner[i]];
-        out->z[i] = z[corner[i]];
+        out->z[i] = vf_set(z[corner[i]]);
     }
 }
 
@@ -652,8 +652,8 @@ SIMD_INLINE void kernel_quad_guess(const int corner[4], int half, const kernel_w
 SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *shape, const int corner[4],
                                     const kernel_quad_place *at, bool has_colour, kernel_crossing *out)
 {
-    float f[4], g[4];
-    for (int i = 0; i < 4; i++) f[i] = c->f[corner[i]], g[i] = has_colour ? c->g[corner[i]] : 0;
+    vf f[4], g[4];
+    for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
     out->mask = at->mask;
     out->t = at->t;
     out->v = kernel_bilinear(f, at->s, at->r);

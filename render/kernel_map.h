@@ -22,6 +22,7 @@ typedef struct kernel_polynomial {
 typedef struct kernel_map {
     bool is_pyramid;
     float origin[3]; /* vertex 0 */
+    float reach[3];  /* |X|, |Y|, |Z| of no vertex are more */
     float tolerance; /* a Newton step below it is the last */
     kernel_polynomial position[3], field, colour;
     double exact[4][8]; /* the positions' coefficients and the field's, not rounded */
@@ -71,6 +72,12 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     m->origin[0] = c->x[0];
     m->origin[1] = c->y[0];
     m->origin[2] = c->z[0];
+    memset(m->reach, 0, sizeof m->reach);
+    for (int i = 0; i < c->count; i++) {
+        m->reach[0] = fmaxf(m->reach[0], fabsf(c->x[i]));
+        m->reach[1] = fmaxf(m->reach[1], fabsf(c->y[i]));
+        m->reach[2] = fmaxf(m->reach[2], fabsf(c->z[i]));
+    }
     kernel_polynomial_of_floats(&m->position[0], c->type, c->x, c->x[0], m->exact[0]);
     kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0], m->exact[1]);
     kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0], m->exact[2]);

@@ -192,7 +192,7 @@ SIMD_INLINE void kernel_quad_of_facets(const polyhedron *c, const kernel_passage
     for (int i = 0; i < 4; i++) {
         out->x[i] = r->x[corner[i]];
         out->y[i] = r->y[corner[i]];
-        out->z[i] = c->z[corner[i]];
+        out->z[i] = vf_set(c->z[corner[i]]);
     }
     out->e01 = kernel_facet_side(t[0], r, corner[0], corner[1]);
     out->e12 = kernel_facet_side(t[0], r, corner[1], corner[2]);
@@ -205,8 +205,8 @@ SIMD_INLINE void kernel_quad_of_facets(const polyhedron *c, const kernel_passage
 SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], const kernel_quad_place *at, vm mine,
                                    bool has_colour, kernel_meeting *m)
 {
-    float f[4], g[4];
-    for (int i = 0; i < 4; i++) f[i] = c->f[corner[i]], g[i] = has_colour ? c->g[corner[i]] : 0;
+    vf f[4], g[4];
+    for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
     m->t_face = vf_select(mine, at->t, m->t_face);
     m->v_face = vf_select(mine, kernel_bilinear(f, at->s, at->r), m->v_face);
     m->w_face = has_colour ? vf_select(mine, kernel_bilinear(g, at->s, at->r), m->w_face) : vf_set(0);

@@ -33,11 +33,11 @@
 #define RENDER_KERNEL_QUAD_H
 
 #include "kernel_line.h"
+#include "kernel_wide.h"
 
 /* In a packet's planes. e01 is the edge function from corner 0 to corner 1, its sign bit the exact one. */
 typedef struct kernel_quad {
-    vf x[4], y[4];
-    float z[4];
+    vf x[4], y[4], z[4];
     vf e01, e32, e03, e12;
 } kernel_quad;
 
@@ -47,7 +47,7 @@ typedef struct kernel_quad_place {
     vf s, r, t;
 } kernel_quad_place;
 
-SIMD_INLINE vf kernel_bilinear(const float f[4], vf s, vf r)
+SIMD_INLINE vf kernel_bilinear(const vf f[4], vf s, vf r)
 {
     const vf low = f[0] + s * (f[1] - f[0]), high = f[3] + s * (f[2] - f[3]);
     return low + r * (high - low);
@@ -178,7 +178,7 @@ static inline kernel_flat_quad kernel_flat_of(const kernel_quad *q, int lane)
     for (int i = 0; i < 4; i++) {
         flat.x[i] = (double)q->x[i][lane];
         flat.y[i] = (double)q->y[i][lane];
-        flat.z[i] = (double)q->z[i];
+        flat.z[i] = (double)q->z[i][lane];
     }
     return flat;
 }
@@ -190,7 +190,76 @@ static inline void kernel_quad_put(kernel_quad_place *out, int lane, const doubl
     out->t[lane] = (float)place[2];
 }
 
-static __attribute__((noinline, cold)) void kernel_quad_once(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+/* ---- as many rays as there are doubles in a vector ---- */
+
+typedef struct kernel_half_quad {
+    kernel_half x[4], y[4];
+} kernel_half_quad;
+
+typedef struct kernel_half_quadratic {
+    kernel_half c0, c1, c2;
+} kernel_half_quadratic;
+
+SIMD_INLINE kernel_half kernel_half_cross(const kernel_half_quad *q, int i, int j)
+{
+    return q->x[i] * q->y[j] - q->x[j] * q->y[i];
+}
+
+SIMD_INLINE kernel_half_mask kernel_half_vanishes(const kernel_half_quadratic *c)
+{
+    return (kernel_half_mask)(c->c0 == 0) & (kernel_half_mask)(c->c1 == 0) & (kernel_half_mask)(c->c2 == 0);
+}
+
+/* kernel_flat_root() */
+SIMD_INLINE kernel_half kernel_half_root(const kernel_half_quadratic *c, kernel_half turn)
+{
+    const kernel_half zero = {0}, one = zero + 1;
+    const kernel_half_mask is_sum = (kernel_half_mask)(c->c1 * turn <= 0);
+    const kernel_half n = kernel_half_select(is_sum, turn - c->c1, c->c0);
+    const kernel_half d = kernel_half_select(is_sum, n + c->c2, (c->c0 - c->c1) - turn);
+    const kernel_half whole = kernel_half_select(is_sum, one, zero);
+    const kernel_half x = kernel_half_select((kernel_half_mask)(d != 0), n / d, whole);
+    const kernel_half least = kernel_half_select((kernel_half_mask)(x < one), x, one);
+    return kernel_half_select((kernel_half_mask)(x >= 0), least, zero);
+}
+
+/* kernel_flat_once() of rays of which nothing vanishes; returns the others. */
+SIMD_INLINE kernel_half_mask kernel_half_once(const kernel_quad *quad, vm wanted, int half, kernel_quad_place *out)
+{
+    const kernel_half zero = {0}, one = zero + 1;
+    kernel_half_quad q;
+    kernel_half z[4], old[3];
+    const vi turns_b = vi_from_bits(quad->e01) ^ vi_from_bits(quad->e32);
+    const kernel_half_mask by_b = kernel_half_of_mask(vm_sign(turns_b), half);
+    const kernel_half_mask negative_a = kernel_half_of_mask(vm_sign(vi_from_bits(quad->e03)), half);
+    const kernel_half_mask negative_b = kernel_half_of_mask(vm_sign(vi_from_bits(quad->e01)), half);
+    for (int i = 0; i < 4; i++) {
+        q.x[i] = kernel_half_of(&quad->x[i], half);
+        q.y[i] = kernel_half_of(&quad->y[i], half);
+        z[i] = kernel_half_of(&quad->z[i], half);
+    }
+    const kernel_half across = kernel_half_cross(&q, 0, 2);
+    const kernel_half_quadratic a = {kernel_half_cross(&q, 0, 3), 0.5 * (across + kernel_half_cross(&q, 1, 3)),
+                                     kernel_half_cross(&q, 1, 2)};
+    const kernel_half_quadratic b = {kernel_half_cross(&q, 0, 1), 0.5 * (across + kernel_half_cross(&q, 3, 1)),
+                                     kernel_half_cross(&q, 3, 2)};
+    const kernel_half square = kernel_half_select(by_b, b.c1 * b.c1 - b.c0 * b.c2, a.c1 * a.c1 - a.c0 * a.c2);
+    const kernel_half root = kernel_half_sqrt(kernel_half_select((kernel_half_mask)(square > 0), square, zero));
+    const kernel_half_mask is_rising = (by_b & negative_b) | (~by_b & negative_a);
+    const kernel_half turn = kernel_half_select(by_b ^ is_rising, root, -root);
+    const kernel_half s = kernel_half_root(&a, turn), r = kernel_half_root(&b, -turn);
+    const kernel_half t = (one - r) * ((one - s) * z[0] + s * z[1]) + r * ((one - s) * z[3] + s * z[2]);
+    const kernel_half_mask rays = kernel_half_of_mask(wanted, half);
+    vf *const lists[3] = {&out->s, &out->r, &out->t};
+    const kernel_half places[3] = {s, r, t};
+    for (int n = 0; n < 3; n++) {
+        old[n] = kernel_half_of(lists[n], half);
+        kernel_half_put(lists[n], half, kernel_half_select(rays, places[n], old[n]));
+    }
+    return rays & (kernel_half_vanishes(&a) | kernel_half_vanishes(&b));
+}
+
+static __attribute__((noinline, cold)) void kernel_quad_limit(const kernel_quad *q, vm wanted, kernel_quad_place *out)
 {
     for (unsigned bits = vm_bits(wanted); bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
@@ -199,6 +268,16 @@ static __attribute__((noinline, cold)) void kernel_quad_once(const kernel_quad *
         kernel_flat_once(&flat, place);
         kernel_quad_put(out, lane, place);
     }
+}
+
+static __attribute__((noinline)) void kernel_quad_once(const kernel_quad *q, vm wanted, kernel_quad_place *out)
+{
+    unsigned vanishing = 0;
+    for (int half = 0; half < 2; half++) {
+        const kernel_half_mask rays = kernel_half_once(q, wanted, half, out);
+        for (int i = 0; i < KERNEL_HALF; i++) vanishing |= (unsigned)(rays[i] & 1) << (half * KERNEL_HALF + i);
+    }
+    if (__builtin_expect(vanishing, 0)) kernel_quad_limit(q, vm_from_bits(vanishing), out);
 }
 
 /* Returns the rays of wanted that meet the patch twice, their places added to both. */
@@ -223,13 +302,13 @@ static __attribute__((noinline, cold)) vm kernel_quad_twice(const kernel_quad *q
  * the ray. */
 typedef struct kernel_patch {
     vf ax, ay, ex, ey, gx, gy, hx, hy;
-    float ez, gz;
+    vf ez, gz;
 } kernel_patch;
 
 SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_quad *q)
 {
-    p->ez = fmaxf(fabsf(q->z[1] - q->z[0]), fabsf(q->z[2] - q->z[3]));
-    p->gz = fmaxf(fabsf(q->z[3] - q->z[0]), fabsf(q->z[2] - q->z[1]));
+    p->ez = vf_max(vf_abs(q->z[1] - q->z[0]), vf_abs(q->z[2] - q->z[3]));
+    p->gz = vf_max(vf_abs(q->z[3] - q->z[0]), vf_abs(q->z[2] - q->z[1]));
     p->ax = q->x[0], p->ay = q->y[0];
     p->ex = q->x[1] - p->ax, p->ey = q->y[1] - p->ay;
     p->gx = q->x[3] - p->ax, p->gy = q->y[3] - p->ay;

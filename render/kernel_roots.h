@@ -17,6 +17,12 @@
  * piece is halved, the nearer half first. At 2^-12 of the interval halving ends: a pair of roots that is missed there
  * dips below 0 by at most |F''| (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own rounding of F.
  *
+ * Before any of that a bound of the whole cell is asked. Let L be linear in the point, with the field's gradient at the
+ * cell's centre, and E = F - L(X), polynomial as F is and small where the field is smooth. Along the ray L(X) is
+ * linear, and |(r*)'| <= L_stretch |J0^-1 d|, d the ray's direction: where |grad L . d| is more than the largest |grad
+ * E| times that, F is monotone along every ray in the cell, and the signs at the faces tell all. And where L at both
+ * ends is farther from 0 than the largest |E|, on one side, there is no root. Both ask for no coordinates in the cell.
+ *
  * The pyramid's m = a b / k is no polynomial, but its second derivative along a line has one sign, so that F(c(u)) lies
  * between its chord and its end tangents and e(u) below e's: the same two slopes at the ends bound them.
  *
@@ -45,6 +51,9 @@ typedef struct kernel_bounds {
     float slope;               /* G */
     float curve, twist;        /* H, K; of a pyramid: times k */
     float coarsest;            /* longer pieces are halved in any case */
+    bool is_monotone;          /* the field along any ray of the beam */
+    float level, gradient[3];  /* of L: at vertex 0, and along tile space */
+    float thickness;           /* of |E|, and what rounding adds to it */
 } kernel_bounds;
 
 /* Derivatives of the products r s, r q, s q, r s q. */
@@ -55,30 +64,40 @@ static inline void kernel_product_slopes(const double r[3], double out[4][3])
     memcpy(out, slopes, sizeof slopes);
 }
 
-/* The extreme slopes of the products over the cell's domain, widened by KERNEL_DOMAIN_RIM on all sides for what
- * rounding takes out of it. Returns how many; the first is the centre's. */
-static inline int kernel_extreme_slopes(int type, double out[9][4][3])
+/* The corners of the cell's domain, widened by KERNEL_DOMAIN_RIM on all sides for what rounding takes out of it; of a
+ * pyramid a / k, b / k and k. */
+static inline int kernel_corner_count(int type)
+{
+    return type == GRID_WEDGE ? 6 : 8;
+}
+
+static inline void kernel_domain_corner(int type, int n, double r[3])
 {
     const double wide = KERNEL_DOMAIN_RIM;
-    int n = 0;
     if (type == GRID_WEDGE) {
-        kernel_product_slopes((const double[]){1.0 / 3, 1.0 / 3, 0.5}, out[n++]);
-        for (int i = 0; i < 6; i++)
-            kernel_product_slopes((const double[]){i % 3 == 1 ? 1 + 2 * wide : -wide, i % 3 == 2 ? 1 + 2 * wide : -wide,
-                                                   i < 3 ? -wide : 1 + wide},
-                                  out[n++]);
-        return n;
+        r[0] = n % 3 == 1 ? 1 + 2 * wide : -wide;
+        r[1] = n % 3 == 2 ? 1 + 2 * wide : -wide;
+        r[2] = n < 3 ? -wide : 1 + wide;
+        return;
     }
+    for (int a = 0; a < 3; a++) r[a] = n >> a & 1 ? 1 + wide : -wide;
+}
+
+/* The extreme slopes of the products over the cell's widened domain. Returns how many; the first is the centre's. */
+static inline int kernel_extreme_slopes(int type, double out[9][4][3])
+{
+    int n = 0;
+    if (type == GRID_WEDGE) kernel_product_slopes((const double[]){1.0 / 3, 1.0 / 3, 0.5}, out[n++]);
     if (type == GRID_HEX) kernel_product_slopes((const double[]){0.5, 0.5, 0.5}, out[n++]);
     if (type == GRID_PYRAMID) {
         memset(out, 0, 9 * sizeof *out);
         for (int a = 0; a < 3; a++) out[n][0][a] = a == 2 ? -0.5 : 0.5;
         n++;
     }
-    for (int i = 0; i < 8; i++, n++) {
+    for (int i = 0; i < kernel_corner_count(type); i++, n++) {
         double r[3];
-        for (int a = 0; a < 3; a++) r[a] = i >> a & 1 ? 1 + wide : -wide;
-        if (type == GRID_HEX) kernel_product_slopes(r, out[n]);
+        kernel_domain_corner(type, i, r);
+        if (type != GRID_PYRAMID) kernel_product_slopes(r, out[n]);
         if (type == GRID_PYRAMID)
             for (int a = 0; a < 3; a++) out[n][0][a] = a == 2 ? -r[a] : r[a];
     }
@@ -153,7 +172,73 @@ static inline double kernel_matrix_norm(const double m[3][3])
     return sqrt(sqrt(sqrt(sum)));
 }
 
-static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, int type)
+/* Rays' directions: (x, y, 1), and up to spread off that in both. */
+typedef struct kernel_beam {
+    float x, y, spread;
+} kernel_beam;
+
+/* The largest and least of |v . d| over the beam's directions d. */
+static inline double kernel_beam_most(const kernel_beam *beam, double v0, double v1, double v2)
+{
+    return fabs(v0 * (double)beam->x + v1 * (double)beam->y + v2) + (double)beam->spread * (fabs(v0) + fabs(v1));
+}
+
+static inline double kernel_beam_least(const kernel_beam *beam, double v0, double v1, double v2)
+{
+    return fabs(v0 * (double)beam->x + v1 * (double)beam->y + v2) - (double)beam->spread * (fabs(v0) + fabs(v1));
+}
+
+/* E and what follows of it. */
+static inline void kernel_bounds_linear(kernel_bounds *b, const kernel_map *map, const double slopes[9][4][3],
+                                        const int count, const int type, const kernel_beam *beam)
+{
+    double e[8], most = 0, steep = 0, speed = 0, size = 0;
+    for (int i = 0; i < 3; i++) {
+        double g = 0;
+        for (int a = 0; a < 3; a++) {
+            double df = map->exact[3][1 + a];
+            for (int j = 0; j < 4; j++) df += map->exact[3][4 + j] * slopes[0][j][a];
+            g += df * (double)b->inverse[a][i];
+        }
+        b->gradient[i] = (float)g;
+    }
+    for (int j = 0; j < 8; j++) {
+        e[j] = map->exact[3][j];
+        for (int i = 0; i < 3; i++) e[j] -= (double)b->gradient[i] * map->exact[i][j];
+    }
+    b->level = (float)e[0];
+    e[0] -= (double)b->level;
+    for (int n = 1; n < count; n++) {
+        double sum = 0;
+        for (int a = 0; a < 3; a++) {
+            double d = e[1 + a];
+            for (int j = 0; j < 4; j++) d += e[4 + j] * slopes[n][j][a];
+            sum += d * d;
+        }
+        steep = sum > steep ? sum : steep;
+    }
+    for (int n = 0; n < kernel_corner_count(type); n++) {
+        double r[3];
+        kernel_domain_corner(type, n, r);
+        const double m = r[0] * r[1] * (type == GRID_PYRAMID ? r[2] : 1);
+        if (type == GRID_PYRAMID) r[0] *= r[2], r[1] *= r[2];
+        const double at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + m * e[4] +
+                          r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
+        most = fabs(at) > most ? fabs(at) : most;
+    }
+    for (int i = 0; i < 3; i++) size += fabs((double)b->gradient[i]) * (double)map->reach[i];
+    /* A hundred-thousandth for the rounding of what is near 1, and of places to some units of where they are. */
+    b->thickness = (float)(most + 1e-5 + 16 * 6e-8 * size);
+    for (int i = 0; i < 3; i++) {
+        const double most_of =
+            kernel_beam_most(beam, (double)b->inverse[i][0], (double)b->inverse[i][1], (double)b->inverse[i][2]);
+        speed += most_of * most_of;
+    }
+    const double rise = kernel_beam_least(beam, (double)b->gradient[0], (double)b->gradient[1], (double)b->gradient[2]);
+    b->is_monotone = b->coarsest == 1 && rise * 0.9999 > sqrt(steep * speed) * (double)b->stretch;
+}
+
+static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, int type, const kernel_beam *beam)
 {
     double slopes[9][4][3], bent[3][4], field[4], theta = 0, gradient = 0, twist = 0;
     const int count = kernel_extreme_slopes(type, slopes);
@@ -183,6 +268,7 @@ static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, 
     }
     b->curve = (float)kernel_hessian_norm(type, field);
     b->twist = (float)sqrt(twist);
+    kernel_bounds_linear(b, map, (const double(*)[4][3])slopes, count, type, beam);
 }
 
 /* What is known of a piece. */
@@ -292,6 +378,14 @@ SIMD_INLINE vf kernel_face_gap(const kernel_packet *p, const kernel_search *s, c
     return vf_sqrt(sum);
 }
 
+/* L on rays at depth t. */
+SIMD_INLINE vf kernel_linear_at(const kernel_packet *p, const kernel_search *s, vf t)
+{
+    const float *g = s->bounds->gradient, *origin = s->map->origin;
+    const vf x = (p->origin_x + p->slope_x * t) - origin[0], y = (p->origin_y + p->slope_y * t) - origin[1];
+    return (s->bounds->level + g[0] * x) + (g[1] * y + g[2] * (t - origin[2]));
+}
+
 /* The whole interval first, by the faces' coordinates and values: most rays are done with it. */
 SIMD_INLINE void kernel_search_begin(kernel_packet *p, kernel_search *s, vm rays)
 {
@@ -301,18 +395,30 @@ SIMD_INLINE void kernel_search_begin(kernel_packet *p, kernel_search *s, vm rays
     s->from = s->low;
     s->end = s->high;
     s->side = kernel_side(i->v_in);
-    s->ended = s->found = vm_none();
-    const vf gap = vf_max(kernel_face_gap(p, s, &s->low), kernel_face_gap(p, s, &s->high));
-    const kernel_verdict v = kernel_judge(s->map, s->bounds, &s->low, &s->high, gap, s->side);
-    const vm change = vm_xor(vf_lt(i->v_in, zero), vf_lt(i->v_out, zero));
-    const vf jump = s->bounds->slope * s->bounds->stretch * gap + KERNEL_ROOT_BAND;
-    const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
-    vm none = vm_or(v.clear, vm_and(v.monotone, faced)), one = vm_and(v.monotone, change);
-    if (s->bounds->coarsest < 1) none = one = vm_none();
-    s->found = vm_and(rays, one);
-    s->open = vm_andnot(vm_andnot(rays, none), one);
+    s->ended = s->found = s->open = vm_none();
     s->number = s->pieces = zero;
     s->size = vf_set(0.5f);
+    const vm change = vm_xor(vf_lt(i->v_in, zero), vf_lt(i->v_out, zero));
+    if (s->bounds->coarsest == 1) {
+        const vf thick = vf_set(s->bounds->thickness);
+        const vm far = vm_and(vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_in)),
+                              vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_out)));
+        rays = vm_andnot(rays, vm_andnot(far, change));
+        if (s->bounds->is_monotone) {
+            s->found = vm_and(rays, change);
+            rays = vm_andnot(rays, change);
+        }
+        if (!vm_any(rays)) return;
+    }
+    const vf gap = vf_max(kernel_face_gap(p, s, &s->low), kernel_face_gap(p, s, &s->high));
+    const kernel_verdict v = kernel_judge(s->map, s->bounds, &s->low, &s->high, gap, s->side);
+    const vf jump = s->bounds->slope * s->bounds->stretch * gap + KERNEL_ROOT_BAND;
+    const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
+    const vm monotone = s->bounds->is_monotone ? rays : v.monotone;
+    vm none = vm_or(v.clear, vm_and(monotone, faced)), one = vm_and(monotone, change);
+    if (s->bounds->coarsest < 1) none = one = vm_none();
+    s->found = vm_or(s->found, vm_and(rays, one));
+    s->open = vm_andnot(vm_andnot(rays, none), one);
     if (!vm_any(s->open)) return;
     kernel_search_face(p, s, s->open, i->v_in, &s->from);
     kernel_search_face(p, s, s->open, i->v_out, &s->end);

@@ -244,15 +244,16 @@ typedef struct kernel_surface_cache {
     kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
 } kernel_surface_cache;
 
-SIMD_INLINE void kernel_poly_setup(kernel_poly *poly, const render_surface_layer *layer, const kernel_cell *c,
-                                   int value)
+SIMD_INLINE void kernel_poly_setup(const kernel_packet *p, kernel_poly *poly, const render_surface_layer *layer,
+                                   const kernel_cell *c, int value)
 {
     if (poly->is_set_up) return;
     poly->is_set_up = true;
     poly->value = value;
     kernel_map_setup(&poly->map, c);
     if (layer->colour_map) kernel_map_colour(&poly->map, c);
-    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type);
+    const kernel_beam beam = {.spread = p->tile->radius};
+    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type, &beam);
 }
 
 SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_cell *c)
@@ -313,7 +314,7 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         const vm wanted = vm_and(near, layer->root == RENDER_ROBUST ? room : kernel_changes_sign(i));
         if (!vm_any(wanted)) continue;
-        kernel_poly_setup(poly, layer, c, value);
+        kernel_poly_setup(p, poly, layer, c, value);
         if (layer->root == RENDER_ROBUST) {
             kernel_poly_robust(p, state, c, poly, i, wanted);
             continue;

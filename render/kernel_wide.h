@@ -71,6 +71,15 @@ SIMD_INLINE kernel_half kernel_half_abs(kernel_half a)
     return (kernel_half)((kernel_half_mask)a & INT64_MAX);
 }
 
+SIMD_INLINE kernel_half kernel_half_sqrt(kernel_half v)
+{
+    double d[KERNEL_HALF];
+    memcpy(d, &v, sizeof d);
+    for (int i = 0; i < KERNEL_HALF; i++) d[i] = __builtin_sqrt(d[i]);
+    memcpy(&v, d, sizeof d);
+    return v;
+}
+
 SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
 {
     return kernel_half_select((kernel_half_mask)(b < a), a, b);

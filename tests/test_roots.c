@@ -274,8 +274,23 @@ static void judge_neubauer(count *c, const truth *t, bool hit, long double at_t)
 
 typedef struct rates {
     count robust, neubauer[5];
-    int64_t later; /* further crossings that the robust search did not find, or found too many of */
+    int64_t monotone; /* packets in whose cells the field is known to be monotone along all rays */
+    int64_t later;    /* further crossings that the robust search did not find, or found too many of */
 } rates;
+
+/* All of the packet's directions. */
+static kernel_beam beam_of(const kernel_packet *p)
+{
+    kernel_beam beam = {.spread = 0};
+    float *const middle[2] = {&beam.x, &beam.y};
+    const vf slopes[2] = {p->slope_x, p->slope_y};
+    for (int a = 0; a < 2; a++) {
+        const float low = vf_reduce_min(slopes[a]), high = vf_reduce_max(slopes[a]);
+        *middle[a] = 0.5f * (low + high);
+        beam.spread = fmaxf(beam.spread, fmaxf(high - *middle[a], *middle[a] - low) * 1.000001f);
+    }
+    return beam;
+}
 
 /* First hits on all rays, and how many hits there are. */
 static vm robust_hits(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i, vf *t,
@@ -309,7 +324,9 @@ static void judge_bundle(bundle *b, rates *r)
     kernel_bounds bounds;
     const int intervals = kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
     kernel_map_setup(&map, &b->cell);
-    kernel_bounds_setup(&bounds, &map, GRID_HEX);
+    const kernel_beam beam = beam_of(&b->packet);
+    kernel_bounds_setup(&bounds, &map, GRID_HEX, &beam);
+    r->monotone += bounds.is_monotone;
     for (int n = 0; n < intervals; n++) {
         vf t[6], hits;
         unsigned hit[6];
@@ -343,13 +360,15 @@ static void robust_misses_no_first_root(void **state)
         make_bundle(&b, n);
         judge_bundle(&b, &r);
     }
-    printf("robust: %lld cubics, %lld with a certain crossing, %lld missed, worst residual %.2g\n",
-           (long long)r.robust.rays, (long long)r.robust.certain, (long long)r.robust.missed, r.robust.worst);
+    printf("robust: %lld cubics, %lld with a certain crossing, %lld missed, worst residual %.2g; monotone %lld cells\n",
+           (long long)r.robust.rays, (long long)r.robust.certain, (long long)r.robust.missed, r.robust.worst,
+           (long long)r.monotone);
     for (int steps = 0; steps < 5; steps++)
         printf("Neubauer, N = %d: no hit on %.3g %%, a later root on %.3g %% of those with a certain crossing\n", steps,
                100.0 * (double)r.neubauer[steps].missed / (double)r.neubauer[steps].certain,
                100.0 * (double)r.neubauer[steps].off / (double)r.neubauer[steps].certain);
     assert_true(r.robust.certain > cubics / 3);
+    assert_true(r.monotone > cubics / 2000);
     assert_int_equal(r.robust.missed, 0);
     assert_int_equal(r.robust.off, 0);
     assert_int_equal(r.later, 0);
