@@ -631,22 +631,6 @@ SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, con
     }
 }
 
-/* A guess at where rays of hit, which cross the triangle of corners 0, half + 1 and half + 2, meet the patch: the
- * triangle's place. */
-SIMD_INLINE void kernel_quad_guess(const int corner[4], int half, const kernel_weights *w, vm hit, vf *s, vf *r)
-{
-    static const float unit_s[4] = {0, 1, 1, 0}, unit_r[4] = {0, 0, 1, 1};
-    const int order[3] = {w->i, w->j, w->k};
-    float place_s[3], place_r[3];
-    for (int n = 0; n < 3; n++) {
-        const int at = order[n] == corner[0] ? 0 : order[n] == corner[half + 1] ? half + 1 : half + 2;
-        place_s[n] = unit_s[at];
-        place_r[n] = unit_r[at];
-    }
-    *s = vf_select(hit, kernel_weigh(w, place_s[0], place_s[1], place_s[2]), *s);
-    *r = vf_select(hit, kernel_weigh(w, place_r[0], place_r[1], place_r[2]), *r);
-}
-
 /* The crossing of a quad's patch. The isoparametric map has the same patch there, so that the field inside the cells on
  * both sides goes on to the same value. */
 SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *shape, const int corner[4],
@@ -665,18 +649,22 @@ SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *sh
     }
 }
 
-/* Weights of triangle a, b, c of the cell, and who crosses it. */
-SIMD_INLINE vm kernel_triangle(const kernel_cell *c, const kernel_edges *edges, vm rays, int i, int j, int k,
-                               kernel_weights *w)
+/* Three of the cell's vertices in the order. */
+SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3], int out[3])
 {
-    int swap;
+    int i = corners[0], j = corners[1], k = corners[2], swap;
     if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
     if (c->rank[k] < c->rank[j]) swap = j, j = k, k = swap;
     if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
-    const vm hit = kernel_inside(rays, edges->e[i][j], edges->e[j][k], edges->e[i][k]);
-    if (!vm_any(hit)) return hit;
-    *w = kernel_weights_of(i, j, k, edges->e[i][j], edges->e[j][k], edges->e[i][k]);
-    return hit;
+    out[0] = i;
+    out[1] = j;
+    out[2] = k;
+}
+
+/* Who crosses the triangle. */
+SIMD_INLINE vm kernel_triangle(const kernel_edges *edges, vm rays, const int ijk[3])
+{
+    return kernel_inside(rays, edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]], edges->e[ijk[0]][ijk[2]]);
 }
 
 /* The crossing of such a triangle; false where no ray has any. */
@@ -684,9 +672,12 @@ SIMD_INLINE bool kernel_triangle_crossing(const kernel_packet *p, const kernel_c
                                           const kernel_edges *edges, vm rays, const int corners[3], bool has_colour,
                                           kernel_crossing *out)
 {
-    kernel_weights w;
-    const vm hit = kernel_triangle(c, edges, rays, corners[0], corners[1], corners[2], &w);
+    int ijk[3];
+    kernel_triangle_order(c, corners, ijk);
+    const vm hit = kernel_triangle(edges, rays, ijk);
     if (!vm_any(hit)) return false;
+    kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]],
+                                         edges->e[ijk[0]][ijk[2]]);
     kernel_weights_mend(p, c->least[0], hit, kernel_cell_spot(c, w.i), kernel_cell_spot(c, w.j),
                         kernel_cell_spot(c, w.k), &w);
     out->mask = hit;
@@ -717,14 +708,12 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_packet *p, const kernel_cell 
 {
     kernel_quad quad;
     kernel_quad_place places[2];
-    vf s = vf_set(0), r = vf_set(0);
     vm once = vm_none();
     for (int half = 0; half < 2; half++) {
-        kernel_weights w;
-        const vm hit = kernel_triangle(c, edges, rays, corner[0], corner[half + 1], corner[half + 2], &w);
-        if (!vm_any(hit)) continue;
-        once = vm_xor(once, hit);
-        kernel_quad_guess(corner, half, &w, hit, &s, &r);
+        const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
+        int ijk[3];
+        kernel_triangle_order(c, corners, ijk);
+        once = vm_xor(once, kernel_triangle(edges, rays, ijk));
     }
     quad.e01 = edges->e[corner[0]][corner[1]];
     quad.e03 = edges->e[corner[0]][corner[3]];
@@ -735,7 +724,7 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_packet *p, const kernel_cell 
     if (kernel_quad_collapses(c, corner))
         return kernel_collapsed_crossings(p, c, shape, edges, rays, corner, has_colour, out);
     kernel_quad_take(q, c->z, corner, &quad);
-    const int n = kernel_quad_places(&quad, once, twice, s, r, places);
+    const int n = kernel_quad_places(&quad, once, twice, places);
     for (int i = 0; i < n; i++) kernel_quad_values(c, shape, corner, &places[i], has_colour, &out[i]);
     return n;
 }

@@ -11,8 +11,13 @@
 #define RENDER_KERNEL_MAP_H
 
 #include "kernel_cell.h"
+#include "kernel_wide.h"
 
 enum { KERNEL_MAP_STEPS = 10 };
+
+/* The error goes as the square of the step, times the map's curvature: below it the next one would be under float32's
+ * resolution for all but the most warped cells. */
+#define KERNEL_MAP_TOLERANCE 5e-5f
 
 typedef struct kernel_polynomial {
     float c[8];
@@ -82,9 +87,7 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0], m->exact[1]);
     kernel_polynomial_of_floats(&m->position[2], c->type, c->z, c->z[0], m->exact[2]);
     kernel_polynomial_of_floats(&m->field, c->type, c->f, 0, m->exact[3]);
-    /* The error goes as the square of the step, times the map's curvature: below 5e-5 the next one would be under
-     * float32's resolution for all but the most warped cells. */
-    m->tolerance = 5e-5f;
+    m->tolerance = KERNEL_MAP_TOLERANCE;
 }
 
 SIMD_INLINE void kernel_map_colour(kernel_map *m, const kernel_cell *c)
@@ -98,10 +101,10 @@ typedef struct kernel_product {
     vf m, dr, ds, dq;
 } kernel_product;
 
-SIMD_INLINE kernel_product kernel_map_product(const kernel_map *map, const vf r[3])
+SIMD_INLINE kernel_product kernel_product_at(bool is_pyramid, const vf r[3])
 {
     kernel_product out = {r[0] * r[1], r[1], r[0], vf_set(0)};
-    if (map->is_pyramid) {
+    if (is_pyramid) {
         /* Within the cell a / k and b / k are in [0, 1]; a step beyond the apex must not blow up. */
         const vf inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
         out.ds = vf_clamp(r[0] * inverse, vf_set(-1), vf_set(2));
@@ -112,26 +115,50 @@ SIMD_INLINE kernel_product kernel_map_product(const kernel_map *map, const vf r[
     return out;
 }
 
+SIMD_INLINE kernel_product kernel_map_product(const kernel_map *map, const vf r[3])
+{
+    return kernel_product_at(map->is_pyramid, r);
+}
+
+/* Each lane with coefficients of its own. */
+SIMD_INLINE vf kernel_value_of(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3])
+{
+    vf v = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m->m * c[4];
+    if (!is_pyramid) v += r[2] * ((r[0] * c[5] + r[1] * c[6]) + m->m * c[7]);
+    return v;
+}
+
+SIMD_INLINE void kernel_gradient_of(const vf c[8], bool is_pyramid, const kernel_product *m, const vf r[3], vf out[3])
+{
+    out[0] = c[1] + m->dr * c[4];
+    out[1] = c[2] + m->ds * c[4];
+    out[2] = c[3] + m->dq * c[4];
+    if (is_pyramid) return;
+    out[0] += r[2] * (c[5] + m->dr * c[7]);
+    out[1] += r[2] * (c[6] + m->ds * c[7]);
+    out[2] += (r[0] * c[5] + r[1] * c[6]) + m->m * c[7];
+}
+
+/* All lanes with the same. */
+SIMD_INLINE void kernel_polynomial_spread(const kernel_polynomial *p, vf out[8])
+{
+    for (int i = 0; i < 8; i++) out[i] = vf_set(p->c[i]);
+}
+
 SIMD_INLINE vf kernel_polynomial_value(const kernel_map *map, const kernel_polynomial *p, const kernel_product *m,
                                        const vf r[3])
 {
-    const float *c = p->c;
-    vf v = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m->m * c[4];
-    if (!map->is_pyramid) v += r[2] * ((r[0] * c[5] + r[1] * c[6]) + m->m * c[7]);
-    return v;
+    vf c[8];
+    kernel_polynomial_spread(p, c);
+    return kernel_value_of(c, map->is_pyramid, m, r);
 }
 
 SIMD_INLINE void kernel_polynomial_gradient(const kernel_map *map, const kernel_polynomial *p, const kernel_product *m,
                                             const vf r[3], vf out[3])
 {
-    const float *c = p->c;
-    out[0] = c[1] + m->dr * c[4];
-    out[1] = c[2] + m->ds * c[4];
-    out[2] = c[3] + m->dq * c[4];
-    if (map->is_pyramid) return;
-    out[0] += r[2] * (c[5] + m->dr * c[7]);
-    out[1] += r[2] * (c[6] + m->ds * c[7]);
-    out[2] += (r[0] * c[5] + r[1] * c[6]) + m->m * c[7];
+    vf c[8];
+    kernel_polynomial_spread(p, c);
+    kernel_gradient_of(c, map->is_pyramid, m, r, out);
 }
 
 SIMD_INLINE void kernel_cross(const vf a[3], const vf b[3], vf out[3])
@@ -153,15 +180,23 @@ typedef struct kernel_jacobian {
     vf det;
 } kernel_jacobian;
 
-SIMD_INLINE void kernel_map_jacobian(const kernel_map *map, const kernel_product *m, const vf r[3],
-                                     kernel_jacobian *out)
+SIMD_INLINE void kernel_jacobian_of(const vf position[3][8], bool is_pyramid, const kernel_product *m, const vf r[3],
+                                    kernel_jacobian *out)
 {
     vf row[3][3];
-    for (int a = 0; a < 3; a++) kernel_polynomial_gradient(map, &map->position[a], m, r, row[a]);
+    for (int a = 0; a < 3; a++) kernel_gradient_of(position[a], is_pyramid, m, r, row[a]);
     kernel_cross(row[1], row[2], out->cross[0]);
     kernel_cross(row[2], row[0], out->cross[1]);
     kernel_cross(row[0], row[1], out->cross[2]);
     out->det = kernel_dot(row[0], out->cross[0]);
+}
+
+SIMD_INLINE void kernel_map_jacobian(const kernel_map *map, const kernel_product *m, const vf r[3],
+                                     kernel_jacobian *out)
+{
+    vf position[3][8];
+    for (int a = 0; a < 3; a++) kernel_polynomial_spread(&map->position[a], position[a]);
+    kernel_jacobian_of((const vf(*)[8])position, map->is_pyramid, m, r, out);
 }
 
 /* From the guess in r to the coordinates of the point at depth t on each ray of wanted, by Newton's method. Returns the
@@ -225,17 +260,45 @@ SIMD_INLINE vf kernel_map_value(const kernel_map *map, const kernel_polynomial *
     return kernel_polynomial_value(map, field, &m, r);
 }
 
-/* The direction of the field's gradient at r, in tile space. */
-SIMD_INLINE void kernel_map_normal(const kernel_map *map, const vf r[3], vf out[3])
+/* Maps of cells of one kind, each lane's its own. */
+typedef struct kernel_map_lanes {
+    bool is_pyramid;
+    float tolerance;
+    vf origin[3], position[3][8], field[8];
+    kernel_half exact[2][4][8]; /* by halves of the lanes */
+} kernel_map_lanes;
+
+SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
 {
-    const kernel_product m = kernel_map_product(map, r);
+    out->is_pyramid = map->is_pyramid;
+    out->tolerance = map->tolerance;
+    for (int a = 0; a < 3; a++) {
+        out->origin[a] = vf_set(map->origin[a]);
+        kernel_polynomial_spread(&map->position[a], out->position[a]);
+    }
+    kernel_polynomial_spread(&map->field, out->field);
+    for (int n = 0; n < 4; n++)
+        for (int i = 0; i < 8; i++) out->exact[0][n][i] = out->exact[1][n][i] = (kernel_half){0} + map->exact[n][i];
+}
+
+/* The direction of the field's gradient at r, in tile space. */
+SIMD_INLINE void kernel_lanes_normal(const kernel_map_lanes *map, const vf r[3], vf out[3])
+{
+    const kernel_product m = kernel_product_at(map->is_pyramid, r);
     kernel_jacobian j;
     vf g[3];
-    kernel_map_jacobian(map, &m, r, &j);
-    kernel_polynomial_gradient(map, &map->field, &m, r, g);
+    kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
+    kernel_gradient_of(map->field, map->is_pyramid, &m, r, g);
     /* grad = J^-T g: the columns of J^-1 are cross / det, and the sign of det is settled by whoever turns the normal.
      */
     for (int a = 0; a < 3; a++) out[a] = kernel_dot(j.cross[a], g);
+}
+
+SIMD_INLINE void kernel_map_normal(const kernel_map *map, const vf r[3], vf out[3])
+{
+    kernel_map_lanes lanes;
+    kernel_map_spread(map, &lanes);
+    kernel_lanes_normal(&lanes, r, out);
 }
 
 #endif

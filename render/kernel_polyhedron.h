@@ -240,7 +240,6 @@ static void kernel_passage_quad(const kernel_packet *p, const polyhedron *c, int
     kernel_weights w;
     kernel_quad quad;
     kernel_quad_place places[2];
-    vf s = vf_set(0), q = vf_set(0);
     int corner[4];
     for (int i = 0; i < 4; i++) ranks.rank[i] = around[i]; /* numbers are in the order */
     kernel_quad_corners(&ranks, loop, corner);
@@ -249,14 +248,11 @@ static void kernel_passage_quad(const kernel_packet *p, const polyhedron *c, int
     const int twin = c->facets[first].twin, half_of[2] = {has_corner ? first : twin, has_corner ? twin : first};
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
     kernel_meeting *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
-    for (int half = 0; half < 2; half++) {
-        const vm hit = kernel_passage_facet(p, c, t[half], rays, has_colour, r, &w, m[half]);
-        if (vm_any(hit)) kernel_quad_guess(corner, half, &w, hit, &s, &q);
-    }
+    for (int half = 0; half < 2; half++) kernel_passage_facet(p, c, t[half], rays, has_colour, r, &w, m[half]);
     kernel_quad_of_facets(c, r, t, corner, &quad);
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
     const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
-    const int count = kernel_quad_places(&quad, once, twice, s, q, places);
+    const int count = kernel_quad_places(&quad, once, twice, places);
     if (count == 2) kernel_places_pair(m, places);
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();

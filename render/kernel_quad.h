@@ -341,10 +341,19 @@ SIMD_INLINE vm kernel_patch_newton(const kernel_patch *p, vf *s, vf *r)
     }
 }
 
-/* Where rays of once, which meet the triangles once, meet the patch, from the guess s, r. */
-SIMD_INLINE void kernel_quad_meet(const kernel_quad *q, vm once, vf s, vf r, kernel_quad_place *out)
+/* A guess at the place: how far it is between two sides, by the triangles that the ray makes with each. */
+SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, int l)
+{
+    const vf near = vf_abs(q->x[i] * q->y[j] - q->x[j] * q->y[i]), far = vf_abs(q->x[k] * q->y[l] - q->x[l] * q->y[k]);
+    const vf sum = near + far;
+    return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
+}
+
+/* Where rays of once, which meet the triangles once, meet the patch. */
+SIMD_INLINE void kernel_quad_meet(const kernel_quad *q, vm once, kernel_quad_place *out)
 {
     kernel_patch patch;
+    vf s = kernel_quad_between(q, 0, 3, 1, 2), r = kernel_quad_between(q, 0, 1, 3, 2);
     kernel_patch_setup(&patch, q);
     const vm left = vm_andnot(once, kernel_patch_newton(&patch, &s, &r));
     *out = (kernel_quad_place){once, s, r, kernel_bilinear(q->z, s, r)};
@@ -375,14 +384,13 @@ SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
-/* Where rays meet the patch, those of once from the guess s, r, those of twice in two places or none. Returns how many
- * of out there are, 0 to 2. */
-SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, vf s, vf r, kernel_quad_place out[2])
+/* Where rays meet the patch, those of twice in two places or none. Returns how many of out there are, 0 to 2. */
+SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kernel_quad_place out[2])
 {
     const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
-        kernel_quad_meet(q, once, s, r, &out[0]);
+        kernel_quad_meet(q, once, &out[0]);
         count = 1;
     }
     if (!vm_any(twice)) return count;

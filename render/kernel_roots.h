@@ -17,11 +17,8 @@
  * piece is halved, the nearer half first. At 2^-12 of the interval halving ends: a pair of roots that is missed there
  * dips below 0 by at most |F''| (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own rounding of F.
  *
- * Before any of that a bound of the whole cell is asked. Let L be linear in the point, with the field's gradient at the
- * cell's centre, and E = F - L(X), polynomial as F is and small where the field is smooth. Along the ray L(X) is
- * linear, and |(r*)'| <= L_stretch |J0^-1 d|, d the ray's direction: where |grad L . d| is more than the largest |grad
- * E| times that, F is monotone along every ray in the cell, and the signs at the faces tell all. And where L at both
- * ends is farther from 0 than the largest |E|, on one side, there is no root. Both ask for no coordinates in the cell.
+ * Before any of that bounds of the whole cell are asked (kernel_bounds.h): where the field is monotone along every ray
+ * in the cell, the signs at the faces tell all, and where it is far from the isovalue at both, there is no root.
  *
  * The pyramid's m = a b / k is no polynomial, but its second derivative along a line has one sign, so that F(c(u)) lies
  * between its chord and its end tangents and e(u) below e's: the same two slopes at the ends bound them.
@@ -34,242 +31,12 @@
 #ifndef RENDER_KERNEL_ROOTS_H
 #define RENDER_KERNEL_ROOTS_H
 
+#include "kernel_bounds.h"
 #include "kernel_neubauer.h"
-#include "kernel_wide.h"
 
 #define KERNEL_ROOT_BAND 3e-7f /* rounding of F where the largest |F| at a vertex is near 1 */
-#define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
-#define KERNEL_DOMAIN_RIM 0.03125
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
-
-/* Of one cell and isovalue. */
-typedef struct kernel_bounds {
-    kernel_polynomial bent[3]; /* N */
-    float inverse[3][3];       /* J0^-1 */
-    float stretch;             /* L */
-    float slope;               /* G */
-    float curve, twist;        /* H, K; of a pyramid: times k */
-    float coarsest;            /* longer pieces are halved in any case */
-    bool is_monotone;          /* the field along any ray of the beam */
-    float level, gradient[3];  /* of L: at vertex 0, and along tile space */
-    float thickness;           /* of |E|, and what rounding adds to it */
-} kernel_bounds;
-
-/* Derivatives of the products r s, r q, s q, r s q. */
-static inline void kernel_product_slopes(const double r[3], double out[4][3])
-{
-    const double slopes[4][3] = {
-        {r[1], r[0], 0}, {r[2], 0, r[0]}, {0, r[2], r[1]}, {r[1] * r[2], r[0] * r[2], r[0] * r[1]}};
-    memcpy(out, slopes, sizeof slopes);
-}
-
-/* The corners of the cell's domain, widened by KERNEL_DOMAIN_RIM on all sides for what rounding takes out of it; of a
- * pyramid a / k, b / k and k. */
-static inline int kernel_corner_count(int type)
-{
-    return type == GRID_WEDGE ? 6 : 8;
-}
-
-static inline void kernel_domain_corner(int type, int n, double r[3])
-{
-    const double wide = KERNEL_DOMAIN_RIM;
-    if (type == GRID_WEDGE) {
-        r[0] = n % 3 == 1 ? 1 + 2 * wide : -wide;
-        r[1] = n % 3 == 2 ? 1 + 2 * wide : -wide;
-        r[2] = n < 3 ? -wide : 1 + wide;
-        return;
-    }
-    for (int a = 0; a < 3; a++) r[a] = n >> a & 1 ? 1 + wide : -wide;
-}
-
-/* The extreme slopes of the products over the cell's widened domain. Returns how many; the first is the centre's. */
-static inline int kernel_extreme_slopes(int type, double out[9][4][3])
-{
-    int n = 0;
-    if (type == GRID_WEDGE) kernel_product_slopes((const double[]){1.0 / 3, 1.0 / 3, 0.5}, out[n++]);
-    if (type == GRID_HEX) kernel_product_slopes((const double[]){0.5, 0.5, 0.5}, out[n++]);
-    if (type == GRID_PYRAMID) {
-        memset(out, 0, 9 * sizeof *out);
-        for (int a = 0; a < 3; a++) out[n][0][a] = a == 2 ? -0.5 : 0.5;
-        n++;
-    }
-    for (int i = 0; i < kernel_corner_count(type); i++, n++) {
-        double r[3];
-        kernel_domain_corner(type, i, r);
-        if (type != GRID_PYRAMID) kernel_product_slopes(r, out[n]);
-        if (type == GRID_PYRAMID)
-            for (int a = 0; a < 3; a++) out[n][0][a] = a == 2 ? -r[a] : r[a];
-    }
-    return n;
-}
-
-/* Frobenius norm of a polynomial's Hessian over the widened domain; of a pyramid's times k: those of a b / k with a / k
- * and b / k in [-1/32, 33/32] are at most 1, 33/32, 33/32 and 2.13 over k, their norm 3.29. */
-static inline double kernel_hessian_norm(int type, const double c[4])
-{
-    if (type == GRID_PYRAMID) return fabs(c[0]) * 3.29;
-    double sum = 0;
-    for (int j = 0; j < 3; j++) {
-        const double largest =
-            fmax(fabs(c[j] - KERNEL_DOMAIN_RIM * c[3]), fabs(c[j] + (1 + 2 * KERNEL_DOMAIN_RIM) * c[3]));
-        sum += 2 * largest * largest;
-    }
-    return sqrt(sum);
-}
-
-static inline bool kernel_invert_matrix(const double m[3][3], double out[3][3])
-{
-    double cofactor[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) {
-            const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-            cofactor[i][k] = m[i1][k1] * m[i2][k2] - m[i1][k2] * m[i2][k1];
-        }
-    const double det = m[0][0] * cofactor[0][0] + m[0][1] * cofactor[0][1] + m[0][2] * cofactor[0][2];
-    const double inverse = det != 0 ? 1 / det : 0;
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) out[i][k] = cofactor[k][i] * inverse;
-    return det != 0 && isfinite(inverse);
-}
-
-static inline void kernel_bounds_bend(kernel_bounds *b, const kernel_map *map, const double slopes[4][3],
-                                      double bent[3][4])
-{
-    double jacobian[3][3], inverse[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int a = 0; a < 3; a++) {
-            jacobian[i][a] = (double)map->position[i].c[1 + a];
-            for (int j = 0; j < 4; j++) jacobian[i][a] += (double)map->position[i].c[4 + j] * slopes[j][a];
-        }
-    const bool is_solid = kernel_invert_matrix(jacobian, inverse);
-    memset(b, 0, sizeof *b);
-    for (int i = 0; i < 3; i++) {
-        for (int a = 0; a < 3; a++) b->inverse[i][a] = is_solid ? (float)inverse[i][a] : 0;
-        for (int j = 0; j < 4; j++) {
-            bent[i][j] = 0;
-            for (int a = 0; a < 3; a++) bent[i][j] += is_solid ? inverse[i][a] * (double)map->position[a].c[4 + j] : 0;
-            b->bent[i].c[4 + j] = (float)bent[i][j];
-        }
-    }
-    b->coarsest = is_solid ? 1 : 0.125f;
-}
-
-/* A bound of how much m lengthens a vector, at most 1.15 times what it is: the norm of its singular values to the
- * eighth power, which is one, and so convex as they all are. */
-static inline double kernel_matrix_norm(const double m[3][3])
-{
-    double square[3][3], sum = 0;
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k <= i; k++)
-            square[i][k] = square[k][i] = m[0][i] * m[0][k] + m[1][i] * m[1][k] + m[2][i] * m[2][k];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) {
-            const double fourth =
-                square[i][0] * square[k][0] + square[i][1] * square[k][1] + square[i][2] * square[k][2];
-            sum += fourth * fourth;
-        }
-    return sqrt(sqrt(sqrt(sum)));
-}
-
-/* Rays' directions: (x, y, 1), and up to spread off that in both. */
-typedef struct kernel_beam {
-    float x, y, spread;
-} kernel_beam;
-
-/* The largest and least of |v . d| over the beam's directions d. */
-static inline double kernel_beam_most(const kernel_beam *beam, double v0, double v1, double v2)
-{
-    return fabs(v0 * (double)beam->x + v1 * (double)beam->y + v2) + (double)beam->spread * (fabs(v0) + fabs(v1));
-}
-
-static inline double kernel_beam_least(const kernel_beam *beam, double v0, double v1, double v2)
-{
-    return fabs(v0 * (double)beam->x + v1 * (double)beam->y + v2) - (double)beam->spread * (fabs(v0) + fabs(v1));
-}
-
-/* E and what follows of it. */
-static inline void kernel_bounds_linear(kernel_bounds *b, const kernel_map *map, const double slopes[9][4][3],
-                                        const int count, const int type, const kernel_beam *beam)
-{
-    double e[8], most = 0, steep = 0, speed = 0, size = 0;
-    for (int i = 0; i < 3; i++) {
-        double g = 0;
-        for (int a = 0; a < 3; a++) {
-            double df = map->exact[3][1 + a];
-            for (int j = 0; j < 4; j++) df += map->exact[3][4 + j] * slopes[0][j][a];
-            g += df * (double)b->inverse[a][i];
-        }
-        b->gradient[i] = (float)g;
-    }
-    for (int j = 0; j < 8; j++) {
-        e[j] = map->exact[3][j];
-        for (int i = 0; i < 3; i++) e[j] -= (double)b->gradient[i] * map->exact[i][j];
-    }
-    b->level = (float)e[0];
-    e[0] -= (double)b->level;
-    for (int n = 1; n < count; n++) {
-        double sum = 0;
-        for (int a = 0; a < 3; a++) {
-            double d = e[1 + a];
-            for (int j = 0; j < 4; j++) d += e[4 + j] * slopes[n][j][a];
-            sum += d * d;
-        }
-        steep = sum > steep ? sum : steep;
-    }
-    for (int n = 0; n < kernel_corner_count(type); n++) {
-        double r[3];
-        kernel_domain_corner(type, n, r);
-        const double m = r[0] * r[1] * (type == GRID_PYRAMID ? r[2] : 1);
-        if (type == GRID_PYRAMID) r[0] *= r[2], r[1] *= r[2];
-        const double at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + m * e[4] +
-                          r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
-        most = fabs(at) > most ? fabs(at) : most;
-    }
-    for (int i = 0; i < 3; i++) size += fabs((double)b->gradient[i]) * (double)map->reach[i];
-    /* A hundred-thousandth for the rounding of what is near 1, and of places to some units of where they are. */
-    b->thickness = (float)(most + 1e-5 + 16 * 6e-8 * size);
-    for (int i = 0; i < 3; i++) {
-        const double most_of =
-            kernel_beam_most(beam, (double)b->inverse[i][0], (double)b->inverse[i][1], (double)b->inverse[i][2]);
-        speed += most_of * most_of;
-    }
-    const double rise = kernel_beam_least(beam, (double)b->gradient[0], (double)b->gradient[1], (double)b->gradient[2]);
-    b->is_monotone = b->coarsest == 1 && rise * 0.9999 > sqrt(steep * speed) * (double)b->stretch;
-}
-
-static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, int type, const kernel_beam *beam)
-{
-    double slopes[9][4][3], bent[3][4], field[4], theta = 0, gradient = 0, twist = 0;
-    const int count = kernel_extreme_slopes(type, slopes);
-    kernel_bounds_bend(b, map, slopes[0], bent);
-    for (int n = 1; n < count; n++) {
-        double steep = 0, m[3][3];
-        for (int a = 0; a < 3; a++) {
-            double f = (double)map->field.c[1 + a];
-            for (int j = 0; j < 4; j++) f += (double)map->field.c[4 + j] * slopes[n][j][a];
-            steep += f * f;
-            for (int i = 0; i < 3; i++) {
-                m[i][a] = 0;
-                for (int j = 0; j < 4; j++) m[i][a] += bent[i][j] * (slopes[n][j][a] - slopes[0][j][a]);
-            }
-        }
-        const double move = kernel_matrix_norm((const double(*)[3])m);
-        theta = move > theta ? move : theta;
-        gradient = steep > gradient ? steep : gradient;
-    }
-    if (!(theta < 0.9)) b->coarsest = 0.125f;
-    b->stretch = theta < 0.9 ? (float)(1 / (1 - theta)) : 10;
-    b->slope = (float)sqrt(gradient);
-    for (int j = 0; j < 4; j++) field[j] = (double)map->field.c[4 + j];
-    for (int i = 0; i < 3; i++) {
-        const double h = kernel_hessian_norm(type, bent[i]);
-        twist += h * h;
-    }
-    b->curve = (float)kernel_hessian_norm(type, field);
-    b->twist = (float)sqrt(twist);
-    kernel_bounds_linear(b, map, (const double(*)[4][3])slopes, count, type, beam);
-}
 
 /* What is known of a piece. */
 typedef struct kernel_verdict {
@@ -400,14 +167,18 @@ SIMD_INLINE void kernel_search_begin(kernel_packet *p, kernel_search *s, vm rays
     s->size = vf_set(0.5f);
     const vm change = vm_xor(vf_lt(i->v_in, zero), vf_lt(i->v_out, zero));
     if (s->bounds->coarsest == 1) {
-        const vf thick = vf_set(s->bounds->thickness);
-        const vm far = vm_and(vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_in)),
-                              vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_out)));
-        rays = vm_andnot(rays, vm_andnot(far, change));
+        vm far;
         if (s->bounds->is_monotone) {
             s->found = vm_and(rays, change);
             rays = vm_andnot(rays, change);
+            far = vf_lt(vf_set(s->bounds->jump), vf_min(vf_abs(i->v_in), vf_abs(i->v_out)));
+        } else {
+            const vf thick = vf_set(s->bounds->thickness);
+            far = vm_and(vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_in)),
+                         vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_out)));
+            far = vm_andnot(far, change);
         }
+        rays = vm_andnot(rays, far);
         if (!vm_any(rays)) return;
     }
     const vf gap = vf_max(kernel_face_gap(p, s, &s->low), kernel_face_gap(p, s, &s->high));
@@ -514,86 +285,110 @@ SIMD_INLINE void kernel_bracket(kernel_packet *p, const kernel_search *s, vm ray
 
 /* ---- the last step ---- */
 
-SIMD_INLINE kernel_wide kernel_wide_value(const double c[8], const kernel_wide r[3], kernel_wide m)
+SIMD_INLINE kernel_half kernel_half_value(const kernel_half c[8], const kernel_half r[3], kernel_half m)
 {
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
+/* Rays in tile space. */
+typedef struct kernel_rays {
+    vf origin_x, origin_y, slope_x, slope_y;
+} kernel_rays;
+
 /* How far the places r at depth t are off their rays, and the field there, in double: exact but for the rounding of r
  * and t themselves. */
-SIMD_INLINE void kernel_residuals(const kernel_packet *p, const kernel_map *map, const kernel_point *at, vf off[3],
-                                  vf *value)
+SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_point *at,
+                                  vf off[3], vf *value)
 {
-    const kernel_wide r[3] = {kernel_widen(at->r[0]), kernel_widen(at->r[1]), kernel_widen(at->r[2])};
-    const kernel_wide t = kernel_widen(at->t);
-    kernel_wide m = r[0] * r[1];
-    if (map->is_pyramid) m /= kernel_widen(vf_max(at->r[2], vf_set(1e-6f)));
-    const kernel_wide x = kernel_widen(p->origin_x) + kernel_widen(p->slope_x) * t;
-    const kernel_wide y = kernel_widen(p->origin_y) + kernel_widen(p->slope_y) * t;
-    off[0] = kernel_narrow(x - (double)map->origin[0] - kernel_wide_value(map->exact[0], r, m));
-    off[1] = kernel_narrow(y - (double)map->origin[1] - kernel_wide_value(map->exact[1], r, m));
-    off[2] = kernel_narrow(t - (double)map->origin[2] - kernel_wide_value(map->exact[2], r, m));
-    *value = kernel_narrow(kernel_wide_value(map->exact[3], r, m));
+    for (int half = 0; half < 2; half++) {
+        kernel_half r[3], target[3];
+        const kernel_half t = kernel_half_of(&at->t, half);
+        for (int a = 0; a < 3; a++) r[a] = kernel_half_of(&at->r[a], half);
+        kernel_half m = r[0] * r[1];
+        if (map->is_pyramid) {
+            const vf k = vf_max(at->r[2], vf_set(1e-6f));
+            m /= kernel_half_of(&k, half);
+        }
+        target[0] = kernel_half_of(&rays->origin_x, half) + kernel_half_of(&rays->slope_x, half) * t;
+        target[1] = kernel_half_of(&rays->origin_y, half) + kernel_half_of(&rays->slope_y, half) * t;
+        target[2] = t;
+        for (int a = 0; a < 3; a++)
+            kernel_half_put(&off[a], half,
+                            target[a] - kernel_half_of(&map->origin[a], half) -
+                                kernel_half_value(map->exact[half][a], r, m));
+        kernel_half_put(value, half, kernel_half_value(map->exact[half][3], r, m));
+    }
 }
 
 /* A step of Newton's method on the four equations X(r) = ray(t), F(r) = 0 at once, from how far these are off; t is
- * kept within the bracket. Returns who has come to its end. */
-SIMD_INLINE vm kernel_polish_step(const kernel_packet *p, const kernel_search *s, vm rays, const kernel_product *m,
-                                  const vf off[3], vf field, kernel_point *out)
+ * kept within the bracket. Returns who has not come to its end. */
+SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_point *low,
+                                  const kernel_point *high, vm wanted, const kernel_product *m, const vf off[3],
+                                  vf field, kernel_point *out)
 {
-    const kernel_map *map = s->map;
     const vf zero = vf_set(0);
     kernel_jacobian j;
     vf gradient[3], step[3], speed[3], largest = zero;
-    kernel_map_jacobian(map, m, out->r, &j);
-    kernel_polynomial_gradient(map, &map->field, m, out->r, gradient);
+    kernel_jacobian_of(map->position, map->is_pyramid, m, out->r, &j);
+    kernel_gradient_of(map->field, map->is_pyramid, m, out->r, gradient);
     const vm flat = vf_eq(j.det, zero);
     const vf inverse = vf_select(flat, zero, 1.0f / j.det);
     for (int a = 0; a < 3; a++) {
         step[a] = ((j.cross[0][a] * off[0] + j.cross[1][a] * off[1]) + j.cross[2][a] * off[2]) * inverse;
-        speed[a] = ((j.cross[0][a] * p->slope_x + j.cross[1][a] * p->slope_y) + j.cross[2][a]) * inverse;
+        speed[a] = ((j.cross[0][a] * rays->slope_x + j.cross[1][a] * rays->slope_y) + j.cross[2][a]) * inverse;
     }
     const vf value = field + kernel_dot(gradient, step), rate = kernel_dot(gradient, speed);
     const vf move = vf_select(vf_eq(rate, zero), zero, -(value / rate));
-    const vf t = vf_clamp(out->t + move, s->low.t, s->high.t);
+    const vf t = vf_clamp(out->t + move, low->t, high->t);
     for (int a = 0; a < 3; a++) {
         const vf change = vf_clamp(step[a] + speed[a] * (t - out->t), vf_set(-1), vf_set(1));
         largest = vf_max(largest, vf_abs(change));
-        out->r[a] = vf_select(rays, vf_clamp(out->r[a] + change, vf_set(-1), vf_set(2)), out->r[a]);
+        out->r[a] = vf_select(wanted, vf_clamp(out->r[a] + change, vf_set(-1), vf_set(2)), out->r[a]);
     }
-    out->t = vf_select(rays, t, out->t);
-    return vm_and(rays, vm_andnot(vf_le(largest, vf_set(map->tolerance)), flat));
+    out->t = vf_select(wanted, t, out->t);
+    return vm_and(wanted, vm_not(vm_andnot(vf_le(largest, vf_set(map->tolerance)), flat)));
 }
 
-/* The roots between low and high by such steps, the last of them from residuals in double; where they do not converge,
- * by the bracket alone. */
+/* The roots between low and high by such steps, the last of them from residuals in double. Returns those of wanted on
+ * which they do not converge. */
+SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted,
+                                   const kernel_point *low, const kernel_point *high, kernel_point *out)
+{
+    const vf zero = vf_set(0), fall = low->value - high->value;
+    const vf along = vf_clamp(vf_select(vf_eq(fall, zero), zero, low->value / fall), zero, vf_set(1));
+    vm open = wanted;
+    vf off[3], value;
+    out->t = low->t + along * (high->t - low->t);
+    out->value = zero;
+    for (int a = 0; a < 3; a++) out->r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
+    for (int n = 0; n < KERNEL_POLISH_STEPS && vm_any(open); n++) {
+        const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
+        const vf target[3] = {(rays->origin_x + rays->slope_x * out->t) - map->origin[0],
+                              (rays->origin_y + rays->slope_y * out->t) - map->origin[1], out->t - map->origin[2]};
+        for (int a = 0; a < 3; a++) off[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, &m, out->r);
+        value = kernel_value_of(map->field, map->is_pyramid, &m, out->r);
+        open = kernel_polish_step(rays, map, low, high, open, &m, off, value, out);
+    }
+    const vm close = vm_andnot(wanted, open);
+    if (vm_any(close)) {
+        const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
+        kernel_point last = *out;
+        kernel_residuals(rays, map, out, off, &value);
+        /* At a double root the field's slope is rounding, and a step by it leads away. */
+        const vm away = kernel_polish_step(rays, map, low, high, close, &m, off, value, &last);
+        kernel_place_move(vm_andnot(close, away), &last, out);
+    }
+    return open;
+}
+
+/* On the packet's rays, all in one cell; where steps do not converge, by the bracket alone. */
 SIMD_INLINE void kernel_polish(kernel_packet *p, const kernel_search *s, kernel_point *out)
 {
-    const kernel_map *map = s->map;
-    const vf zero = vf_set(0), fall = s->low.value - s->high.value;
-    const vf along = vf_clamp(vf_select(vf_eq(fall, zero), zero, s->low.value / fall), zero, vf_set(1));
-    vm open = s->found;
-    vf off[3], value;
-    out->t = s->low.t + along * (s->high.t - s->low.t);
-    out->value = zero;
-    for (int a = 0; a < 3; a++) out->r[a] = s->low.r[a] + along * (s->high.r[a] - s->low.r[a]);
-    for (int n = 0; n < KERNEL_POLISH_STEPS && vm_any(open); n++) {
-        const kernel_product m = kernel_map_product(map, out->r);
-        const vf target[3] = {(p->origin_x + p->slope_x * out->t) - map->origin[0],
-                              (p->origin_y + p->slope_y * out->t) - map->origin[1], out->t - map->origin[2]};
-        for (int a = 0; a < 3; a++) off[a] = target[a] - kernel_polynomial_value(map, &map->position[a], &m, out->r);
-        value = kernel_polynomial_value(map, &map->field, &m, out->r);
-        open = vm_andnot(open, kernel_polish_step(p, s, open, &m, off, value, out));
-    }
-    const vm close = vm_andnot(s->found, open);
-    if (vm_any(close)) {
-        const kernel_product m = kernel_map_product(map, out->r);
-        kernel_point last = *out;
-        kernel_residuals(p, map, out, off, &value);
-        /* At a double root the field's slope is rounding, and a step by it leads away. */
-        kernel_place_move(kernel_polish_step(p, s, close, &m, off, value, &last), &last, out);
-    }
+    const kernel_rays rays = {p->origin_x, p->origin_y, p->slope_x, p->slope_y};
+    kernel_map_lanes map;
+    kernel_map_spread(s->map, &map);
+    const vm open = kernel_polish_lanes(&rays, &map, s->found, &s->low, &s->high, out);
     if (vm_any(open)) kernel_bracket(p, s, open, out);
 }
 

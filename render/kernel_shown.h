@@ -1,8 +1,8 @@
 /* Isosurfaces by one traversal a frame: the trees are gone down once for the whole picture, and each cell that the
  * surface crosses, or that shows in the volume, is fetched and placed once, to find the pixels that it may show in; the
  * cells are then binned by tile (render_shown.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace them
- * from the nearest on, blocks that know of something nearer left out (kernel_tile_shown.h, kernel_batch.h; of the volume
- * kernel_tile_cells.h):
+ * from the nearest on, blocks that know of something nearer left out (kernel_tile_shown.h, kernel_batch.h; of the
+ * volume kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
@@ -162,6 +162,78 @@ SIMD_INLINE bool kernel_outline_shown(const kernel_finder *s, kernel_outline *o,
     return kernel_extents_shown(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
 }
 
+/* ---- hexes: kernel_slab_outline() with a pair of vertices a lane ---- */
+
+enum { KERNEL_HEX_PAIRS = 32 }; /* 28 of them */
+
+/* A hex's vertices by lane. */
+SIMD_INLINE vf kernel_eight_pick(const float v[16], vi index)
+{
+    if (SIMD_WIDTH >= 8) return vf_permute(vf_load(v), index);
+    return vf_gather(v, index);
+}
+
+typedef struct kernel_slab_ends {
+    vm any;
+    vf low[3], high[3]; /* depth; columns and rows, relative to the axis of view */
+} kernel_slab_ends;
+
+SIMD_INLINE void kernel_slab_add(const kernel_finder *s, kernel_slab_ends *e, vm points, const vf at[3])
+{
+    vf by = at[2] - s->t_near;
+    if (s->frame->job->camera.is_orthographic) by = vf_set(1);
+    const vf places[3] = {at[2], at[0] * s->column_scale / by, at[1] * s->row_scale / by};
+    e->any = vm_or(e->any, points);
+    for (int a = 0; a < 3; a++) {
+        e->low[a] = vf_select(points, vf_min(e->low[a], places[a]), e->low[a]);
+        e->high[a] = vf_select(points, vf_max(e->high[a], places[a]), e->high[a]);
+    }
+}
+
+/* L at the vertices, and the slab's thickness. */
+SIMD_INLINE bool kernel_slab_shown(const kernel_finder *s, const kernel_cell *c, const float values[16],
+                                   float thickness, kernel_shown *out)
+{
+    static const int32_t from[KERNEL_HEX_PAIRS] = {1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 5, 6,
+                                                   6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 7, 0, 0, 0, 0};
+    static const int32_t to[KERNEL_HEX_PAIRS] = {0, 0, 1, 0, 1, 2, 0, 1, 2, 3, 0, 1, 2, 3, 4, 0,
+                                                 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 6, 0, 0, 0, 0};
+    static const int32_t own[16] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+    float place[3][16] = {{0}};
+    kernel_slab_ends ends = {.any = vm_none()};
+    memcpy(place[0], c->x, sizeof c->x);
+    memcpy(place[1], c->y, sizeof c->y);
+    memcpy(place[2], c->z, sizeof c->z);
+    for (int a = 0; a < 3; a++) ends.low[a] = vf_set(INFINITY), ends.high[a] = vf_set(-INFINITY);
+    for (int n = 0; n < 8; n += SIMD_WIDTH) {
+        vi i;
+        vf at[3];
+        memcpy(&i, own + n, sizeof i);
+        for (int a = 0; a < 3; a++) at[a] = kernel_eight_pick(place[a], i);
+        kernel_slab_add(s, &ends, vf_le(vf_abs(kernel_eight_pick(values, i)), vf_set(thickness)), at);
+    }
+    for (int n = 0; n < KERNEL_HEX_PAIRS; n += SIMD_WIDTH) {
+        vi i, j;
+        vf begin[3], edge[3];
+        memcpy(&i, from + n, sizeof i);
+        memcpy(&j, to + n, sizeof j);
+        const vf v = kernel_eight_pick(values, i), w = kernel_eight_pick(values, j), inverse = 1.0f / (w - v);
+        for (int a = 0; a < 3; a++) {
+            begin[a] = kernel_eight_pick(place[a], i);
+            edge[a] = kernel_eight_pick(place[a], j) - begin[a];
+        }
+        for (int side = -1; side <= 1; side += 2) {
+            const vf level = vf_set((float)side * thickness), along = (level - v) * inverse;
+            const vf at[3] = {begin[0] + along * edge[0], begin[1] + along * edge[1], begin[2] + along * edge[2]};
+            kernel_slab_add(s, &ends, vm_xor(vf_lt(v, level), vf_lt(w, level)), at);
+        }
+    }
+    if (!vm_any(ends.any)) return false;
+    kernel_extent extents[3];
+    for (int a = 0; a < 3; a++) extents[a] = (kernel_extent){vf_reduce_min(ends.low[a]), vf_reduce_max(ends.high[a])};
+    return kernel_extents_shown(s, extents[0], kernel_largest(c->z, 8) + fabsf(s->t_near), extents[1], extents[2], out);
+}
+
 SIMD_INLINE void kernel_add_shown(kernel_finder *s, const kernel_shown *shown)
 {
     kernel_shown_list *list = s->list;
@@ -202,11 +274,15 @@ static void kernel_find_value(kernel_finder *s, int value)
     kernel_cell *c = &s->cell;
     kernel_outline o;
     kernel_shown shown = {.cell = c->index, .source = s->source + (uint32_t)value};
+    float at[16] = {0}, thickness;
     if (!kernel_cell_straddles(c, layer->values[value])) return;
     if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_cell_relative(c, layer->values[value]);
     if (c->type == GRID_TET) {
         if (!kernel_tet_outline(c, &o)) return;
+    } else if (c->type == GRID_HEX && kernel_linear_part(c, at, &thickness)) {
+        if (kernel_slab_shown(s, c, at, thickness, &shown)) kernel_add_shown(s, &shown);
+        return;
     } else {
         kernel_vertex_outline(c, &o);
         if (!kernel_slab_outline(c, &o)) return;
@@ -511,6 +587,8 @@ static void kernel_find_coming(kernel_finder *s)
     }
     const grid *g = s->frame->job->parts[s->part].cells;
     const grid_field *field = &s->field->fields[s->part];
+    if (!s->surface || g->cell_type != GRID_TET)
+        for (int n = 0; n < s->coming_count; n++) kernel_tile_prefetch_vertices(g, field, s->coming[n]);
     for (int n = 0; n < s->coming_count; n++) {
         const uint32_t cell = s->coming[n];
         if (s->surface && grid_cell_type(g, cell) == GRID_TET) {

@@ -244,15 +244,17 @@ typedef struct kernel_surface_cache {
     kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
 } kernel_surface_cache;
 
-SIMD_INLINE void kernel_poly_setup(const kernel_packet *p, kernel_poly *poly, const render_surface_layer *layer,
-                                   const kernel_cell *c, int value)
+SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *tile, kernel_poly *poly,
+                                   const render_surface_layer *layer, const kernel_cell *c, int value)
 {
     if (poly->is_set_up) return;
     poly->is_set_up = true;
     poly->value = value;
     kernel_map_setup(&poly->map, c);
     if (layer->colour_map) kernel_map_colour(&poly->map, c);
-    const kernel_beam beam = {.spread = p->tile->radius};
+    const bool flat = f->job->camera.is_orthographic;
+    const float shift = fabsf((float)f->depth_shift), radius = tile->radius;
+    const kernel_beam beam = {.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
     if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type, &beam);
 }
 
@@ -314,7 +316,7 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         const vm wanted = vm_and(near, layer->root == RENDER_ROBUST ? room : kernel_changes_sign(i));
         if (!vm_any(wanted)) continue;
-        kernel_poly_setup(p, poly, layer, c, value);
+        kernel_poly_setup(p->frame, p->tile, poly, layer, c, value);
         if (layer->root == RENDER_ROBUST) {
             kernel_poly_robust(p, state, c, poly, i, wanted);
             continue;

@@ -4,6 +4,7 @@
 #define RENDER_KERNEL_TILE_SHOWN_H
 
 #include "kernel_batch.h"
+#include "kernel_hexes.h"
 
 /* A tile's cells by depth, as far as it takes to leave out what is hidden: in so many parts of the tile's depth, in any
  * order within each. */
@@ -52,8 +53,8 @@ SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
     return vf_reduce_max(far);
 }
 
-static void kernel_tile_meet(kernel_tile_trace *t, const kernel_plain *plain, const kernel_tile_shown *shown, int part,
-                             int value, unsigned blocks)
+static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const kernel_plain *plain,
+                             const kernel_tile_shown *shown, int part, int value, unsigned blocks)
 {
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
@@ -71,6 +72,11 @@ static void kernel_tile_meet(kernel_tile_trace *t, const kernel_plain *plain, co
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
     t->poly.is_set_up = false;
+    if (c->type == GRID_HEX) kernel_poly_setup(t->frame, &t->tile, &t->poly, layer, c, value);
+    if (kernel_hexes_take(t, c, shown->box)) {
+        kernel_hexes_add(t, hexes, shown, part, value);
+        return;
+    }
     kernel_blocks_meet(t, blocks, part, c->index, c, value);
 }
 
@@ -95,7 +101,8 @@ SIMD_INLINE unsigned kernel_shown_blocks(const kernel_tile_trace *t, const kerne
 }
 
 /* Vertices of all that wait come from memory while those that came before are traced. */
-static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace *t, kernel_batch *b, kernel_waiting *w)
+static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace *t, kernel_batch *b, kernel_hexes *h,
+                                                               kernel_waiting *w)
 {
     for (int n = 0; n < w->count; n++) {
         int part;
@@ -114,7 +121,7 @@ static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace
         if (b->is_for_it)
             kernel_batch_add(t, b, w->items[n], value);
         else
-            kernel_tile_meet(t, &b->plain, w->items[n], part, value, blocks);
+            kernel_tile_meet(t, h, &b->plain, w->items[n], part, value, blocks);
     }
     w->count = 0;
 }
@@ -124,8 +131,10 @@ static __attribute__((noinline)) void kernel_tile_trace_shown(kernel_tile_trace 
                                                               bool transparent)
 {
     kernel_batch batch;
+    kernel_hexes hexes;
     kernel_waiting waiting = {0};
     kernel_batch_begin(&batch);
+    kernel_hexes_begin(&hexes);
     for (int part = 0; part < KERNEL_DEPTHS && part <= kernel_depth_part(q, kernel_tile_far(t)); part++)
         for (int i = q->first[part]; i >= 0; i = q->items[i].next) {
             const kernel_tile_shown *shown = &q->items[i];
@@ -135,10 +144,11 @@ static __attribute__((noinline)) void kernel_tile_trace_shown(kernel_tile_trace 
             if (is_transparent != transparent || !kernel_shown_blocks(t, shown)) continue;
             kernel_tile_prefetch_indices(t->frame->job->parts[source / RENDER_MAX_ISOVALUES].cells, shown->cell);
             waiting.items[waiting.count++] = shown;
-            if (waiting.count == SIMD_WIDTH) kernel_tile_meet_waiting(t, &batch, &waiting);
+            if (waiting.count == SIMD_WIDTH) kernel_tile_meet_waiting(t, &batch, &hexes, &waiting);
         }
-    kernel_tile_meet_waiting(t, &batch, &waiting);
+    kernel_tile_meet_waiting(t, &batch, &hexes, &waiting);
     kernel_batch_end(t, &batch);
+    kernel_hexes_end(t, &hexes);
 }
 
 /* The cells that the tile has of a picture's; returns how many they are. */

@@ -1,6 +1,6 @@
-/* Tets of plain meshes, which tiles trace as many at once as there are lanes (kernel_batch.h), against the same tets in
- * traversals that take them one by one: the same bits. Cells are of some pixels, of many and of one; the last ones lie
- * beside each other in one vector, and may hit one pixel. */
+/* Tets of plain meshes and hexes, which tiles trace as many at once as there are lanes (kernel_batch.h,
+ * kernel_hexes.h), against the same cells in traversals that take them one by one: the same bits. Cells are of some
+ * pixels, of many and of one; the last ones lie beside each other in one vector, and may hit one pixel. */
 #include "test_render_fixture.h"
 
 #include <math.h>
@@ -24,6 +24,8 @@ static void create(render_fixture *f, const test_mesh *meshes, int count, int n,
 static void compare(render_fixture *f)
 {
     drawn_frame binned, packets;
+    for (int i = 0; i < f->job.surface_count; i++)
+        f->surfaces[i].root = RENDER_ROBUST; /* what batches of hexes are for */
     f->job.traversal = RENDER_BINNED;
     fixture_draw(f, &binned);
     f->job.traversal = RENDER_PACKETS;
@@ -36,19 +38,21 @@ static void compare(render_fixture *f)
     fixture_free(f);
 }
 
-static void batches_draw_what_single_tets_do(void **state)
+static void batches_draw_what_single_cells_do(void **state)
 {
     (void)state;
+    static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES};
     static const struct {
         int n;
         test_function *field;
     } lattices[] = {{2, test_wave}, {4, test_wave}, {7, test_wave}, {13, test_wave}, {16, test_linear}};
     for (size_t i = 0; i < sizeof lattices / sizeof *lattices; i++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++)
-            for (int jittered = 0; jittered < 2; jittered++) {
+            for (int turn = 0; turn < 4; turn++) {
+                const int jittered = turn % 2;
                 render_fixture f;
                 test_mesh mesh;
-                test_mesh_lattice(TEST_TETS, lattices[i].n, 0.2 * jittered, lattices[i].field, &mesh);
+                test_mesh_lattice(kinds[turn / 2], lattices[i].n, 0.2 * jittered, lattices[i].field, &mesh);
                 create(&f, &mesh, 1, lattices[i].n, camera);
                 fixture_add_surface(&f, values, 1 + jittered, 1);
                 compare(&f);
@@ -79,10 +83,12 @@ static void meshes_and_layers_take_turns(void **state)
 static void ties_are_kept(void **state)
 {
     (void)state;
-    for (int n = 4; n <= 16; n *= 4) {
+    for (int turn = 0; turn < 4; turn++) {
+        const int n = turn % 2 ? 16 : 4;
         render_fixture f;
         test_mesh meshes[2];
-        for (int i = 0; i < 2; i++) test_mesh_lattice(TEST_TETS, n, 0.2, test_linear, &meshes[i]);
+        for (int i = 0; i < 2; i++)
+            test_mesh_lattice(turn / 2 ? TEST_HEXES : TEST_TETS, n, 0.2, test_linear, &meshes[i]);
         create(&f, meshes, 2, n, CAMERA_OUTSIDE);
         fixture_add_surface(&f, values, 1, 1);
         compare(&f);
@@ -119,7 +125,7 @@ static void odd_values_are_found_one_by_one(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(batches_draw_what_single_tets_do),
+        cmocka_unit_test(batches_draw_what_single_cells_do),
         cmocka_unit_test(meshes_and_layers_take_turns),
         cmocka_unit_test(ties_are_kept),
         cmocka_unit_test(odd_values_are_found_one_by_one),
