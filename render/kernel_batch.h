@@ -246,34 +246,42 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
     return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, r->far)));
 }
 
-/* kernel_accept(), ray by ray: two of them may be of one pixel. Returns the blocks in which something is nearer. */
+/* kernel_accept() of one ray, for two of a packet may be of one pixel. Returns its block, where something is nearer. */
+SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, int value, float depth, const float normal[3])
+{
+    const kernel_surface *s = t->surface;
+    const float *colour = s->layer->colours + 3 * value;
+    const int ray = at % SIMD_WIDTH;
+    kernel_packet *p = &t->packets[at / SIMD_WIDTH];
+    kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
+    const float far = p->t_far[ray];
+    if (!(depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
+    if (depth == far && far < INFINITY) {
+        const vf own_normal[3] = {vf_set(normal[0]), vf_set(normal[1]), vf_set(normal[2])};
+        const vf own_colour[3] = {vf_set(colour[0]), vf_set(colour[1]), vf_set(colour[2])};
+        kernel_emit_tied(p, s, value, vm_from_bits(1u << ray), vf_set(depth), own_normal, own_colour);
+        return 0;
+    }
+    p->t_far[ray] = depth;
+    vm_set_lane(&hits->found, ray);
+    for (int a = 0; a < 3; a++) {
+        hits->normal[a][ray] = normal[a];
+        hits->colour[a][ray] = colour[a];
+    }
+    hits->kind[ray] = (float)((int)s->first_kind + value);
+    return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
+}
+
+/* Returns the blocks in which something is nearer. */
 static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, const kernel_batch_rays *r,
                                     const uint8_t *lanes, unsigned hit, vf depth)
 {
-    const kernel_surface *s = t->surface;
     unsigned blocks = 0;
     if (!b->has_normals) kernel_batch_normals(b, t->frame);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), at = r->at[i], ray = at % SIMD_WIDTH, n = lanes[i];
-        const float *colour = s->layer->colours + 3 * b->value[n];
-        kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-        kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
-        const float far = p->t_far[ray];
-        if (!(depth[i] <= far)) continue;
-        if (depth[i] == far && far < INFINITY) {
-            const vf normal[3] = {vf_set(b->normal[0][n]), vf_set(b->normal[1][n]), vf_set(b->normal[2][n])};
-            const vf own[3] = {vf_set(colour[0]), vf_set(colour[1]), vf_set(colour[2])};
-            kernel_emit_tied(p, s, b->value[n], vm_from_bits(1u << ray), vf_set(depth[i]), normal, own);
-            continue;
-        }
-        p->t_far[ray] = depth[i];
-        vm_set_lane(&hits->found, ray);
-        for (int a = 0; a < 3; a++) {
-            hits->normal[a][ray] = b->normal[a][n];
-            hits->colour[a][ray] = colour[a];
-        }
-        hits->kind[ray] = (float)((int)s->first_kind + b->value[n]);
-        blocks |= 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
+        const int i = __builtin_ctz(hit), n = lanes[i];
+        const float normal[3] = {b->normal[0][n], b->normal[1][n], b->normal[2][n]};
+        blocks |= kernel_ray_accept(t, r->at[i], b->value[n], depth[i], normal);
     }
     return blocks;
 }

@@ -72,7 +72,7 @@ SIMD_INLINE void kernel_hex_line(kernel_hexes *h, int n, int lane, const kernel_
     h->c[n][lane] = is_turned ? -line->c : line->c;
     h->cu[n][lane] = is_turned ? -line->cu : line->cu;
     h->cv[n][lane] = is_turned ? -line->cv : line->cv;
-    h->doubt[lane] = fmaxf(h->doubt[lane], line->bound);
+    h->doubt[lane] = simd_max(line->bound, h->doubt[lane]);
 }
 
 /* The cell, placed and with its lines, into a lane. */
@@ -388,36 +388,18 @@ SIMD_INLINE void kernel_hex_maps(const kernel_hexes *h, vi lane, kernel_map_lane
     }
 }
 
-/* kernel_accept(), ray by ray: two of them may be of one pixel. Returns the blocks in which something is nearer. */
+/* Returns the blocks in which something is nearer. */
 static __attribute__((noinline)) unsigned kernel_hexes_accept(kernel_tile_trace *t, const kernel_hexes *h,
                                                               const kernel_hex_rays *rays, int first, vi at_lanes,
-                                                              unsigned hit, vf depth, const vf normal[3])
+                                                              unsigned hit, vf depth, const vf normals[3])
 {
-    const kernel_surface *s = t->surface;
     unsigned blocks = 0;
-    int32_t at_of[SIMD_WIDTH];
-    memcpy(at_of, &at_lanes, sizeof at_of);
+    int32_t at[SIMD_WIDTH];
+    memcpy(at, &at_lanes, sizeof at);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), at = at_of[i], ray = at % SIMD_WIDTH, value = h->value[rays->lane[first + i]];
-        const float *colour = s->layer->colours + 3 * value;
-        kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-        kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
-        const float far = p->t_far[ray];
-        if (!(depth[i] <= far) || !(vm_bits(p->active) >> ray & 1)) continue;
-        if (depth[i] == far && far < INFINITY) {
-            const vf lit[3] = {vf_set(normal[0][i]), vf_set(normal[1][i]), vf_set(normal[2][i])};
-            const vf own[3] = {vf_set(colour[0]), vf_set(colour[1]), vf_set(colour[2])};
-            kernel_emit_tied(p, s, value, vm_from_bits(1u << ray), vf_set(depth[i]), lit, own);
-            continue;
-        }
-        p->t_far[ray] = depth[i];
-        vm_set_lane(&hits->found, ray);
-        for (int a = 0; a < 3; a++) {
-            hits->normal[a][ray] = normal[a][i];
-            hits->colour[a][ray] = colour[a];
-        }
-        hits->kind[ray] = (float)((int)s->first_kind + value);
-        blocks |= 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
+        const int i = __builtin_ctz(hit);
+        const float normal[3] = {normals[0][i], normals[1][i], normals[2][i]};
+        blocks |= kernel_ray_accept(t, at[i], h->value[rays->lane[first + i]], depth[i], normal);
     }
     return blocks;
 }

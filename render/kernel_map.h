@@ -79,9 +79,9 @@ SIMD_INLINE void kernel_map_setup(kernel_map *m, const kernel_cell *c)
     m->origin[2] = c->z[0];
     memset(m->reach, 0, sizeof m->reach);
     for (int i = 0; i < c->count; i++) {
-        m->reach[0] = fmaxf(m->reach[0], fabsf(c->x[i]));
-        m->reach[1] = fmaxf(m->reach[1], fabsf(c->y[i]));
-        m->reach[2] = fmaxf(m->reach[2], fabsf(c->z[i]));
+        m->reach[0] = simd_max(fabsf(c->x[i]), m->reach[0]);
+        m->reach[1] = simd_max(fabsf(c->y[i]), m->reach[1]);
+        m->reach[2] = simd_max(fabsf(c->z[i]), m->reach[2]);
     }
     kernel_polynomial_of_floats(&m->position[0], c->type, c->x, c->x[0], m->exact[0]);
     kernel_polynomial_of_floats(&m->position[1], c->type, c->y, c->y[0], m->exact[1]);

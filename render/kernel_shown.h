@@ -118,9 +118,9 @@ SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int pixels, uint16_t *first,
                                      uint16_t *last)
 {
-    const float pad = 0.01f + 3e-5f * (fmaxf(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + blur;
-    const float low = fmaxf(ceilf(e.low + zero - pad), 0);
-    const float high = fminf(floorf(e.high + zero + pad), (float)(pixels - 1));
+    const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + blur;
+    const float low = simd_max(ceilf(e.low + zero - pad), 0);
+    const float high = simd_min(floorf(e.high + zero + pad), (float)(pixels - 1));
     if (!(low <= high)) return false;
     *first = (uint16_t)low;
     *last = (uint16_t)high;
@@ -256,14 +256,14 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
         grid_vertex(g, vertex, world);
         kernel_place_in(s->frame, &s->picture, world, &place[0], &place[1], &place[2]);
         for (int a = 0; a < 3; a++) {
-            low[a] = fminf(low[a], place[a]);
-            high[a] = fmaxf(high[a], place[a]);
+            low[a] = simd_min(place[a], low[a]);
+            high[a] = simd_max(place[a], high[a]);
         }
     }
     o.count = 8;
     for (int i = 0; i < 8; i++)
         for (int a = 0; a < 3; a++) o.point[a][i] = i >> a & 1 ? high[a] : low[a];
-    for (int a = 0; a < 3; a++) o.size[a] = fmaxf(fabsf(low[a]), fabsf(high[a]));
+    for (int a = 0; a < 3; a++) o.size[a] = simd_max(fabsf(low[a]), fabsf(high[a]));
     if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
 }
 
