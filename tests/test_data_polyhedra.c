@@ -40,7 +40,7 @@ static void surfaces_and_samples_are_the_reference(void **state)
     }
 }
 
-/* Exact on tets, and so on polyhedra: 3e-6 as in test_segments.c, whose rays meet as many cells. */
+/* Exact on tets, and so on polyhedra: 1e-6 as in test_segments.c, whose rays meet as many cells. */
 static void segments_are_the_integral(void **state)
 {
     (void)state;
@@ -59,7 +59,7 @@ static void segments_are_the_integral(void **state)
     }
     reference_integral_free(scene);
     fprintf(stderr, "segments: %.2g\n", worst);
-    assert_true(worst < 3e-6);
+    assert_true(worst < 1e-6);
     drawn_free(&drawn);
     fixture_free(&f);
 }
