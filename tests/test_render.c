@@ -289,6 +289,27 @@ static void single_cells_are_the_reference(void **state)
         }
 }
 
+/* A field across the thickness, whose surfaces lie along the sliver: met where the sliver is, and where it is known. */
+static void surfaces_along_slivers_are_the_reference(void **state)
+{
+    (void)state;
+    static const double values[3] = {-0.25, 0.1, 0.35};
+    for (fixture_camera camera = 0; camera < CAMERA_INSIDE; camera++) {
+        test_mesh mesh;
+        render_fixture f;
+        test_mesh_single(TEST_SLIVER_TET, test_linear, &mesh);
+        for (int v = 0; v < 4; v++) mesh.values[v] = v == 3 ? 0.5 : -0.5;
+        fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                       (const double[]){0, 0, 0});
+        fixture_look(&f, camera, 121, 101);
+        fixture_add_surface(&f, values, 3, 0.5f);
+        const fixture_outcome met = fixture_compare(&f, &fixture_usual_bounds, fixture_camera_name(camera));
+        assert_true(met.hits > 100);
+        fixture_free(&f);
+        test_mesh_free(&mesh);
+    }
+}
+
 static void left_handed_cells_are_the_reference(void **state)
 {
     (void)state;
@@ -489,6 +510,7 @@ int main(void)
         cmocka_unit_test(constant_volume_counts_every_sample_once),
         cmocka_unit_test(lattice_lines_have_no_holes),
         cmocka_unit_test(single_cells_are_the_reference),
+        cmocka_unit_test(surfaces_along_slivers_are_the_reference),
         cmocka_unit_test(left_handed_cells_are_the_reference),
         cmocka_unit_test(far_coordinates_are_the_reference),
         cmocka_unit_test(two_volumes_share_their_light),
