@@ -105,11 +105,12 @@ static double uniform(uint64_t n, uint64_t seed, double low, double high)
     return low + (high - low) * test_uniform(n, seed);
 }
 
-/* Within 0 .. 1, with a step in one of four; opacities to most. */
-static void set_random_function(render_fixture *f, random_function *r, uint64_t seed, double most, double unit)
+/* Within 0 .. 1, opacities to most. */
+static void set_random_function(render_fixture *f, random_function *r, uint64_t seed, bool step, double most,
+                                double unit)
 {
     for (uint64_t i = 0; i < POINTS; i++) {
-        r->values[i] = seed % 4 == 0 && i == 2 ? r->values[1] : 0.25 * (double)i + uniform(i, seed, 0.05, 0.2);
+        r->values[i] = step && i == 2 ? r->values[1] : 0.25 * (double)i + uniform(i, seed, 0.05, 0.2);
         r->opacities[i] = (float)uniform(i, seed + 1, 0, most);
     }
     for (uint64_t i = 0; i < 3 * COLOURS; i++) r->colours[i] = (float)test_uniform(i, seed + 2);
@@ -128,8 +129,8 @@ static double bent_field(const double p[3])
     return 0.5 + 0.35 * sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.3 * sin(2.3 * p[2] + p[0]);
 }
 
-/* The worst of each error asked for, 1e-2 to 1e-4, of one mesh and function. */
-static void judge(const test_mesh *mesh, uint64_t seed, float opacity, double worst[3])
+/* The worst of each error asked for, 1e-2 to 1e-4, of one mesh and function. Returns whether there is a step. */
+static bool judge(const test_mesh *mesh, uint64_t seed, bool step, float opacity, double worst[3])
 {
     static const double values[2] = {0.35, 0.6};
     render_fixture f;
@@ -139,7 +140,7 @@ static void judge(const test_mesh *mesh, uint64_t seed, float opacity, double wo
                    (const double[]){0, 0, 0});
     fixture_look(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE, SIDE);
     set_segments(&f, 0);
-    set_random_function(&f, &function, 100 * seed + 9, seed % 3 ? 0.5 : 0.9,
+    set_random_function(&f, &function, 100 * seed + 9, step, seed % 3 ? 0.5 : 0.9,
                         pow(10, uniform(0, 100 * seed + 10, -2, 4)));
     if (opacity > 0) fixture_add_surface(&f, values, 2, opacity);
     truth_of(&f, truth);
@@ -148,6 +149,7 @@ static void judge(const test_mesh *mesh, uint64_t seed, float opacity, double wo
         worst[i] = test_worse(worst[i], error_of(&f, truth));
     }
     fixture_free(&f);
+    return function.values[1] == function.values[2];
 }
 
 /* Where a medium begins or ends, float32's places are off by 1.2e-7, and light by that times the extinction: 5e-8 of
@@ -160,15 +162,19 @@ static void max_error_is_kept_in_dense_media(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (int surface = 0; surface < 3; surface++) {
             double worst[3] = {0};
+            int steps = 0;
             for (uint64_t seed = 0; seed < 6; seed++) {
                 test_mesh mesh;
                 test_mesh_lattice(kind, 2, 0.2, bent_field, &mesh);
-                judge(&mesh, seed, opacities[surface], worst);
+                /* The two densest media step, one for each camera; beside tets and polyhedra this is not promised, but
+                 * holds where no ray grazes a step within a cell. */
+                steps += judge(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
                 test_mesh_free(&mesh);
             }
             fprintf(stderr, "%s, surfaces of opacity %g: %.2g, %.2g, %.2g\n", test_mesh_kind_name(kind),
                     (double)opacities[surface], worst[0], worst[1], worst[2]);
             for (int i = 0; i < 3; i++) assert_true(worst[i] <= pow(10, -2 - i));
+            assert_int_equal(steps, 2);
         }
 }
 
