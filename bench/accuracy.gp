@@ -71,14 +71,18 @@ if (layer eq "volume") {
         set title title_of(mesh) noenhanced offset 0,-0.6
         panel = panel + 1
         if (panel == key_panel) { set key at screen 0.5,0.022 center center vertical maxrows 1 Left reverse samplen 2 width 2 } else { set key off }
-        plot csv using (own(mesh, "Neubauer", $13)):(above($19, floor)) with linespoints lc rgb "#1f5fbf" pt 7 ps 1 lw 1.5 title "Neubauer's method", \
+        plot csv using (own(mesh, "Neubauer", $13)):(above($19, floor)) with linespoints lc rgb "#1f5fbf" pt 7 ps 1 lw 1.5 notitle, \
              csv using (own(mesh, "Neubauer", $13)):(above($19, floor)):(note($20, strcol(9), strcol(20))) with labels left font ",9" tc rgb "#1f5fbf" offset 0.8,0.45 notitle, \
-             csv using (own(mesh, "Neubauer packets", $13)):(above($19, floor)) with linespoints lc rgb "#77aadd" pt 9 ps 0.9 lw 1.2 dt 3 title "packets", \
-             csv using (own(mesh, "Neubauer SPMD", $13)):(above($19, floor)) with linespoints lc rgb "#bbccee" pt 11 ps 0.9 lw 1.2 dt 3 title "SPMD", \
+             csv using (own(mesh, "Neubauer packets", $13)):(above($19, floor)) with linespoints lc rgb "#77aadd" pt 9 ps 0.9 lw 1.2 dt 3 notitle, \
+             csv using (own(mesh, "Neubauer SPMD", $13)):(above($19, floor)) with linespoints lc rgb "#bbccee" pt 11 ps 0.9 lw 1.2 dt 3 notitle, \
              csv using (own(mesh, "robust packets", $13)):(above($19, floor)) with points lc rgb "#66bb88" pt 9 ps 1.2 notitle, \
              csv using (own(mesh, "robust SPMD", $13)):(above($19, floor)) with points lc rgb "#aaddbb" pt 11 ps 1.2 notitle, \
-             csv using (own(mesh, "robust", $13)):(above($19, floor)) with points lc rgb "#117733" pt 5 ps 1.3 title "robust roots", \
-             csv using (own(mesh, "robust", $13)):(above($19, floor)):(note($20, strcol(9), strcol(20))) with labels left font ",9" tc rgb "#117733" offset 0.8,0.45 notitle
+             csv using (own(mesh, "robust", $13)):(above($19, floor)) with points lc rgb "#117733" pt 5 ps 1.3 notitle, \
+             csv using (own(mesh, "robust", $13)):(above($19, floor)):(note($20, strcol(9), strcol(20))) with labels left font ",9" tc rgb "#117733" offset 0.8,0.45 notitle, \
+             keyentry with linespoints lc rgb "#1f5fbf" pt 7 ps 1 lw 1.5 title "Neubauer's method", \
+             keyentry with linespoints lc rgb "#77aadd" pt 9 ps 0.9 lw 1.2 dt 3 title "by packets", \
+             keyentry with linespoints lc rgb "#bbccee" pt 11 ps 0.9 lw 1.2 dt 3 title "by SPMD", \
+             keyentry with points lc rgb "#117733" pt 5 ps 1.3 title "robust roots (packets, SPMD: paler)"
     }
 }
 unset multiplot
