@@ -142,11 +142,6 @@ static void robust_hits_are_on_the_surface(void **state)
 
 typedef enum ugly { UGLY_WARPED, UGLY_CONCAVE, UGLY_WEDGE, UGLY_APEX, UGLY_COUNT } ugly;
 
-static double uniform(uint64_t n, uint64_t seed, double low, double high)
-{
-    return low + (high - low) * test_uniform(n, seed);
-}
-
 static void make_ugly(ugly kind, uint64_t seed, test_mesh *out)
 {
     static const test_cell_shape shapes[UGLY_COUNT] = {TEST_UNIT_HEX, TEST_UNIT_HEX, TEST_UNIT_WEDGE,
@@ -155,14 +150,14 @@ static void make_ugly(ugly kind, uint64_t seed, test_mesh *out)
     for (uint64_t i = 0; i < (uint64_t)out->vertex_count; i++) {
         double *p = out->coordinates + 3 * i;
         const double amount = kind == UGLY_WARPED || kind == UGLY_APEX ? 0.2 : 0.1;
-        for (uint64_t a = 0; a < 3; a++) p[a] += uniform(3 * i + a, seed, -amount, amount);
-        out->values[i] = uniform(i, seed + 1000, -1, 1.5);
+        for (uint64_t a = 0; a < 3; a++) p[a] += test_uniform_in(3 * i + a, seed, -amount, amount);
+        out->values[i] = test_uniform_in(i, seed + 1000, -1, 1.5);
         /* A corner pulled in almost to the plane of its neighbours: dents on both sides of its edges. Beyond that plane
          * the hex's map folds, and a point has several values. */
         if (kind == UGLY_CONCAVE && i == 6)
-            for (uint64_t a = 0; a < 3; a++) p[a] = uniform(a, seed + 2000, 0.24, 0.3);
+            for (uint64_t a = 0; a < 3; a++) p[a] = test_uniform_in(a, seed + 2000, 0.24, 0.3);
         if (kind == UGLY_WEDGE && i >= 3) {
-            const double angle = uniform(0, seed + 3000, -0.8, 0.8), x = p[0], y = p[1];
+            const double angle = test_uniform_in(0, seed + 3000, -0.8, 0.8), x = p[0], y = p[1];
             p[0] = cos(angle) * x - sin(angle) * y;
             p[1] = sin(angle) * x + cos(angle) * y;
         }

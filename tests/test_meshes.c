@@ -34,6 +34,11 @@ double test_uniform(uint64_t index, uint64_t seed)
     return (double)(test_hash(index, seed) >> 11) * 0x1p-53;
 }
 
+double test_uniform_in(uint64_t index, uint64_t seed, double low, double high)
+{
+    return low + (high - low) * test_uniform(index, seed);
+}
+
 double test_wave(const double p[3])
 {
     return sin(6 * p[0]) * cos(6 * p[1]) + sin(6 * p[1]) * cos(6 * p[2]) + sin(6 * p[2]) * cos(6 * p[0]);

@@ -143,6 +143,25 @@ void fixture_set_volume(render_fixture *f, double step)
     f->job.step = step * f->cell_size;
 }
 
+void fixture_set_function(render_fixture *f, fixture_function *function, uint64_t seed, bool step, double most,
+                          double unit)
+{
+    double *values = function->values;
+    for (uint64_t i = 0; i < FIXTURE_POINTS; i++) {
+        values[i] = step && i == 2 ? values[1] : 0.25 * (double)i + test_uniform_in(i, seed, 0.05, 0.2);
+        function->opacities[i] = (float)test_uniform_in(i, seed + 1, 0, most);
+    }
+    for (uint64_t i = 0; i < 3 * FIXTURE_COLOURS; i++) function->colours[i] = (float)test_uniform(i, seed + 2);
+    f->transfer = (render_transfer){.low = 0,
+                                    .high = 1,
+                                    .colour_count = FIXTURE_COLOURS,
+                                    .colours = function->colours,
+                                    .opacity_count = FIXTURE_POINTS,
+                                    .opacity_values = values,
+                                    .opacities = function->opacities,
+                                    .unit_distance = unit};
+}
+
 double fixture_depth(const render_fixture *f, float t)
 {
     return (double)t / f->job.space.scale + f->job.space.depth_origin;

@@ -50,6 +50,16 @@ void fixture_add_surface(render_fixture *f, const double *values, int count, flo
 /* A volume of a tent of opacity for |value| < 0.6. step in cells. */
 void fixture_set_volume(render_fixture *f, double step);
 
+/* A random transfer function over 0 .. 1, for as long as the fixture draws by it: opacities to most, of the unit
+ * distance, with a step at a value or without. */
+enum { FIXTURE_POINTS = 4, FIXTURE_COLOURS = 5 };
+typedef struct fixture_function {
+    double values[FIXTURE_POINTS];
+    float opacities[FIXTURE_POINTS], colours[3 * FIXTURE_COLOURS];
+} fixture_function;
+void fixture_set_function(render_fixture *f, fixture_function *function, uint64_t seed, bool step, double most,
+                          double unit);
+
 /* What came of a frame. */
 typedef struct drawn_frame {
     image picture;      /* over the background of fixture_background */

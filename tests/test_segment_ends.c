@@ -93,37 +93,6 @@ static void thin_tets_are_not_lost(void **state)
 
 /* ---- cells of every kind ---- */
 
-enum { POINTS = 4, COLOURS = 5 };
-
-typedef struct random_function {
-    double values[POINTS];
-    float opacities[POINTS], colours[3 * COLOURS];
-} random_function;
-
-static double uniform(uint64_t n, uint64_t seed, double low, double high)
-{
-    return low + (high - low) * test_uniform(n, seed);
-}
-
-/* Within 0 .. 1, opacities to most. */
-static void set_random_function(render_fixture *f, random_function *r, uint64_t seed, bool step, double most,
-                                double unit)
-{
-    for (uint64_t i = 0; i < POINTS; i++) {
-        r->values[i] = step && i == 2 ? r->values[1] : 0.25 * (double)i + uniform(i, seed, 0.05, 0.2);
-        r->opacities[i] = (float)uniform(i, seed + 1, 0, most);
-    }
-    for (uint64_t i = 0; i < 3 * COLOURS; i++) r->colours[i] = (float)test_uniform(i, seed + 2);
-    f->transfer = (render_transfer){.low = 0,
-                                    .high = 1,
-                                    .colour_count = COLOURS,
-                                    .colours = r->colours,
-                                    .opacity_count = POINTS,
-                                    .opacity_values = r->values,
-                                    .opacities = r->opacities,
-                                    .unit_distance = unit};
-}
-
 static double bent_field(const double p[3])
 {
     return 0.5 + 0.35 * sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.3 * sin(2.3 * p[2] + p[0]);
@@ -134,14 +103,14 @@ static bool judge(const test_mesh *mesh, uint64_t seed, bool step, float opacity
 {
     static const double values[2] = {0.35, 0.6};
     render_fixture f;
-    random_function function;
+    fixture_function function;
     double truth[4 * PIXELS];
     fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                    (const double[]){0, 0, 0});
     fixture_look(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE, SIDE);
     set_segments(&f, 0);
-    set_random_function(&f, &function, 100 * seed + 9, step, seed % 3 ? 0.5 : 0.9,
-                        pow(10, uniform(0, 100 * seed + 10, -2, 4)));
+    fixture_set_function(&f, &function, 100 * seed + 9, step, seed % 3 ? 0.5 : 0.9,
+                         pow(10, test_uniform_in(0, 100 * seed + 10, -2, 4)));
     if (opacity > 0) fixture_add_surface(&f, values, 2, opacity);
     truth_of(&f, truth);
     for (int i = 0; i < 3; i++) {

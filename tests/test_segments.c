@@ -77,41 +77,12 @@ static void tets_are_exact_for_every_camera(void **state)
     }
 }
 
-static double uniform(uint64_t n, uint64_t seed, double low, double high)
-{
-    return low + (high - low) * test_uniform(n, seed);
-}
-
-enum { RANDOM_POINTS = 4, RANDOM_COLOURS = 5, RANDOM_TETS = 80 };
-
-typedef struct random_function {
-    double values[RANDOM_POINTS];
-    float opacities[RANDOM_POINTS], colours[3 * RANDOM_COLOURS];
-} random_function;
+enum { RANDOM_TETS = 80 };
 
 /* Steps of the opacity come in one of four seeds, with slivers and other tets and with every camera. */
 static bool has_step(uint64_t seed)
 {
     return seed / 4 % 4 == 0;
-}
-
-/* On the tet's range of values; opacities to most. */
-static void set_random_function(render_fixture *f, random_function *r, uint64_t seed, bool step, double most,
-                                double unit)
-{
-    for (uint64_t i = 0; i < RANDOM_POINTS; i++) {
-        r->values[i] = step && i == 2 ? r->values[1] : 0.25 * (double)i + uniform(i, seed, 0.05, 0.2);
-        r->opacities[i] = (float)uniform(i, seed + 1, 0, most);
-    }
-    for (uint64_t i = 0; i < 3 * RANDOM_COLOURS; i++) r->colours[i] = (float)test_uniform(i, seed + 2);
-    f->transfer = (render_transfer){.low = 0,
-                                    .high = 1,
-                                    .colour_count = RANDOM_COLOURS,
-                                    .colours = r->colours,
-                                    .opacity_count = RANDOM_POINTS,
-                                    .opacity_values = r->values,
-                                    .opacities = r->opacities,
-                                    .unit_distance = unit};
 }
 
 /* Random tets, slivers among them, with random functions and unit distances from 1e-3 to 1e4 of the tet's size: optical
@@ -127,17 +98,17 @@ static void random_tets_are_exact(void **state)
         for (uint64_t seed = 0; seed < RANDOM_TETS; seed++) {
             test_mesh mesh;
             render_fixture f;
-            random_function function;
+            fixture_function function;
             test_mesh_single(seed % 5 ? TEST_UNIT_TET : TEST_SLIVER_TET, test_linear, &mesh);
             for (uint64_t i = 0; i < 12; i++)
-                mesh.coordinates[i] += uniform(i, 100 * seed + 7, -0.25, 0.25) * (seed % 5 ? 1 : 1e-5);
-            for (uint64_t i = 0; i < 4; i++) mesh.values[i] = uniform(i, 100 * seed + 8, -0.1, 1.1);
+                mesh.coordinates[i] += test_uniform_in(i, 100 * seed + 7, -0.25, 0.25) * (seed % 5 ? 1 : 1e-5);
+            for (uint64_t i = 0; i < 4; i++) mesh.values[i] = test_uniform_in(i, 100 * seed + 8, -0.1, 1.1);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
             fixture_look(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 15, 13);
             set_segments(&f, 1, 0);
-            set_random_function(&f, &function, 100 * seed + 9, has_step(seed), most[k],
-                                pow(10, uniform(0, 100 * seed + 10, -3, 4)));
+            fixture_set_function(&f, &function, 100 * seed + 9, has_step(seed), most[k],
+                                 pow(10, test_uniform_in(0, 100 * seed + 10, -3, 4)));
             steps += function.values[1] == function.values[2];
             double *truth = truth_of(&f);
             worst = test_worse(worst, error_of(&f, truth, NULL));
@@ -234,18 +205,18 @@ static void random_tets_keep_max_error(void **state)
         for (uint64_t seed = 0; seed < RANDOM_TETS; seed++) {
             test_mesh mesh;
             render_fixture f;
-            random_function function;
+            fixture_function function;
             const bool is_sliver = seed % 5 == 0;
             test_mesh_single(is_sliver ? TEST_SLIVER_TET : TEST_UNIT_TET, test_linear, &mesh);
             for (uint64_t i = 0; i < 12; i++)
-                mesh.coordinates[i] += uniform(i, 100 * seed + 7, -0.25, 0.25) * (is_sliver ? 1e-5 : 1);
-            for (uint64_t i = 0; i < 4; i++) mesh.values[i] = uniform(i, 100 * seed + 8, -0.1, 1.1);
+                mesh.coordinates[i] += test_uniform_in(i, 100 * seed + 7, -0.25, 0.25) * (is_sliver ? 1e-5 : 1);
+            for (uint64_t i = 0; i < 4; i++) mesh.values[i] = test_uniform_in(i, 100 * seed + 8, -0.1, 1.1);
             fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
                            (const double[]){0, 0, 0});
             fixture_look(&f, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 15, 13);
             set_segments(&f, 1, allowed);
-            set_random_function(&f, &function, 100 * seed + 9, has_step(seed), seed % 3 ? 0.5 : 1,
-                                pow(10, uniform(0, 100 * seed + 10, -3, 4)));
+            fixture_set_function(&f, &function, 100 * seed + 9, has_step(seed), seed % 3 ? 0.5 : 1,
+                                 pow(10, test_uniform_in(0, 100 * seed + 10, -3, 4)));
             steps += function.values[1] == function.values[2];
             double *truth = truth_of(&f);
             worst = test_worse(worst, error_of(&f, truth, NULL));
