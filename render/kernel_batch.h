@@ -366,6 +366,13 @@ static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
     t->surface = &t->frame->surfaces[layer];
 }
 
+/* Are rays of the layer under way accepted by kernel_ray_accept()? */
+SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
+{
+    const render_surface_layer *l = t->surface->layer;
+    return t->layer < t->frame->opaque_count && !l->colour_map && l->normal != RENDER_DIFFERENCES;
+}
+
 /* What is added from now on is of the part and the layer under way: what waits, of others, is traced. */
 SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int part)
 {
@@ -380,8 +387,7 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     b->layer = layer;
     b->part = part;
     kernel_plain_begin(&b->plain, t->frame, t->frame->job->parts[part].cells, &l->field.fields[part]);
-    b->is_for_it =
-        b->plain.is_so && layer < t->frame->opaque_count && !l->colour_map && l->normal != RENDER_DIFFERENCES;
+    b->is_for_it = b->plain.is_so && kernel_tile_layer_batches(t);
 }
 
 /* The last ones. */

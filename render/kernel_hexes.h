@@ -375,14 +375,7 @@ SIMD_INLINE void kernel_hex_maps(const kernel_hexes *h, vi lane, kernel_map_lane
             for (int i = 0; i < 8; i++) d[i] = kernel_half_of(&v[i], half);
             if (n < 3)
                 for (int i = 7; i >= 0; i--) d[i] -= d[0];
-            e[0] = d[0];
-            e[1] = d[1] - d[0];
-            e[2] = d[3] - d[0];
-            e[3] = d[4] - d[0];
-            e[4] = d[2] - d[1] - d[3] + d[0];
-            e[5] = d[5] - d[1] - d[4] + d[0];
-            e[6] = d[7] - d[3] - d[4] + d[0];
-            e[7] = (d[6] - d[5] - d[7] + d[4]) - e[4];
+            KERNEL_HEX_FIT(e, d);
             for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
         }
     }
@@ -515,10 +508,9 @@ SIMD_INLINE void kernel_hexes_end(kernel_tile_trace *t, kernel_hexes *h)
 /* Is the tile's cell, with all that it takes to meet rays, one for a batch? */
 SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell *c, unsigned box)
 {
-    const render_surface_layer *layer = t->surface->layer;
     const unsigned columns = (box >> 4 & 15) - (box & 15) + 1, rows = (box >> 12) - (box >> 8 & 15) + 1;
-    if (columns * rows > KERNEL_HEX_PIXELS || c->type != GRID_HEX || layer->root != RENDER_ROBUST ||
-        t->layer >= t->frame->opaque_count || layer->colour_map || layer->normal == RENDER_DIFFERENCES)
+    if (columns * rows > KERNEL_HEX_PIXELS || c->type != GRID_HEX || t->surface->layer->root != RENDER_ROBUST ||
+        !kernel_tile_layer_batches(t))
         return false;
     for (int face = 0; face < KERNEL_HEX_FACES; face++) {
         int corner[4];

@@ -33,18 +33,24 @@ typedef struct kernel_map {
     double exact[4][8]; /* the positions' coefficients and the field's, not rounded */
 } kernel_map;
 
+/* A hex's coefficients of its vertices' numbers: doubles, or vectors of them. */
+#define KERNEL_HEX_FIT(c, v)                                                                                           \
+    do {                                                                                                               \
+        (c)[0] = (v)[0];                                                                                               \
+        (c)[1] = (v)[1] - (v)[0];                                                                                      \
+        (c)[2] = (v)[3] - (v)[0];                                                                                      \
+        (c)[3] = (v)[4] - (v)[0];                                                                                      \
+        (c)[4] = (v)[2] - (v)[1] - (v)[3] + (v)[0];                                                                    \
+        (c)[5] = (v)[5] - (v)[1] - (v)[4] + (v)[0];                                                                    \
+        (c)[6] = (v)[7] - (v)[3] - (v)[4] + (v)[0];                                                                    \
+        (c)[7] = ((v)[6] - (v)[5] - (v)[7] + (v)[4]) - (c)[4];                                                         \
+    } while (0)
+
 SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[GRID_MAX_CELL_VERTICES])
 {
     double c[8] = {0};
     if (type == GRID_HEX) {
-        c[0] = v[0];
-        c[1] = v[1] - v[0];
-        c[2] = v[3] - v[0];
-        c[3] = v[4] - v[0];
-        c[4] = v[2] - v[1] - v[3] + v[0];
-        c[5] = v[5] - v[1] - v[4] + v[0];
-        c[6] = v[7] - v[3] - v[4] + v[0];
-        c[7] = (v[6] - v[5] - v[7] + v[4]) - c[4];
+        KERNEL_HEX_FIT(c, v);
     } else if (type == GRID_WEDGE) {
         c[0] = v[0];
         c[1] = v[1] - v[0];

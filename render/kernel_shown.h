@@ -464,16 +464,12 @@ SIMD_INLINE void kernel_plain_value(kernel_finder *s, const vf v[4], kernel_tet_
 /* The same of all that shows of them in the volume. */
 SIMD_INLINE void kernel_plain_volume(kernel_finder *s, const vf v[4], const kernel_tet_lanes *l)
 {
-    const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3])),
-             high = vf_max(vf_max(v[0], v[1]), vf_max(v[2], v[3]));
-    vm usual = vm_all_lanes(), shows = vm_none();
+    vm usual = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
         usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
         for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(l->at[a][i]), vf_set(1e15f)));
     }
-    for (int i = 0; i < s->interest->count; i++)
-        shows =
-            vm_or(shows, vm_and(vf_le(low, vf_set(s->interest->high[i])), vf_le(vf_set(s->interest->low[i]), high)));
+    const vm shows = kernel_interest_meets_values(s->interest, v);
     const unsigned all = (1u << s->tets.count) - 1, good = all & vm_bits(vm_and(usual, shows));
     if (good) {
         kernel_tet_ends e = kernel_tet_no_ends();

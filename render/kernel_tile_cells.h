@@ -90,12 +90,9 @@ SIMD_INLINE unsigned kernel_placed_shown(const kernel_tile_trace *t, const kerne
                                          const kernel_interest *interest, float near[SIMD_WIDTH])
 {
     const vf *z = placed->at[2], *v = placed->values;
-    const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3]));
-    const vf high = vf_max(vf_max(v[0], v[1]), vf_max(v[2], v[3]));
-    vm is_finite = vm_all_lanes(), shows = vm_none();
+    vm is_finite = vm_all_lanes();
     for (int i = 0; i < 4; i++) is_finite = vm_and(is_finite, vf_lt(vf_abs(v[i]), vf_set(INFINITY)));
-    for (int i = 0; i < interest->count; i++)
-        shows = vm_or(shows, vm_and(vf_le(low, vf_set(interest->high[i])), vf_le(vf_set(interest->low[i]), high)));
+    const vm shows = kernel_interest_meets_values(interest, v);
     const vf front = vf_min(vf_min(z[0], z[1]), vf_min(z[2], z[3]));
     const vf back = vf_max(vf_max(z[0], z[1]), vf_max(z[2], z[3]));
     const vf pad = KERNEL_OUTLINE_PAD * vf_max(vf_abs(front), vf_abs(back));
