@@ -154,8 +154,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
         float far = -INFINITY;
         for (int n = 0; n < KERNEL_BLOCK_PACKETS && blocks >> b & 1; n++) {
             const int i = b * KERNEL_BLOCK_PACKETS + n;
-            v->packets[i].samples.first = first;
-            v->packets[i].samples.count = last - first + 1;
+            kernel_samples_window(&t->packets[i], &v->packets[i].samples, first, last - first + 1);
             far = simd_max(kernel_ray_window(&t->packets[i], &v->packets[i], job->volume_count, &t->t_near), far);
         }
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;

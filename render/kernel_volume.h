@@ -16,6 +16,7 @@
 /* The samples of a window: NaN where this rank has none. */
 typedef struct kernel_samples {
     int first, count;
+    float pad; /* numbers of samples are known to so much */
     vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
     vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* of the owning interval; only where contact is asked for */
     vf marked; /* where the rays' nearest sample with two owners is, of those of this window and before */
@@ -67,6 +68,17 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
     }
 }
 
+/* The window, of samples first .. first + count - 1. A number found from t, by three roundings of it, and t found from
+ * the number, by one of step * m and one of t, are apart by no more than 6e-8 (4 m + t / step), and t / step is m and
+ * base / step at most. */
+SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s, int first, int count)
+{
+    const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));
+    s->first = first;
+    s->count = count;
+    s->pad = 1e-4f + 4e-7f * ((float)(abs(first) + count) + base);
+}
+
 /* The window's samples that may be in the interval of some ray: indices into the window. */
 SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
                                     int *begin, int *end)
@@ -75,9 +87,10 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
     const vf to = (i->t_out - p->sample_base) * p->sample_inverse;
     const float low = vf_reduce_min(vf_select(i->mask, from, vf_set(INFINITY)));
     const float high = vf_reduce_max(vf_select(i->mask, to, vf_set(-INFINITY)));
-    const float first = simd_min(simd_max(low - (float)s->first - 0.5f, 0), KERNEL_MAX_GROUP);
-    const float last = simd_min(simd_max(high - (float)s->first + 1.5f, 0), (float)s->count);
+    const float first = simd_min(simd_max((low - (float)s->first) - s->pad, 0), KERNEL_MAX_GROUP);
+    const float last = simd_min(simd_max((high - (float)s->first) + s->pad + 1, 0), (float)s->count);
     *begin = (int)first;
+    *begin += (float)*begin < first;
     *end = (int)last;
 }
 
@@ -112,22 +125,25 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     if (begin >= end) return;
     const vf length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
+    const vf base = p->sample_base, step = p->sample_step;
+    const bool needs_contact = p->frame->needs_contact;
+    vf *values = s->value[state->volume];
     for (int n = begin; n < end; n++) {
-        const vf t = kernel_sample_t(p, s->first + n);
+        const vf t = base + step * (float)(s->first + n);
         vm own = vm_and(i->mask, vm_andnot(vf_lt(t, i->t_out), vf_lt(t, i->t_in)));
         vf value = i->v_in + slope * (t - i->t_in);
         if (map) {
             if (!vm_any(own)) continue;
             value = kernel_value_at(p, map, i, own, t);
         }
-        const vf kept = s->value[state->volume][n];
+        const vf kept = values[n];
         const vm apart = vm_and(own, vf_eq(kept, kept));
         if (__builtin_expect(vm_any(apart), 0)) {
             kernel_emit_sample(p, state, apart, t, value);
             own = vm_andnot(own, apart);
         }
-        s->value[state->volume][n] = vf_select(own, value, kept);
-        if (p->frame->needs_contact) {
+        values[n] = vf_select(own, value, kept);
+        if (needs_contact) {
             s->t_in[n] = vf_select(own, i->t_in, s->t_in[n]);
             s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);
         }
@@ -284,8 +300,8 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
     s.marked = vf_set(INFINITY);
     b.contact_in = b.contact_out = b.t_first = b.t_last = b.colour[0] = b.colour[1] = b.colour[2] = vf_set(0);
     for (; first <= last; first += f->job->sample_group) {
-        s.first = first;
-        s.count = last - first + 1 < f->job->sample_group ? last - first + 1 : f->job->sample_group;
+        const int left = last - first + 1;
+        kernel_samples_window(p, &s, first, left < f->job->sample_group ? left : f->job->sample_group);
         const vf t_first = kernel_sample_t(p, first), t_last = kernel_sample_t(p, first + s.count - 1);
         const vf t_end = vf_min(t_last, p->t_far);
         const vm lit = vm_and(p->active, vm_and(vf_lt(vf_set(KERNEL_DARK), b.light), vf_le(t_first, t_end)));

@@ -37,9 +37,16 @@ typedef __mmask16 vm;
 typedef vi vm;
 #endif
 
+/* Not (vf){0} + x: no compiler may leave out that addition, which makes -0 to 0. */
 SIMD_INLINE vf vf_set(float x)
 {
-    return (vf){0} + x;
+#if defined(SIMD_AVX512)
+    return (vf)_mm512_set1_ps(x);
+#elif defined(SIMD_AVX2)
+    return (vf)_mm256_set1_ps(x);
+#else
+    return (vf){x, x, x, x};
+#endif
 }
 SIMD_INLINE vi vi_set(int32_t x)
 {
