@@ -428,7 +428,7 @@ function page(    p, words) {
     print "tets each; float32 coordinates and values, int32 indices. The field is sin 6x cos 6y + sin 6y cos 6z + sin 6z cos 6x. Images"
     print "are 1920 x 1080 from (2.4, 1.6, 3.0) to the origin, 40 degrees vertical: every pixel's ray counts, those that miss too."
     print "The isosurface is at 0.3 (three: and at -0.5 and 1), shaded, by the robust root finder. The volume has a tent of opacity"
-    print "over |f| < 0.6 (at its peak 0.5 in a length of 0.5), samples each half side of a cube, jittered, in groups of 16."
+    print "over |f| < 0.6 (at its peak 0.5 in a length of 0.5), samples each half side of a cube, jittered, in groups of 64."
     print ""
     print "A speed is the median of the runs, with the least and the greatest of them. Beside it stands the error on one pixel in each"
     print "block of 60 x 60, against brute force in double over all cells: of the isosurface the difference in depth, in sides of a"
