@@ -6,7 +6,7 @@
  *
  * Where cells are small a block's packet would be asked for rays most of which lie beside the cell. Pixels of several
  * cells' boxes are put side by side instead, and a lane takes its cell's numbers out of the batch's vectors by a
- * permutation. Every operation is that of a cell alone (kernel_cell.h, kernel_line.h, kernel_surface.h) in the same
+ * permutation. Every operation is that of a cell alone (kernel_tet.h, kernel_line.h, kernel_surface.h) in the same
  * order, so that a hit has the same bits however it came to be found. */
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H

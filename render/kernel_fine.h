@@ -16,7 +16,7 @@
 #ifndef RENDER_KERNEL_FINE_H
 #define RENDER_KERNEL_FINE_H
 
-#include "kernel_cell.h"
+#include "kernel_tet.h"
 #include "kernel_wide.h"
 
 /* The plane is left by no more than 1e-7 / KERNEL_FINE_EDGE of the face's extent. */

@@ -10,7 +10,7 @@
 #ifndef RENDER_KERNEL_MAP_H
 #define RENDER_KERNEL_MAP_H
 
-#include "kernel_cell.h"
+#include "kernel_poly.h"
 #include "kernel_wide.h"
 
 enum { KERNEL_MAP_STEPS = 10 };

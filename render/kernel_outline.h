@@ -8,7 +8,7 @@
 #ifndef RENDER_KERNEL_OUTLINE_H
 #define RENDER_KERNEL_OUTLINE_H
 
-#include "kernel_cell.h"
+#include "kernel_tet.h"
 #include "kernel_tile.h"
 
 SIMD_INLINE kernel_four kernel_four_pick(kernel_four v, const int32_t *index)

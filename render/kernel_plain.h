@@ -2,7 +2,7 @@
 #ifndef RENDER_KERNEL_PLAIN_H
 #define RENDER_KERNEL_PLAIN_H
 
-#include "kernel_cell.h"
+#include "kernel_tet.h"
 
 /* A mesh of tets alone whose indices are int32 one after the other, and whose coordinates and values float32, within
  * reach of a gather: strides in elements. */

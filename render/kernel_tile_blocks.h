@@ -8,7 +8,7 @@
 #ifndef RENDER_KERNEL_TILE_BLOCKS_H
 #define RENDER_KERNEL_TILE_BLOCKS_H
 
-#include "kernel_cell.h"
+#include "kernel_tet.h"
 #include "kernel_tile.h"
 
 enum { KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH };
