@@ -1,13 +1,15 @@
-/* Meshes that most simulations of tets have, whose arrays are read without asking each element for its type. */
+/* Meshes that most simulations of tets or hexes have, whose arrays are read without asking each element for its type.
+ */
 #ifndef RENDER_KERNEL_PLAIN_H
 #define RENDER_KERNEL_PLAIN_H
 
 #include "kernel_tet.h"
 
-/* A mesh of tets alone whose indices are int32 one after the other, and whose coordinates and values float32, within
- * reach of a gather: strides in elements. */
+/* A mesh of tets alone, or of hexes, whose indices are int32 one after the other, and whose coordinates and values
+ * float32, within reach of a gather: strides in elements. */
 typedef struct kernel_plain {
-    bool is_so;
+    bool is_so;          /* of tets; */
+    bool is_hexes;       /* of hexes */
     bool is_interleaved; /* a vertex's coordinates are side by side */
     const int32_t *connectivity;
     const float *coordinates[3], *values;
@@ -28,8 +30,9 @@ static inline void kernel_plain_begin(kernel_plain *p, const kernel_frame *f, co
 {
     const grid_array *c = g->coordinates;
     memset(p, 0, sizeof *p);
-    if (g->offsets.data || g->cell_types || g->cell_type != GRID_TET || g->connectivity.is_wide ||
-        g->connectivity.stride != sizeof(int32_t) || field->is_cell_centred || field->component < 0)
+    if (g->offsets.data || g->cell_types || (g->cell_type != GRID_TET && g->cell_type != GRID_HEX) ||
+        g->connectivity.is_wide || g->connectivity.stride != sizeof(int32_t) || field->is_cell_centred ||
+        field->component < 0)
         return;
     p->connectivity = (const int32_t *)(const void *)g->connectivity.data;
     p->stride = kernel_plain_stride(&c[0], g->vertex_count);
@@ -46,6 +49,8 @@ static inline void kernel_plain_begin(kernel_plain *p, const kernel_frame *f, co
         p->is_so = p->is_so && kernel_plain_stride(&c[a], g->vertex_count) == p->stride && fabs(eye) < 1e15;
         p->is_interleaved = p->is_interleaved && c[a].data == c[0].data + a * (int64_t)sizeof(float);
     }
+    p->is_hexes = p->is_so && g->cell_type == GRID_HEX;
+    p->is_so = p->is_so && g->cell_type == GRID_TET;
 }
 
 SIMD_INLINE void kernel_plain_prefetch(const kernel_plain *p, int32_t vertex)

@@ -24,8 +24,15 @@ typedef struct kernel_tets {
     int count;
     uint32_t cell[SIMD_WIDTH];
     int64_t vertices[SIMD_WIDTH][GRID_MAX_CELL_VERTICES];
-    int32_t plain[4][SIMD_WIDTH]; /* the vertices of a plain mesh, instead */
+    int32_t plain[8][SIMD_WIDTH]; /* the vertices of a plain mesh, instead; or of hexes */
 } kernel_tets;
+
+/* Hexes of a plain mesh that the isovalue under way crosses (kernel_shown_hexes.h). */
+typedef struct kernel_crossed_hexes {
+    int count, value;
+    uint32_t cell[SIMD_WIDTH];
+    int32_t vertex[8][SIMD_WIDTH];
+} kernel_crossed_hexes;
 
 /* One subtree's search. */
 typedef struct kernel_finder {
@@ -44,6 +51,7 @@ typedef struct kernel_finder {
     kernel_cell cell;
     uint32_t coming[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
     kernel_tets tets;            /* tets whose vertices are */
+    kernel_crossed_hexes hexes;
     kernel_plain plain;
     int coming_count;
 } kernel_finder;
@@ -76,8 +84,9 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
-    s->coming_count = s->tets.count = 0;
+    s->coming_count = s->tets.count = s->hexes.count = 0;
     kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
+    s->plain.is_hexes = s->plain.is_hexes && s->surface;
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);
@@ -548,9 +557,15 @@ static void kernel_find_any_tets(kernel_finder *s)
     s->tets.count = 0;
 }
 
+/* kernel_shown_hexes.h */
+static void kernel_find_plain_hexes(kernel_finder *s);
+static void kernel_find_crossed_hexes(kernel_finder *s);
+
 static void kernel_find_tets(kernel_finder *s)
 {
-    if (s->plain.is_so)
+    if (s->plain.is_hexes)
+        kernel_find_plain_hexes(s);
+    else if (s->plain.is_so)
         kernel_find_plain_tets(s);
     else
         kernel_find_any_tets(s);
@@ -562,10 +577,11 @@ static void kernel_find_tets(kernel_finder *s)
 static void kernel_find_coming_plain(kernel_finder *s)
 {
     const kernel_plain *p = &s->plain;
+    const int count = p->is_hexes ? 8 : 4;
     for (int n = 0; n < s->coming_count; n++) {
-        const int32_t *vertices = p->connectivity + 4 * (int64_t)s->coming[n];
+        const int32_t *vertices = p->connectivity + count * (int64_t)s->coming[n];
         s->tets.cell[n] = s->coming[n];
-        for (int i = 0; i < 4; i++) {
+        for (int i = 0; i < count; i++) {
             s->tets.plain[i][n] = vertices[i];
             kernel_plain_prefetch(p, vertices[i]);
         }
@@ -577,7 +593,7 @@ static void kernel_find_coming_plain(kernel_finder *s)
 /* Cells whose connectivity has come: tets wait for their vertices, others are done with. */
 static void kernel_find_coming(kernel_finder *s)
 {
-    if (s->plain.is_so) {
+    if (s->plain.is_so || s->plain.is_hexes) {
         kernel_find_coming_plain(s);
         return;
     }
@@ -622,6 +638,7 @@ static void kernel_find_rest(kernel_finder *s)
     kernel_find_tets(s);
     kernel_find_coming(s);
     kernel_find_tets(s);
+    kernel_find_crossed_hexes(s);
 }
 
 /* A node is looked at beside others, each of which has what it needs on its way from memory while they wait. */
