@@ -315,30 +315,46 @@ SIMD_INLINE void kernel_patch_setup(kernel_patch *p, const kernel_quad *q)
     p->hx = (q->x[2] - q->x[1]) - p->gx, p->hy = (q->y[2] - q->y[1]) - p->gy;
 }
 
-/* Newton's method for the ray's place (s, r) on the patch, within [0, 1]: the error goes as its square in each step,
- * 0.2 to 1e-9 in four. Returns the rays that have arrived: to what float32 leaves of the quad's size, across the ray.
- * None have where the quad is so steep that this is 8 times as much along it, or nearly folded, nor where the place is
- * so near the quad's border that the crossing of a face beside it, 1e-6 of its size off, may come in the wrong order.
- */
-SIMD_INLINE vm kernel_patch_newton(const kernel_patch *p, vf *s, vf *r)
+/* At the place (s, r): the patch's derivatives, their determinant, and how far the ray is. */
+typedef struct kernel_patch_at {
+    vf sx, sy, rx, ry, det, dx, dy;
+} kernel_patch_at;
+
+SIMD_INLINE kernel_patch_at kernel_patch_look(const kernel_patch *p, vf s, vf r)
+{
+    kernel_patch_at at;
+    at.rx = p->gx + s * p->hx, at.ry = p->gy + s * p->hy;
+    at.dx = -((p->ax + s * p->ex) + r * at.rx), at.dy = -((p->ay + s * p->ey) + r * at.ry);
+    at.sx = p->ex + r * p->hx, at.sy = p->ey + r * p->hy;
+    at.det = at.sx * at.ry - at.sy * at.rx;
+    return at;
+}
+
+/* A step of Newton's method for the ray's place on the patch, within [0, 1]: the error goes as its square in each, 0.2
+ * to 1e-9 in four. */
+enum { KERNEL_PATCH_STEPS = 4 };
+
+SIMD_INLINE void kernel_patch_step(const kernel_patch *p, vf *s, vf *r)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    for (int step = 0;; step++) {
-        const vf rx = p->gx + *s * p->hx, ry = p->gy + *s * p->hy;
-        const vf dx = -((p->ax + *s * p->ex) + *r * rx), dy = -((p->ay + *s * p->ey) + *r * ry);
-        const vf sx = p->ex + *r * p->hx, sy = p->ey + *r * p->hy;
-        const vf det = sx * ry - sy * rx;
-        if (step == 4) {
-            const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
-            const vf rim = vf_min(vf_min(*s, one - *s), vf_min(*r, one - *r));
-            const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(det) * 8.0f);
-            const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), rim));
-            return vm_and(inside, vf_le(vf_abs(dx) + vf_abs(dy), (e + g) * 1.2e-7f));
-        }
-        const vf inverse = vf_select(vf_eq(det, zero), zero, 1.0f / det);
-        *s = vf_clamp(*s + (dx * ry - dy * rx) * inverse, zero, one);
-        *r = vf_clamp(*r + (sx * dy - sy * dx) * inverse, zero, one);
-    }
+    const kernel_patch_at at = kernel_patch_look(p, *s, *r);
+    const vf inverse = vf_select(vf_eq(at.det, zero), zero, 1.0f / at.det);
+    *s = vf_clamp(*s + (at.dx * at.ry - at.dy * at.rx) * inverse, zero, one);
+    *r = vf_clamp(*r + (at.sx * at.dy - at.sy * at.dx) * inverse, zero, one);
+}
+
+/* Rays that have arrived: to what float32 leaves of the quad's size, across the ray. None have where the quad is so
+ * steep that this is 8 times as much along it, or nearly folded, nor where the place is so near the quad's border that
+ * the crossing of a face beside it, 1e-6 of its size off, may come in the wrong order. */
+SIMD_INLINE vm kernel_patch_arrived(const kernel_patch *p, vf s, vf r)
+{
+    const vf one = vf_set(1);
+    const kernel_patch_at at = kernel_patch_look(p, s, r);
+    const vf e = vf_abs(p->ex) + vf_abs(p->ey), g = vf_abs(p->gx) + vf_abs(p->gy);
+    const vf rim = vf_min(vf_min(s, one - s), vf_min(r, one - r));
+    const vm open = vf_lt(e * (p->gz + 0.5f * g) + g * p->ez, vf_abs(at.det) * 8.0f);
+    const vm inside = vm_and(open, vf_lt(vf_set(1.0f / 1024), rim));
+    return vm_and(inside, vf_le(vf_abs(at.dx) + vf_abs(at.dy), (e + g) * 1.2e-7f));
 }
 
 /* A guess at the place: how far it is between two sides, by the triangles that the ray makes with each. */
@@ -349,15 +365,24 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
-/* Where rays of once, which meet the triangles once, meet the patch. */
-SIMD_INLINE void kernel_quad_meet(const kernel_quad *q, vm once, kernel_quad_place *out)
+/* Where rays of once, which meet the triangles once, meet the patch: count quads at once, each of whose steps waits for
+ * the one before. */
+SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_place *out)
 {
-    kernel_patch patch;
-    vf s = kernel_quad_between(q, 0, 3, 1, 2), r = kernel_quad_between(q, 0, 1, 3, 2);
-    kernel_patch_setup(&patch, q);
-    const vm left = vm_andnot(once, kernel_patch_newton(&patch, &s, &r));
-    *out = (kernel_quad_place){once, s, r, kernel_bilinear(q->z, s, r)};
-    if (__builtin_expect(vm_any(left), 0)) kernel_quad_once(q, left, out);
+    kernel_patch patch[2];
+    vf s[2], r[2];
+    for (int n = 0; n < count; n++) {
+        s[n] = kernel_quad_between(&q[n], 0, 3, 1, 2);
+        r[n] = kernel_quad_between(&q[n], 0, 1, 3, 2);
+        kernel_patch_setup(&patch[n], &q[n]);
+    }
+    for (int step = 0; step < KERNEL_PATCH_STEPS; step++)
+        for (int n = 0; n < count; n++) kernel_patch_step(&patch[n], &s[n], &r[n]);
+    for (int n = 0; n < count; n++) {
+        const vm left = vm_andnot(once, kernel_patch_arrived(&patch[n], s[n], r[n]));
+        out[n] = (kernel_quad_place){once, s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
+        if (__builtin_expect(vm_any(left), 0)) kernel_quad_once(&q[n], left, &out[n]);
+    }
 }
 
 /* May rays meet the patch twice? By the signs of its sides alone: none does that meets the triangles once. */
@@ -390,7 +415,7 @@ SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kern
     const vf zero = vf_set(0);
     int count = 0;
     if (vm_any(once)) {
-        kernel_quad_meet(q, once, &out[0]);
+        kernel_quads_meet(q, 1, once, &out[0]);
         count = 1;
     }
     if (!vm_any(twice)) return count;

@@ -244,6 +244,14 @@ typedef struct kernel_surface_cache {
     kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
 } kernel_surface_cache;
 
+/* The tile's rays. */
+SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const float shift = fabsf((float)f->depth_shift), radius = tile->radius;
+    return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
+}
+
 SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *tile, kernel_poly *poly,
                                    const render_surface_layer *layer, const kernel_cell *c, int value)
 {
@@ -252,9 +260,7 @@ SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *til
     poly->value = value;
     kernel_map_setup(&poly->map, c);
     if (layer->colour_map) kernel_map_colour(&poly->map, c);
-    const bool flat = f->job->camera.is_orthographic;
-    const float shift = fabsf((float)f->depth_shift), radius = tile->radius;
-    const kernel_beam beam = {.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
+    const kernel_beam beam = kernel_tile_beam(f, tile);
     if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type, &beam);
 }
 

@@ -74,7 +74,8 @@ static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const ke
     t->poly.is_set_up = false;
     if (c->type == GRID_HEX) kernel_poly_setup(t->frame, &t->tile, &t->poly, layer, c, value);
     if (kernel_hexes_take(t, c, shown->box)) {
-        kernel_hexes_add(t, hexes, shown, part, value);
+        kernel_hexes_turn(t, hexes, plain, part);
+        kernel_hexes_add(t, hexes, shown, value);
         return;
     }
     kernel_blocks_meet(t, blocks, part, c->index, c, value);
@@ -108,7 +109,8 @@ static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
         if (!b->count) kernel_batch_turn(t, b, part);
-        if (b->is_for_it && b->layer == t->layer && b->part == part) continue; /* batches ask for theirs */
+        const bool is_known = b->layer == t->layer && b->part == part;
+        if (is_known && (b->is_for_it || b->plain.is_hexes)) continue; /* batches ask for theirs */
         kernel_tile_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                       w->items[n]->cell);
     }
@@ -118,10 +120,14 @@ static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace
         const unsigned blocks = kernel_shown_blocks(t, w->items[n]);
         if (!blocks) continue;
         kernel_batch_turn(t, b, part);
-        if (b->is_for_it)
+        if (b->is_for_it) {
             kernel_batch_add(t, b, w->items[n], value);
-        else
+        } else if (b->plain.is_hexes && kernel_hexes_fit(t)) {
+            kernel_hexes_turn(t, h, &b->plain, part);
+            kernel_hexes_wait(t, h, w->items[n], value);
+        } else {
             kernel_tile_meet(t, h, &b->plain, w->items[n], part, value, blocks);
+        }
     }
     w->count = 0;
 }

@@ -1,0 +1,239 @@
+/* Is the field monotone along a tile's rays, in as many hexes as there are lanes? kernel_bounds.h has what is asked,
+ * with a corner of the domain a lane; here lanes are cells, and the same operations in the same order give the same
+ * answers. What depends on two of a corner's three coordinates is computed for four corners. */
+#ifndef RENDER_KERNEL_BOUNDS_HEXES_H
+#define RENDER_KERNEL_BOUNDS_HEXES_H
+
+#include "kernel_bounds.h"
+
+/* Half of the lanes. */
+typedef struct kernel_bounds_lanes {
+    kernel_half exact[4][8], bent[3][4], inverse[3][3], reach[3];
+    kernel_half_mask is_solid;
+} kernel_bounds_lanes;
+
+/* At corners, by the bits of two coordinates. */
+typedef struct kernel_lanes_slopes {
+    kernel_half bend[3][3][4], df[3][4], de[3][4];
+} kernel_lanes_slopes;
+
+SIMD_INLINE kernel_half kernel_half_all(double x)
+{
+    return (kernel_half){0} + x;
+}
+
+/* As a float32 has it. */
+SIMD_INLINE kernel_half kernel_half_rounded(kernel_half v)
+{
+    return kernel_half_widen(kernel_half_narrow(v));
+}
+
+SIMD_INLINE kernel_half kernel_half_more(kernel_half v, kernel_half most)
+{
+    return kernel_half_select((kernel_half_mask)(v > most), v, most);
+}
+
+/* A number's slope along axis a: of coefficients 1 to 7, at the coordinates after a and after that. */
+SIMD_INLINE kernel_half kernel_half_slope(const kernel_half c[8], int a, double next, double last)
+{
+    const double r[3] = {a == 0   ? 0
+                         : a == 1 ? last
+                                  : next,
+                         a == 1   ? 0
+                         : a == 2 ? last
+                                  : next,
+                         a == 2   ? 0
+                         : a == 0 ? last
+                                  : next};
+    kernel_half out = c[1 + a];
+    for (int j = 0; j < 3; j++)
+        if (a != 2 - j) out += c[4 + j] * r[3 - a - (2 - j)];
+    return out + c[7] * (next * last);
+}
+
+/* kernel_map_setup()'s coefficients. */
+SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, const float at[4][8][SIMD_WIDTH], int half)
+{
+    for (int n = 0; n < 4; n++) {
+        kernel_half d[8];
+        vf v[8];
+        for (int i = 0; i < 8; i++) {
+            v[i] = vf_load(at[n][i]);
+            d[i] = kernel_half_of(&v[i], half);
+        }
+        if (n < 3) {
+            b->reach[n] = kernel_half_abs(d[0]);
+            for (int i = 1; i < 8; i++) b->reach[n] = kernel_half_more(kernel_half_abs(d[i]), b->reach[n]);
+            for (int i = 7; i >= 0; i--) d[i] -= d[0];
+        }
+        KERNEL_HEX_FIT(b->exact[n], d);
+    }
+}
+
+/* kernel_bounds_bend(). */
+SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b)
+{
+    const kernel_half zero = {0};
+    kernel_half m[3][3], cofactor[3][3], position[3][8];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 8; j++) position[i][j] = kernel_half_rounded(b->exact[i][j]);
+        for (int a = 0; a < 3; a++) m[i][a] = kernel_half_slope(position[i], a, 0.5, 0.5);
+    }
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+            cofactor[i][k] = m[i1][k1] * m[i2][k2] - m[i1][k2] * m[i2][k1];
+        }
+    const kernel_half det = m[0][0] * cofactor[0][0] + m[0][1] * cofactor[0][1] + m[0][2] * cofactor[0][2];
+    const kernel_half_mask some = (kernel_half_mask)(det != 0);
+    const kernel_half over = kernel_half_select(some, 1 / kernel_half_select(some, det, zero + 1), zero);
+    b->is_solid = some & (kernel_half_mask)(kernel_half_abs(over) < kernel_half_all((double)INFINITY));
+    for (int i = 0; i < 3; i++) {
+        kernel_half inverse[3];
+        for (int a = 0; a < 3; a++) {
+            inverse[a] = cofactor[a][i] * over;
+            b->inverse[i][a] = kernel_half_select(b->is_solid, kernel_half_rounded(inverse[a]), zero);
+        }
+        for (int j = 0; j < 4; j++) {
+            b->bent[i][j] = zero;
+            for (int a = 0; a < 3; a++)
+                b->bent[i][j] += kernel_half_select(b->is_solid, inverse[a] * position[a][4 + j], zero);
+        }
+    }
+}
+
+/* The gradient of L, rounded; of the field and of E the gradients at the corners, and the bend there. */
+SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, kernel_half gradient[3],
+                                            kernel_lanes_slopes *out)
+{
+    kernel_half field[8], e[8], df[3];
+    for (int j = 0; j < 8; j++) field[j] = kernel_half_rounded(b->exact[3][j]);
+    for (int a = 0; a < 3; a++) df[a] = kernel_half_slope(b->exact[3], a, 0.5, 0.5);
+    for (int i = 0; i < 3; i++) {
+        kernel_half g = {0};
+        for (int a = 0; a < 3; a++) g += df[a] * b->inverse[a][i];
+        gradient[i] = kernel_half_rounded(g);
+    }
+    for (int j = 0; j < 8; j++) {
+        e[j] = b->exact[3][j];
+        for (int i = 0; i < 3; i++) e[j] -= gradient[i] * b->exact[i][j];
+    }
+    for (int n = 0; n < 4; n++) {
+        const double next = n & 1 ? KERNEL_HIGH : KERNEL_LOW, last = n & 2 ? KERNEL_HIGH : KERNEL_LOW;
+        for (int a = 0; a < 3; a++) {
+            out->df[a][n] = kernel_half_slope(field, a, next, last);
+            out->de[a][n] = kernel_half_slope(e, a, next, last);
+            for (int i = 0; i < 3; i++) {
+                const kernel_half *bent = b->bent[i], none = {0};
+                const kernel_half c[8] = {none, none, none, none, bent[0], bent[1], bent[2], none};
+                out->bend[i][a][n] = kernel_half_slope(c, a, next - 0.5, last - 0.5) + bent[3] * (next * last - 0.25);
+            }
+        }
+    }
+}
+
+/* The largest over the corners. */
+typedef struct kernel_lanes_most {
+    kernel_half bend;                   /* kernel_matrix_norm(), to its eighth power */
+    kernel_half df, along, steep, bent; /* squares: of F's gradient; as in kernel_bounds_rise() */
+} kernel_lanes_most;
+
+SIMD_INLINE kernel_half kernel_half_length(const kernel_half v[3])
+{
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+SIMD_INLINE kernel_half kernel_half_eighth(const kernel_half m[3][3])
+{
+    kernel_half square[3][3], fourth[3][3], sum = {0};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k <= i; k++)
+            square[i][k] = square[k][i] = m[0][i] * m[0][k] + m[1][i] * m[1][k] + m[2][i] * m[2][k];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k <= i; k++)
+            fourth[i][k] = fourth[k][i] =
+                square[i][0] * square[k][0] + square[i][1] * square[k][1] + square[i][2] * square[k][2];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) sum += fourth[i][k] * fourth[i][k];
+    return sum;
+}
+
+SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, const kernel_half w[3], kernel_lanes_most *out)
+{
+    for (int n = 0; n < 8; n++) {
+        kernel_half bend[3][3], df[3], de[3], along = {0}, steep = {0}, bent = {0};
+        for (int a = 0; a < 3; a++) {
+            const int at = (n >> (a + 1) % 3 & 1) | (n >> (a + 2) % 3 & 1) << 1;
+            df[a] = s->df[a][at];
+            de[a] = s->de[a][at];
+            for (int i = 0; i < 3; i++) bend[i][a] = s->bend[i][a][at];
+        }
+        for (int i = 0; i < 3; i++) {
+            const kernel_half part = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
+            along += de[i] * w[i];
+            steep += de[i] * de[i];
+            bent += part * part;
+        }
+        const kernel_half eighth = kernel_half_eighth((const kernel_half(*)[3])bend), slope = kernel_half_length(df);
+        if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, bent};
+        out->bend = kernel_half_more(eighth, out->bend);
+        out->df = kernel_half_more(slope, out->df);
+        out->along = kernel_half_more(along * along, out->along);
+        out->steep = kernel_half_more(steep, out->steep);
+        out->bent = kernel_half_more(bent, out->bent);
+    }
+}
+
+/* kernel_bounds_jump(), or less than nothing where kernel_bounds_rise() is not known to be so; of rays about (0, 0, 1).
+ */
+SIMD_INLINE kernel_half_floats kernel_half_jump(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam)
+{
+    const kernel_half zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
+    kernel_bounds_lanes b;
+    kernel_lanes_slopes slopes;
+    kernel_lanes_most most;
+    kernel_half g[3], w[3], length = zero, off = zero, gap = zero;
+    kernel_bounds_lanes_fit(&b, at, half);
+    kernel_bounds_lanes_bend(&b);
+    kernel_bounds_lanes_slopes(&b, g, &slopes);
+    const kernel_half across =
+        2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
+    for (int i = 0; i < 3; i++) {
+        const kernel_half side = kernel_half_abs(b.inverse[i][0]) + kernel_half_abs(b.inverse[i][1]);
+        const kernel_half part = spread * side;
+        const kernel_half blur = across * side + 1e-6 * b.reach[2] * kernel_half_abs(b.inverse[i][2]);
+        w[i] = b.inverse[i][2];
+        length += w[i] * w[i];
+        off += part * part;
+        gap += blur * blur;
+    }
+    kernel_lanes_corners(&slopes, w, &most);
+    const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));
+    const kernel_half_mask is_fine = b.is_solid & (kernel_half_mask)(theta < 0.9);
+    const kernel_half stretch =
+        kernel_half_select((kernel_half_mask)(theta < 0.9), kernel_half_rounded(1 / (1 - theta)), kernel_half_all(10));
+    const kernel_half slope = kernel_half_rounded(kernel_half_sqrt(most.df)), slant = kernel_half_sqrt(most.steep);
+    length = kernel_half_sqrt(length);
+    off = kernel_half_sqrt(off);
+    const kernel_half whole = slant * stretch * (length + off);
+    const kernel_half parts =
+        kernel_half_sqrt(most.along) +
+        slant * (kernel_half_sqrt(most.bent) + theta * theta * stretch * (length + off) + (one + theta) * off);
+    const kernel_half rise = kernel_half_abs(g[2]) - spread * (kernel_half_abs(g[0]) + kernel_half_abs(g[1]));
+    const kernel_half least = kernel_half_select((kernel_half_mask)(whole < parts), whole, parts);
+    const kernel_half_mask rises = is_fine & (kernel_half_mask)(rise * 0.9999 > least);
+    const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
+    return kernel_half_narrow(kernel_half_select(rises, kernel_half_widen(jump), -one));
+}
+
+/* Lane by lane, of places in tile space and values. */
+static __attribute__((noinline)) void kernel_hexes_jump(const float at[4][8][SIMD_WIDTH], const kernel_beam *beam,
+                                                        float jump[SIMD_WIDTH])
+{
+    for (int half = 0; half < 2; half++) {
+        const kernel_half_floats own = kernel_half_jump(at, half, beam);
+        memcpy(jump + half * KERNEL_HALF, &own, sizeof own);
+    }
+}
+
+#endif

@@ -1,0 +1,357 @@
+/* Hexes of a plain mesh, one a lane, placed for a tile and given their lines: the operations of kernel_cell_relative(),
+ * kernel_place_in(), kernel_cell_order() and kernel_poly_lines(), and so the same bits, for as many hexes at once as a
+ * vector has lanes. Vertices are turned into the order of coordinates first, so that all else comes in order. What is
+ * computed in double is computed in two halves. */
+#ifndef RENDER_KERNEL_PLACED_HEXES_H
+#define RENDER_KERNEL_PLACED_HEXES_H
+
+#include "kernel_plain.h"
+#include "kernel_surface.h"
+#include "kernel_wide.h"
+
+enum {
+    KERNEL_HEX_EDGES = 12,
+    KERNEL_HEX_FACES = 6,
+    KERNEL_HEX_LINES = KERNEL_HEX_EDGES + KERNEL_HEX_FACES,
+};
+
+/* Cells in lanes. A line's direction is the shape's: from an edge's first vertex to its second, and on a face from its
+ * loop's vertex 0 to 2, or 1 to 3 where it is turned. */
+typedef struct kernel_placed_hexes {
+    float at[4][8][SIMD_WIDTH];       /* places in tile space, and the field less the isovalue, scaled */
+    float corner[8 * 4 * SIMD_WIDTH]; /* the same, those of a vertex side by side: KERNEL_PLACED_CORNER */
+    float c[KERNEL_HEX_LINES][SIMD_WIDTH], cu[KERNEL_HEX_LINES][SIMD_WIDTH], cv[KERNEL_HEX_LINES][SIMD_WIDTH];
+    float doubt[SIMD_WIDTH];                      /* the largest of the bounds */
+    int32_t turned[SIMD_WIDTH];                   /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
+    int32_t quads[KERNEL_HEX_FACES * SIMD_WIDTH]; /* face by face: kernel_quad_corners(), four bits each */
+    /* for kernel_placed_hex_cell() */
+    float bound[KERNEL_HEX_LINES][SIMD_WIDTH], world[3][8][SIMD_WIDTH];
+    int32_t rank[8][SIMD_WIDTH];
+} kernel_placed_hexes;
+
+/* Where the numbers of a lane's vertex i are. Of each four lanes all firsts come first, as vf_transpose() has them. */
+#define KERNEL_PLACED_CORNER(i, lane) (((i)*4 + ((lane)&3)) * SIMD_WIDTH + ((lane) & ~3))
+
+/* ---- order ---- */
+
+/* Vertices on their way into order, by the bits of x, y, z that kernel_cell_turn() has for them. */
+typedef struct kernel_turned_hexes {
+    vf at[3][8], rank[8];
+    vi vertex[8];
+} kernel_turned_hexes;
+
+static const signed char kernel_hex_bits[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* of a vertex; and back */
+
+SIMD_INLINE vm kernel_lanes_before(const vf at[3][8], int i, int j)
+{
+    vm before = vf_lt(at[2][i], at[2][j]);
+    for (int a = 1; a >= 0; a--) before = vm_or(vf_lt(at[a][i], at[a][j]), vm_and(vf_eq(at[a][i], at[a][j]), before));
+    return before;
+}
+
+SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
+{
+    const vf was = *a;
+    *a = vf_select(lanes, *b, was);
+    *b = vf_select(lanes, was, *b);
+}
+
+SIMD_INLINE void kernel_turned_swap(kernel_turned_hexes *h, vm lanes, int i, int j)
+{
+    const vi was = h->vertex[i];
+    for (int a = 0; a < 3; a++) kernel_vf_swap(lanes, &h->at[a][i], &h->at[a][j]);
+    kernel_vf_swap(lanes, &h->rank[i], &h->rank[j]);
+    h->vertex[i] = vi_select(lanes, h->vertex[j], was);
+    h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
+}
+
+/* kernel_rank_positions(), of vertices as they came. */
+SIMD_INLINE void kernel_turned_rank(kernel_turned_hexes *h)
+{
+    const vf zero = vf_set(0), one = vf_set(1);
+    for (int i = 0; i < 8; i++) h->rank[kernel_hex_bits[i]] = vf_set((float)i);
+    for (int i = 0; i < 8; i++)
+        for (int j = i + 1; j < 8; j++) {
+            const int k = kernel_hex_bits[i], l = kernel_hex_bits[j];
+            const vf after = vf_select(kernel_lanes_before((const vf(*)[8])h->at, l, k), one, zero);
+            h->rank[k] += after;
+            h->rank[l] -= after;
+        }
+}
+
+/* kernel_cell_turn(): the least vertex to bits 0, then the axes in the order of its neighbours. */
+SIMD_INLINE void kernel_turned_turn(kernel_turned_hexes *h)
+{
+    vm turn[3] = {vm_none(), vm_none(), vm_none()};
+    for (int b = 1; b < 8; b++) {
+        const vm least = vf_eq(h->rank[b], vf_set(0));
+        for (int a = 0; a < 3; a++)
+            if (b >> a & 1) turn[a] = vm_or(turn[a], least);
+    }
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 8; b++)
+            if (!(b >> a & 1)) kernel_turned_swap(h, turn[a], b, b | 1 << a);
+    for (int k = 0; k < 3; k++) {
+        const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high); /* 0 and 1, 1 and 2, 0 and 1 */
+        const vm swap = vf_lt(h->rank[high], h->rank[low]);
+        kernel_turned_swap(h, swap, low, high);
+        kernel_turned_swap(h, swap, low | other, high | other);
+    }
+}
+
+SIMD_INLINE void kernel_turned_fetch(kernel_turned_hexes *h, const kernel_plain *p, int32_t vertices[8][SIMD_WIDTH])
+{
+    for (int i = 0; i < 8; i++) {
+        const int b = kernel_hex_bits[i];
+        memcpy(&h->vertex[b], vertices[i], sizeof h->vertex[b]);
+        for (int a = 0; a < 3; a++) h->at[a][b] = vf_gather(p->coordinates[a], h->vertex[b] * p->stride);
+    }
+    kernel_turned_rank(h);
+    kernel_turned_turn(h);
+}
+
+/* ---- places and values ---- */
+
+/* kernel_place_in() of a vertex. */
+SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const vf world[3], vf out[3])
+{
+    const double *eye = f->job->camera.eye;
+    for (int half = 0; half < 2; half++) {
+        kernel_half d[3], at[3];
+        for (int a = 0; a < 3; a++) d[a] = kernel_half_of(&world[a], half) - eye[a];
+        for (int a = 0; a < 3; a++)
+            at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
+        const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+        kernel_half_put(&out[0], half, at[0] - tile->centre_x * depth);
+        kernel_half_put(&out[1], half, at[1] - tile->centre_y * depth);
+        kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
+    }
+}
+
+/* kernel_cell_relative() of eight values. */
+SIMD_INLINE void kernel_lanes_relative(const vf values[8], const double isovalues[SIMD_WIDTH], vf out[8])
+{
+    for (int half = 0; half < 2; half++) {
+        kernel_half isovalue, v[8], largest = {0};
+        memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
+        for (int i = 0; i < 8; i++) {
+            v[i] = kernel_half_of(&values[i], half) - isovalue;
+            largest = kernel_half_max(kernel_half_abs(v[i]), largest);
+        }
+        /* kernel_mirrored_power() */
+        kernel_half_mask exponent = (kernel_half_mask)largest >> 52;
+        const kernel_half_mask low = exponent < 23;
+        const kernel_half_mask high = exponent > 2023;
+        exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
+        const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
+        for (int i = 0; i < 8; i++) kernel_half_put(&out[i], half, v[i] * scale);
+    }
+}
+
+/* ---- lines ---- */
+
+/* A vertex as lines take it. */
+typedef struct kernel_lanes_spot {
+    vf at[3], size;
+} kernel_lanes_spot;
+
+/* kernel_spot_size(). */
+SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile, const vf at[3])
+{
+    vf depth = vf_set(1);
+    if (!f->job->camera.is_orthographic) depth = vf_abs(at[2]) + fabsf((float)f->depth_shift);
+    return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
+}
+
+/* kernel_line_between(); which of the two is the first decides signs alone. */
+SIMD_INLINE void kernel_placed_hex_line(kernel_placed_hexes *out, const kernel_frame *f, int n,
+                                        const kernel_lanes_spot *a, const kernel_lanes_spot *b, vf *doubt)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    vf line[3];
+    for (int half = 0; half < 2; half++) {
+        const kernel_half ax = kernel_half_of(&a->at[0], half), ay = kernel_half_of(&a->at[1], half);
+        const kernel_half bx = kernel_half_of(&b->at[0], half), by = kernel_half_of(&b->at[1], half);
+        kernel_half da = kernel_half_of(&a->at[2], half) + f->depth_shift;
+        kernel_half db = kernel_half_of(&b->at[2], half) + f->depth_shift;
+        if (flat) da = db = (kernel_half){0} + 1;
+        kernel_half_put(&line[0], half, ax * by - bx * ay);
+        kernel_half_put(&line[1], half, db * ay - da * by);
+        kernel_half_put(&line[2], half, da * bx - db * ax);
+    }
+    const vf bound = 6 * 6e-8f * (a->size * b->size);
+    *doubt = vf_max(bound, *doubt);
+    vf_store(out->c[n], line[0]);
+    vf_store(out->cu[n], line[1]);
+    vf_store(out->cv[n], line[2]);
+    vf_store(out->bound[n], bound);
+}
+
+/* Of all faces the corners in kernel_quad_corners()' order, and the diagonals. */
+SIMD_INLINE void kernel_placed_hex_face(kernel_placed_hexes *out, const kernel_frame *f, int face, const vf rank[8],
+                                        const kernel_lanes_spot spots[8], vi *turned, vf *doubt)
+{
+    const signed char *loop = kernel_shapes[0].faces[face].vertices;
+    const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
+    /* The least of 0 and 2, of 1 and 3, and of all. */
+    const vm second = vf_lt(r[2], r[0]), fourth = vf_lt(r[3], r[1]),
+             odd = vf_lt(vf_min(r[1], r[3]), vf_min(r[0], r[2]));
+    const vm far = vm_or(vm_and(odd, fourth), vm_andnot(second, odd)); /* it is 2 or 3 */
+    /* From 0 or 2 the neighbours ahead are 1 or 3, from 1 or 3 they are 2 or 0. */
+    const vm ahead = vm_xor(far, vm_or(vm_and(odd, second), vm_andnot(vm_not(fourth), odd)));
+    const vi one = vi_set(1), none = vi_set(0);
+    const vi first = vi_select(odd, one, none) + (vi_select(far, one, none) << 1);
+    const vi step = vi_select(ahead, one, vi_set(-1));
+    const int loops = loop[0] | loop[1] << 4 | loop[2] << 8 | loop[3] << 12;
+    vi word = none;
+    for (int i = 0; i < 4; i++) word |= (vi_set(loops) >> (((first + i * step) & 3) << 2) & 15) << (4 * i);
+    memcpy(out->quads + face * SIMD_WIDTH, &word, sizeof word);
+    *turned |= vi_select(odd, vi_set(1 << face), none);
+    kernel_lanes_spot from, to;
+    for (int a = 0; a < 3; a++) {
+        from.at[a] = vf_select(odd, spots[loop[1]].at[a], spots[loop[0]].at[a]);
+        to.at[a] = vf_select(odd, spots[loop[3]].at[a], spots[loop[2]].at[a]);
+    }
+    from.size = vf_select(odd, spots[loop[1]].size, spots[loop[0]].size);
+    to.size = vf_select(odd, spots[loop[3]].size, spots[loop[2]].size);
+    kernel_placed_hex_line(out, f, KERNEL_HEX_EDGES + face, &from, &to, doubt);
+}
+
+/* kernel_poly_lines(). */
+SIMD_INLINE void kernel_placed_hex_lines(kernel_placed_hexes *out, const kernel_frame *f, const kernel_tile *tile,
+                                         const vf rank[8])
+{
+    kernel_lanes_spot spots[8];
+    vi turned = vi_set(0);
+    vf doubt = vf_set(0);
+    for (int i = 0; i < 8; i++) {
+        for (int a = 0; a < 3; a++) spots[i].at[a] = vf_load(out->at[a][i]);
+        spots[i].size = kernel_lanes_size(f, tile, spots[i].at);
+    }
+    for (int n = 0; n < KERNEL_HEX_EDGES; n++) {
+        const signed char *edge = kernel_shapes[0].edges[n];
+        kernel_placed_hex_line(out, f, n, &spots[edge[0]], &spots[edge[1]], &doubt);
+    }
+    for (int face = 0; face < KERNEL_HEX_FACES; face++)
+        kernel_placed_hex_face(out, f, face, rank, spots, &turned, &doubt);
+    vf_store(out->doubt, doubt);
+    memcpy(out->turned, &turned, sizeof turned);
+}
+
+/* ---- all of it ---- */
+
+/* Lanes with two neighbouring vertices in one place: kernel_quad_collapses() of some face. */
+SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_hexes *h)
+{
+    vm out = vm_none();
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 8; b++) {
+            const int c = b | 1 << a;
+            if (b == c) continue;
+            const vm same = vm_and(vf_eq(h->at[0][b], h->at[0][c]), vf_eq(h->at[1][b], h->at[1][c]));
+            out = vm_or(out, vm_and(same, vf_eq(h->at[2][b], h->at[2][c])));
+        }
+    return out;
+}
+
+/* The eight vertices of hexes, lane by lane. Returns the lanes of which some face is a triangle. */
+static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out, const kernel_plain *p,
+                                                       const kernel_frame *f, const kernel_tile *tile,
+                                                       int32_t vertices[8][SIMD_WIDTH],
+                                                       const double isovalues[SIMD_WIDTH])
+{
+    kernel_turned_hexes h;
+    vf values[8], relative[8], rank[8];
+    kernel_turned_fetch(&h, p, vertices);
+    for (int i = 0; i < 8; i++) {
+        const int b = kernel_hex_bits[i];
+        const vf world[3] = {h.at[0][b], h.at[1][b], h.at[2][b]};
+        const vi own_rank = vi_from_vf(h.rank[b]);
+        vf at[3];
+        values[i] = vf_gather(p->values, h.vertex[b] * p->value_stride);
+        kernel_lanes_place(f, tile, world, at);
+        for (int a = 0; a < 3; a++) {
+            vf_store(out->world[a][i], world[a]);
+            vf_store(out->at[a][i], at[a]);
+        }
+        rank[i] = h.rank[b];
+        memcpy(out->rank[i], &own_rank, sizeof own_rank);
+    }
+    kernel_lanes_relative(values, isovalues, relative);
+    for (int i = 0; i < 8; i++) {
+        vf at[4] = {vf_load(out->at[0][i]), vf_load(out->at[1][i]), vf_load(out->at[2][i]), relative[i]};
+        vf_store(out->at[3][i], relative[i]);
+        vf_transpose(at);
+        for (int k = 0; k < 4; k++) vf_store(out->corner + (i * 4 + k) * SIMD_WIDTH, at[k]);
+    }
+    kernel_placed_hex_lines(out, f, tile, rank);
+    return kernel_turned_collapsed(&h);
+}
+
+/* ---- one cell ---- */
+
+SIMD_INLINE void kernel_placed_hex_flip(kernel_line *line)
+{
+    line->c = -line->c;
+    line->cu = -line->cu;
+    line->cv = -line->cv;
+}
+
+/* Lane n as a cell, with all that surfaces ask of it; its lines from the vertex of less rank. */
+static __attribute__((noinline)) void kernel_placed_hex_cell(const kernel_placed_hexes *h, int n, kernel_cell *c)
+{
+    const kernel_shape *shape = &kernel_shapes[0];
+    c->type = GRID_HEX;
+    c->count = 8;
+    c->is_finite = c->is_placed = c->has_lines = true;
+    c->has_normal = false;
+    for (int i = 0; i < 8; i++) {
+        c->x[i] = h->at[0][i][n];
+        c->y[i] = h->at[1][i][n];
+        c->z[i] = h->at[2][i][n];
+        c->f[i] = h->at[3][i][n];
+        c->rank[i] = h->rank[i][n];
+        for (int a = 0; a < 3; a++) c->world[i][a] = (double)h->world[a][i][n];
+    }
+    for (int i = 0; i < KERNEL_HEX_LINES; i++) {
+        const bool is_edge = i < KERNEL_HEX_EDGES;
+        const int face = is_edge ? 0 : i - KERNEL_HEX_EDGES, turn = h->turned[n] >> face & 1;
+        const signed char *ends = is_edge ? shape->edges[i] : shape->faces[face].vertices + turn;
+        c->lines[i] = (kernel_line){h->c[i][n], h->cu[i][n], h->cv[i][n], h->bound[i][n]};
+        if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_hex_flip(&c->lines[i]);
+    }
+    c->least[0] = (float)INFINITY;
+}
+
+/* A placed cell with its lines into lane n, from which it need not come back. */
+static __attribute__((noinline)) void kernel_placed_hex_put(kernel_placed_hexes *h, int n, const kernel_cell *c)
+{
+    const kernel_shape *shape = &kernel_shapes[0];
+    h->doubt[n] = 0;
+    h->turned[n] = 0;
+    for (int i = 0; i < 8; i++) {
+        const float at[4] = {c->x[i], c->y[i], c->z[i], c->f[i]};
+        for (int a = 0; a < 4; a++) h->at[a][i][n] = h->corner[KERNEL_PLACED_CORNER(i, n) + a] = at[a];
+    }
+    for (int face = 0; face < KERNEL_HEX_FACES; face++) {
+        const signed char *loop = shape->faces[face].vertices;
+        int corner[4], first = 0;
+        kernel_quad_corners(c, loop, corner);
+        while (loop[first] != corner[0]) first++;
+        h->turned[n] |= (first & 1) << face;
+        h->quads[face * SIMD_WIDTH + n] = corner[0] | corner[1] << 4 | corner[2] << 8 | corner[3] << 12;
+    }
+    for (int i = 0; i < KERNEL_HEX_LINES; i++) {
+        const bool is_edge = i < KERNEL_HEX_EDGES;
+        const int face = is_edge ? 0 : i - KERNEL_HEX_EDGES, turn = h->turned[n] >> face & 1;
+        const signed char *ends = is_edge ? shape->edges[i] : shape->faces[face].vertices + turn;
+        kernel_line line = c->lines[i];
+        if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_hex_flip(&line);
+        h->c[i][n] = line.c;
+        h->cu[i][n] = line.cu;
+        h->cv[i][n] = line.cv;
+        h->doubt[n] = simd_max(line.bound, h->doubt[n]);
+    }
+}
+
+#endif
