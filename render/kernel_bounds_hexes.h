@@ -1,10 +1,17 @@
-/* Is the field monotone along a tile's rays, in as many hexes as there are lanes? kernel_bounds.h has what is asked,
+/* Bounds of the field in hexes along a tile's rays, as many as there are lanes. kernel_bounds.h has what is asked,
  * with a corner of the domain a lane; here lanes are cells, and the same operations in the same order give the same
  * answers. What depends on two of a corner's three coordinates is computed for four corners. */
 #ifndef RENDER_KERNEL_BOUNDS_HEXES_H
 #define RENDER_KERNEL_BOUNDS_HEXES_H
 
 #include "kernel_bounds.h"
+
+/* Lane by lane what kernel_bounds has of a hex. */
+typedef struct kernel_hexes_bounds {
+    float jump[SIMD_WIDTH]; /* less than nothing where the field is not known to be monotone; */
+    /* there L and its thickness, which is infinite where that is of no use */
+    float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
+} kernel_hexes_bounds;
 
 /* Half of the lanes. */
 typedef struct kernel_bounds_lanes {
@@ -102,22 +109,45 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b)
     }
 }
 
-/* The gradient of L, rounded; of the field and of E the gradients at the corners, and the bend there. */
-SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, kernel_half gradient[3],
-                                            kernel_lanes_slopes *out)
+/* L's gradient, rounded, and E; *size is of the rounding of places. */
+SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, kernel_half gradient[3], kernel_half e[8],
+                                            kernel_half *size)
 {
-    kernel_half field[8], e[8], df[3];
-    for (int j = 0; j < 8; j++) field[j] = kernel_half_rounded(b->exact[3][j]);
+    kernel_half df[3];
+    *size = (kernel_half){0};
     for (int a = 0; a < 3; a++) df[a] = kernel_half_slope(b->exact[3], a, 0.5, 0.5);
     for (int i = 0; i < 3; i++) {
         kernel_half g = {0};
         for (int a = 0; a < 3; a++) g += df[a] * b->inverse[a][i];
         gradient[i] = kernel_half_rounded(g);
+        *size += kernel_half_abs(g) * b->reach[i];
     }
     for (int j = 0; j < 8; j++) {
         e[j] = b->exact[3][j];
         for (int i = 0; i < 3; i++) e[j] -= gradient[i] * b->exact[i][j];
     }
+}
+
+/* kernel_bounds_error(). */
+SIMD_INLINE kernel_half kernel_half_error(const kernel_half e[8])
+{
+    kernel_half most = {0};
+    for (int n = 0; n < 8; n++) {
+        const double r[3] = {n & 1 ? KERNEL_HIGH : KERNEL_LOW, n & 2 ? KERNEL_HIGH : KERNEL_LOW,
+                             n & 4 ? KERNEL_HIGH : KERNEL_LOW};
+        const kernel_half at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + r[0] * r[1] * e[4] +
+                               r[2] * ((r[0] * e[5] + r[1] * e[6]) + r[0] * r[1] * e[7]);
+        most = n ? kernel_half_more(at * at, most) : at * at;
+    }
+    return kernel_half_sqrt(most);
+}
+
+/* The gradients of the field and of E at the corners, and the bend there. */
+SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, const kernel_half e[8],
+                                            kernel_lanes_slopes *out)
+{
+    kernel_half field[8];
+    for (int j = 0; j < 8; j++) field[j] = kernel_half_rounded(b->exact[3][j]);
     for (int n = 0; n < 4; n++) {
         const double next = n & 1 ? KERNEL_HIGH : KERNEL_LOW, last = n & 2 ? KERNEL_HIGH : KERNEL_LOW;
         for (int a = 0; a < 3; a++) {
@@ -184,18 +214,25 @@ SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, const kernel
     }
 }
 
-/* kernel_bounds_jump(), or less than nothing where kernel_bounds_rise() is not known to be so; of rays about (0, 0, 1).
- */
-SIMD_INLINE kernel_half_floats kernel_half_jump(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam)
+SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_half v)
+{
+    const kernel_half_floats floats = kernel_half_narrow(v);
+    memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
+}
+
+/* kernel_bounds_linear(), with kernel_bounds_jump() and kernel_bounds_rise() of rays about (0, 0, 1). */
+SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
+                                    kernel_hexes_bounds *out)
 {
     const kernel_half zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
     kernel_bounds_lanes b;
     kernel_lanes_slopes slopes;
     kernel_lanes_most most;
-    kernel_half g[3], w[3], length = zero, off = zero, gap = zero;
+    kernel_half g[3], e[8], w[3], size, length = zero, off = zero, gap = zero;
     kernel_bounds_lanes_fit(&b, at, half);
     kernel_bounds_lanes_bend(&b);
-    kernel_bounds_lanes_slopes(&b, g, &slopes);
+    kernel_bounds_lanes_linear(&b, g, e, &size);
+    kernel_bounds_lanes_slopes(&b, e, &slopes);
     const kernel_half across =
         2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
     for (int i = 0; i < 3; i++) {
@@ -223,17 +260,30 @@ SIMD_INLINE kernel_half_floats kernel_half_jump(const float at[4][8][SIMD_WIDTH]
     const kernel_half least = kernel_half_select((kernel_half_mask)(whole < parts), whole, parts);
     const kernel_half_mask rises = is_fine & (kernel_half_mask)(rise * 0.9999 > least);
     const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
-    return kernel_half_narrow(kernel_half_select(rises, kernel_half_widen(jump), -one));
+    kernel_half_store(out->jump, half, kernel_half_select(rises, kernel_half_widen(jump), -one));
+    /* L, and its thickness. */
+    const kernel_half level = kernel_half_rounded(e[0]), endless = kernel_half_all((double)INFINITY);
+    e[0] -= level;
+    const kernel_half thickness = kernel_half_error(e) + 1e-5 + 16 * 6e-8 * size;
+    kernel_half_store(out->level, half, level);
+    for (int a = 0; a < 3; a++) kernel_half_store(out->gradient[a], half, g[a]);
+    kernel_half_store(out->thickness, half, kernel_half_select(is_fine, thickness, endless));
 }
 
 /* Lane by lane, of places in tile space and values. */
-static __attribute__((noinline)) void kernel_hexes_jump(const float at[4][8][SIMD_WIDTH], const kernel_beam *beam,
-                                                        float jump[SIMD_WIDTH])
+static __attribute__((noinline)) void kernel_hexes_bound(const float at[4][8][SIMD_WIDTH], const kernel_beam *beam,
+                                                         kernel_hexes_bounds *out)
 {
-    for (int half = 0; half < 2; half++) {
-        const kernel_half_floats own = kernel_half_jump(at, half, beam);
-        memcpy(jump + half * KERNEL_HALF, &own, sizeof own);
-    }
+    for (int half = 0; half < 2; half++) kernel_half_bounds(at, half, beam, out);
+}
+
+/* The same of a cell that has its bounds. */
+SIMD_INLINE void kernel_hexes_bounds_put(kernel_hexes_bounds *out, int lane, const kernel_bounds *b)
+{
+    out->jump[lane] = b->is_monotone ? b->jump : -1;
+    out->level[lane] = b->level;
+    for (int a = 0; a < 3; a++) out->gradient[a][lane] = b->gradient[a];
+    out->thickness[lane] = b->coarsest == 1 ? b->thickness : (float)INFINITY;
 }
 
 #endif

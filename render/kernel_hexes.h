@@ -18,7 +18,7 @@
 #include "kernel_bounds_hexes.h"
 #include "kernel_hex_rays.h"
 
-enum { KERNEL_HEX_PIXELS = 64 }; /* of a cell's box: with more of them, the cell is traced block by block */
+enum { KERNEL_HEX_PIXELS = 256 }; /* of a cell's box: with more of them, the cell is traced block by block */
 
 typedef struct kernel_hexes {
     int count, layer, part; /* -1: of none yet */
@@ -28,8 +28,9 @@ typedef struct kernel_hexes {
     double isovalue[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
     int value[SIMD_WIDTH];
-    float near[SIMD_WIDTH], jump[SIMD_WIDTH]; /* jump: less than nothing where the field is not monotone */
+    float near[SIMD_WIDTH];
     kernel_placed_hexes placed;
+    kernel_hexes_bounds bounds;
     unsigned ready; /* lanes that are cells on their own as well */
     kernel_cell cells[SIMD_WIDTH];
     kernel_poly polys[SIMD_WIDTH];
@@ -115,6 +116,26 @@ static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t
     return nearer;
 }
 
+/* kernel_linear_at(). */
+SIMD_INLINE vf kernel_hexes_linear_at(const kernel_hexes *h, const kernel_hex_packet *p, vf t)
+{
+    vf g[3], at[3];
+    for (int a = 0; a < 3; a++) {
+        g[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
+        at[a] = kernel_hex_take(h->placed.at[a][0], p->lane);
+    }
+    const vf x = (p->rays.origin_x + p->rays.slope_x * t) - at[0], y = (p->rays.origin_y + p->rays.slope_y * t) - at[1];
+    return (kernel_hex_take(h->bounds.level, p->lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
+}
+
+/* Are both ends out of the cell's slab, on the first one's side? */
+SIMD_INLINE vm kernel_hexes_far(const kernel_hexes *h, const kernel_hex_packet *p, const kernel_hex_place ends[2])
+{
+    const vf thick = kernel_hex_take(h->bounds.thickness, p->lane), side = kernel_side(ends[0].v);
+    return vm_and(vf_lt(thick, side * kernel_hexes_linear_at(h, p, ends[0].t)),
+                  vf_lt(thick, side * kernel_hexes_linear_at(h, p, ends[1].t)));
+}
+
 /* kernel_poly_intervals() and the begin of kernel_poly_surface() and kernel_search_begin(). */
 static __attribute__((noinline)) void kernel_hexes_cross(const kernel_tile_trace *t, kernel_hexes *h)
 {
@@ -132,12 +153,14 @@ static __attribute__((noinline)) void kernel_hexes_cross(const kernel_tile_trace
         vm near = vm_and(vf_le(ends[0].t, p.far), vf_le(vf_set(t->t_near), ends[1].t));
         near = vm_and(vm_and(p.active, near), vm_and(vf_lt(ends[0].t, endless), vf_lt(ends[1].t, endless)));
         const vm change = vm_xor(vf_lt(ends[0].v, zero), vf_lt(ends[1].v, zero));
-        const vf jump = kernel_hex_take(h->jump, p.lane);
+        const vf jump = kernel_hex_take(h->bounds.jump, p.lane);
         const vm far = vf_lt(jump, vf_min(vf_abs(ends[0].v), vf_abs(ends[1].v))), other = vf_lt(jump, zero);
         const vm room = vm_and(near, vm_or(change, vf_lt(ends[0].t, ends[1].t)));
         const vm close = vm_andnot(room, vm_or(change, far)), found = vm_andnot(vm_and(near, change), other);
         kernel_hex_ends_add(&h->met, n, ends, vm_bits(found), &h->found, &h->found_ends);
-        kernel_hex_ends_add(&h->met, n, ends, vm_bits(vm_or(close, vm_and(room, other))), &h->others, &h->other_ends);
+        vm searched = vm_and(room, other);
+        if (vm_any(searched)) searched = vm_andnot(searched, vm_andnot(kernel_hexes_far(h, &p, ends), change));
+        kernel_hex_ends_add(&h->met, n, ends, vm_bits(vm_or(close, searched)), &h->others, &h->other_ends);
     }
 }
 
@@ -304,7 +327,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
         h->isovalue[n] = h->isovalue[0];
     }
     const vm collapsed = kernel_place_hexes(&h->placed, &h->plain, t->frame, &t->tile, h->vertex, h->isovalue);
-    kernel_hexes_jump((const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, h->jump);
+    kernel_hexes_bound((const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
     h->ready = 0;
     for (int n = 0; n < h->count; n++) {
         const unsigned blocks = h->blocks[n] & t->wanted & kernel_blocks_beyond(t, h->near[n]);
@@ -385,7 +408,6 @@ SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell
 /* The tile's cell is put to the others. */
 SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_shown *shown, int value)
 {
-    const kernel_bounds *bounds = &t->poly.bounds;
     if (h->count == SIMD_WIDTH) kernel_hexes_run(t, h);
     const int n = h->count++;
     h->cells[n] = t->cell;
@@ -393,7 +415,7 @@ SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const k
     h->ready |= 1u << n;
     h->value[n] = value;
     h->near[n] = shown->near;
-    h->jump[n] = bounds->is_monotone ? bounds->jump : -1;
+    kernel_hexes_bounds_put(&h->bounds, n, &t->poly.bounds);
     kernel_placed_hex_put(&h->placed, n, &t->cell);
     kernel_hexes_rays_of(t, h, n, shown->box, shown->blocks);
 }
