@@ -141,19 +141,31 @@ typedef struct kernel_hex_quad {
     vf f[4];
 } kernel_hex_quad;
 
+/* A number of each ray's own vertex of its cell. Of 16 lanes, selections among all vertices' are faster than a gather,
+ * of 8 they are slower. */
+SIMD_INLINE vf kernel_hex_pick(const float of[8][SIMD_WIDTH], vi lane, vi corner)
+{
+    if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
+    vf four[4], two[2];
+    const vm odd = vm_sign(corner << 31), second = vm_sign(corner << 30), upper = vm_sign(corner << 29);
+    for (int i = 0; i < 4; i++)
+        four[i] = vf_select(odd, kernel_hex_take(of[2 * i + 1], lane), kernel_hex_take(of[2 * i], lane));
+    for (int i = 0; i < 2; i++) two[i] = vf_select(second, four[2 * i + 1], four[2 * i]);
+    return vf_select(upper, two[1], two[0]);
+}
+
 SIMD_INLINE void kernel_hex_quad_take(const kernel_placed_hexes *h, const kernel_hex_packet *p, vi face, kernel_quad *q,
                                       kernel_hex_quad *out)
 {
     const float *quads = (const float *)(const void *)h->quads;
     const vi word = vi_from_bits(vf_gather(quads, face * SIMD_WIDTH + p->lane));
     for (int i = 0; i < 4; i++) {
-        vf at[4];
-        out->corner[i] = word >> (4 * i) & 7;
-        vf_gather_four(h->corner, KERNEL_PLACED_CORNER(out->corner[i], p->lane), at);
-        q->z[i] = at[2];
-        q->x[i] = (at[0] - p->rays.origin_x) - p->rays.slope_x * q->z[i];
-        q->y[i] = (at[1] - p->rays.origin_y) - p->rays.slope_y * q->z[i];
-        out->f[i] = at[3];
+        const vi corner = word >> (4 * i) & 7;
+        out->corner[i] = corner;
+        q->z[i] = kernel_hex_pick(h->at[2], p->lane, corner);
+        q->x[i] = (kernel_hex_pick(h->at[0], p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
+        q->y[i] = (kernel_hex_pick(h->at[1], p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
+        out->f[i] = kernel_hex_pick(h->at[3], p->lane, corner);
     }
     /* Not in doubt, so these have the lines' signs. */
     q->e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);

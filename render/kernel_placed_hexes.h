@@ -18,8 +18,7 @@ enum {
 /* Cells in lanes. A line's direction is the shape's: from an edge's first vertex to its second, and on a face from its
  * loop's vertex 0 to 2, or 1 to 3 where it is turned. */
 typedef struct kernel_placed_hexes {
-    float at[4][8][SIMD_WIDTH];       /* places in tile space, and the field less the isovalue, scaled */
-    float corner[8 * 4 * SIMD_WIDTH]; /* the same, those of a vertex side by side: KERNEL_PLACED_CORNER */
+    float at[4][8][SIMD_WIDTH]; /* places in tile space, and the field less the isovalue, scaled */
     float c[KERNEL_HEX_LINES][SIMD_WIDTH], cu[KERNEL_HEX_LINES][SIMD_WIDTH], cv[KERNEL_HEX_LINES][SIMD_WIDTH];
     float doubt[SIMD_WIDTH];                      /* the largest of the bounds */
     int32_t turned[SIMD_WIDTH];                   /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
@@ -28,9 +27,6 @@ typedef struct kernel_placed_hexes {
     float bound[KERNEL_HEX_LINES][SIMD_WIDTH], world[3][8][SIMD_WIDTH];
     int32_t rank[8][SIMD_WIDTH];
 } kernel_placed_hexes;
-
-/* Where the numbers of a lane's vertex i are. Of each four lanes all firsts come first, as vf_transpose() has them. */
-#define KERNEL_PLACED_CORNER(i, lane) (((i)*4 + ((lane)&3)) * SIMD_WIDTH + ((lane) & ~3))
 
 /* ---- order ---- */
 
@@ -278,12 +274,7 @@ static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out,
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
     }
     kernel_lanes_relative(values, isovalues, relative);
-    for (int i = 0; i < 8; i++) {
-        vf at[4] = {vf_load(out->at[0][i]), vf_load(out->at[1][i]), vf_load(out->at[2][i]), relative[i]};
-        vf_store(out->at[3][i], relative[i]);
-        vf_transpose(at);
-        for (int k = 0; k < 4; k++) vf_store(out->corner + (i * 4 + k) * SIMD_WIDTH, at[k]);
-    }
+    for (int i = 0; i < 8; i++) vf_store(out->at[3][i], relative[i]);
     kernel_placed_hex_lines(out, f, tile, rank);
     return kernel_turned_collapsed(&h);
 }
@@ -330,8 +321,10 @@ static __attribute__((noinline)) void kernel_placed_hex_put(kernel_placed_hexes 
     h->doubt[n] = 0;
     h->turned[n] = 0;
     for (int i = 0; i < 8; i++) {
-        const float at[4] = {c->x[i], c->y[i], c->z[i], c->f[i]};
-        for (int a = 0; a < 4; a++) h->at[a][i][n] = h->corner[KERNEL_PLACED_CORNER(i, n) + a] = at[a];
+        h->at[0][i][n] = c->x[i];
+        h->at[1][i][n] = c->y[i];
+        h->at[2][i][n] = c->z[i];
+        h->at[3][i][n] = c->f[i];
     }
     for (int face = 0; face < KERNEL_HEX_FACES; face++) {
         const signed char *loop = shape->faces[face].vertices;

@@ -371,50 +371,6 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
-/* Of each four lanes, lane i of v[j] and lane j of v[i] change places. */
-SIMD_INLINE void vf_transpose(vf v[4])
-{
-#if defined(SIMD_AVX512)
-    const __m512 a = _mm512_unpacklo_ps((__m512)v[0], (__m512)v[1]), b = _mm512_unpackhi_ps((__m512)v[0], (__m512)v[1]);
-    const __m512 c = _mm512_unpacklo_ps((__m512)v[2], (__m512)v[3]), d = _mm512_unpackhi_ps((__m512)v[2], (__m512)v[3]);
-    v[0] = (vf)_mm512_unpacklo_pd(_mm512_castps_pd(a), _mm512_castps_pd(c));
-    v[1] = (vf)_mm512_unpackhi_pd(_mm512_castps_pd(a), _mm512_castps_pd(c));
-    v[2] = (vf)_mm512_unpacklo_pd(_mm512_castps_pd(b), _mm512_castps_pd(d));
-    v[3] = (vf)_mm512_unpackhi_pd(_mm512_castps_pd(b), _mm512_castps_pd(d));
-#elif defined(SIMD_AVX2)
-    const __m256 a = _mm256_unpacklo_ps((__m256)v[0], (__m256)v[1]), b = _mm256_unpackhi_ps((__m256)v[0], (__m256)v[1]);
-    const __m256 c = _mm256_unpacklo_ps((__m256)v[2], (__m256)v[3]), d = _mm256_unpackhi_ps((__m256)v[2], (__m256)v[3]);
-    v[0] = (vf)_mm256_unpacklo_pd(_mm256_castps_pd(a), _mm256_castps_pd(c));
-    v[1] = (vf)_mm256_unpackhi_pd(_mm256_castps_pd(a), _mm256_castps_pd(c));
-    v[2] = (vf)_mm256_unpacklo_pd(_mm256_castps_pd(b), _mm256_castps_pd(d));
-    v[3] = (vf)_mm256_unpackhi_pd(_mm256_castps_pd(b), _mm256_castps_pd(d));
-#else
-    const vf a = v[0], b = v[1], c = v[2], d = v[3];
-    for (int i = 0; i < 4; i++) v[i] = (vf){a[i], b[i], c[i], d[i]};
-#endif
-}
-
-/* base[index] to base[index + 3]. */
-SIMD_INLINE void vf_gather_four(const float *base, vi index, vf out[4])
-{
-    int32_t at[SIMD_WIDTH];
-    memcpy(at, &index, sizeof at);
-    for (int i = 0; i < 4; i++) {
-#if defined(SIMD_AVX512)
-        const __m512 one = _mm512_castps128_ps512(_mm_loadu_ps(base + at[i]));
-        const __m512 two = _mm512_insertf32x4(one, _mm_loadu_ps(base + at[4 + i]), 1);
-        const __m512 three = _mm512_insertf32x4(two, _mm_loadu_ps(base + at[8 + i]), 2);
-        out[i] = (vf)_mm512_insertf32x4(three, _mm_loadu_ps(base + at[12 + i]), 3);
-#elif defined(SIMD_AVX2)
-        const __m256 one = _mm256_castps128_ps256(_mm_loadu_ps(base + at[i]));
-        out[i] = (vf)_mm256_insertf128_ps(one, _mm_loadu_ps(base + at[4 + i]), 1);
-#else
-        out[i] = vf_load(base + at[i]);
-#endif
-    }
-    vf_transpose(out);
-}
-
 /* a b - c d to 1.5 units in the last place, zero only where it is zero, and of the right sign: Kahan's two fused
  * steps where there are such, else in double, where the products of floats are exact. */
 SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
