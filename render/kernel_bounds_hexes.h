@@ -11,6 +11,7 @@ typedef struct kernel_hexes_bounds {
     float jump[SIMD_WIDTH]; /* less than nothing where the field is not known to be monotone; */
     /* there L and its thickness, which is infinite where that is of no use */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
+    float depth[2][SIMD_WIDTH]; /* the least and the largest of the vertices' */
 } kernel_hexes_bounds;
 
 /* Half of the lanes. */
@@ -274,12 +275,26 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
 static __attribute__((noinline)) void kernel_hexes_bound(const float at[4][8][SIMD_WIDTH], const kernel_beam *beam,
                                                          kernel_hexes_bounds *out)
 {
+    vf near = vf_load(at[2][0]), far = near;
+    for (int i = 1; i < 8; i++) {
+        near = vf_min(near, vf_load(at[2][i]));
+        far = vf_max(far, vf_load(at[2][i]));
+    }
+    vf_store(out->depth[0], near);
+    vf_store(out->depth[1], far);
     for (int half = 0; half < 2; half++) kernel_half_bounds(at, half, beam, out);
 }
 
 /* The same of a cell that has its bounds. */
-SIMD_INLINE void kernel_hexes_bounds_put(kernel_hexes_bounds *out, int lane, const kernel_bounds *b)
+SIMD_INLINE void kernel_hexes_bounds_put(kernel_hexes_bounds *out, int lane, const kernel_bounds *b, const float z[8])
 {
+    float near = z[0], far = z[0];
+    for (int i = 1; i < 8; i++) {
+        near = simd_min(near, z[i]);
+        far = simd_max(far, z[i]);
+    }
+    out->depth[0][lane] = near;
+    out->depth[1][lane] = far;
     out->jump[lane] = b->is_monotone ? b->jump : -1;
     out->level[lane] = b->level;
     for (int a = 0; a < 3; a++) out->gradient[a][lane] = b->gradient[a];

@@ -18,8 +18,6 @@
 #include "kernel_bounds_hexes.h"
 #include "kernel_hex_rays.h"
 
-enum { KERNEL_HEX_PIXELS = 256 }; /* of a cell's box: with more of them, the cell is traced block by block */
-
 typedef struct kernel_hexes {
     int count, layer, part; /* -1: of none yet */
     kernel_plain plain;     /* of the layer's field on the part: if it is of hexes, */
@@ -88,6 +86,34 @@ static __attribute__((noinline)) unsigned kernel_hexes_alone(kernel_tile_trace *
 
 /* ---- rays ---- */
 
+/* kernel_linear_at(). */
+SIMD_INLINE vf kernel_hexes_linear_at(const kernel_hexes *h, const kernel_hex_packet *p, vf t)
+{
+    vf g[3], at[3];
+    for (int a = 0; a < 3; a++) {
+        g[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
+        at[a] = kernel_hex_take(h->placed.at[a][0], p->lane);
+    }
+    const vf x = (p->rays.origin_x + p->rays.slope_x * t) - at[0], y = (p->rays.origin_y + p->rays.slope_y * t) - at[1];
+    return (kernel_hex_take(h->bounds.level, p->lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
+}
+
+/* Rays on which L leaves the cell's slab out on one side from depth to depth. */
+SIMD_INLINE vm kernel_hexes_far(const kernel_hexes *h, const kernel_hex_packet *p, vf side, vf from, vf to)
+{
+    const vf thick = kernel_hex_take(h->bounds.thickness, p->lane);
+    return vm_and(vf_lt(thick, side * kernel_hexes_linear_at(h, p, from)),
+                  vf_lt(thick, side * kernel_hexes_linear_at(h, p, to)));
+}
+
+/* Rays that are so between the least and the largest depth of their cells: a face's value has L's sign on these, and
+ * there is no root. */
+SIMD_INLINE vm kernel_hexes_beside(const kernel_hexes *h, const kernel_hex_packet *p)
+{
+    const vf from = kernel_hex_take(h->bounds.depth[0], p->lane), to = kernel_hex_take(h->bounds.depth[1], p->lane);
+    return kernel_hexes_far(h, p, kernel_side(kernel_hexes_linear_at(h, p, from)), from, to);
+}
+
 /* The rays that cross two faces of their cells go on. Returns the blocks in which something is nearer. */
 static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t, kernel_hexes *h)
 {
@@ -99,6 +125,7 @@ static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t
         uint8_t faces[SIMD_WIDTH];
         kernel_hex_packet_begin(&p, t, &h->rays, n);
         p.active = vm_and(p.active, vf_le(kernel_hex_take(h->near, p.lane), p.far));
+        p.active = vm_andnot(p.active, kernel_hexes_beside(h, &p));
         if (!vm_any(p.active)) continue;
         kernel_hex_faces(&h->placed, &p, &crossed);
         const vi both = crossed.first | crossed.last << 3;
@@ -114,26 +141,6 @@ static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t
     kernel_hex_rays_close(&h->met);
     memset(h->faces + h->met.count, 0, SIMD_WIDTH);
     return nearer;
-}
-
-/* kernel_linear_at(). */
-SIMD_INLINE vf kernel_hexes_linear_at(const kernel_hexes *h, const kernel_hex_packet *p, vf t)
-{
-    vf g[3], at[3];
-    for (int a = 0; a < 3; a++) {
-        g[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
-        at[a] = kernel_hex_take(h->placed.at[a][0], p->lane);
-    }
-    const vf x = (p->rays.origin_x + p->rays.slope_x * t) - at[0], y = (p->rays.origin_y + p->rays.slope_y * t) - at[1];
-    return (kernel_hex_take(h->bounds.level, p->lane) + g[0] * x) + (g[1] * y + g[2] * (t - at[2]));
-}
-
-/* Are both ends out of the cell's slab, on the first one's side? */
-SIMD_INLINE vm kernel_hexes_far(const kernel_hexes *h, const kernel_hex_packet *p, const kernel_hex_place ends[2])
-{
-    const vf thick = kernel_hex_take(h->bounds.thickness, p->lane), side = kernel_side(ends[0].v);
-    return vm_and(vf_lt(thick, side * kernel_hexes_linear_at(h, p, ends[0].t)),
-                  vf_lt(thick, side * kernel_hexes_linear_at(h, p, ends[1].t)));
 }
 
 /* kernel_poly_intervals() and the begin of kernel_poly_surface() and kernel_search_begin(). */
@@ -159,7 +166,9 @@ static __attribute__((noinline)) void kernel_hexes_cross(const kernel_tile_trace
         const vm close = vm_andnot(room, vm_or(change, far)), found = vm_andnot(vm_and(near, change), other);
         kernel_hex_ends_add(&h->met, n, ends, vm_bits(found), &h->found, &h->found_ends);
         vm searched = vm_and(room, other);
-        if (vm_any(searched)) searched = vm_andnot(searched, vm_andnot(kernel_hexes_far(h, &p, ends), change));
+        if (vm_any(searched))
+            searched = vm_andnot(
+                searched, vm_andnot(kernel_hexes_far(h, &p, kernel_side(ends[0].v), ends[0].t, ends[1].t), change));
         kernel_hex_ends_add(&h->met, n, ends, vm_bits(vm_or(close, searched)), &h->others, &h->other_ends);
     }
 }
@@ -303,19 +312,9 @@ static __attribute__((noinline)) void kernel_hexes_trace(kernel_tile_trace *t, k
 /* A lane's rays, and its blocks, of the tile's. */
 SIMD_INLINE void kernel_hexes_rays_of(kernel_tile_trace *t, kernel_hexes *h, int lane, unsigned box, unsigned blocks)
 {
-    for (unsigned y = box >> 8 & 15; y <= box >> 12; y++)
-        for (unsigned x = box & 15; x <= (box >> 4 & 15); x++) {
-            h->rays.pixel[h->rays.count] = (uint8_t)(y << 4 | x);
-            h->rays.lane[h->rays.count++] = (uint8_t)lane;
-        }
+    kernel_hex_rays_of(&h->rays, box, lane);
     for (blocks &= ~t->begun; blocks; blocks &= blocks - 1) kernel_block_begin(t, __builtin_ctz(blocks));
     if (h->rays.count >= KERNEL_HEX_RAYS) kernel_hexes_trace(t, h);
-}
-
-SIMD_INLINE bool kernel_hexes_few(unsigned box)
-{
-    const unsigned columns = (box >> 4 & 15) - (box & 15) + 1, rows = (box >> 12) - (box >> 8 & 15) + 1;
-    return columns * rows <= KERNEL_HEX_PIXELS;
 }
 
 /* The cells that wait are placed. */
@@ -332,7 +331,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
     for (int n = 0; n < h->count; n++) {
         const unsigned blocks = h->blocks[n] & t->wanted & kernel_blocks_beyond(t, h->near[n]);
         if (!blocks) continue;
-        if (kernel_hexes_few(h->box[n]) && !(vm_bits(collapsed) >> n & 1)) {
+        if (!(vm_bits(collapsed) >> n & 1)) {
             kernel_hexes_rays_of(t, h, n, h->box[n], h->blocks[n]);
             continue;
         }
@@ -394,9 +393,9 @@ SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const 
 }
 
 /* Is the tile's cell, with all that it takes to meet rays, one for a batch? */
-SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell *c, unsigned box)
+SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell *c)
 {
-    if (c->type != GRID_HEX || !kernel_hexes_few(box) || !kernel_hexes_fit(t)) return false;
+    if (c->type != GRID_HEX || !kernel_hexes_fit(t)) return false;
     for (int face = 0; face < KERNEL_HEX_FACES; face++) {
         int corner[4];
         kernel_quad_corners(c, kernel_shapes[0].faces[face].vertices, corner);
@@ -415,7 +414,7 @@ SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const k
     h->ready |= 1u << n;
     h->value[n] = value;
     h->near[n] = shown->near;
-    kernel_hexes_bounds_put(&h->bounds, n, &t->poly.bounds);
+    kernel_hexes_bounds_put(&h->bounds, n, &t->poly.bounds, t->cell.z);
     kernel_placed_hex_put(&h->placed, n, &t->cell);
     kernel_hexes_rays_of(t, h, n, shown->box, shown->blocks);
 }

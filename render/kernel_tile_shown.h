@@ -73,7 +73,7 @@ static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const ke
     kernel_tile_ready(t, part);
     t->poly.is_set_up = false;
     if (c->type == GRID_HEX) kernel_poly_setup(t->frame, &t->tile, &t->poly, layer, c, value);
-    if (kernel_hexes_take(t, c, shown->box)) {
+    if (kernel_hexes_take(t, c)) {
         kernel_hexes_turn(t, hexes, plain, part);
         kernel_hexes_add(t, hexes, shown, value);
         return;
