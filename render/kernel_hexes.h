@@ -369,9 +369,15 @@ SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const 
 }
 
 /* Are hexes of the layer under way for batches? */
-SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t)
+SIMD_INLINE bool kernel_hexes_layer_fits(const kernel_tile_trace *t)
 {
     return t->surface->layer->root == RENDER_ROBUST && kernel_tile_layer_batches(t);
+}
+
+/* Those of the mesh, all together? */
+SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t, const kernel_plain *plain)
+{
+    return plain->is_hexes && kernel_hexes_layer_fits(t);
 }
 
 /* A hex of a plain mesh waits. */
@@ -395,7 +401,7 @@ SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const 
 /* Is the tile's cell, with all that it takes to meet rays, one for a batch? */
 SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell *c)
 {
-    if (c->type != GRID_HEX || !kernel_hexes_fit(t)) return false;
+    if (c->type != GRID_HEX || !kernel_hexes_layer_fits(t)) return false;
     for (int face = 0; face < KERNEL_HEX_FACES; face++) {
         int corner[4];
         kernel_quad_corners(c, kernel_shapes[0].faces[face].vertices, corner);

@@ -110,7 +110,7 @@ static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace
         kernel_tile_source(t, w->items[n]->source, &part);
         if (!b->count) kernel_batch_turn(t, b, part);
         const bool is_known = b->layer == t->layer && b->part == part;
-        if (is_known && (b->is_for_it || b->plain.is_hexes)) continue; /* batches ask for theirs */
+        if (is_known && (b->is_for_it || kernel_hexes_fit(t, &b->plain))) continue; /* batches ask for theirs */
         kernel_tile_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                       w->items[n]->cell);
     }
@@ -122,7 +122,7 @@ static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace
         kernel_batch_turn(t, b, part);
         if (b->is_for_it) {
             kernel_batch_add(t, b, w->items[n], value);
-        } else if (b->plain.is_hexes && kernel_hexes_fit(t)) {
+        } else if (kernel_hexes_fit(t, &b->plain)) {
             kernel_hexes_turn(t, h, &b->plain, part);
             kernel_hexes_wait(t, h, w->items[n], value);
         } else {

@@ -15,10 +15,16 @@ enum { WIDTH = 61, HEIGHT = 47 };
 static const float other_colours[2][3] = {{0.9f, 0.9f, 0.1f}, {0.1f, 0.9f, 0.9f}};
 static const double values[4] = {-0.2, 0.3, 0.1, -0.5};
 
+static void create_as(render_fixture *f, const test_mesh *meshes, int count, int n, fixture_camera camera,
+                      test_layout layout)
+{
+    fixture_create(f, meshes, count, layout, 2.0 / n, 1, (const double[]){0, 0, 0});
+    fixture_look(f, camera, WIDTH, HEIGHT);
+}
+
 static void create(render_fixture *f, const test_mesh *meshes, int count, int n, fixture_camera camera)
 {
-    fixture_create(f, meshes, count, (test_layout){.is_interleaved = n % 2}, 2.0 / n, 1, (const double[]){0, 0, 0});
-    fixture_look(f, camera, WIDTH, HEIGHT);
+    create_as(f, meshes, count, n, camera, (test_layout){.is_interleaved = n % 2});
 }
 
 static void compare(render_fixture *f)
@@ -60,6 +66,28 @@ static void batches_draw_what_single_cells_do(void **state)
             }
 }
 
+/* Hexes are placed together, or where coordinates or indices are wide one by one, whatever their vertices' order; some
+ * have an edge of no length, so that two of their faces are triangles. */
+static void hexes_are_numbered_anyhow(void **state)
+{
+    (void)state;
+    for (int turn = 0; turn < 6; turn++)
+        for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
+            const int n = turn / 2 % 2 ? 12 : 5;
+            render_fixture f;
+            test_mesh mesh;
+            test_mesh_lattice(TEST_HEXES, n, 0.2, test_wave, &mesh);
+            for (int64_t c = 0; turn < 4 && c < mesh.cell_count; c += 7)
+                mesh.connectivity[8 * c + 1] = mesh.connectivity[8 * c];
+            test_mesh_turn(&mesh, (uint64_t)turn);
+            create_as(&f, &mesh, 1, n, camera,
+                      (test_layout){.wide_coordinates = turn % 2, .wide_indices = turn == 4, .is_interleaved = true});
+            fixture_add_surface(&f, values, 2, 1);
+            compare(&f);
+            test_mesh_free(&mesh);
+        }
+}
+
 /* What waits for a batch is of one mesh and one layer. */
 static void meshes_and_layers_take_turns(void **state)
 {
@@ -96,17 +124,18 @@ static void ties_are_kept(void **state)
     }
 }
 
-/* Values of no usual size, from nearly nothing to what is no number: such tets are found one by one, and in one vector
+/* Values of no usual size, from nearly nothing to what is no number: such cells are found one by one, and in one vector
  * with others. */
 static void odd_values_are_found_one_by_one(void **state)
 {
     static const float opacity[1] = {0.3f};
     static const double odd[] = {3e31, -3e31, 1e-41, (double)INFINITY, (double)NAN, 3e38};
     (void)state;
-    for (int as_volume = 0; as_volume < 2; as_volume++) {
+    for (int turn = 0; turn < 3; turn++) {
+        const bool as_volume = turn == 1;
         render_fixture f;
         test_mesh mesh;
-        test_mesh_lattice(TEST_TETS, 7, 0.2, test_wave, &mesh);
+        test_mesh_lattice(turn == 2 ? TEST_HEXES : TEST_TETS, 7, 0.2, test_wave, &mesh);
         for (int64_t v = 5; v < mesh.vertex_count; v += 37)
             mesh.values[v] = odd[v / 37 % (int64_t)(sizeof odd / sizeof *odd)];
         create(&f, &mesh, 1, 7, CAMERA_OUTSIDE);
@@ -125,9 +154,8 @@ static void odd_values_are_found_one_by_one(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(batches_draw_what_single_cells_do),
-        cmocka_unit_test(meshes_and_layers_take_turns),
-        cmocka_unit_test(ties_are_kept),
+        cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(hexes_are_numbered_anyhow),
+        cmocka_unit_test(meshes_and_layers_take_turns),      cmocka_unit_test(ties_are_kept),
         cmocka_unit_test(odd_values_are_found_one_by_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
