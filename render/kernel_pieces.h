@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "render.h"
+
 /* KERNEL_BLACK: what is behind so little light is left out of a segment. KERNEL_SHORT: kernel_integral.h. */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
@@ -39,10 +41,17 @@ typedef struct kernel_piece {
     kernel_real entry[KERNEL_PIECE_ENTRIES];
 } kernel_piece;
 
-/* Over a stretch of values: how the function may change in it. Extinctions are per unit distance, slopes per domain. */
+/* Over a stretch of values: how the function may change in it, between steps. Extinctions are per unit distance, slopes
+ * per domain. */
 typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
+
+/* Where the opacity steps: at, and the end of pieces there, which is at rounded. */
+typedef struct kernel_step {
+    double at;
+    float cut;
+} kernel_step;
 
 /* A bin of the sums (kernel_preintegral.h), in units; read as ten floats. */
 typedef struct kernel_pre_entry {
@@ -73,6 +82,8 @@ typedef struct kernel_pieces {
     /* Of the bounds' bins: also from bin_low; below and above the bins the function is constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
+    int step_count;
+    kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* by value */
     float contrast;                  /* no two colours differ by more, in any channel; black and white counted */
     kernel_preintegral *preintegral; /* NULL: no error is allowed */
 } kernel_pieces;

@@ -94,7 +94,8 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
     kernel_passage r;
     kernel_stay stay;
     if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
-    const float cost = state->mixing > 0 ? kernel_course_cost(state, c->f, c->vertex_count) : 0;
+    kernel_course course = {.map = NULL};
+    if (state->mixing > 0) kernel_course_bound(state, c->f, c->vertex_count, &course);
     while (kernel_passage_next(&r, &stay)) {
         if (!c->is_constant) kernel_passage_profile(p, c, rays, false, &r, &stay);
         kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
@@ -103,7 +104,7 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
             kernel_profile_next(&r, &stay, stay.u_out, &piece);
             const kernel_interval i = {
                 .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
-            const kernel_course course = {.interval = &i, .cost = cost};
+            course.interval = &i;
             kernel_course_run(p, state, &course);
             open = kernel_profile_open(&stay, &piece, open);
         }

@@ -22,120 +22,10 @@
 #ifndef RENDER_KERNEL_SEGMENTS_H
 #define RENDER_KERNEL_SEGMENTS_H
 
+#include "kernel_halving.h"
 #include "kernel_preintegral.h"
-#include "kernel_segment_list.h"
-#include "kernel_volume.h"
-
-enum { KERNEL_MAX_PARTS = 256 };
 
 /* ---- a cell's segments ---- */
-
-typedef struct kernel_segment_state {
-    kernel_segments *list;
-    const kernel_pieces *pieces;
-    int volume;
-    float allowance; /* the error a unit distance, and a unit of optical depth, may make; 0: parts by step */
-    float mixing;    /* > 0: segments go out as they are met, to be mixed with others: see kernel_course_mixed() */
-    float reach;     /* no ray is longer in the cells, unit distances */
-} kernel_segment_state;
-
-/* A cell under way: how its field is known, and how finely it must be. */
-typedef struct kernel_course {
-    const kernel_map *map; /* NULL: linear */
-    const kernel_interval *interval;
-    float cost; /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
-} kernel_course;
-
-/* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
- * unit distance (docs/decisions.md): the most of that over the cell's values. */
-SIMD_INLINE float kernel_course_cost(const kernel_segment_state *state, const float *values, int count)
-{
-    const kernel_pieces *t = state->pieces;
-    float low = values[0], high = low;
-    if (!(state->allowance > 0) && !(state->mixing > 0)) return 0;
-    for (int i = 1; i < count; i++) {
-        low = simd_min(values[i], low);
-        high = simd_max(values[i], high);
-    }
-    const float last = KERNEL_BOUND_BINS - 1;
-    const int from = (int)simd_min(simd_max((low - t->bin_low) * t->bound_inverse, 0), last);
-    const int to = (int)simd_min(simd_max((high - t->bin_low) * t->bound_inverse, 0), last);
-    kernel_bound b = t->bounds[from];
-    for (int i = from + 1; i <= to; i++) {
-        b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
-        b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
-        b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
-    }
-    return simd_min(t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope, 1e30f);
-}
-
-SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
-{
-    const kernel_interval *i = course->interval;
-    if (course->map) return kernel_value_at(p, course->map, i, rays, t);
-    const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    return i->v_in + along * (i->v_out - i->v_in);
-}
-
-/* Into how many parts, as a real number, to cut the stretch from t0 to t1, with values v0 and v1 there, and how far its
- * field is off the line between them. By error: the deviation from the
- * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
- * square of a part, and its mean is two thirds of it. Allowed is the stretch's share of the ray's length and of its
- * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. */
-SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
-                                    vm rays, vf t0, vf t1, vf v0, vf v1, vf *deviation)
-{
-    const vf length = t1 - t0;
-    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
-    vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
-    for (int quarter = 1; quarter < 4; quarter++) {
-        const float share = 0.25f * (float)quarter;
-        const vf v = kernel_value_at(p, course->map, course->interval, rays, t0 + length * share);
-        off = vf_max(off, vf_abs((v0 + (v1 - v0) * share) - v));
-        opacity += kernel_opacity(transfer, v);
-    }
-    const vf distance = length * state->list->per_t, depth = distance * opacity * 0.25f;
-    const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = off * course->cost * distance; /* 3/2 of 2/3 */
-    *deviation = off;
-    return vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
-}
-
-/* The same for a stretch that others are mixed with, who take it for a medium that is the same throughout (comp.h). Of
- * a stretch of depth d whose extinction and colour vary by the share v, no more than d v / 4 is elsewhere than it is
- * said to be, and what that does to light is attenuated by the others' depth in it. That depth, times the light that
- * gets there, sums to 1 over a ray; so d v / 4 may be the whole error allowed. */
-SIMD_INLINE vf kernel_course_mixed(const kernel_segment_state *state, const kernel_course *course, vf length, vf change)
-{
-    const vf moved = change * course->cost * (length * state->list->per_t) * 0.25f;
-    return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
-}
-
-SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
-                                   vm rays, vf t0, vf t1, vf v0, vf v1)
-{
-    const vf length = t1 - t0;
-    vf parts = vf_set(1), off = vf_set(0);
-    if (course->map && state->allowance > 0)
-        parts = kernel_course_curved(p, state, course, rays, t0, t1, v0, v1, &off);
-    else if (course->map)
-        parts = length / p->sample_step;
-    if (state->mixing > 0)
-        parts = vf_max(parts, kernel_course_mixed(state, course, length, vf_abs(v1 - v0) + 2.0f * off));
-    return vf_clamp(-vf_floor(-parts), vf_set(1), vf_set(KERNEL_MAX_PARTS));
-}
-
-/* A segment as a fragment of its own. */
-static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
-                                vf v_in, vf v_out)
-{
-    kernel_light light = kernel_clear();
-    const kernel_run run = kernel_run_of((t_out - t_in) * state->list->per_t, v_in, v_out);
-    kernel_integrate(state->pieces, rays, &run, &light);
-    kernel_emit(p, vm_and(rays, vf_lt(light.transmittance, vf_set(1))), FRAGMENT_VOLUME, vf_set(0), t_in, t_out,
-                light.colour, light.transmittance);
-}
 
 /* A stretch in equal parts: the field at three of their ends in turn. */
 typedef struct kernel_parts {
@@ -174,7 +64,13 @@ SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *
     kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
     s.before = kernel_course_value(p, course, rays, t0);
     s.last = kernel_course_value(p, course, rays, t1);
-    s.count = kernel_course_parts(p, state, course, rays, t0, t1, s.before, s.last);
+    vm halved;
+    s.count = kernel_course_parts(p, state, course, rays, t0, t1, s.before, s.last, &halved);
+    if (__builtin_expect(vm_any(halved), 0)) {
+        kernel_course_halve(p, state, course, halved, t0, t1);
+        rays = vm_andnot(rays, halved);
+        if (!vm_any(rays)) return;
+    }
     s.span = (t1 - t0) / s.count;
     s.to = kernel_parts_end(p, course, &s, rays, 1, &s.after);
     s.bend = vf_set(0);
@@ -233,8 +129,8 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out));
     if (list->cuts.row_count) cut = vm_or(cut, vf_lt(kernel_next_cut(p, &list->cuts, i.t_in, true), i.t_out));
     if (__builtin_expect(state->mixing > 0 || vm_any(vm_and(i.mask, cut)), 0)) {
-        const kernel_course course = {.interval = &i,
-                                      .cost = state->mixing > 0 ? kernel_course_cost(state, c->f, c->count) : 0};
+        kernel_course course = {.interval = &i};
+        if (state->mixing > 0) kernel_course_bound(state, c->f, c->count, &course);
         kernel_course_run(p, state, &course);
         return;
     }
@@ -279,13 +175,13 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
             continue;
         }
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-        kernel_course course = {.cost = state->mixing > 0 ? kernel_course_cost(state, c->f, c->count) : 0};
+        kernel_course course = {.cell = c};
         kernel_map map;
         const int intervals = kernel_poly_intervals(p, c, rays, false, list);
         if (intervals && !c->is_constant) {
             kernel_map_setup(&map, c);
             course.map = &map;
-            course.cost = kernel_course_cost(state, c->f, c->count);
+            kernel_course_bound(state, c->f, c->count, &course);
         }
         for (int k = 0; k < intervals; k++) {
             course.interval = &list[k];

@@ -41,9 +41,9 @@ static __attribute__((noinline)) void kernel_tile_poly_segments(kernel_packet *p
                                                                 const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_course course = {.map = map};
+    kernel_course course = {.map = map, .cell = c};
     const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
-    if (intervals && map) course.cost = kernel_course_cost(state, c->f, c->count);
+    if (intervals && map) kernel_course_bound(state, c->f, c->count, &course);
     for (int k = 0; k < intervals; k++) {
         course.interval = &list[k];
         kernel_course_run(p, state, &course);

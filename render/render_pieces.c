@@ -182,13 +182,19 @@ static void bound_piece(kernel_pieces *out, const kernel_piece *p)
     }
 }
 
-/* A step between two pieces has no slope that bounds it. */
-static void bound_step(kernel_pieces *out, const kernel_piece *p)
+/* Points that pieces do not tell apart: of those at one place the first's opacity ends one side, and the last's begins
+ * the other. */
+static void fill_steps(kernel_pieces *out, const render_transfer *t)
 {
-    const double x = (double)p[0].entry[KERNEL_PIECE_HIGH];
-    if (fabs(piece_opacity(&p[0], x) - piece_opacity(&p[1], x)) <= 1e-5) return;
-    const double width = 1e-6 / (double)out->bound_inverse;
-    for (int side = -1; side <= 1; side += 2) out->bounds[bound_bin(out, x + side * width)].extinction_slope = 1e30f;
+    int last;
+    for (int i = 0; i < t->opacity_count; i = last + 1) {
+        const double at = domain_of(t, t->opacity_values[i]);
+        last = i;
+        while (last + 1 < t->opacity_count && (kernel_real)domain_of(t, t->opacity_values[last + 1]) == (kernel_real)at)
+            last++;
+        if (t->opacities[i] != t->opacities[last])
+            out->steps[out->step_count++] = (kernel_step){at, (float)(kernel_real)at};
+    }
 }
 
 static void fill_bounds(kernel_pieces *out, const render_transfer *t)
@@ -196,7 +202,6 @@ static void fill_bounds(kernel_pieces *out, const render_transfer *t)
     float low = 0, high = 1;
     for (int i = 0; i < KERNEL_BOUND_BINS; i++) out->bounds[i] = (kernel_bound){.extinction_low = 1e30f};
     for (int i = 0; i < out->count; i++) bound_piece(out, &out->pieces[i]);
-    for (int i = 0; i + 1 < out->count; i++) bound_step(out, &out->pieces[i]);
     for (int i = 0; i < 3 * t->colour_count; i++) {
         low = fminf(low, t->colours[i]);
         high = fmaxf(high, t->colours[i]);
@@ -216,6 +221,7 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     out->bound_inverse = (float)(KERNEL_BOUND_BINS / (double)(cuts[count - 1] - cuts[0]));
     fill_bins(out);
     fill_bounds(out, t);
+    fill_steps(out, t);
 }
 
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error)

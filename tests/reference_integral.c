@@ -2,7 +2,9 @@
  * there may be all of it that shows, and so narrow that no sample would meet it. Between cuts all cells that are there,
  * of all volume layers, emit and absorb together: extinctions add, and so does what is emitted. An interval is
  * integrated by Simpson's rule whole and in halves; where the two differ by more than the tolerance each half is taken
- * in turn. Kinks and steps of the transfer function are not known here: they are found by halving. */
+ * in turn. It is cut as well where the field comes to a point of the opacity, which it may barely do, for less than any
+ * sampling would meet: found between samples and the extremes beside them. Kinks of the colours are not known here:
+ * they are found by halving. */
 #include "reference_integral.h"
 
 #include "reference_base.h"
@@ -103,15 +105,23 @@ void reference_integral_free(reference_integral *scene)
     free(scene);
 }
 
+static double value_at(const stretch *s, const reference_line *line, double z)
+{
+    const placed_cell *placed = s->cell;
+    const double point[3] = {line->base[0] + line->slope[0] * z, line->base[1] + line->slope[1] * z, z};
+    double value;
+    if (placed->cell.type == GRID_POLYHEDRON)
+        reference_profile_value(&placed->cell, line, s->ends, placed->values, z, &value);
+    else
+        reference_interpolate(&placed->cell, point, placed->values, &value, NULL);
+    return value;
+}
+
 static void add_sample(const course *c, const stretch *s, double z, sample *sum)
 {
     const placed_cell *placed = s->cell;
-    const double point[3] = {c->line.base[0] + c->line.slope[0] * z, c->line.base[1] + c->line.slope[1] * z, z};
-    double value, colour[3];
-    if (placed->cell.type == GRID_POLYHEDRON)
-        reference_profile_value(&placed->cell, &c->line, s->ends, placed->values, z, &value);
-    else
-        reference_interpolate(&placed->cell, point, placed->values, &value, NULL);
+    const double value = value_at(s, &c->line, z);
+    double colour[3];
     const double clear = -log1p(-fmin(reference_opacity(placed->transfer, value), 1 - 1e-15));
     const double extinction = clear * c->length / placed->transfer->unit_distance;
     reference_colour(placed->transfer, value, colour);
@@ -253,21 +263,117 @@ static int stretch_cuts(const stretch *s, const reference_line *line, double z[R
     return cuts;
 }
 
-/* Where something begins, bends or ends, sorted. */
+/* Places, as many as there are. */
+typedef struct places {
+    double *z;
+    int64_t count, capacity;
+} places;
+
+static void add_place(places *list, double z)
+{
+    if (list->count == list->capacity)
+        list->z = reference_reserve(list->z, (size_t)(list->capacity = 2 * list->capacity + 64) * sizeof *list->z);
+    list->z[list->count++] = z;
+}
+
+/* The last place on this side of where the value is x, and the first beyond it, so that neither part's end is of the
+ * other's side. */
+static void add_crossing(const stretch *s, const reference_line *line, double low, double high, double x, places *out)
+{
+    const bool rises = value_at(s, line, low) < x;
+    for (int i = 0; i < 60; i++) {
+        const double middle = 0.5 * (low + high);
+        if ((value_at(s, line, middle) < x) == rises)
+            low = middle;
+        else
+            high = middle;
+    }
+    add_place(out, low);
+    add_place(out, high);
+}
+
+/* The greatest (sign 1) or least (-1) value between the places, by the golden section. */
+static double extreme(const stretch *s, const reference_line *line, double low, double high, double sign)
+{
+    const double golden = 0.6180339887498949;
+    double a = high - golden * (high - low), b = low + golden * (high - low);
+    double at_a = sign * value_at(s, line, a), at_b = sign * value_at(s, line, b);
+    for (int i = 0; i < 60; i++) {
+        if (at_a < at_b) {
+            low = a, a = b, at_a = at_b;
+            b = low + golden * (high - low);
+            at_b = sign * value_at(s, line, b);
+        } else {
+            high = b, b = a, at_b = at_a;
+            a = high - golden * (high - low);
+            at_a = sign * value_at(s, line, a);
+        }
+    }
+    return 0.5 * (low + high);
+}
+
+static void add_crossings(const stretch *s, const reference_line *line, double from, double to, places *out)
+{
+    const render_transfer *t = s->cell->transfer;
+    const double a = value_at(s, line, from), b = value_at(s, line, to);
+    for (int i = 0; i < t->opacity_count; i++) {
+        const double x = t->opacity_values[i];
+        if ((i && x == t->opacity_values[i - 1]) || (a < x) == (b < x)) continue;
+        add_crossing(s, line, from, to, x, out);
+    }
+}
+
+/* Where the stretch, which bends nowhere between the places, comes to a point of the opacity. */
+static void add_points(const stretch *s, const reference_line *line, double from, double to, places *out)
+{
+    enum { SAMPLES = 48 };
+    const render_transfer *t = s->cell->transfer;
+    const int type = s->cell->cell.type, count = type == GRID_TET || type == GRID_POLYHEDRON ? 1 : SAMPLES;
+    double value[SAMPLES + 1], low = INFINITY, high = -INFINITY;
+    bool is_met = false;
+    for (int i = 0; i < s->cell->cell.count; i++) {
+        low = fmin(low, s->cell->values[i]);
+        high = fmax(high, s->cell->values[i]);
+    }
+    for (int i = 0; i < t->opacity_count; i++)
+        is_met = is_met || (low <= t->opacity_values[i] && t->opacity_values[i] <= high);
+    if (!is_met) return;
+    for (int i = 0; i <= count; i++) value[i] = value_at(s, line, from + (to - from) * i / count);
+    double last = from;
+    for (int i = 0; i <= count; i++) {
+        /* An extreme about sample i; about the first and the last one the stretch may hide it. */
+        const int before = i ? i - 1 : 0, after = i < count ? i + 1 : count;
+        const bool is_top = value[i] >= fmax(value[before], value[after]);
+        const bool is_bottom = value[i] <= fmin(value[before], value[after]);
+        if (count > 1 && is_top != is_bottom) {
+            const double top = extreme(s, line, from + (to - from) * before / count, from + (to - from) * after / count,
+                                       is_top ? 1 : -1);
+            if (top > last) add_crossings(s, line, last, top, out);
+            last = fmax(last, top);
+        }
+        const double z = from + (to - from) * i / count;
+        if (z > last) add_crossings(s, line, last, z, out);
+        last = fmax(last, z);
+    }
+}
+
+/* Where something begins, bends, comes to a point of the opacity or ends, sorted. */
 static double *find_cuts(const stretch *list, int64_t count, const reference_line *line, const reference_hit *hits,
                          int hit_count, int64_t *cuts)
 {
-    double *z = reference_reserve(NULL, (size_t)(hit_count + 1) * sizeof *z);
-    *cuts = 0;
+    places all = {0};
     for (int64_t i = 0; i < count; i++) {
         double own[REFERENCE_MAX_BREAKS];
         const int more = stretch_cuts(&list[i], line, own);
-        z = reference_reserve(z, (size_t)(*cuts + more + hit_count) * sizeof *z);
-        for (int k = 0; k < more; k++) z[(*cuts)++] = own[k];
+        if (more > 2) qsort(own, (size_t)more, sizeof *own, compare_numbers);
+        for (int k = 0; k < more; k++) add_place(&all, own[k]);
+        for (int k = 0; k + 1 < more; k++)
+            if (own[k] < own[k + 1]) add_points(&list[i], line, own[k], own[k + 1], &all);
     }
-    for (int i = 0; i < hit_count; i++) z[(*cuts)++] = hits[i].depth;
-    if (*cuts) qsort(z, (size_t)*cuts, sizeof *z, compare_numbers);
-    return z;
+    for (int i = 0; i < hit_count; i++) add_place(&all, hits[i].depth);
+    if (all.count) qsort(all.z, (size_t)all.count, sizeof *all.z, compare_numbers);
+    *cuts = all.count;
+    return all.z;
 }
 
 static void find_active(course *c, const stretch *list, int64_t count, double from, double to)

@@ -51,6 +51,10 @@ insitu_render_program(test_segment_ends)
 add_test(NAME segment_ends COMMAND test_segment_ends)
 set_tests_properties(segment_ends PROPERTIES TIMEOUT 120)
 
+insitu_render_program(test_segment_steps)
+add_test(NAME segment_steps COMMAND test_segment_steps)
+set_tests_properties(segment_steps PROPERTIES TIMEOUT 180)
+
 add_executable(test_integral test_integral.c integral_doubles.c integral_floats.c)
 target_link_libraries(test_integral PRIVATE test_render_support insitu_flags)
 target_compile_options(test_integral PRIVATE $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)

@@ -160,15 +160,14 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
 #define SAMPLING_KEYS(X)                                                                                               \
     X(CHOICE("method", scene_file_sampling, method, method_words),                                                     \
       .help = "How a volume is integrated: by samples, or by segments, exact on tetrahedra and of second order in "    \
-              "the step elsewhere. Segments of several volumes are mixed pixel by pixel, slower than samples.",        \
+              "the step elsewhere (of first on rays that graze a step of the opacity). Segments of several volumes "   \
+              "are mixed pixel by pixel, slower than samples.",                                                        \
       .by_default = "`samples`, with `max_error` `segments`")                                                          \
     X(CYAML_FIELD_FLOAT_PTR("max_error", OPTIONAL, scene_file_sampling, max_error),                                    \
       .help = "No channel of a pixel is off by more, in linear light: cells are cut, and integrals taken, as "         \
               "finely as that takes, where the medium is of less than 1000 optical depths across the scene: of "       \
-              "a denser one single precision's places of faces may cost more. Where `opacity` has a step, two "        \
-              "points of one value, it is kept on tetrahedra and polyhedra alone: in a curved cell that barely "       \
-              "reaches the step, 3e-3 was seen at 800 optical depths. On tetrahedra, and with tables of many "         \
-              "colours, `1e-2` takes a fraction of the time of `method: segments`. Not with `step`, "                  \
+              "a denser one single precision's places of faces may cost more. On tetrahedra, and with tables of "      \
+              "many colours, `1e-2` takes a fraction of the time of `method: segments`. Not with `step`, "             \
               "`step_cells`, nor `method: samples`.",                                                                  \
       .by_default = "by the step", .low = 1e-4, .high = 1)                                                             \
     X(CYAML_FIELD_FLOAT_PTR("step", OPTIONAL, scene_file_sampling, step),                                              \

@@ -1,0 +1,492 @@
+/* A stretch of a ray in a cell, cut where the transfer function asks for it: for rays on which no number of equal parts
+ * is enough. A step of the opacity has no slope that would bound what a field that is somewhat off does to the light,
+ * and where a curved field barely reaches the step, the length that is beyond it goes as the root of how far: at 800
+ * optical depths a field that is off by 1e-6 of the function's domain changes such a pixel by a tenth. So all of this
+ * is in double, from the coordinates and values as they were handed over and from the ray's place in the picture, a ray
+ * at a time, and the same for all instruction sets.
+ *
+ * Parts. The field is known at a part's ends, quarters and middle; it is off the chord by no more than d, half as much
+ * again as it is there (the three see 7/8 of a cubic's). Where the chord rises by 4 d or more, the field is monotone
+ * (a parabola that is off its chord by d has the slopes (rise +- 4 d) / length at its ends), and so are all parts of
+ * it. Its values are then those between its ends, otherwise these widened by d. What the part is:
+ *   - of one side of each step, and its chord is close enough: a segment;
+ *   - monotone, with a step strictly between its ends: cut where the field is that step's value, to rounding;
+ *   - anything else: halved, the nearer half first, to the same questions.
+ * So a field that barely reaches a step is halved about its extreme alone, until what is about it is of one side, or so
+ * short that it does not show.
+ *
+ * The error of a part of length L, T being the light that comes to it from the stretch's begin (docs/decisions.md has
+ * the rest). Over the part's values let extinction be from s0 to s1 and change by no more than s' per value, the colour
+ * by c', and let R be the colours' contrast. A field that is off by d on average changes extinction by ds <= s' d, and
+ * no more than s1 - s0; light in the part falls at least as exp(-s0 t), so that
+ *     R ds  is seen for no more than min(L, 1 / s0),    s1 dc  for min(s1 L, 1) / s1:
+ *     error <= R ds min(L, 1 / s0) + dc min(s1 L, 1),
+ * times T. It may be 7/8 of the share that equal parts have, a = allowance:
+ *     T error <= 7/8 a (L / reach + T D / (1 + D)),    D = s0 L,
+ * The rest is for parts that no halving makes good, about an extreme that touches a step: where T (s1 - s0) .. of one
+ * is no more than a 32nd of a (stretch / reach) it is left as it is. A cubic has two extremes, and four such parts are
+ * in an eighth. */
+#ifndef RENDER_KERNEL_HALVING_H
+#define RENDER_KERNEL_HALVING_H
+
+#include "kernel_course.h"
+
+/* KERNEL_HALVING_DEPTH: 2^-40 of a stretch is nothing to any medium. The count of parts is a guard that no function in
+ * use comes to: what is left of the stretch is then one part each time. */
+enum { KERNEL_HALVING_DEPTH = 40, KERNEL_HALVING_ROOM = 128, KERNEL_HALVING_PARTS = 8192, KERNEL_EXACT_STEPS = 24 };
+
+/* ---- the field in double ---- */
+
+typedef struct kernel_exact_map {
+    bool is_pyramid;
+    double position[3][8], field[8];
+} kernel_exact_map;
+
+/* A place of the ray: the field there, and the cell's own coordinates. */
+typedef struct kernel_knot {
+    double t, v, r[3];
+} kernel_knot;
+
+/* A stretch under way, of one ray. */
+typedef struct kernel_halving {
+    const kernel_segment_state *state;
+    const kernel_course *course;
+    const kernel_exact_map *map; /* NULL: linear */
+    double u, v, slope, shift;   /* at depth t the ray is at (u, v) (slope t + shift) */
+    kernel_knot in, out;         /* of the interval, as the faces have it */
+    double per_t, length, light; /* unit distances per t, of the stretch; what light gets to the part */
+    int count;
+} kernel_halving;
+
+static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, const kernel_cell *c,
+                               const kernel_transfer *transfer)
+{
+    double d[4][GRID_MAX_CELL_VERTICES];
+    for (int i = 0; i < c->count; i++) {
+        const kernel_fine_spot spot = kernel_fine_place(p->frame, p->tile, c->world[i]);
+        d[0][i] = spot.x;
+        d[1][i] = spot.y;
+        d[2][i] = spot.t;
+        d[3][i] = fmax(fmin((c->values[i] - transfer->low) * transfer->inverse_width, 1e18), -1e18);
+    }
+    m->is_pyramid = c->type == GRID_PYRAMID;
+    for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);
+    kernel_polynomial_fit(m->field, c->type, d[3]);
+}
+
+/* m of kernel_map.h, and its derivatives. */
+static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
+{
+    slopes[0] = r[1];
+    slopes[1] = r[0];
+    slopes[2] = 0;
+    if (!is_pyramid) return r[0] * r[1];
+    const double inverse = 1 / fmax(r[2], 1e-9);
+    slopes[0] = fmax(fmin(r[1] * inverse, 2), -1);
+    slopes[1] = fmax(fmin(r[0] * inverse, 2), -1);
+    slopes[2] = -slopes[0] * slopes[1];
+    return slopes[1] * r[1];
+}
+
+static inline double kernel_exact_value(const double c[8], const double r[3], double m)
+{
+    return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
+           r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
+}
+
+static inline void kernel_exact_gradient(const double c[8], const double r[3], double m, const double slopes[3],
+                                         double out[3])
+{
+    const double of_m = c[4] + r[2] * c[7];
+    out[0] = c[1] + r[2] * c[5] + slopes[0] * of_m;
+    out[1] = c[2] + r[2] * c[6] + slopes[1] * of_m;
+    out[2] = c[3] + (r[0] * c[5] + r[1] * c[6]) + m * c[7] + slopes[2] * of_m;
+}
+
+/* kernel_map_newton(), to the end: where a step is below 1e-8, the next would be below rounding. */
+static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
+{
+    for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {
+        double slopes[3], row[3][3], off[3], cross[3][3], largest = 0;
+        const double m = kernel_exact_product(map->is_pyramid, r, slopes);
+        for (int a = 0; a < 3; a++) {
+            off[a] = target[a] - kernel_exact_value(map->position[a], r, m);
+            kernel_exact_gradient(map->position[a], r, m, slopes, row[a]);
+        }
+        for (int a = 0; a < 3; a++) {
+            const double *x = row[(a + 1) % 3], *y = row[(a + 2) % 3];
+            for (int b = 0; b < 3; b++) cross[a][b] = x[(b + 1) % 3] * y[(b + 2) % 3] - x[(b + 2) % 3] * y[(b + 1) % 3];
+        }
+        const double det = row[0][0] * cross[0][0] + row[0][1] * cross[0][1] + row[0][2] * cross[0][2];
+        if (det == 0) return false;
+        for (int b = 0; b < 3; b++) {
+            const double move = (cross[0][b] * off[0] + cross[1][b] * off[1] + cross[2][b] * off[2]) / det;
+            largest = fmax(largest, fabs(move));
+            r[b] = fmax(fmin(r[b] + fmax(fmin(move, 1), -1), 2), -1);
+        }
+        if (largest <= 1e-8) return true;
+    }
+    return false;
+}
+
+static inline bool kernel_exact_is_near(const double r[3])
+{
+    bool near = true;
+    for (int a = 0; a < 3; a++)
+        near = near && -r[a] <= (double)KERNEL_MAP_BEYOND && r[a] - 1 <= (double)KERNEL_MAP_BEYOND;
+    return near;
+}
+
+static inline double kernel_between(double from, double to, double share)
+{
+    return from + (to - from) * share;
+}
+
+/* The field at depth t from a guess of r, as kernel_solve() has it. */
+static kernel_knot kernel_knot_at(const kernel_halving *h, double t, const double guess[3])
+{
+    const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
+    kernel_knot out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
+    if (!h->map) return out;
+    const double reach = h->slope * t + h->shift, target[3] = {h->u * reach, h->v * reach, t};
+    double slopes[3];
+    memcpy(out.r, guess, sizeof out.r);
+    if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
+        out.r[0] = out.r[1] = 0.4;
+        out.r[2] = 0.5;
+        if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
+            for (int a = 0; a < 3; a++) out.r[a] = kernel_between(h->in.r[a], h->out.r[a], share);
+            return out;
+        }
+    }
+    out.v = kernel_exact_value(h->map->field, out.r, kernel_exact_product(h->map->is_pyramid, out.r, slopes));
+    return out;
+}
+
+static kernel_knot kernel_knot_between(const kernel_halving *h, const kernel_knot *a, const kernel_knot *b,
+                                       double share)
+{
+    double guess[3];
+    for (int n = 0; n < 3; n++) guess[n] = kernel_between(a->r[n], b->r[n], share);
+    return kernel_knot_at(h, kernel_between(a->t, b->t, share), guess);
+}
+
+/* Where the field is x, between two knots on either side of it. By regula falsi that halves the value of an end that
+ * stays. */
+static kernel_knot kernel_knot_where(const kernel_halving *h, const kernel_knot *a, const kernel_knot *b, double x)
+{
+    kernel_knot low = *a, high = *b, at = *a;
+    double low_v = low.v - x, high_v = high.v - x;
+    const double enough = 1e-15 * fmax(1, fabs(x));
+    for (int n = 0; n < 60; n++) {
+        const double share = n % 3 == 2 ? 0.5 : low_v / (low_v - high_v);
+        at = kernel_knot_between(h, &low, &high, share);
+        const double v = at.v - x;
+        if (fabs(v) <= enough || high.t - low.t <= 1e-16 * fabs(at.t)) break;
+        if ((v < 0) == (low_v < 0)) {
+            low = at;
+            low_v = v;
+            high_v *= 0.5;
+        } else {
+            high = at;
+            high_v = v;
+            low_v *= 0.5;
+        }
+    }
+    at.v = x;
+    return at;
+}
+
+/* ---- what a part may do to the light ---- */
+
+/* Of the transfer function over some values. */
+typedef struct kernel_span {
+    double least, most, slope, colour_slope; /* least, most: of the extinction */
+} kernel_span;
+
+/* -ln(1 - a), from below and from above: the logarithm's series, and ln(1 + x) <= x (6 + x) / (6 + 4 x). */
+static inline double kernel_extinction_least(double a)
+{
+    return a + 0.5 * a * a;
+}
+
+static inline double kernel_extinction_most(double a)
+{
+    if (!(a < 1)) return (double)KERNEL_OPAQUE;
+    const double x = a / (1 - a);
+    return fmin(x * (6 + x) / (6 + 4 * x), (double)KERNEL_OPAQUE);
+}
+
+static inline void kernel_span_widen(kernel_span *s, const kernel_piece *p, double low, double high)
+{
+    const double from = (double)p->entry[KERNEL_PIECE_LOW], slope = (double)p->entry[KERNEL_PIECE_SLOPE];
+    const double x0 = fmax(low, from), x1 = fmin(high, (double)p->entry[KERNEL_PIECE_HIGH]);
+    const double a0 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x0 - from) * slope, 1), 0);
+    const double a1 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x1 - from) * slope, 1), 0);
+    const double most = fmax(a0, a1);
+    s->least = fmin(s->least, kernel_extinction_least(fmin(a0, a1)));
+    s->most = fmax(s->most, kernel_extinction_most(most));
+    if (slope != 0) s->slope = fmax(s->slope, most < 1 ? fmin(fabs(slope) / (1 - most), 1e30) : 1e30);
+    for (int c = 0; c < 3; c++)
+        s->colour_slope = fmax(s->colour_slope, fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
+}
+
+/* Of the values between low and high; by the bins' bounds where these are many. */
+static kernel_span kernel_span_of(const kernel_pieces *t, double low, double high)
+{
+    const double last = KERNEL_BOUND_BINS - 1, begin = (double)t->bin_low, per_bin = (double)t->bound_inverse;
+    const double pieces_last = KERNEL_PIECE_BINS - 1;
+    kernel_span out = {1e30, 0, 0, 0};
+    if ((high - low) * per_bin > 2) {
+        const int from = (int)fmin(fmax((low - begin) * per_bin, 0), last);
+        const int to = (int)fmin(fmax((high - begin) * per_bin, 0), last);
+        for (int i = from; i <= to; i++) {
+            out.least = fmin(out.least, (double)t->bounds[i].extinction_low);
+            out.most = fmax(out.most, (double)t->bounds[i].extinction_high);
+            out.slope = fmax(out.slope, (double)t->bounds[i].extinction_slope);
+            out.colour_slope = fmax(out.colour_slope, (double)t->bounds[i].colour_slope);
+        }
+        return out;
+    }
+    int at = (int)t->bin_first[(int)fmin(fmax((low - begin) * (double)t->bin_inverse, 0), pieces_last)];
+    while (at > 0 && low < (double)t->pieces[at].entry[KERNEL_PIECE_LOW]) at--;
+    while (at + 1 < t->count && (double)t->pieces[at].entry[KERNEL_PIECE_HIGH] <= low) at++;
+    do {
+        kernel_span_widen(&out, &t->pieces[at], low, high);
+        at++;
+    } while (at < t->count && (double)t->pieces[at].entry[KERNEL_PIECE_LOW] < high);
+    return out;
+}
+
+/* A part: its ends, middle, by how much its field may be off the chord, and its values. */
+typedef struct kernel_half_part {
+    kernel_knot end, middle;
+    int depth;
+    bool is_monotone;
+} kernel_half_part;
+
+typedef struct kernel_part_values {
+    double off, low, high;
+} kernel_part_values;
+
+/* By the field at its quarters. */
+static kernel_part_values kernel_part_look(const kernel_halving *h, const kernel_knot *from, kernel_half_part *part,
+                                           const kernel_knot *first, const kernel_knot *third)
+{
+    const double a = from->v, b = part->end.v, rise = b - a;
+    kernel_part_values out = {0, fmin(a, b), fmax(a, b)};
+    if (!h->map) return out;
+    out.off = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
+                   fabs(a + 0.5 * rise - part->middle.v));
+    part->is_monotone = part->is_monotone || fabs(rise) >= 6 * out.off;
+    if (!part->is_monotone) {
+        out.low -= 1.5 * out.off;
+        out.high += 1.5 * out.off;
+    }
+    return out;
+}
+
+/* What the part does wrong as a segment, as light; all: whatever its field is off by. */
+static double kernel_part_error(const kernel_halving *h, const kernel_part_values *part, const kernel_span *s,
+                                double length, double *all)
+{
+    const double contrast = (double)h->state->pieces->contrast;
+    const double seen = fmin(length, 1 / fmax(s->least, 1e-30)), lit = fmin(s->most * length, 1);
+    const double change = s->most - s->least, tint = fmin(s->colour_slope * (part->high - part->low), contrast);
+    *all = fmin(contrast * change * seen + tint * lit, contrast * lit);
+    return fmin(contrast * (s->slope * part->off) * seen + fmin(s->colour_slope * part->off, contrast) * lit, *all);
+}
+
+/* ---- steps ---- */
+
+/* The nearest step strictly between two values; NULL: none. */
+static const kernel_step *kernel_step_between(const kernel_halving *h, double low, double high)
+{
+    const kernel_step *steps = h->state->pieces->steps + h->course->first_step;
+    for (int i = 0; i < h->course->step_count; i++)
+        if (low < steps[i].at && steps[i].at < high) return &steps[i];
+    return NULL;
+}
+
+/* Pieces end at steps that are rounded to float: of the values there that are beside the step on the same side as
+ * inside, the least and the most. */
+typedef struct kernel_side_values {
+    float low, high;
+} kernel_side_values;
+
+static kernel_side_values kernel_step_side(const kernel_halving *h, double inside)
+{
+    const kernel_step *steps = h->state->pieces->steps;
+    kernel_side_values out = {-3e38f, 3e38f};
+    int n = 0;
+    for (; n < h->state->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
+    /* A level segment at a step is beyond it; one that is not must not come to be there by rounding. */
+    if (n < h->state->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
+    return out;
+}
+
+/* A value x in float, on its side, and what that loses. */
+static void kernel_step_round(const kernel_side_values *side, double x, float *v, double *rest)
+{
+    const double kept = fmax(fmin(x, (double)side->high), (double)side->low);
+    *v = (float)kept;
+    *rest = side->low < *v && *v < side->high ? kept - (double)*v : 0;
+}
+
+/* The function over the part's values, of which inside is one; step: what is between them. */
+static kernel_span kernel_part_span(const kernel_halving *h, const kernel_part_values *values, double inside,
+                                    const kernel_step *step)
+{
+    const kernel_side_values side = kernel_step_side(h, inside);
+    if (step)
+        return kernel_span_of(h->state->pieces, fmin(values->low, (double)nextafterf(step->cut, -3e38f)),
+                              fmax(values->high, (double)nextafterf(step->cut, 3e38f)));
+    const double low = fmin(fmax(values->low, (double)side.low), (double)side.high);
+    const double high = fmin(fmax(values->high, (double)side.low), (double)side.high);
+    return kernel_span_of(h->state->pieces, low, high);
+}
+
+/* ---- segments ---- */
+
+/* From the part's begin to its end, in so many equal parts as mixing asks for. */
+static void kernel_part_emit(kernel_packet *p, const kernel_halving *h, vm lane, const kernel_knot *from,
+                             const kernel_knot *to, double v0, double v1, double parts)
+{
+    float begin = (float)from->t;
+    for (int n = 1; n <= (int)parts; n++) {
+        const double before = (n - 1) / parts, after = n / parts;
+        const float end = n < (int)parts ? (float)kernel_between(from->t, to->t, after) : (float)to->t;
+        if (begin < end)
+            kernel_emit_segment(p, h->state, lane, vf_set(begin), vf_set(end),
+                                vf_set((float)kernel_between(v0, v1, before)),
+                                vf_set((float)kernel_between(v0, v1, after)));
+        begin = end;
+    }
+}
+
+/* The part as segments; raised so that the mean along the chord is the field's where that is a parabola. */
+static void kernel_part_put(kernel_packet *p, const kernel_halving *h, vm lane, const kernel_knot *from,
+                            const kernel_half_part *part, const kernel_part_values *values, const kernel_span *s)
+{
+    kernel_segments *list = h->state->list;
+    const double chord = 0.5 * (from->v + part->end.v), inside = part->middle.v;
+    const bool is_cut = kernel_step_between(h, values->low, values->high) != NULL;
+    const double lift = is_cut ? 0 : (inside - chord) * (2.0 / 3);
+    double x[2] = {from->v + lift, part->end.v + lift}, rest[2] = {0, 0};
+    float v[2] = {(float)x[0], (float)x[1]};
+    const kernel_side_values side = kernel_step_side(h, inside);
+    for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(&side, x[i], &v[i], &rest[i]);
+    if (h->state->mixing > 0) {
+        const double contrast = (double)h->state->pieces->contrast, change = values->high - values->low;
+        const double length = (part->end.t - from->t) * h->per_t;
+        const double moved = 0.25 * length *
+                             (contrast * fmin(change * s->slope, s->most - s->least) +
+                              s->most * fmin(change * s->colour_slope, contrast));
+        const double parts = sqrt(fmin(moved / (double)h->state->mixing, KERNEL_MAX_PARTS * KERNEL_MAX_PARTS));
+        kernel_part_emit(p, h, lane, from, &part->end, (double)v[0], (double)v[1], fmax(ceil(parts), 1));
+        return;
+    }
+    const kernel_interval i = {.t_in = vf_set((float)from->t),
+                               .t_out = vf_set((float)part->end.t),
+                               .v_in = vf_set(v[0]),
+                               .v_out = vf_set(v[1])};
+    const kernel_fine fine = {vf_set((float)(part->end.t - from->t)), vf_set((float)rest[0]), vf_set((float)rest[1])};
+    if (!list->is_fine) lane = vm_and(lane, vf_lt(i.t_in, i.t_out));
+    kernel_segments_add(h->state->pieces, list, lane, &i, list->is_fine ? &fine : NULL);
+}
+
+/* ---- a stretch ---- */
+
+static bool kernel_part_is_good(const kernel_halving *h, const kernel_part_values *values, const kernel_span *s,
+                                double length, bool is_cut)
+{
+    const double a = (double)h->state->allowance, reach = (double)h->state->reach, depth = s->least * length;
+    double all;
+    const double error = kernel_part_error(h, values, s, length, &all);
+    if (!is_cut && h->light * error <= 0.875 * a * (length / reach + h->light * depth / (1 + depth))) return true;
+    return h->light * all <= a * h->length / (32 * reach);
+}
+
+/* All parts of a stretch whose ends and middle are known. */
+static void kernel_stretch_halve(kernel_packet *p, kernel_halving *h, int lane, kernel_knot from,
+                                 kernel_half_part whole)
+{
+    const kernel_segments *list = h->state->list;
+    const vm only = vm_from_bits(1u << lane);
+    kernel_half_part stack[KERNEL_HALVING_ROOM];
+    int count = 1;
+    stack[0] = whole;
+    while (count > 0 && (float)from.t < list->t_end[lane]) {
+        kernel_half_part part = stack[--count];
+        const kernel_knot first = kernel_knot_between(h, &from, &part.middle, 0.5);
+        const kernel_knot third = kernel_knot_between(h, &part.middle, &part.end, 0.5);
+        const kernel_part_values values = kernel_part_look(h, &from, &part, &first, &third);
+        const kernel_step *step = kernel_step_between(h, values.low, values.high);
+        const kernel_span s = kernel_part_span(h, &values, part.middle.v, step);
+        const double length = (part.end.t - from.t) * h->per_t;
+        const bool is_last =
+            part.depth >= KERNEL_HALVING_DEPTH || h->count >= KERNEL_HALVING_PARTS || count + 2 > KERNEL_HALVING_ROOM;
+        if (is_last || kernel_part_is_good(h, &values, &s, length, step != NULL)) {
+            if (list->t_begin[lane] <= (float)from.t) kernel_part_put(p, h, only, &from, &part, &values, &s);
+            const double depth = s.least * length;
+            h->light /= 1 + depth * (1 + 0.5 * depth);
+            h->count++;
+            from = part.end;
+            continue;
+        }
+        kernel_half_part near = {part.middle, first, part.depth + 1, part.is_monotone};
+        kernel_half_part far = {part.end, third, part.depth + 1, part.is_monotone};
+        if (step && part.is_monotone) {
+            near.end = kernel_knot_where(h, &from, &part.end, step->at);
+            near.middle = kernel_knot_between(h, &from, &near.end, 0.5);
+            far.middle = kernel_knot_between(h, &near.end, &far.end, 0.5);
+        }
+        stack[count++] = far;
+        stack[count++] = near;
+    }
+}
+
+/* The stretches from t0 to t1 of the rays, as segments; those that begin in the window are kept. */
+static __attribute__((noinline, cold)) void kernel_course_halve(kernel_packet *p, const kernel_segment_state *state,
+                                                                const kernel_course *course, vm rays, vf t0, vf t1)
+{
+    const kernel_interval *i = course->interval;
+    const kernel_frame *f = p->frame;
+    const bool is_flat = f->job->camera.is_orthographic;
+    kernel_exact_map map;
+    kernel_lanes at;
+    kernel_packet_lanes(p, &at);
+    if (course->map) kernel_exact_setup(&map, p, course->cell, &f->volumes[state->volume]);
+    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
+        const int n = __builtin_ctz(bits);
+        kernel_halving h = {.state = state,
+                            .course = course,
+                            .map = course->map ? &map : NULL,
+                            .u = at.px[n] - p->tile->centre_x,
+                            .v = at.py[n] - p->tile->centre_y,
+                            .slope = is_flat ? 0 : 1,
+                            .shift = is_flat ? f->job->space.scale : p->tile->depth_shift,
+                            .in = {.t = (double)i->t_in[n], .v = (double)i->v_in[n]},
+                            .out = {.t = (double)i->t_out[n], .v = (double)i->v_out[n]},
+                            .per_t = (double)state->list->per_t[n],
+                            .length = (double)((t1[n] - t0[n]) * state->list->per_t[n]),
+                            .light = 1};
+        for (int a = 0; a < 3 && course->map; a++) {
+            h.in.r[a] = (double)i->r_in[a][n];
+            h.out.r[a] = (double)i->r_out[a][n];
+        }
+        const double whole = h.out.t - h.in.t, a = ((double)t0[n] - h.in.t) / whole,
+                     b = ((double)t1[n] - h.in.t) / whole;
+        if (!(whole > 0)) continue;
+        const kernel_knot from = kernel_knot_between(&h, &h.in, &h.out, a);
+        kernel_half_part part = {.end = kernel_knot_between(&h, &h.in, &h.out, b)};
+        kernel_knot begin = from;
+        begin.t = (double)t0[n];
+        part.end.t = (double)t1[n];
+        part.middle = kernel_knot_between(&h, &from, &part.end, 0.5);
+        part.is_monotone = !course->map;
+        kernel_stretch_halve(p, &h, n, begin, part);
+    }
+}
+
+#endif

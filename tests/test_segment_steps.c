@@ -1,0 +1,372 @@
+/* max_error where the opacity has a step: a cell's field is curved along a ray, and may barely reach the step or come
+ * back through it within the cell. The light of the little that is beyond it, or of the wrong length of it, is what a
+ * sampling misses. Single cells, warped at random; where rays graze the step by a given amount; and functions that are
+ * all but a step. */
+#include "comp.h"
+#include "reference_cell.h"
+#include "reference_integral.h"
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { SIDE = 17, PIXELS = SIDE * SIDE };
+
+static const float colours[6] = {0.1f, 0.9f, 0.2f, 0.9f, 0.3f, 0.7f};
+
+/* The opacities at 0, at both sides of a step (or of a ramp of some width) and at 1, in 0 .. 1. */
+typedef struct step_function {
+    double values[4];
+    float opacities[4];
+} step_function;
+
+static void set_function(render_fixture *f, step_function *function, double at, double width, double unit)
+{
+    const double values[4] = {0, at, at + width, 1};
+    memcpy(function->values, values, sizeof values);
+    f->transfer = (render_transfer){.low = 0,
+                                    .high = 1,
+                                    .colour_count = 2,
+                                    .colours = colours,
+                                    .opacity_count = 4,
+                                    .opacity_values = function->values,
+                                    .opacities = function->opacities,
+                                    .unit_distance = unit};
+}
+
+static void begin(render_fixture *f, const test_mesh *mesh, fixture_camera camera, int side)
+{
+    fixture_create(f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                   (const double[]){0, 0, 0});
+    fixture_look(f, camera, side, side);
+    fixture_set_volume(f, 1);
+    f->job.integration = RENDER_SEGMENTS;
+}
+
+/* The worst of each error asked for, 1e-2 to 1e-4. */
+static void judge(render_fixture *f, double worst[3])
+{
+    const int side = f->job.camera.width;
+    double truth[4 * PIXELS];
+    reference_integral *scene = reference_integral_create(&f->job, 1e-9);
+    for (int p = 0; p < side * side; p++)
+        reference_integral_trace(scene, p % side, p / side, fixture_background, NULL, 0, truth + 4 * p);
+    reference_integral_free(scene);
+    for (int i = 0; i < 3; i++) {
+        drawn_frame drawn;
+        f->job.max_error = pow(10, -2 - i);
+        fixture_draw(f, &drawn);
+        for (int k = 0; k < 4 * side * side; k++)
+            worst[i] = test_worse(worst[i], fabs((double)drawn.picture.rgba[k] - truth[k]));
+        drawn_free(&drawn);
+    }
+}
+
+static void assert_kept(const double worst[3], const char *what)
+{
+    fprintf(stderr, "%s: %.2g, %.2g, %.2g\n", what, worst[0], worst[1], worst[2]);
+    for (int i = 0; i < 3; i++) assert_true(worst[i] <= pow(10, -2 - i));
+}
+
+/* ---- the field along a ray ---- */
+
+enum { SAMPLES = 1000 };
+
+/* The field along the ray of a picture of one pixel, and how many of the samples it has. */
+static int values_on_ray(const render_fixture *f, const test_mesh *mesh, int type, double values[SAMPLES])
+{
+    const render_camera *camera = &f->job.camera;
+    const double *axes[3] = {camera->right, camera->up, camera->forward};
+    reference_cell cell = {.type = type, .count = grid_type_vertices(type)};
+    reference_crossing ends[REFERENCE_MAX_CROSSINGS];
+    reference_line line;
+    double base[3], direction[3];
+    render_camera_ray(camera, 0, 0, base, direction);
+    for (int axis = 0; axis < 2; axis++) {
+        line.base[axis] = line.slope[axis] = 0;
+        for (int a = 0; a < 3; a++) {
+            line.base[axis] += axes[axis][a] * (base[a] - camera->eye[a]);
+            line.slope[axis] += axes[axis][a] * direction[a];
+        }
+    }
+    for (int i = 0; i < cell.count; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            cell.position[i][axis] = 0;
+            for (int a = 0; a < 3; a++) {
+                cell.world[i][a] = mesh->coordinates[3 * i + a];
+                cell.position[i][axis] += axes[axis][a] * (cell.world[i][a] - camera->eye[a]);
+            }
+        }
+    if (reference_crossings(&cell, &line, ends) != 2) return 0;
+    for (int i = 0; i < SAMPLES; i++) {
+        const double z = ends[0].z + (ends[1].z - ends[0].z) * i / (SAMPLES - 1);
+        const double point[3] = {line.base[0] + line.slope[0] * z, line.base[1] + line.slope[1] * z, z};
+        if (!reference_interpolate(&cell, point, mesh->values, &values[i], NULL)) return 0;
+    }
+    return SAMPLES;
+}
+
+/* The largest value within the ray's stretch, or the smallest (sign -1): of the parabola through three samples. False
+ * where it is at an end, or hardly more than there. */
+static bool extreme_of(const double values[SAMPLES], double sign, double *at)
+{
+    int best = 0;
+    for (int i = 1; i < SAMPLES; i++)
+        if (sign * values[i] > sign * values[best]) best = i;
+    if (best == 0 || best == SAMPLES - 1) return false;
+    const double before = values[best - 1], here = values[best], after = values[best + 1];
+    const double bend = (before - here) + (after - here), rise = 0.5 * (after - before);
+    *at = here - 0.5 * rise * rise / bend;
+    return sign * (*at - values[0]) > 0.01 && sign * (*at - values[SAMPLES - 1]) > 0.01;
+}
+
+/* ---- the hex that was seen to be off by 2.8e-3 ---- */
+
+static void make_hex(test_mesh *mesh)
+{
+    static const double values[8] = {0, 1, 0.2, 0.9, 0.8, 0.1, 1, 0};
+    test_mesh_single(TEST_UNIT_HEX, test_linear, mesh);
+    for (int i = 0; i < 24; i++) mesh->coordinates[i] *= 2;
+    memcpy(mesh->values, values, sizeof values);
+}
+
+static void a_hex_that_barely_reaches_a_step(void **state)
+{
+    static const double units[2] = {0.005, 0.1};
+    (void)state;
+    for (int k = 0; k < 2; k++)
+        for (fixture_camera camera = 0; camera <= CAMERA_ORTHOGRAPHIC; camera++) {
+            test_mesh mesh;
+            render_fixture f;
+            step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
+            double worst[3] = {0};
+            char what[64];
+            make_hex(&mesh);
+            begin(&f, &mesh, camera, SIDE);
+            set_function(&f, &function, 0.6, 0, units[k]);
+            judge(&f, worst);
+            snprintf(what, sizeof what, "unit distance %g, %s", units[k], fixture_camera_name(camera));
+            assert_kept(worst, what);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+}
+
+/* How far beyond 0.6 the hex comes on the ray of a picture of one pixel, the eye moved sideways and up; NaN: its most
+ * is at an end. */
+static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sideways, double up)
+{
+    static double values[SAMPLES];
+    double most;
+    fixture_look(f, CAMERA_ORTHOGRAPHIC, 1, 1);
+    render_camera *c = &f->job.camera;
+    for (int a = 0; a < 3; a++) c->eye[a] += sideways * c->right[a] + up * c->up[a];
+    if (!values_on_ray(f, mesh, GRID_HEX, values) || !extreme_of(values, 1, &most)) return (double)NAN;
+    return most - 0.6;
+}
+
+/* Move the eye to where the hex comes to 0.6 and so much beyond. */
+static void look_past_step(render_fixture *f, const test_mesh *mesh, double past)
+{
+    const double step = 0.05;
+    for (double up = -1; up < 1; up += step)
+        for (double low = -1; low < 1; low += step) {
+            const double before = hex_past_step(f, mesh, low, up), after = hex_past_step(f, mesh, low + step, up);
+            const bool rises = after > past;
+            double from = low, to = low + step;
+            if (isnan(before) || isnan(after) || (before > past) == rises) continue;
+            for (int i = 0; i < 50; i++) {
+                const double middle = 0.5 * (from + to);
+                if ((hex_past_step(f, mesh, middle, up) > past) == rises)
+                    to = middle;
+                else
+                    from = middle;
+            }
+            assert_true(fabs(hex_past_step(f, mesh, to, up) - past) < 0.01 * past);
+            return;
+        }
+    fail_msg("no ray comes to the step by %g", past);
+}
+
+static void a_ray_on_which_it_barely_does(void **state)
+{
+    static const double units[2] = {0.005, 0.1}, passes[4] = {3e-3, 1e-4, 1e-5, 1e-6};
+    (void)state;
+    for (int k = 0; k < 2; k++)
+        for (int n = 0; n < 4; n++) {
+            test_mesh mesh;
+            render_fixture f;
+            step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
+            double worst[3] = {0};
+            char what[64];
+            make_hex(&mesh);
+            begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
+            look_past_step(&f, &mesh, passes[n]);
+            set_function(&f, &function, 0.6, 0, units[k]);
+            judge(&f, worst);
+            snprintf(what, sizeof what, "unit distance %g, by %g", units[k], passes[n]);
+            assert_kept(worst, what);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+}
+
+/* ---- cells and functions at random ---- */
+
+enum { KINDS = 4, SEEDS = 12 };
+static const test_cell_shape shapes[KINDS] = {TEST_UNIT_HEX, TEST_UNIT_WEDGE, TEST_UNIT_PYRAMID, TEST_UNIT_TET};
+
+/* Vertices moved by up to 0.12 of a side: far from folding. */
+static void make_cell(test_cell_shape shape, uint64_t seed, test_mesh *mesh)
+{
+    test_mesh_single(shape, test_linear, mesh);
+    for (uint64_t i = 0; i < 3 * (uint64_t)mesh->vertex_count; i++)
+        mesh->coordinates[i] = 1.8 * (mesh->coordinates[i] + test_uniform_in(i, 100 * seed + 1, -0.12, 0.12));
+    for (uint64_t i = 0; i < (uint64_t)mesh->vertex_count; i++)
+        mesh->values[i] = test_uniform_in(i, 100 * seed + 2, 0, 1);
+}
+
+static void random_cells_and_steps(void **state)
+{
+    (void)state;
+    for (int polyhedra = 0; polyhedra < 2; polyhedra++)
+        for (int kind = 0; kind < KINDS; kind++) {
+            double worst[3] = {0};
+            for (uint64_t seed = 0; seed < SEEDS; seed++) {
+                test_mesh mesh;
+                render_fixture f;
+                fixture_function function;
+                make_cell(shapes[kind], 16 * seed + (uint64_t)kind, &mesh);
+                if (polyhedra) test_mesh_to_polyhedra(&mesh, 1);
+                begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE);
+                /* From 2 to 900 optical depths across the cell. */
+                fixture_set_function(&f, &function, 100 * seed + 9, true, seed % 3 ? 0.5 : 0.9,
+                                     pow(10, test_uniform_in(0, 100 * seed + 10, -2.2, 0)));
+                assert_true(function.values[1] == function.values[2]);
+                judge(&f, worst);
+                fixture_free(&f);
+                test_mesh_free(&mesh);
+            }
+            char what[64];
+            snprintf(what, sizeof what, "steps in %s%s", test_cell_shape_name(shapes[kind]),
+                     polyhedra ? " as polyhedron" : "");
+            assert_kept(worst, what);
+        }
+}
+
+/* ---- rays that graze a step ---- */
+
+/* From 1e-2 of the function's domain to less than float32 tells apart, and a ray that does not come to the step. */
+enum { PASSES = 9 };
+static const double passes[PASSES] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 3e-7, 1e-7, 1e-8, -1e-7};
+
+/* A cell's field above a step, or (sign -1) below it, by each of them. Returns whether it has such an extreme. */
+static bool graze(render_fixture *f, const double values[SAMPLES], double sign, double worst[PASSES][3])
+{
+    step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
+    double at;
+    if (sign < 0) memcpy(function.opacities, (const float[]){0.9f, 0.9f, 0, 0}, sizeof function.opacities);
+    if (!extreme_of(values, sign, &at)) return false;
+    for (int k = 0; k < PASSES; k++)
+        for (int dense = 0; dense < 2; dense++) {
+            set_function(f, &function, at - sign * passes[k], 0, dense ? 0.005 : 0.1);
+            judge(f, worst[k]);
+        }
+    return true;
+}
+
+static void rays_that_graze_a_step(void **state)
+{
+    static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
+    static double values[SAMPLES];
+    (void)state;
+    for (int kind = 0; kind < 3; kind++) {
+        double worst[PASSES][3] = {{0}};
+        int count = 0;
+        for (uint64_t seed = 0; seed < 40; seed++) {
+            test_mesh mesh;
+            render_fixture f;
+            make_cell(shapes[kind], seed, &mesh);
+            begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, 1);
+            if (values_on_ray(&f, &mesh, types[kind], values))
+                for (int sign = -1; sign <= 1; sign += 2) count += graze(&f, values, sign, worst);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+        for (int k = 0; k < PASSES; k++) {
+            char what[80];
+            snprintf(what, sizeof what, "%d rays in %s past a step by %g", count, test_cell_shape_name(shapes[kind]),
+                     passes[k]);
+            assert_kept(worst[k], what);
+        }
+        assert_true(count >= 6);
+    }
+}
+
+/* ---- all but a step ---- */
+
+static void steep_ramps_are_kept_as_steps_are(void **state)
+{
+    static const double widths[] = {1e-2, 1e-3, 1e-4, 1e-6};
+    (void)state;
+    for (int k = 0; k < (int)(sizeof widths / sizeof *widths); k++)
+        for (int dense = 0; dense < 2; dense++) {
+            test_mesh mesh;
+            render_fixture f;
+            step_function function = {.opacities = {0, 0.02f, 0.9f, 0.5f}};
+            double worst[3] = {0};
+            char what[64];
+            make_hex(&mesh);
+            begin(&f, &mesh, CAMERA_OUTSIDE, SIDE);
+            set_function(&f, &function, 0.6, widths[k], dense ? 0.005 : 0.1);
+            judge(&f, worst);
+            snprintf(what, sizeof what, "a ramp of %g, unit distance %g", widths[k], f.transfer.unit_distance);
+            assert_kept(worst, what);
+            fixture_free(&f);
+            test_mesh_free(&mesh);
+        }
+}
+
+/* ---- the same rays everywhere ---- */
+
+/* All traversals cut a ray alike: only the order of segments that begin at one place may differ. */
+static void tiles_cut_as_packets_do(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 3; kind++) {
+        test_mesh mesh;
+        render_fixture f;
+        drawn_frame drawn[3];
+        step_function function = {.opacities = {0, 0.1f, 0.9f, 0.6f}};
+        make_cell(shapes[kind], 3, &mesh);
+        begin(&f, &mesh, CAMERA_OUTSIDE, SIDE);
+        set_function(&f, &function, 0.6, 0, 0.02);
+        f.job.max_error = 1e-4;
+        for (int i = 0; i < 3; i++) {
+            f.job.traversal = (const render_traversal[]){RENDER_PACKETS, RENDER_TILES, RENDER_BINNED}[i];
+            fixture_draw(&f, &drawn[i]);
+            assert_true(drawn_difference(&drawn[0], &drawn[i]) < 5e-7);
+        }
+        for (int i = 0; i < 3; i++) drawn_free(&drawn[i]);
+        fixture_free(&f);
+        test_mesh_free(&mesh);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_hex_that_barely_reaches_a_step),
+        cmocka_unit_test(a_ray_on_which_it_barely_does),
+        cmocka_unit_test(random_cells_and_steps),
+        cmocka_unit_test(rays_that_graze_a_step),
+        cmocka_unit_test(steep_ramps_are_kept_as_steps_are),
+        cmocka_unit_test(tiles_cut_as_packets_do),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
