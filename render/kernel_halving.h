@@ -23,9 +23,9 @@
  *     error <= R ds min(L, 1 / s0) + dc min(s1 L, 1),
  * times T. It may be 7/8 of the share that equal parts have, a = allowance:
  *     T error <= 7/8 a (L / reach + T D / (1 + D)),    D = s0 L,
- * The rest is for parts that no halving makes good, about an extreme that touches a step: where T (s1 - s0) .. of one
- * is no more than a 32nd of a (stretch / reach) it is left as it is. A cubic has two extremes, and four such parts are
- * in an eighth. */
+ * The rest is for parts that no halving makes good, about an extreme that touches a step: where T error of one, by s1 -
+ * s0 alone, is no more than a 32nd of a (stretch / reach) it is left as it is. A cubic has two extremes, and four such
+ * parts are in an eighth. */
 #ifndef RENDER_KERNEL_HALVING_H
 #define RENDER_KERNEL_HALVING_H
 
@@ -364,15 +364,16 @@ static void kernel_part_emit(kernel_packet *p, const kernel_halving *h, vm lane,
     }
 }
 
-/* The part as segments; raised so that the mean along the chord is the field's where that is a parabola. */
+/* The part as segments on its chord: raised to the field's mean, as equal parts are, it might come to values that have
+ * not been looked at. */
 static void kernel_part_put(kernel_packet *p, const kernel_halving *h, vm lane, const kernel_knot *from,
                             const kernel_half_part *part, const kernel_part_values *values, const kernel_span *s)
 {
     kernel_segments *list = h->state->list;
-    const double chord = 0.5 * (from->v + part->end.v), inside = part->middle.v;
+    const double inside = part->middle.v;
     const bool is_cut = kernel_step_between(h, values->low, values->high) != NULL;
-    const double lift = is_cut ? 0 : (inside - chord) * (2.0 / 3);
-    double x[2] = {from->v + lift, part->end.v + lift}, rest[2] = {0, 0};
+    const double x[2] = {from->v, part->end.v};
+    double rest[2] = {0, 0};
     float v[2] = {(float)x[0], (float)x[1]};
     const kernel_side_values side = kernel_step_side(h, inside);
     for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(&side, x[i], &v[i], &rest[i]);

@@ -135,8 +135,7 @@ static void max_error_is_kept_in_dense_media(void **state)
             for (uint64_t seed = 0; seed < 6; seed++) {
                 test_mesh mesh;
                 test_mesh_lattice(kind, 2, 0.2, bent_field, &mesh);
-                /* The two densest media step, one for each camera; beside tets and polyhedra this is not promised, but
-                 * holds where no ray grazes a step within a cell. */
+                /* The two densest media step, one for each camera. */
                 steps += judge(&mesh, seed, seed % 5 == 0, opacities[surface], worst);
                 test_mesh_free(&mesh);
             }
