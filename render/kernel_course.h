@@ -100,7 +100,8 @@ SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
     const vf made = off * course->cost * distance; /* 3/2 of 2/3 */
     *deviation = off;
-    const vf parts = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
+    const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
+    const vf parts = vf_min(wanted, vf_set(KERNEL_MAX_PARTS));
     if (!course->step_count) return parts;
     const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING;
     const vm stepped = kernel_course_steps(state, course, vf_min(v0, v1) - wide, vf_max(v0, v1) + wide);
@@ -117,7 +118,7 @@ SIMD_INLINE vf kernel_course_mixed(const kernel_segment_state *state, const kern
     return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
 }
 
-/* How many equal parts; halved: the rays for which they are too many, or not enough. */
+/* How many equal parts; halved: the rays for which no number is enough. */
 SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
                                    vm rays, vf t0, vf t1, vf v0, vf v1, vm *halved)
 {
