@@ -476,9 +476,9 @@ static __attribute__((noinline, cold)) void kernel_course_halve(kernel_packet *p
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];
         }
-        const double whole = h.out.t - h.in.t, a = ((double)t0[n] - h.in.t) / whole,
-                     b = ((double)t1[n] - h.in.t) / whole;
+        const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
+        const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
         const kernel_knot from = kernel_knot_between(&h, &h.in, &h.out, a);
         kernel_half_part part = {.end = kernel_knot_between(&h, &h.in, &h.out, b)};
         kernel_knot begin = from;
