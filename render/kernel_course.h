@@ -26,6 +26,7 @@ typedef struct kernel_course {
     const kernel_interval *interval;
     float cost;                 /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
     int first_step, step_count; /* the steps of the opacity among the cell's values */
+    bool is_steep;              /* steep ramps are */
 } kernel_course;
 
 /* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
@@ -53,6 +54,8 @@ SIMD_INLINE void kernel_course_bound(const kernel_segment_state *state, const fl
     while (out->first_step < t->step_count && t->steps[out->first_step].cut < low) out->first_step++;
     while (out->first_step + out->step_count < t->step_count && t->steps[out->first_step + out->step_count].cut <= high)
         out->step_count++;
+    for (int i = 0; i < t->steep_count; i++)
+        out->is_steep = out->is_steep || (low <= t->steep[i].high && t->steep[i].low <= high);
 }
 
 SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
@@ -64,7 +67,18 @@ SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course
     return i->v_in + along * (i->v_out - i->v_in);
 }
 
-/* Rays whose values, from low to high, have a step among them. */
+/* Rays whose values, from low to high, have a steep ramp among them. */
+SIMD_INLINE vm kernel_course_is_steep(const kernel_segment_state *state, vf low, vf high)
+{
+    vm any = vm_none();
+    for (int i = 0; i < state->pieces->steep_count; i++) {
+        const kernel_steep *steep = &state->pieces->steep[i];
+        any = vm_or(any, vm_and(vf_le(low, vf_set(steep->high)), vf_le(vf_set(steep->low), high)));
+    }
+    return any;
+}
+
+/* The same for a step. */
 SIMD_INLINE vm kernel_course_steps(const kernel_segment_state *state, const kernel_course *course, vf low, vf high)
 {
     vm any = vm_none();
@@ -83,7 +97,7 @@ SIMD_INLINE vm kernel_course_steps(const kernel_segment_state *state, const kern
  * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
  * square of a part, and its mean is two thirds of it. Allowed is the stretch's share of the ray's length and of its
  * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. Where a step of
- * the opacity is among the values, no number is enough. */
+ * the opacity is among the values no number is enough, nor where a steep ramp is among them and asks for too many. */
 SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
                                     vm rays, vf t0, vf t1, vf v0, vf v1, vf *deviation)
 {
@@ -102,10 +116,13 @@ SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state
     *deviation = off;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf parts = vf_min(wanted, vf_set(KERNEL_MAX_PARTS));
-    if (!course->step_count) return parts;
-    const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING;
-    const vm stepped = kernel_course_steps(state, course, vf_min(v0, v1) - wide, vf_max(v0, v1) + wide);
-    return vf_select(stepped, vf_set(2 * KERNEL_MAX_PARTS), parts);
+    if (!course->step_count && !course->is_steep) return parts;
+    const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING, low = vf_min(v0, v1) - wide, high = vf_max(v0, v1) + wide;
+    vm too_few = kernel_course_steps(state, course, low, high);
+    if (course->is_steep)
+        too_few =
+            vm_or(too_few, vm_and(vf_lt(vf_set(KERNEL_MAX_PARTS), wanted), kernel_course_is_steep(state, low, high)));
+    return vf_select(too_few, vf_set(2 * KERNEL_MAX_PARTS), parts);
 }
 
 /* The same for a stretch that others are mixed with, who take it for a medium that is the same throughout (comp.h). Of

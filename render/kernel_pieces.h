@@ -53,6 +53,11 @@ typedef struct kernel_step {
     float cut;
 } kernel_step;
 
+/* Values between which the opacity rises or falls nearly as at a step. */
+typedef struct kernel_steep {
+    float low, high;
+} kernel_steep;
+
 /* A bin of the sums (kernel_preintegral.h), in units; read as ten floats. */
 typedef struct kernel_pre_entry {
     struct {
@@ -82,8 +87,9 @@ typedef struct kernel_pieces {
     /* Of the bounds' bins: also from bin_low; below and above the bins the function is constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
-    int step_count;
+    int step_count, steep_count;
     kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* by value */
+    kernel_steep steep[RENDER_MAX_OPACITY_POINTS];
     float contrast;                  /* no two colours differ by more, in any channel; black and white counted */
     kernel_preintegral *preintegral; /* NULL: no error is allowed */
 } kernel_pieces;

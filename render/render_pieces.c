@@ -197,6 +197,18 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
+/* Of the function's domain: equal parts are enough for wider ramps, up to 1000 optical depths (docs/decisions.md). */
+static const double steep_width = 1.0 / 64;
+
+static void fill_steep(kernel_pieces *out, const render_transfer *t)
+{
+    for (int i = 0; i + 1 < t->opacity_count; i++) {
+        const double low = domain_of(t, t->opacity_values[i]), high = domain_of(t, t->opacity_values[i + 1]);
+        if (low < high && high - low < steep_width && t->opacities[i] != t->opacities[i + 1])
+            out->steep[out->steep_count++] = (kernel_steep){(float)low, (float)high};
+    }
+}
+
 static void fill_bounds(kernel_pieces *out, const render_transfer *t)
 {
     float low = 0, high = 1;
@@ -222,6 +234,7 @@ static void fill(kernel_pieces *out, const render_transfer *t, double tolerance,
     fill_bins(out);
     fill_bounds(out, t);
     fill_steps(out, t);
+    fill_steep(out, t);
 }
 
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error)
