@@ -12,7 +12,7 @@
 #ifndef RENDER_KERNEL_SHOWN_HEXES_H
 #define RENDER_KERNEL_SHOWN_HEXES_H
 
-#include "kernel_shown.h"
+#include "kernel_shown_tets.h"
 
 typedef struct kernel_hex_lanes {
     vf at[8][3], f[8]; /* along the camera's axes; values less the isovalue, scaled as kernel_cell_relative() does */

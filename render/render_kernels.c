@@ -6,7 +6,7 @@
 #include "kernel_segments.h"
 #include "kernel_polyhedron_surface.h"
 #include "kernel_polyhedron_volume.h"
-#include "kernel_shown_hexes.h"
+#include "kernel_shown.h"
 #include "kernel_spmd.h"
 #include "kernel_tile_segments.h"
 #include "kernel_tile_shown.h"

@@ -1,0 +1,314 @@
+/* The search of a subtree for what shows of it (kernel_shown.h), and what it asks of a cell alone: the pixels that its
+ * isosurfaces, or all of it, may show in. Types of which there are many are asked for many at once
+ * (kernel_shown_tets.h, kernel_shown_hexes.h). */
+#ifndef RENDER_KERNEL_FINDER_H
+#define RENDER_KERNEL_FINDER_H
+
+#include "kernel_plain.h"
+#include "kernel_tile_surface.h"
+#include "kernel_volume.h"
+
+/* Tets, one a lane. */
+typedef struct kernel_tets {
+    int count;
+    uint32_t cell[SIMD_WIDTH];
+    int64_t vertices[SIMD_WIDTH][GRID_MAX_CELL_VERTICES];
+    int32_t plain[8][SIMD_WIDTH]; /* the vertices of a plain mesh, instead; or of hexes */
+} kernel_tets;
+
+/* Hexes of a plain mesh that the isovalue under way crosses (kernel_shown_hexes.h). */
+typedef struct kernel_crossed_hexes {
+    int count, value;
+    uint32_t cell[SIMD_WIDTH];
+    int32_t vertex[8][SIMD_WIDTH];
+} kernel_crossed_hexes;
+
+/* One subtree's search. */
+typedef struct kernel_finder {
+    const kernel_frame *frame;
+    const kernel_surface *surface;   /* NULL: */
+    const kernel_transfer *transfer; /* the volume's */
+    const render_field *field;
+    const kernel_interest *interest;
+    kernel_shown_list *list;
+    bool (*grow)(kernel_shown_list *list);
+    int part;
+    uint32_t source;     /* of the layer's first isovalue */
+    kernel_tile picture; /* all of it as one tile, about the axis of view */
+    kernel_planes planes;
+    float t_near, column_scale, row_scale, column_0, row_0;
+    kernel_cell cell;
+    uint32_t coming[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
+    kernel_tets tets;            /* tets whose vertices are */
+    kernel_crossed_hexes hexes;
+    kernel_plain plain;
+    int coming_count;
+} kernel_finder;
+
+/* The least float that is not below x. */
+SIMD_INLINE float kernel_not_below(double x)
+{
+    float f = (float)x;
+    int32_t bits;
+    if (!((double)f < x)) return f;
+    if (f == 0) return 1e-45f;
+    memcpy(&bits, &f, sizeof bits);
+    bits += f > 0 ? 1 : -1;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+
+static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, const kernel_subtree *subtree)
+{
+    kernel_borders borders;
+    s->frame = f;
+    s->part = subtree->part;
+    s->source = (uint32_t)subtree->part;
+    s->surface = NULL;
+    s->transfer = &f->volumes[0];
+    if (subtree->surface >= 0) {
+        s->surface = &f->surfaces[subtree->surface];
+        s->source *= RENDER_MAX_ISOVALUES;
+        while (f->isovalues[s->source % RENDER_MAX_ISOVALUES].surface != subtree->surface) s->source++;
+    }
+    s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
+    s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
+    s->coming_count = s->tets.count = s->hexes.count = 0;
+    kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
+    s->plain.is_hexes = s->plain.is_hexes && s->surface;
+    memset(&s->picture, 0, sizeof s->picture);
+    s->picture.depth_shift = f->depth_shift;
+    kernel_picture_borders(&borders, f);
+    kernel_tree_planes(&s->planes, f, &borders);
+    const double unit = f->job->camera.is_orthographic ? f->job->space.scale : 1;
+    s->t_near = (float)-f->depth_shift;
+    s->column_scale = (float)(1 / (f->slope_dx * unit));
+    s->row_scale = (float)(1 / (f->slope_dy * unit));
+    s->column_0 = (float)(-f->slope_x0 / f->slope_dx);
+    s->row_0 = (float)(-f->slope_y0 / f->slope_dy);
+}
+
+/* Least and largest. */
+typedef struct kernel_extent {
+    float low, high;
+} kernel_extent;
+
+SIMD_INLINE kernel_extent kernel_extent_of(const kernel_outline *o, vf scale, const float *of, const float *by)
+{
+    vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
+    for (int i = 0; i < o->count; i += SIMD_WIDTH) {
+        const vf at = by ? vf_load(of + i) * scale / vf_load(by + i) : vf_load(of + i) * scale;
+        low = vf_min(low, at);
+        high = vf_max(high, at);
+    }
+    return (kernel_extent){vf_reduce_min(low), vf_reduce_max(high)};
+}
+
+/* Whole vectors of points: the last ones are the first again. */
+SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
+{
+    for (int a = 0; a < 3; a++)
+        for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
+}
+
+/* The pixels between, of so many: false where there are none. A part in 1e5 of the cell and its place, and a hundredth
+ * of a pixel, are more than rays are off by when they hit by a rounding; blur is what places may be off by. */
+SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int pixels, uint16_t *first,
+                                     uint16_t *last)
+{
+    const float pad = 0.01f + 3e-5f * (simd_max(fabsf(e.low), fabsf(e.high)) + fabsf(zero)) + blur;
+    const float low = simd_max(ceilf(e.low + zero - pad), 0);
+    const float high = simd_min(floorf(e.high + zero + pad), (float)(pixels - 1));
+    if (!(low <= high)) return false;
+    *first = (uint16_t)low;
+    *last = (uint16_t)high;
+    return true;
+}
+
+/* Of a cell whose surface has these depths and columns and rows, relative to the axis of view, size the largest depth
+ * of anything in it. Where some of it is near the eye's plane or behind it, it may be anywhere. */
+SIMD_INLINE bool kernel_extents_shown(const kernel_finder *s, kernel_extent depth, float size, kernel_extent columns,
+                                      kernel_extent rows, kernel_shown *out)
+{
+    const render_camera *camera = &s->frame->job->camera;
+    const float pad = KERNEL_OUTLINE_PAD * size;
+    if (depth.high + pad < s->t_near) return false;
+    out->near = depth.low - pad;
+    out->far = depth.high + pad;
+    if (!(out->near > -INFINITY)) out->near = -INFINITY; /* not a number */
+    if (!(out->far < INFINITY)) out->far = INFINITY;
+    if (!camera->is_orthographic && !(depth.low - s->t_near > 0.01f * size)) {
+        out->x0 = out->y0 = 0;
+        out->x1 = (uint16_t)(camera->width - 1);
+        out->y1 = (uint16_t)(camera->height - 1);
+        return true;
+    }
+    const float blur = 2e-6f * (camera->is_orthographic ? size + 1 : 1);
+    return kernel_extent_range(columns, s->column_0, blur * fabsf(s->column_scale), camera->width, &out->x0,
+                               &out->x1) &&
+           kernel_extent_range(rows, s->row_0, blur * fabsf(s->row_scale), camera->height, &out->y0, &out->y1);
+}
+
+SIMD_INLINE bool kernel_outline_shown(const kernel_finder *s, kernel_outline *o, kernel_shown *out)
+{
+    kernel_outline_fill(o);
+    const kernel_extent depth = kernel_extent_of(o, vf_set(1), o->point[2], NULL);
+    for (int i = 0; i < o->count; i += SIMD_WIDTH) vf_store(o->point[2] + i, vf_load(o->point[2] + i) - s->t_near);
+    const float *by = s->frame->job->camera.is_orthographic ? NULL : o->point[2];
+    const kernel_extent columns = kernel_extent_of(o, vf_set(s->column_scale), o->point[0], by);
+    const kernel_extent rows = kernel_extent_of(o, vf_set(s->row_scale), o->point[1], by);
+    return kernel_extents_shown(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
+}
+
+/* ---- hexes: kernel_slab_outline() with a pair of vertices a lane ---- */
+
+enum { KERNEL_HEX_PAIRS = 32 }; /* 28 of them */
+
+/* A hex's vertices by lane. */
+SIMD_INLINE vf kernel_eight_pick(const float v[16], vi index)
+{
+    if (SIMD_WIDTH >= 8) return vf_permute(vf_load(v), index);
+    return vf_gather(v, index);
+}
+
+typedef struct kernel_slab_ends {
+    vm any;
+    vf low[3], high[3]; /* depth; columns and rows, relative to the axis of view */
+} kernel_slab_ends;
+
+SIMD_INLINE void kernel_slab_add(const kernel_finder *s, kernel_slab_ends *e, vm points, const vf at[3])
+{
+    vf by = at[2] - s->t_near;
+    if (s->frame->job->camera.is_orthographic) by = vf_set(1);
+    const vf places[3] = {at[2], at[0] * s->column_scale / by, at[1] * s->row_scale / by};
+    e->any = vm_or(e->any, points);
+    for (int a = 0; a < 3; a++) {
+        e->low[a] = vf_select(points, vf_min(e->low[a], places[a]), e->low[a]);
+        e->high[a] = vf_select(points, vf_max(e->high[a], places[a]), e->high[a]);
+    }
+}
+
+/* L at the vertices, and the slab's thickness. */
+SIMD_INLINE bool kernel_slab_shown(const kernel_finder *s, const kernel_cell *c, const float values[16],
+                                   float thickness, kernel_shown *out)
+{
+    static const int32_t from[KERNEL_HEX_PAIRS] = {1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 5, 6,
+                                                   6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 7, 0, 0, 0, 0};
+    static const int32_t to[KERNEL_HEX_PAIRS] = {0, 0, 1, 0, 1, 2, 0, 1, 2, 3, 0, 1, 2, 3, 4, 0,
+                                                 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 6, 0, 0, 0, 0};
+    static const int32_t own[16] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+    float place[3][16] = {{0}};
+    kernel_slab_ends ends = {.any = vm_none()};
+    memcpy(place[0], c->x, sizeof c->x);
+    memcpy(place[1], c->y, sizeof c->y);
+    memcpy(place[2], c->z, sizeof c->z);
+    for (int a = 0; a < 3; a++) ends.low[a] = vf_set(INFINITY), ends.high[a] = vf_set(-INFINITY);
+    for (int n = 0; n < 8; n += SIMD_WIDTH) {
+        vi i;
+        vf at[3];
+        memcpy(&i, own + n, sizeof i);
+        for (int a = 0; a < 3; a++) at[a] = kernel_eight_pick(place[a], i);
+        kernel_slab_add(s, &ends, vf_le(vf_abs(kernel_eight_pick(values, i)), vf_set(thickness)), at);
+    }
+    for (int n = 0; n < KERNEL_HEX_PAIRS; n += SIMD_WIDTH) {
+        vi i, j;
+        vf begin[3], edge[3];
+        memcpy(&i, from + n, sizeof i);
+        memcpy(&j, to + n, sizeof j);
+        const vf v = kernel_eight_pick(values, i), w = kernel_eight_pick(values, j), inverse = 1.0f / (w - v);
+        for (int a = 0; a < 3; a++) {
+            begin[a] = kernel_eight_pick(place[a], i);
+            edge[a] = kernel_eight_pick(place[a], j) - begin[a];
+        }
+        for (int side = -1; side <= 1; side += 2) {
+            const vf level = vf_set((float)side * thickness), along = (level - v) * inverse;
+            const vf at[3] = {begin[0] + along * edge[0], begin[1] + along * edge[1], begin[2] + along * edge[2]};
+            kernel_slab_add(s, &ends, vm_xor(vf_lt(v, level), vf_lt(w, level)), at);
+        }
+    }
+    if (!vm_any(ends.any)) return false;
+    kernel_extent extents[3];
+    for (int a = 0; a < 3; a++) extents[a] = (kernel_extent){vf_reduce_min(ends.low[a]), vf_reduce_max(ends.high[a])};
+    return kernel_extents_shown(s, extents[0], kernel_largest(c->z, 8) + fabsf(s->t_near), extents[1], extents[2], out);
+}
+
+SIMD_INLINE void kernel_add_shown(kernel_finder *s, const kernel_shown *shown)
+{
+    kernel_shown_list *list = s->list;
+    if (list->count == list->capacity && !s->grow(list)) return;
+    list->items[list->count++] = *shown;
+}
+
+static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
+{
+    const grid *g = s->frame->job->parts[s->part].cells;
+    kernel_outline o = {0};
+    kernel_shown shown = {.cell = index, .source = s->source};
+    /* The corners of the vertices' box. */
+    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    grid_walk walk = grid_walk_cell(g, index);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
+        double world[3];
+        float place[3];
+        grid_vertex(g, vertex, world);
+        kernel_place_in(s->frame, &s->picture, world, &place[0], &place[1], &place[2]);
+        for (int a = 0; a < 3; a++) {
+            low[a] = simd_min(place[a], low[a]);
+            high[a] = simd_max(place[a], high[a]);
+        }
+    }
+    o.count = 8;
+    for (int i = 0; i < 8; i++)
+        for (int a = 0; a < 3; a++) o.point[a][i] = i >> a & 1 ? high[a] : low[a];
+    for (int a = 0; a < 3; a++) o.size[a] = simd_max(fabsf(low[a]), fabsf(high[a]));
+    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+}
+
+/* One isovalue of the fetched cell. */
+static void kernel_find_value(kernel_finder *s, int value)
+{
+    const render_surface_layer *layer = s->surface->layer;
+    kernel_cell *c = &s->cell;
+    kernel_outline o;
+    kernel_shown shown = {.cell = c->index, .source = s->source + (uint32_t)value};
+    float at[16] = {0}, thickness;
+    if (!kernel_cell_straddles(c, layer->values[value])) return;
+    if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    kernel_cell_relative(c, layer->values[value]);
+    if (c->type == GRID_TET) {
+        if (!kernel_tet_outline(c, &o)) return;
+    } else if (c->type == GRID_HEX && kernel_linear_part(c, at, &thickness)) {
+        if (kernel_slab_shown(s, c, at, thickness, &shown)) kernel_add_shown(s, &shown);
+        return;
+    } else {
+        kernel_vertex_outline(c, &o);
+        if (!kernel_slab_outline(c, &o)) return;
+    }
+    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+}
+
+/* All of the fetched cell, in the volume. */
+static void kernel_find_volume(kernel_finder *s)
+{
+    kernel_cell *c = &s->cell;
+    kernel_outline o;
+    kernel_shown shown = {.cell = c->index, .source = s->source};
+    if (!kernel_cell_shows(c, s->transfer)) return;
+    kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    kernel_vertex_outline(c, &o);
+    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+}
+
+/* What of the fetched cell shows. */
+static void kernel_find_cell(kernel_finder *s)
+{
+    if (!s->cell.is_finite) return;
+    if (!s->surface) {
+        kernel_find_volume(s);
+        return;
+    }
+    for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_value(s, value);
+}
+
+#endif
