@@ -71,21 +71,38 @@ typedef struct kernel_cache {
     kernel_cell cells[KERNEL_CACHE_CELLS];
 } kernel_cache;
 
-/* Is the polyhedron a tet, on which its field is linear as a tet's is? Then it is drawn as one, to the same bits. */
+/* Which of the vertices, bit by bit, the face has; those not yet known are added. 0: it needs more than four. */
+static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)
+{
+    int64_t first, end;
+    int corners = 0;
+    grid_face_vertices(g, face, &first, &end);
+    for (int64_t i = first; i < end; i++) {
+        const int64_t vertex = grid_array_index(&g->face_connectivity, i);
+        int at = 0;
+        while (at < *count && vertices[at] != vertex) at++;
+        if (at == 4) return 0;
+        if (at == *count) vertices[(*count)++] = vertex;
+        corners |= 1 << at;
+    }
+    return corners;
+}
+
+/* Is the polyhedron a tet, on which its field is linear as a tet's is? Then it is drawn as one, to the same bits. Each
+ * triangle is to lack another vertex: two of them, each twice, bound nothing. Faces in one place are none. */
 static bool kernel_is_tet(const grid *g, int64_t cell, int64_t vertices[4])
 {
-    int64_t first, end, vertex;
+    int64_t first, end;
+    int count = 0, lacking = 0;
     grid_cell_faces(g, cell, &first, &end);
-    if (end - first != 4) return false;
-    int count = 0, entries = 0;
-    grid_walk walk = grid_walk_cell(g, cell);
-    while (grid_walk_next(&walk, &vertex)) {
-        int at = 0;
-        while (at < count && vertices[at] != vertex) at++;
-        if (++entries > 12 || at == 4) return false;
-        if (at == count) vertices[count++] = vertex;
+    for (int64_t i = first; i < end; i++) {
+        const int corners = kernel_face_corners(g, grid_array_index(&g->connectivity, i), vertices, &count);
+        if (corners && !(corners & (corners - 1))) continue;
+        const int lack = ~corners & 15;
+        if (!corners || !lack || (lack & (lack - 1)) || (lacking & lack)) return false;
+        lacking |= lack;
     }
-    return count == 4;
+    return count == 4 && lacking == 15;
 }
 
 /* The cell with its values; not placed yet. Of a polyhedron only the type: see kernel_polyhedron.h. */

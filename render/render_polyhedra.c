@@ -275,6 +275,8 @@ static int number_vertex(work *w, int64_t vertex, int64_t cell)
     return w->vertex_count++;
 }
 
+/* Without a vertex that stands beside itself: a quad is one however often its corners are said, as its other cell has
+ * it, and a face all of whose entries are one vertex has none. */
 static void read_faces(work *w, int64_t cell)
 {
     int64_t first, end;
@@ -285,12 +287,16 @@ static void read_faces(work *w, int64_t cell)
         int64_t from, to;
         grid_face_vertices(w->g, grid_array_index(&w->g->connectivity, first + face), &from, &to);
         w->face_first[face] = entry;
+        int64_t before = grid_array_index(&w->g->face_connectivity, to - 1);
         for (int64_t i = from; i < to; i++) {
+            const int64_t vertex = grid_array_index(&w->g->face_connectivity, i);
+            if (vertex == before) continue;
             w->face_of[entry] = face;
-            w->entry[entry++] = number_vertex(w, grid_array_index(&w->g->face_connectivity, i), cell);
+            w->entry[entry++] = number_vertex(w, vertex, cell);
+            before = vertex;
         }
     }
-    w->face_first[w->face_count] = entry;
+    w->face_first[w->face_count] = w->entry_count = entry;
     sort_vertices(w->vertices, w->vertex_count);
     for (int i = 0; i < w->vertex_count; i++) w->rank[w->vertices[i].as_met] = i;
     for (int i = 0; i < entry; i++) w->entry[i] = w->rank[w->entry[i]];

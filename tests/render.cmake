@@ -110,3 +110,7 @@ endforeach()
 insitu_render_program(test_hard_cases)
 add_test(NAME hard_cases COMMAND test_hard_cases)
 set_tests_properties(hard_cases PROPERTIES TIMEOUT 120)
+
+insitu_render_program(test_degenerate)
+add_test(NAME degenerate COMMAND test_degenerate)
+set_tests_properties(degenerate PROPERTIES TIMEOUT 120)
