@@ -4,7 +4,9 @@
  * A rank's faces and vertices are numbered in the order in which its cells first use them: cell 0 has face 0 first, and
  * no cell before it. */
 #include <math.h>
+#include <string.h>
 
+#include "test_mesh_make.h"
 #include "test_session_fixture.h"
 
 static const char scene_text[] = "images:\n"
@@ -114,6 +116,37 @@ static void face_left_out(session_input *in)
 {
     in->part.connectivity[0] = in->part.connectivity[1];
 }
+/* The first face a further time, in the place of the next cell's first, which is then open; cell 0 comes before it. */
+static void face_once_more(session_input *in)
+{
+    in->part.connectivity[in->part.offsets[1]] = in->part.connectivity[0];
+    in->part.offsets[1]++;
+}
+/* The last face of the first cell that has more than four. */
+static void face_missing(session_input *in)
+{
+    int64_t cell = 0;
+    while (in->part.offsets[cell + 1] - in->part.offsets[cell] < 5) cell++;
+    in->part.offsets[cell + 1]--;
+}
+static void one_face(session_input *in)
+{
+    in->part.offsets[1] = in->part.offsets[0] + 1;
+}
+static void cell_without_faces(session_input *in)
+{
+    in->part.offsets[1] = in->part.offsets[0];
+}
+/* There and back: a, b, a. */
+static void vertex_twice_apart(session_input *in)
+{
+    in->part.face_connectivity[2] = in->part.face_connectivity[0];
+}
+/* a, b, b: the face is the edge. */
+static void vertex_twice_beside(session_input *in)
+{
+    in->part.face_connectivity[2] = in->part.face_connectivity[1];
+}
 static void face_of_another_cell(session_input *in)
 {
     in->part.connectivity[0] = in->part.connectivity[in->part.connectivity_count - 1];
@@ -202,6 +235,28 @@ static const spoilt_case at_the_step[] = {
      {CELL_0 "face 0: vertex index 1000000 is outside 0.."}},
     {"vertex negative", face_vertex_negative, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex index -1 is outside"}},
     {"three faces", three_faces, INSITU_ERROR_MESH, false, {CELL_0 "3 faces, a closed surface has at least 4"}},
+    {"one face", one_face, INSITU_ERROR_MESH, false, {CELL_0 "1 faces, a closed surface has at least 4"}},
+    {"without faces",
+     cell_without_faces,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "0 faces, a closed surface has at least 4"}},
+    {"face once more",
+     face_once_more,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "face ", " occurs 3 times, not once in each of two faces"}},
+    {"face missing",
+     face_missing,
+     INSITU_ERROR_MESH,
+     false,
+     {" (polyhedron): face ", " occurs 1 times, not once in each of two faces"}},
+    {"a face there and back",
+     vertex_twice_apart,
+     INSITU_ERROR_MESH,
+     false,
+     {CELL_0 "face ", "not once in each of two"}},
+    {"a face an edge", vertex_twice_beside, INSITU_ERROR_MESH, false, {CELL_0 "face ", "not once in each of two"}},
     {"face twice", face_left_out, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
     {"another's face", face_of_another_cell, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
     {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex 0 has a coordinate that is not finite"}},
@@ -233,12 +288,71 @@ static void ghosts_are_proved_but_for_coordinates(void **context)
     spoilt_is_told_to_all(session, &input, &ghost);
 }
 
+/* ---- cells of no volume -------------------------------------------------------------------------------------- */
+
+/* The part with flat cells beside every third: its first face before and behind, closed by faces that are points, or
+ * four faces that are points. Returns how many. */
+static int64_t add_flat_cells(const test_mesh *part, test_mesh *out)
+{
+    int *all = test_calloc((size_t)part->cell_count + 1, sizeof *all);
+    test_mesh bare;
+    int64_t flat = 0;
+    test_mesh_part(part, all, 0, &bare);
+    test_mesh_allocate(out, part->vertex_count, 2 * part->cell_count, 5 * part->connectivity_count);
+    test_mesh_allocate_faces(out, part->face_count + 4 * part->cell_count,
+                             part->face_connectivity_count + 16 * part->cell_count);
+    for (int64_t v = 0; v < bare.vertex_count; v++)
+        out->values[test_mesh_add_vertex(out, bare.coordinates + 3 * v)] = bare.values[v];
+    for (int64_t face = 0; face < bare.face_count; face++)
+        test_mesh_add_face(out, bare.face_connectivity + bare.face_offsets[face], 3);
+    for (int64_t cell = 0; cell < bare.cell_count; cell++) {
+        const int64_t *own = bare.connectivity + bare.offsets[cell];
+        int64_t faces[4] = {own[0]};
+        test_mesh_add_polyhedron(out, own, bare.offsets[cell + 1] - bare.offsets[cell]);
+        if (cell % 3) continue;
+        const int64_t *v = bare.face_connectivity + bare.face_offsets[own[0]];
+        for (int i = 0; i < 4; i++) {
+            const int64_t point[3] = {v[i % 3], v[i % 3], v[i % 3]};
+            if (i > 0 || cell % 2) faces[i] = test_mesh_add_face(out, i == 1 && cell % 2 == 0 ? v : point, 3);
+        }
+        test_mesh_add_polyhedron(out, faces, 4);
+        flat++;
+    }
+    test_mesh_free(&bare);
+    test_free(all);
+    return flat;
+}
+
+static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
+{
+    (void)context;
+    session_input more = input;
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(session, 5);
+    everywhere(insitu_last_report(session)->cells_flat == 0);
+    const size_t numbers = own_rank == 0 ? (size_t)4 * 24 * 16 : 0;
+    float *before = test_calloc(numbers + 1, sizeof *before);
+    if (own_rank == 0) memcpy(before, caught[0].rgba, numbers * sizeof *before);
+    const int64_t flat = add_flat_cells(&input.part, &more.part);
+    input_describe(&more);
+    everywhere(hand_over(session, &more) == INSITU_OK);
+    step_is_good(session, 6);
+    everywhere(insitu_last_report(session)->cells_flat == flat);
+    everywhere(insitu_last_report(session)->cells_inverted == 0);
+    everywhere(own_rank != 0 || memcmp(before, caught[0].rgba, numbers * sizeof *before) == 0);
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(session, 7);
+    test_mesh_free(&more.part);
+    test_free(before);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spoilt_arrays_are_told_at_once),
         cmocka_unit_test(spoilt_faces_are_told_at_the_step),
         cmocka_unit_test(ghosts_are_proved_but_for_coordinates),
+        cmocka_unit_test(flat_polyhedra_are_counted_and_change_no_picture),
     };
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     input_create(&input, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);

@@ -102,17 +102,27 @@ face_fault session_check_faces(const session_mesh *mesh, int64_t cell, face_room
     return check_edges(room->edges, edges, place);
 }
 
-static void mean_of_corners(const grid *g, int64_t cell, double mean[3])
+/* And the volume of their box. */
+static double mean_of_corners(const grid *g, int64_t cell, double mean[3])
 {
     grid_walk walk = grid_walk_cell(g, cell);
+    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY}, box = 1;
     int64_t vertex, count = 0;
     mean[0] = mean[1] = mean[2] = 0;
     for (; grid_walk_next(&walk, &vertex); count++) {
         double p[3];
         grid_vertex(g, vertex, p);
-        for (int axis = 0; axis < 3; axis++) mean[axis] += p[axis];
+        for (int axis = 0; axis < 3; axis++) {
+            mean[axis] += p[axis];
+            lower[axis] = p[axis] < lower[axis] ? p[axis] : lower[axis];
+            upper[axis] = p[axis] > upper[axis] ? p[axis] : upper[axis];
+        }
     }
-    for (int axis = 0; axis < 3; axis++) mean[axis] /= (double)count;
+    for (int axis = 0; axis < 3; axis++) {
+        mean[axis] /= (double)count;
+        box *= upper[axis] - lower[axis];
+    }
+    return box;
 }
 
 static double tet_volume(const double *a, const double *b, const double *c)
@@ -128,24 +138,43 @@ static void corner_from(const grid *g, int64_t entry, const double mean[3], doub
     for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
 }
 
-double session_polyhedron_volume(const grid *g, int64_t cell)
+/* Of the tet on a triangle with a corner of the cell, all relative to the mean. */
+static double volume_from(const double origin[3], const double *const corners[3])
 {
-    int64_t first, end;
-    double mean[3], volume = 0;
-    mean_of_corners(g, cell, mean);
+    double d[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int axis = 0; axis < 3; axis++) d[i][axis] = corners[i][axis] - origin[axis];
+    return tet_volume(d[0], d[1], d[2]);
+}
+
+/* What rounding may leave of a triangle's tet with a corner of the same plane, of the cell's box. With u = 2^-53: an
+ * edge is of three differences, each off by u of the box's side (the mean, whatever it is, drops out), a determinant's
+ * six products of three edges by 9 u more, 2 u and 3 u of sums and products: 6 times 14 u, over 6. 32 u leaves room for
+ * the sum over triangles, which are few beside 1 / u, the box's own roundings and squares of u. */
+static const double flat_share = 0x1p-48;
+
+double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)
+{
+    int64_t first, end, triangles = 0;
+    double mean[3], origin[3] = {0, 0, 0}, volume = 0, from_corner = 0;
+    const double box = mean_of_corners(g, cell, mean);
     grid_cell_faces(g, cell, &first, &end);
     for (int64_t i = first; i < end; i++) {
         int64_t from, to;
         double a[3], b[3], c[3];
+        const double *const corners[3] = {a, b, c};
         grid_face_vertices(g, grid_array_index(&g->connectivity, i), &from, &to);
         corner_from(g, from, mean, a);
-        for (int64_t k = from + 1; k + 1 < to; k++) {
+        for (int axis = 0; axis < 3 && i == first; axis++) origin[axis] = a[axis];
+        for (int64_t k = from + 1; k + 1 < to; k++, triangles++) {
             corner_from(g, k, mean, b);
             corner_from(g, k + 1, mean, c);
             volume += tet_volume(a, b, c);
+            from_corner += volume_from(origin, corners);
         }
     }
-    return volume;
+    *is_flat = from_corner <= flat_share * (double)triangles * box;
+    return *is_flat ? 0 : volume;
 }
 
 insitu_status session_describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault, const face_place *place,

@@ -36,8 +36,9 @@ void session_faces_free(face_room *room);
 /* offsets of the cell have been proved. */
 face_fault session_check_faces(const session_mesh *mesh, int64_t cell, face_room *room, face_place *place);
 
-/* The volume: exact for cells that are star-shaped from their vertices' mean, else somewhat more. */
-double session_polyhedron_volume(const grid *g, int64_t cell);
+/* The volume: exact for cells that are star-shaped from their vertices' mean, else somewhat more. Flat, of
+ * volume 0: in one plane, but for rounding. */
+double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat);
 
 /* The error in words. */
 insitu_status session_describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault, const face_place *place,

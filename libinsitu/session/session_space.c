@@ -46,7 +46,7 @@ static insitu_status check_meshes(insitu_session *session, base_error *error)
 static insitu_status reduce_extent(insitu_session *session, session_extent *out, base_error *error)
 {
     double mine[6], all[6];
-    int64_t counts[2] = {0, 0}, totals[2] = {0, 0};
+    int64_t counts[3] = {0, 0, 0}, totals[3] = {0, 0, 0};
     double sizes = 0, all_sizes = 0;
     for (int i = 0; i < 6; i++) mine[i] = INFINITY;
     for (int i = 0; i < session->mesh_count; i++) {
@@ -57,6 +57,7 @@ static insitu_status reduce_extent(insitu_session *session, session_extent *out,
             mine[3 + axis] = fmin(mine[3 + axis], -mesh->upper[axis]);
         }
         counts[0] += mesh->drawn_count;
+        counts[2] += mesh->drawn_count - mesh->flat_count;
         sizes += mesh->size_sum;
     }
     counts[1] = counts[0] > 0;
@@ -64,14 +65,16 @@ static insitu_status reduce_extent(insitu_session *session, session_extent *out,
         session_mpi(error, MPI_Allreduce(mine, all, 6, MPI_DOUBLE, MPI_MIN, session->comm), "MPI_Allreduce");
     if (!status)
         status =
-            session_mpi(error, MPI_Allreduce(counts, totals, 2, MPI_INT64_T, MPI_SUM, session->comm), "MPI_Allreduce");
+            session_mpi(error, MPI_Allreduce(counts, totals, 3, MPI_INT64_T, MPI_SUM, session->comm), "MPI_Allreduce");
     if (!status)
         status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, session->comm),
                              "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .rank_count = (int)totals[1]};
-    /* To float, so that the sum's rounding, which depends on the partition, does not reach the samples. */
-    if (totals[0] > 0) out->cell_size = (double)(float)(all_sizes / (double)totals[0]);
+    /* Of the cells that have one: flat ones change no sample. To float, so that the sum's rounding, which depends on
+     * the partition, does not reach the samples. */
+    const int64_t sized = totals[2] > 0 ? totals[2] : totals[0];
+    if (sized > 0) out->cell_size = (double)(float)(all_sizes / (double)sized);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
         out->lower[axis] = all[axis];
         out->upper[axis] = -all[3 + axis];

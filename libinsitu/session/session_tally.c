@@ -152,9 +152,16 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
         grid_vertex(g, vertex, point);
         tally_point(tally, point);
     }
-    const double volume = type == GRID_POLYHEDRON ? session_polyhedron_volume(g, cell) : signed_volume(type, points);
+    bool is_flat_cell = false;
+    double volume;
+    if (type == GRID_POLYHEDRON) {
+        volume = session_polyhedron_volume(g, cell, &is_flat_cell);
+    } else {
+        volume = signed_volume(type, points);
+        is_flat_cell = is_flat(volume, box_volume(points, grid_type_vertices(type)));
+    }
     tally_volume(tally, volume);
-    if (type != GRID_POLYHEDRON) tally->flat += is_flat(volume, box_volume(points, grid_type_vertices(type)));
+    tally->flat += is_flat_cell;
 }
 
 /* ---- runs ---------------------------------------------------------------------------------------------------- */

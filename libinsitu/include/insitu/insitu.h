@@ -83,8 +83,9 @@ typedef struct insitu_mesh {
                                     INSITU_POLYHEDRON. */
     /* Faces of polyhedra: given where there are any. A polyhedron's entries in connectivity are its faces' indices from
      * 0, at least 4, in any order; a face between two polyhedra is the same one in both. The faces of a cell must
-     * make a closed surface: along every edge two of them meet. No copy of them is kept: a frame holds those under way
-     * alone, about 200 bytes a vertex of each, 16 MiB a thread at most. */
+     * make a closed surface: along every edge two of them meet, once each (an edge from a vertex to itself is none, so
+     * a face may repeat a vertex beside itself, or be one vertex). Which way round a face runs is nothing. No copy of
+     * them is kept: a frame holds those under way alone, about 200 bytes a vertex of each, 16 MiB a thread at most. */
     int64_t face_count;
     insitu_array face_offsets;       /* int32 or int64, face_count + 1: where each face begins in face_connectivity */
     int64_t face_connectivity_count; /* elements in face_connectivity */
@@ -127,11 +128,11 @@ typedef struct insitu_report {
     int64_t cells_ghost;    /* not drawn: flagged as ghosts */
     int64_t cells_unusable; /* not drawn: a field value that is not finite */
     int64_t cells_inverted; /* drawn right all the same: left-handed, by the sign of the corner volumes' sum */
-    int64_t cells_flat;     /* of no volume, and so not seen: the corner volumes' sum is nothing beside the cell's box (at
-                               most 1.4e-14 of it, which is rounding). Polyhedra are not looked at. */
-    int64_t rays;           /* primary rays traced */
-    int64_t fragments;      /* sent to pixel owners, own ones included */
-    int64_t map_failures;   /* inverse maps that did not converge and fell back to linear interpolation */
+    int64_t cells_flat;   /* of no volume, and so not seen: the corner volumes' sum is nothing beside the cell's box (at
+                             most 1.4e-14 of it, which is rounding). Polyhedra are not looked at. */
+    int64_t rays;         /* primary rays traced */
+    int64_t fragments;    /* sent to pixel owners, own ones included */
+    int64_t map_failures; /* inverse maps that did not converge and fell back to linear interpolation */
     int64_t bytes_borrowed; /* of the caller's arrays in use */
     int64_t bytes_copied;   /* of the caller's data held in copies, with reasons in copied_why */
     int64_t bytes_trees;    /* of all trees held */
