@@ -89,7 +89,8 @@ SIMD_INLINE vm kernel_course_steps(const kernel_segment_state *state, const kern
     return any;
 }
 
-/* Of a stretch's values, the rounding of those in float32 (docs/decisions.md: 4e-7 at most). */
+/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/decisions.md: 4e-7 at most).
+ */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 
 /* Into how many parts, as a real number, to cut the stretch from t0 to t1, with values v0 and v1 there, and how far its
@@ -117,7 +118,9 @@ SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
     const vf parts = vf_min(wanted, vf_set(KERNEL_MAX_PARTS));
     if (!course->step_count && !course->is_steep) return parts;
-    const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING, low = vf_min(v0, v1) - wide, high = vf_max(v0, v1) + wide;
+    const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
+    const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
+             high = vf_max(v0, v1) + wide;
     vm too_few = kernel_course_steps(state, course, low, high);
     if (course->is_steep)
         too_few =
@@ -147,6 +150,10 @@ SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state 
         *halved = vm_and(rays, vf_lt(most, parts));
     } else if (course->map) {
         parts = length / p->sample_step;
+        if (course->step_count && state->mixing > 0) {
+            const vf wanted = kernel_course_curved(p, state, course, rays, t0, t1, v0, v1, &off);
+            *halved = vm_and(rays, vf_lt(most, wanted));
+        }
     } else if (course->step_count && state->mixing > 0) {
         *halved = vm_and(rays, kernel_course_steps(state, course, vf_min(v0, v1), vf_max(v0, v1)));
     }

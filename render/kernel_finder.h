@@ -73,7 +73,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
-    s->coming_count = s->tets.count = s->hexes.count = 0;
+    s->coming_count = s->tets.count = s->hexes.count = s->hexes.value = 0;
     kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     s->plain.is_hexes = s->plain.is_hexes && s->surface;
     memset(&s->picture, 0, sizeof s->picture);

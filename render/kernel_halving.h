@@ -6,9 +6,11 @@
  * at a time, and the same for all instruction sets.
  *
  * Parts. The field is known at a part's ends, quarters and middle; it is off the chord by no more than d, half as much
- * again as it is there (the three see 7/8 of a cubic's). Where the chord rises by 4 d or more, the field is monotone
- * (a parabola that is off its chord by d has the slopes (rise +- 4 d) / length at its ends), and so are all parts of
- * it. Its values are then those between its ends, otherwise these widened by d. What the part is:
+ * again as it is there (the three see 7/8 of a cubic's). A cubic is off its chord by s (1 - s) (u + q (s - 1/2)), s
+ * from 0 to 1, and its slope off the chord's by u + q / 2 at most, at an end. If it is off by no more than e at the
+ * middle and the quarters, then |u| <= 4 e, |u| + |q| / 4 <= 16/3 e, and that slope is 32/3 e at most. Where the chord
+ * rises by 12 e or more the field is monotone, with something to spare for maps that bend, and so are all parts of it.
+ * Its values are then those between its ends, otherwise these widened by d. What the part is:
  *   - of one side of each step, and its chord is close enough: a segment;
  *   - monotone, with a step strictly between its ends: cut where the field is that step's value, to rounding;
  *   - anything else: halved, the nearer half first, to the same questions.
@@ -55,6 +57,7 @@ typedef struct kernel_halving {
     double u, v, slope, shift;   /* at depth t the ray is at (u, v) (slope t + shift) */
     kernel_knot in, out;         /* of the interval, as the faces have it */
     double per_t, length, light; /* unit distances per t, of the stretch; what light gets to the part */
+    int64_t *map_failures;
     int count;
 } kernel_halving;
 
@@ -156,6 +159,7 @@ static kernel_knot kernel_knot_at(const kernel_halving *h, double t, const doubl
         out.r[2] = 0.5;
         if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
             for (int a = 0; a < 3; a++) out.r[a] = kernel_between(h->in.r[a], h->out.r[a], share);
+            ++*h->map_failures;
             return out;
         }
     }
@@ -278,7 +282,7 @@ static kernel_part_values kernel_part_look(const kernel_halving *h, const kernel
     if (!h->map) return out;
     out.off = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
                    fabs(a + 0.5 * rise - part->middle.v));
-    part->is_monotone = part->is_monotone || fabs(rise) >= 6 * out.off;
+    part->is_monotone = part->is_monotone || fabs(rise) >= 12 * out.off;
     if (!part->is_monotone) {
         out.low -= 1.5 * out.off;
         out.high += 1.5 * out.off;
@@ -399,13 +403,14 @@ static void kernel_part_put(kernel_packet *p, const kernel_halving *h, vm lane, 
 /* ---- a stretch ---- */
 
 static bool kernel_part_is_good(const kernel_halving *h, const kernel_part_values *values, const kernel_span *s,
-                                double length, bool is_cut)
+                                double length, bool is_cut, bool is_monotone)
 {
-    const double a = (double)h->state->allowance, reach = (double)h->state->reach, depth = s->least * length;
+    const double reach = (double)h->state->reach, depth = s->least * length;
+    const double a = (double)(h->state->allowance > 0 ? h->state->allowance : h->state->mixing);
     double all;
     const double error = kernel_part_error(h, values, s, length, &all);
     if (!is_cut && h->light * error <= 0.875 * a * (length / reach + h->light * depth / (1 + depth))) return true;
-    return h->light * all <= a * h->length / (32 * reach);
+    return (is_cut || !is_monotone) && h->light * all <= a * h->length / (32 * reach);
 }
 
 /* All parts of a stretch whose ends and middle are known. */
@@ -427,7 +432,7 @@ static void kernel_stretch_halve(kernel_packet *p, kernel_halving *h, int lane, 
         const double length = (part.end.t - from.t) * h->per_t;
         const bool is_last =
             part.depth >= KERNEL_HALVING_DEPTH || h->count >= KERNEL_HALVING_PARTS || count + 2 > KERNEL_HALVING_ROOM;
-        if (is_last || kernel_part_is_good(h, &values, &s, length, step != NULL)) {
+        if (is_last || kernel_part_is_good(h, &values, &s, length, step != NULL, part.is_monotone)) {
             if (list->t_begin[lane] <= (float)from.t) kernel_part_put(p, h, only, &from, &part, &values, &s);
             const double depth = s.least * length;
             h->light /= 1 + depth * (1 + 0.5 * depth);
@@ -471,7 +476,8 @@ static __attribute__((noinline, cold)) void kernel_course_halve(kernel_packet *p
                             .out = {.t = (double)i->t_out[n], .v = (double)i->v_out[n]},
                             .per_t = (double)state->list->per_t[n],
                             .length = (double)((t1[n] - t0[n]) * state->list->per_t[n]),
-                            .light = 1};
+                            .light = 1,
+                            .map_failures = &p->thread->map_failures};
         for (int a = 0; a < 3 && course->map; a++) {
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];

@@ -41,7 +41,8 @@ SIMD_INLINE void kernel_hex_differences(const vf v[8], vf out[3])
 SIMD_INLINE vm kernel_hex_lanes_unfolded(const kernel_hex_lanes *l, vf inverse[3][3])
 {
     const kernel_differential *d = &kernel_differentials[0];
-    vf y[8][3], off[12], most = vf_set(0);
+    vf y[8][3], off[12];
+    vm unfolded = vm_all_lanes();
     for (int i = 1; i < 8; i++) {
         vf move[3];
         for (int a = 0; a < 3; a++) move[a] = l->at[i][a] - l->at[0][a];
@@ -59,9 +60,9 @@ SIMD_INLINE vm kernel_hex_lanes_unfolded(const kernel_hex_lanes *l, vf inverse[3
     }
     for (int n = 0; n < 8; n++) {
         const signed char *columns = d->corners[n];
-        most = vf_max(off[columns[0]] + off[columns[1]] + off[columns[2]], most);
+        unfolded = vm_and(unfolded, vf_lt(off[columns[0]] + off[columns[1]] + off[columns[2]], vf_set(0.9f)));
     }
-    return vf_lt(most, vf_set(0.9f));
+    return unfolded;
 }
 
 /* kernel_linear_part(). Lanes whose volume is near float32's least are not usual. */

@@ -91,10 +91,13 @@ typedef struct drawing {
     int frame;
     int64_t fragment_limit;
     double max_error; /* > 0: by segments */
+    bool is_stepped;  /* the opacity */
 } drawing;
 
 static const double surface_values[2] = {-0.2, 0.3};
 static const double ramp_values[2] = {-0.5, 1};
+static const double step_values[4] = {-0.7, -0.1, -0.1, 0.7};
+static const float step_opacities[4] = {0, 0.1f, 0.6f, 0.5f};
 static const float ramp_opacities[2] = {0, 0.6f};
 
 typedef struct staged {
@@ -111,6 +114,11 @@ static void stage(staged *s, const test_mesh *mesh, const drawing *d)
     if (d->scene == OPAQUE_VOLUME || d->scene == TRANSPARENT_VOLUME)
         fixture_add_surface(&s->f, surface_values, 2, d->scene == OPAQUE_VOLUME ? 1 : 0.4f);
     fixture_set_volume(&s->f, 0.3);
+    if (d->is_stepped) {
+        s->f.transfer.opacity_count = 4;
+        s->f.transfer.opacity_values = step_values;
+        s->f.transfer.opacities = step_opacities;
+    }
     s->f.job.frame = d->frame;
     s->f.job.integration = d->max_error > 0 ? RENDER_SEGMENTS : RENDER_SAMPLES;
     s->f.job.max_error = d->max_error;
@@ -294,7 +302,7 @@ static void lattices_in_one_another_are_as_counted(void **state)
         test_mesh mesh;
         interpenetrating(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
-            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY, 0};
+            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY, 0, false};
             compare(&mesh, &d, true, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
@@ -308,8 +316,8 @@ static void segments_in_one_another_are_as_integrated(void **state)
         test_mesh mesh;
         interpenetrating(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
-            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0, MANY,
-                               pow(10, -2 - ((int)kind + (int)scene) % 3)};
+            const drawing d = {scene, scene % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, 0,
+                               MANY,  pow(10, -2 - ((int)kind + (int)scene) % 3),       false};
             compare(&mesh, &d, true, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
@@ -323,8 +331,10 @@ static void segments_of_two_volumes_are_as_integrated(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
         test_mesh mesh;
         test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
-        const drawing d = {TWO_VOLUMES, CAMERA_INSIDE, 0, MANY / 40, pow(10, -2 - (int)kind % 3)};
+        const drawing d = {TWO_VOLUMES, CAMERA_INSIDE, 0, MANY / 40, pow(10, -2 - (int)kind % 3), false};
         compare(&mesh, &d, true, test_mesh_kind_name(kind));
+        const drawing stepped = {TWO_VOLUMES, CAMERA_INSIDE, 0, MANY / 40, pow(10, -2 - (int)kind % 3), true};
+        compare(&mesh, &stepped, true, test_mesh_kind_name(kind));
         test_mesh_free(&mesh);
     }
 }
@@ -337,7 +347,7 @@ static void tangled_lattices_are_the_same_everywhere(void **state)
         test_mesh mesh;
         tangled(kind, &mesh);
         for (scene_kind scene = 0; scene < SCENE_COUNT; scene++) {
-            const drawing d = {scene, scene == VOLUME ? CAMERA_INSIDE : CAMERA_OUTSIDE, 3, MANY, 0};
+            const drawing d = {scene, scene == VOLUME ? CAMERA_INSIDE : CAMERA_OUTSIDE, 3, MANY, 0, false};
             compare(&mesh, &d, kind == TEST_TETS, test_mesh_kind_name(kind));
         }
         test_mesh_free(&mesh);
@@ -351,7 +361,7 @@ static void turns_make_the_same_bits(void **state)
     test_mesh mesh;
     interpenetrating(TEST_MIXED, &mesh);
     image at_once, in_turns;
-    drawing d = {TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0};
+    drawing d = {TRANSPARENT_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0, false};
     draw_shares(&mesh, TEST_RANDOM, &d, &at_once);
     d.fragment_limit = 3000; /* of a step of 0.15 in an extent of 2: 100 pixels and more */
     const int64_t overlaps = draw_shares(&mesh, TEST_RANDOM, &d, &in_turns);
@@ -370,7 +380,7 @@ static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partitio
     for (scene_kind scene = 0; scene < SCENE_COUNT; scene++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             image drawn;
-            const drawing d = {scene, camera, (int)camera, MANY, 0};
+            const drawing d = {scene, camera, (int)camera, MANY, 0, false};
             const int64_t overlaps = draw_shares(mesh, partition, &d, &drawn);
             free_image(&drawn);
             if (overlaps)

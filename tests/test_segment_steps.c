@@ -162,6 +162,40 @@ static void a_hex_that_barely_reaches_a_step(void **state)
         }
 }
 
+/* Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186 and rises to
+ * 0.8, and is off its chord there by less than a sixth of that at a quarter, the half and three quarters. */
+static void a_cubic_that_dips_below_a_step(void **state)
+{
+    static const double values[8] = {0.2, 0.2 / 3, 2.8 / 3, 0.2 / 3, 0.2 / 3, 2.8 / 3, 0.8, 2.8 / 3};
+    test_mesh mesh;
+    render_fixture f;
+    step_function function = {.opacities = {0.9f, 0.9f, 0, 0}};
+    double worst[3] = {0};
+    (void)state;
+    make_hex(&mesh);
+    begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
+    const render_camera camera = f.job.camera;
+    fixture_free(&f);
+    for (int i = 0; i < 8; i++)
+        for (int a = 0; a < 3; a++) {
+            const double edges[3][3] = {{1 / 3.0, 0.5, 0}, {1 / 3.0, -0.25, 0.43}, {1 / 3.0, -0.25, -0.43}};
+            const int corner[3] = {i % 4 == 1 || i % 4 == 2, i % 4 / 2, i / 4};
+            /* Not through the corners themselves. */
+            double along[3] = {-0.5, 1e-4, 2e-4};
+            for (int e = 0; e < 3; e++)
+                for (int k = 0; k < 3; k++) along[k] += corner[e] * edges[e][k];
+            mesh.coordinates[3 * i + a] =
+                along[0] * camera.forward[a] + along[1] * camera.right[a] + along[2] * camera.up[a];
+        }
+    memcpy(mesh.values, values, sizeof values);
+    begin(&f, &mesh, CAMERA_ORTHOGRAPHIC, 1);
+    set_function(&f, &function, 0.193, 0, 0.005);
+    judge(&f, worst);
+    assert_kept(worst, "a dip");
+    fixture_free(&f);
+    test_mesh_free(&mesh);
+}
+
 /* How far beyond 0.6 the hex comes on the ray of a picture of one pixel, the eye moved sideways and up; NaN: its most
  * is at an end. */
 static double hex_past_step(render_fixture *f, const test_mesh *mesh, double sideways, double up)
@@ -381,9 +415,13 @@ static void tiles_cut_as_packets_do(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_hex_that_barely_reaches_a_step), cmocka_unit_test(a_ray_on_which_it_barely_does),
-        cmocka_unit_test(random_cells_and_steps),           cmocka_unit_test(rays_that_graze_a_step),
-        cmocka_unit_test(rays_that_graze_a_steep_ramp),     cmocka_unit_test(steep_ramps_are_kept_as_steps_are),
+        cmocka_unit_test(a_hex_that_barely_reaches_a_step),
+        cmocka_unit_test(a_ray_on_which_it_barely_does),
+        cmocka_unit_test(a_cubic_that_dips_below_a_step),
+        cmocka_unit_test(random_cells_and_steps),
+        cmocka_unit_test(rays_that_graze_a_step),
+        cmocka_unit_test(rays_that_graze_a_steep_ramp),
+        cmocka_unit_test(steep_ramps_are_kept_as_steps_are),
         cmocka_unit_test(tiles_cut_as_packets_do),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -167,7 +167,7 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
       .help = "No channel of a pixel is off by more, in linear light: cells are cut, and integrals taken, as "         \
               "finely as that takes, where the medium is of less than 1000 optical depths across the scene: of "       \
               "a denser one single precision's places of faces may cost more. Steps of `opacity` are kept to it; a "   \
-              "ramp narrower than 0.001 of the function's range may cost 1e-7 / its share of that range more. On "     \
+              "ramp narrower than 0.01 of the function's range may cost 1e-7 / its share of that range more. On "      \
               "tetrahedra, and with tables of many colours, `1e-2` takes a fraction of the time of "                   \
               "`method: segments`. Not with `step`, "                                                                  \
               "`step_cells`, nor `method: samples`.",                                                                  \
