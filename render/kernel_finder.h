@@ -16,6 +16,13 @@ typedef struct kernel_tets {
     int32_t plain[8][SIMD_WIDTH]; /* the vertices of a plain mesh, instead; or of hexes */
 } kernel_tets;
 
+/* Of a plain mesh's cells of so many vertices, lanes from count on are as the first. */
+SIMD_INLINE void kernel_tets_fill(kernel_tets *t, int vertices)
+{
+    for (int n = t->count; n < SIMD_WIDTH; n++)
+        for (int i = 0; i < vertices; i++) t->plain[i][n] = t->plain[i][0];
+}
+
 /* Hexes of a plain mesh that the isovalue under way crosses (kernel_shown_hexes.h). */
 typedef struct kernel_crossed_hexes {
     int count, value;

@@ -204,8 +204,7 @@ static void kernel_find_plain_hexes(kernel_finder *s)
     const render_surface_layer *layer = s->surface->layer;
     vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
     if (!t->count) return;
-    for (int n = t->count; n < SIMD_WIDTH; n++)
-        for (int i = 0; i < 8; i++) t->plain[i][n] = t->plain[i][0];
+    kernel_tets_fill(t, 8);
     for (int i = 0; i < 8; i++) {
         vi vertex;
         memcpy(&vertex, t->plain[i], sizeof vertex);

@@ -181,8 +181,7 @@ static void kernel_find_plain_tets(kernel_finder *s)
     kernel_tet_lanes l;
     vf v[4];
     if (!t->count) return;
-    for (int n = t->count; n < SIMD_WIDTH; n++)
-        for (int i = 0; i < 4; i++) t->plain[i][n] = t->plain[i][0];
+    kernel_tets_fill(t, 4);
     for (int i = 0; i < 4; i++) {
         vi vertex;
         memcpy(&vertex, t->plain[i], sizeof vertex);

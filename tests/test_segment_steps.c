@@ -140,26 +140,30 @@ static void make_hex(test_mesh *mesh)
     memcpy(mesh->values, values, sizeof values);
 }
 
+/* Its picture with the opacity's ramp at 0.6, or a step. */
+static void judge_hex(step_function function, fixture_camera camera, double width, double unit)
+{
+    test_mesh mesh;
+    render_fixture f;
+    double worst[3] = {0};
+    char what[80];
+    make_hex(&mesh);
+    begin(&f, &mesh, camera, SIDE);
+    set_function(&f, &function, 0.6, width, unit);
+    judge(&f, worst);
+    snprintf(what, sizeof what, "a ramp of %g, unit distance %g, %s", width, unit, fixture_camera_name(camera));
+    assert_kept(worst, what);
+    fixture_free(&f);
+    test_mesh_free(&mesh);
+}
+
 static void a_hex_that_barely_reaches_a_step(void **state)
 {
     static const double units[2] = {0.005, 0.1};
     (void)state;
     for (int k = 0; k < 2; k++)
-        for (fixture_camera camera = 0; camera <= CAMERA_ORTHOGRAPHIC; camera++) {
-            test_mesh mesh;
-            render_fixture f;
-            step_function function = {.opacities = {0, 0, 0.9f, 0.9f}};
-            double worst[3] = {0};
-            char what[64];
-            make_hex(&mesh);
-            begin(&f, &mesh, camera, SIDE);
-            set_function(&f, &function, 0.6, 0, units[k]);
-            judge(&f, worst);
-            snprintf(what, sizeof what, "unit distance %g, %s", units[k], fixture_camera_name(camera));
-            assert_kept(worst, what);
-            fixture_free(&f);
-            test_mesh_free(&mesh);
-        }
+        for (fixture_camera camera = 0; camera <= CAMERA_ORTHOGRAPHIC; camera++)
+            judge_hex((step_function){.opacities = {0, 0, 0.9f, 0.9f}}, camera, 0, units[k]);
 }
 
 /* Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186 and rises to
@@ -369,21 +373,9 @@ static void steep_ramps_are_kept_as_steps_are(void **state)
     static const double widths[] = {1e-2, 1e-3, 1e-4, 1e-6};
     (void)state;
     for (int k = 0; k < (int)(sizeof widths / sizeof *widths); k++)
-        for (int dense = 0; dense < 2; dense++) {
-            test_mesh mesh;
-            render_fixture f;
-            step_function function = {.opacities = {0, 0.02f, 0.9f, 0.5f}};
-            double worst[3] = {0};
-            char what[64];
-            make_hex(&mesh);
-            begin(&f, &mesh, CAMERA_OUTSIDE, SIDE);
-            set_function(&f, &function, 0.6, widths[k], dense ? 0.005 : 0.1);
-            judge(&f, worst);
-            snprintf(what, sizeof what, "a ramp of %g, unit distance %g", widths[k], f.transfer.unit_distance);
-            assert_kept(worst, what);
-            fixture_free(&f);
-            test_mesh_free(&mesh);
-        }
+        for (int dense = 0; dense < 2; dense++)
+            judge_hex((step_function){.opacities = {0, 0.02f, 0.9f, 0.5f}}, CAMERA_OUTSIDE, widths[k],
+                      dense ? 0.005 : 0.1);
 }
 
 /* ---- the same rays everywhere ---- */
