@@ -5,11 +5,22 @@
  * normals have it), and as one of a tile, its edge functions by lines where these are good enough (as frames have it).
  * The tile is as wide as its rays are apart: a thousandth of a cell to several cells.
  *
- * Lengths are in sides of the hull, 1 in the kernels' scaled units, and may be off by 1e-6. A ray that grazes the hull
- * has no chord to that accuracy in float32:
- * positions are rounded by half a unit of 1 (6e-8) and so is the ray, and the chord is that of a hull whose planes lie
- * up to 2.4e-7 off, a rounding on either side. Where that changes the chord by more than 1e-6, what it changes is
- * allowed as well; such a ray may also enter and leave the hull more than once. */
+ * Lengths are in sides of the hull, 1 in the kernels' scaled units. The chord is that of the ray that is traced: how
+ * far it is off its tile's middle is rounded to float32, as the kernels have it, and all else is double. What is left
+ * is the rounding of the hull's vertices. Along the ray it and that of weights and depths cost 1e-6 at most in two
+ * crossings (kernel_line.h). Across the ray a vertex within 1 of the tile's middle is rounded by up to 3e-8 four times:
+ * when it is placed, and the ray's origin, its slope's share and their difference when it is projected. So the hull is
+ * one whose planes lie up to hull_shift = 1.2e-7 off, and a ray that meets them at an angle of the cosine c is longer
+ * or shorter by 1.2e-7 / c. From that come three bounds:
+ * - Of every ray the sum is between the chords of the hull shrunk by hull_shift and swollen by it, to 1e-6; every end
+ *   within the shrunk hull is that of two intervals, no gap is there, and no end is beyond the swollen one, each to
+ *   5e-7 along the ray.
+ * - It is the chord to 1e-6 wherever the shift, from shrunk to swollen, changes that by no more than 3e-6 (the sum of
+ *   both 1 / c is up to 12.5): roundings are not all at their worst at once. Rays beyond that are called slanted.
+ * - There are two ends alone, or none, wherever the shift changes the chord by no more than 0.01, so c is 2.4e-5 and
+ *   more: rounding tilts the plane of a face a quarter of the hull wide by 1e-6, so that it is crossed once. Rays
+ *   beyond that run within the hull's surface; which cells of it they touch rounding decides, and the first bound is
+ *   all that holds. */
 #include "chord_aim.h"
 #include "cpu.h"
 #include "memory.h"
@@ -28,10 +39,11 @@
 
 enum { SIDE = 4 };
 
-static const double hull_shift = 1.2e-7, length_allowed = 1e-6;
+static const double hull_shift = 1.2e-7, length_allowed = 1e-6, end_allowed = 5e-7;
+static const double slanted_from = 3e-6, touching_from = 0.01;
 
 /* Two faces that meet at a vertex are each placed to float32, 6e-8 times a few: so far may one cell's interval reach
- * into the next one's. */
+ * into the next one's, or, where a concave cell has several there, end before it. */
 static const double doubled_allowed = 5e-7;
 
 static int64_t rays_wanted = 1000000;
@@ -91,20 +103,32 @@ static const double jitter_wanted = 0.2;
 /* What rays were, over a test. Lengths are in sides of the hull. */
 typedef struct tally {
     int64_t rays, met, spans;
-    int64_t grazing;  /* whose chord is not known to length_allowed */
-    int64_t unpaired; /* with an end that is not exactly two intervals' */
+    int64_t slanted, touching; /* of both kinds each ray counts once */
+    int64_t unpaired;          /* with an end alone where there may be none */
     int64_t off;
-    int64_t doubled;      /* on which intervals overlap by rounding */
-    double worst_length;  /* of rays that do not graze */
-    double worst_doubled; /* the longest overlap */
+    int64_t doubled, gaps;  /* on which intervals overlap by rounding, or leave gaps */
+    double worst_length;    /* of rays that are neither */
+    double worst_slanted;   /* of slanted rays, in shares of what the shift changes */
+    double worst_bracketed; /* of all: beyond the shrunk and the swollen hull's chords */
+    double worst_doubled;   /* the longest overlap */
+    double worst_gap;
 } tally;
 
 typedef struct line {
     double base[3], direction[3], length; /* of the direction */
 } line;
 
-static line ray_line(const render_camera *c, double x, double y)
+typedef struct chord {
+    double in, out;
+} chord;
+
+/* The ray as the kernels have it: what it is off its tile's middle is float32, all else double. */
+static line ray_line(const render_job *job, const chord_rays *rays, int i)
 {
+    const render_camera *c = &job->camera;
+    const double unit = c->is_orthographic ? job->space.scale : 1;
+    const double x = rays->centre_x + (double)(float)((rays->x[i] - rays->centre_x) * unit) / unit;
+    const double y = rays->centre_y + (double)(float)((rays->y[i] - rays->centre_y) * unit) / unit;
     line l;
     for (int a = 0; a < 3; a++) {
         const double sideways = x * c->right[a] + y * c->up[a];
@@ -116,20 +140,25 @@ static line ray_line(const render_camera *c, double x, double y)
     return l;
 }
 
-/* The length of the ray, from the eye's plane on, in the hull of this half side, in sides of the hull. */
-static double hull_chord(const line *l, double half)
+/* Where the ray is in the hull of this half side, from the eye's plane on: depths from the eye. */
+static chord hull_chord(const line *l, double half)
 {
-    double low = 0, high = (double)INFINITY;
+    chord c = {0, (double)INFINITY};
     for (int a = 0; a < 3; a++) {
         if (l->direction[a] == 0) {
-            if (!(fabs(l->base[a]) < half)) return 0;
+            if (!(fabs(l->base[a]) < half)) return (chord){0, 0};
             continue;
         }
         const double t1 = (-half - l->base[a]) / l->direction[a], t2 = (half - l->base[a]) / l->direction[a];
-        low = fmax(low, fmin(t1, t2));
-        high = fmin(high, fmax(t1, t2));
+        c.in = fmax(c.in, fmin(t1, t2));
+        c.out = fmin(c.out, fmax(t1, t2));
     }
-    return low < high ? (high - low) * l->length / 2 : 0;
+    return c.in < c.out ? c : (chord){0, 0};
+}
+
+static double chord_length(const line *l, chord c)
+{
+    return (c.out - c.in) * l->length / 2;
 }
 
 static int compare_spans(const void *left, const void *right)
@@ -145,23 +174,22 @@ static int compare_floats(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Is every end that of two intervals, but one where the ray enters the hull and one where it leaves? These too may be
- * one, where the ray touches the hull: the intervals' lengths tell whether it does. */
-static bool is_paired(const chord_span *spans, int count)
+/* The ends that are not two intervals', sorted; returns how many. */
+static int lone_ends(const chord_span *spans, int count, float lone[2 * CHORD_MAX_SPANS])
 {
     float ends[2 * CHORD_MAX_SPANS];
+    int alone = 0;
     for (int i = 0; i < count; i++) {
         ends[2 * i] = spans[i].t_in;
         ends[2 * i + 1] = spans[i].t_out;
     }
     qsort(ends, 2 * (size_t)count, sizeof *ends, compare_floats);
-    int alone = 0;
     for (int i = 0; i < 2 * count;)
         if (i + 1 < 2 * count && ends[i] == ends[i + 1])
             i += 2;
         else
-            alone++, i++;
-    return alone == 0 || alone == 2;
+            lone[alone++] = ends[i++];
+    return alone;
 }
 
 /* From near on: what lies behind the eye's plane does not count. Returns how many are left. */
@@ -173,39 +201,112 @@ static int clip_spans(chord_span *spans, int count, float near)
     return left;
 }
 
-static void judge_ray(const render_job *job, double x, double y, chord_span *spans, int count, tally *t)
+/* A ray with its chords of the hull, of the shrunk and of the swollen one, as depths and as lengths. */
+typedef struct hull_ray {
+    line line;
+    chord within, about;
+    double length, least, most;
+} hull_ray;
+
+static hull_ray make_hull_ray(const render_job *job, const chord_rays *rays, int i)
 {
-    const line l = ray_line(&job->camera, x, y);
-    const double chord = hull_chord(&l, 1);
-    const double spread = hull_chord(&l, 1 + 2 * hull_shift) - hull_chord(&l, 1 - 2 * hull_shift);
-    const bool grazes = spread > length_allowed;
-    double sum = 0, reached = -(double)INFINITY;
+    hull_ray r = {.line = ray_line(job, rays, i)};
+    const chord exact = hull_chord(&r.line, 1);
+    r.within = hull_chord(&r.line, 1 - 2 * hull_shift);
+    r.about = hull_chord(&r.line, 1 + 2 * hull_shift);
+    r.length = chord_length(&r.line, exact);
+    r.least = chord_length(&r.line, r.within);
+    r.most = chord_length(&r.line, r.about);
+    return r;
+}
+
+static bool is_touching(const hull_ray *r)
+{
+    return r->most - r->least > touching_from;
+}
+
+/* Is any of what is from depth low to high in the shrunk hull for longer than rounding along the ray? */
+static bool is_within(const hull_ray *r, double low, double high)
+{
+    const double margin = 2 * end_allowed / r->line.length;
+    return low < r->within.out - margin && high > r->within.in + margin;
+}
+
+static bool is_beyond(const hull_ray *r, double depth)
+{
+    const double margin = 2 * end_allowed / r->line.length;
+    return depth < r->about.in - margin || depth > r->about.out + margin;
+}
+
+static double depth_of(const render_job *job, float t)
+{
+    return (double)t / job->space.scale + job->space.depth_origin;
+}
+
+/* Are ends alone only where they may be? */
+static bool is_paired(const render_job *job, const hull_ray *r, const chord_span *spans, int count)
+{
+    float lone[2 * CHORD_MAX_SPANS];
+    const int alone = lone_ends(spans, count, lone);
+    if (!is_touching(r) && alone != 0 && alone != 2) return false;
+    for (int i = 0; i < alone; i++) {
+        const double depth = depth_of(job, lone[i]);
+        if (is_within(r, depth, depth) || is_beyond(r, depth)) return false;
+    }
+    return true;
+}
+
+/* The longest overlap of intervals, which are sorted, and the longest gap; of rays that run within the hull's surface
+ * only gaps in the shrunk hull count. */
+static void judge_neighbours(const render_job *job, const hull_ray *r, const chord_span *spans, int count, tally *t)
+{
+    double doubled = 0, gap = 0;
+    for (int i = 1, last = 0; i < count; i++) {
+        const chord_span *before = &spans[last], *now = &spans[i];
+        doubled = fmax(doubled, fmin((double)before->t_out, (double)now->t_out) - (double)now->t_in);
+        if (!is_touching(r) || is_within(r, depth_of(job, before->t_out), depth_of(job, now->t_in)))
+            gap = fmax(gap, (double)now->t_in - (double)before->t_out);
+        if (now->t_out > before->t_out) last = i;
+    }
+    t->doubled += doubled > 0;
+    t->gaps += gap > 0;
+    t->worst_doubled = fmax(t->worst_doubled, doubled * r->line.length);
+    t->worst_gap = fmax(t->worst_gap, gap * r->line.length);
+}
+
+static void judge_length(const hull_ray *r, double sum, tally *t)
+{
+    const double spread = r->most - r->least, off = fabs(sum - r->length);
+    const double bracketed = fmax(r->least - sum, sum - r->most);
+    const bool is_slanted = !is_touching(r) && spread > slanted_from, is_plain = spread <= slanted_from;
+    t->slanted += is_slanted;
+    t->touching += is_touching(r);
+    t->worst_bracketed = fmax(t->worst_bracketed, bracketed);
+    if (is_slanted) t->worst_slanted = fmax(t->worst_slanted, off / spread);
+    if (is_plain) t->worst_length = fmax(t->worst_length, off);
+    if (bracketed <= length_allowed && (!is_plain || off <= length_allowed)) return;
+    if (t->off++ < 3)
+        fprintf(stderr, "a ray with %.9g in cells, chord %.9g, of the shrunk and swollen hull %.9g and %.9g\n", sum,
+                r->length, r->least, r->most);
+}
+
+static void judge_ray(const render_job *job, const chord_rays *rays, int ray, chord_span *spans, int count, tally *t)
+{
+    const hull_ray r = make_hull_ray(job, rays, ray);
+    double sum = 0;
     assert_true(count <= CHORD_MAX_SPANS);
     count = clip_spans(spans, count, (float)(-job->space.depth_origin * job->space.scale));
     qsort(spans, (size_t)count, sizeof *spans, compare_spans);
     t->rays++;
-    t->grazing += grazes;
     t->met += count > 0;
     t->spans += count;
-    double doubled = 0;
-    for (int i = 0; i < count; i++) {
-        sum += ((double)spans[i].t_out - (double)spans[i].t_in) * l.length;
-        doubled = fmax(doubled, fmin(reached, (double)spans[i].t_out) - (double)spans[i].t_in);
-        reached = fmax(reached, (double)spans[i].t_out);
-    }
-    t->doubled += doubled > 0;
-    t->worst_doubled = fmax(t->worst_doubled, doubled * l.length);
-    if (!grazes) t->worst_length = fmax(t->worst_length, fabs(sum - chord));
-    if (!(fabs(sum - chord) <= length_allowed + (grazes ? spread : 0))) {
-        if (t->off++ < 3)
-            fprintf(stderr, "ray %.17g %.17g: %d cells, %.9g in them, chord %.9g, grazing %.2g, doubled %.2g\n", x, y,
-                    count, sum, chord, spread, doubled);
-    }
-    if (!grazes && !is_paired(spans, count)) {
-        if (t->unpaired++ < 3)
-            fprintf(stderr, "ray %.17g %.17g: an end of one interval alone; chord %.9g, grazing %.2g\n", x, y, chord,
-                    spread);
-    }
+    for (int i = 0; i < count; i++) sum += ((double)spans[i].t_out - (double)spans[i].t_in) * r.line.length;
+    judge_neighbours(job, &r, spans, count, t);
+    judge_length(&r, sum, t);
+    if (is_paired(job, &r, spans, count)) return;
+    if (t->unpaired++ < 3)
+        fprintf(stderr, "ray %.17g %.17g: ends of one interval alone; chord %.9g, %.9g to %.9g\n", rays->x[ray],
+                rays->y[ray], r.length, r.least, r.most);
 }
 
 /* ---- a mesh ---- */
@@ -254,7 +355,7 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
             rays.is_pencil = by_tile;
             trace(&f.job, &thread, &rays);
             for (int i = 0; i < rays.count; i++)
-                judge_ray(&f.job, rays.x[i], rays.y[i], rays.spans[i], rays.span_count[i], &tallies[by_tile]);
+                judge_ray(&f.job, &rays, i, rays.spans[i], rays.span_count[i], &tallies[by_tile]);
         }
     }
     fixture_free(&f);
@@ -265,11 +366,12 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
 
 static void tell(const char *what, const char *mesh, int by_tile, const tally *t)
 {
-    printf("%s%s%s, %s: %lld rays, %lld cells; off by %.2g of the side at most, %lld graze the hull; overlaps by "
-           "rounding on "
-           "%lld, %.2g at most; %lld wrong lengths, %lld with ends alone\n",
+    printf("%s%s%s, %s: %lld rays, %lld cells; off by %.2g of the side at most; %lld slanted, off by %.2g of the "
+           "shift's share at most, %lld touching; %.2g beyond the shrunk and swollen hull's; overlaps by rounding on "
+           "%lld, %.2g at most, gaps on %lld, %.2g at most; %lld wrong lengths, %lld with ends alone\n",
            what, *mesh ? ", " : "", mesh, by_tile ? "by tile" : "alone", (long long)t->rays, (long long)t->spans,
-           t->worst_length, (long long)t->grazing, (long long)t->doubled, t->worst_doubled, (long long)t->off,
+           t->worst_length, (long long)t->slanted, t->worst_slanted, (long long)t->touching, t->worst_bracketed,
+           (long long)t->doubled, t->worst_doubled, (long long)t->gaps, t->worst_gap, (long long)t->off,
            (long long)t->unpaired);
 }
 
@@ -278,12 +380,35 @@ static void add_tally(tally *sum, const tally *t)
     sum->rays += t->rays;
     sum->met += t->met;
     sum->spans += t->spans;
-    sum->grazing += t->grazing;
+    sum->slanted += t->slanted;
+    sum->touching += t->touching;
     sum->unpaired += t->unpaired;
     sum->off += t->off;
     sum->doubled += t->doubled;
+    sum->gaps += t->gaps;
     sum->worst_length = fmax(sum->worst_length, t->worst_length);
+    sum->worst_slanted = fmax(sum->worst_slanted, t->worst_slanted);
+    sum->worst_bracketed = fmax(sum->worst_bracketed, t->worst_bracketed);
     sum->worst_doubled = fmax(sum->worst_doubled, t->worst_doubled);
+    sum->worst_gap = fmax(sum->worst_gap, t->worst_gap);
+}
+
+/* No more rays than are so by how they are aimed are slanted, or run within the hull's surface. Shares as counted, and
+ * a tenth or so more: a fifth of all edges and faces are the hull's own, and rays to these and their vertices come from
+ * anywhere. And one camera's rays, as few as they may be. */
+static void assert_few_at_the_surface(chord_aim aim, const tally *t)
+{
+    static const double slanted_most[CHORD_AIM_COUNT] = {
+        [CHORD_RANDOM] = 0.015,      [CHORD_TO_VERTICES] = 0.05,   [CHORD_TO_EDGES] = 0.04,
+        [CHORD_TO_FACES] = 0.03,     [CHORD_ALONG_EDGES] = 0.03,   [CHORD_ALONG_FACES] = 0.025,
+        [CHORD_AXIS_ALIGNED] = 5e-4, [CHORD_FROM_INSIDE] = 0.0025,
+    };
+    static const double touching_most[CHORD_AIM_COUNT] = {
+        [CHORD_ALONG_EDGES] = 0.17, [CHORD_ALONG_FACES] = 0.09, [CHORD_AXIS_ALIGNED] = 0.055};
+    const double rays = (double)t->rays, touching = fmax(touching_most[aim], 1e-4) * rays;
+    if ((double)t->touching > touching + CHORD_MAX_RAYS ||
+        (double)t->slanted > slanted_most[aim] * rays + CHORD_MAX_RAYS)
+        fail_msg("%d slanted and %d touching of %d rays", (int)t->slanted, (int)t->touching, (int)t->rays);
 }
 
 static void judge(chord_aim aim, const char *what)
@@ -306,6 +431,8 @@ static void judge(chord_aim aim, const char *what)
         assert_int_equal(all[by_tile].off, 0);
         assert_int_equal(all[by_tile].unpaired, 0);
         assert_true(all[by_tile].worst_doubled <= doubled_allowed);
+        assert_true(all[by_tile].worst_gap <= doubled_allowed);
+        assert_few_at_the_surface(aim, &all[by_tile]);
     }
 }
 
