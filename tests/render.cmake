@@ -63,12 +63,16 @@ set_tests_properties(integral PROPERTIES TIMEOUT 120)
 
 
 # The root finder's headers compiled into the test, on the compiler's own vectors.
-add_executable(test_roots test_roots.c)
-target_compile_definitions(test_roots PRIVATE SIMD_PLAIN)
-target_compile_options(test_roots PRIVATE -fno-math-errno -fno-trapping-math $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
-target_link_libraries(test_roots PRIVATE test_meshes insitu_internal PkgConfig::CMOCKA insitu_flags)
+foreach(program test_roots test_roots_bent)
+  add_executable(${program} ${program}.c)
+  target_compile_definitions(${program} PRIVATE SIMD_PLAIN)
+  target_compile_options(${program} PRIVATE -fno-math-errno -fno-trapping-math $<$<C_COMPILER_ID:GNU>:-Wno-psabi>)
+  target_link_libraries(${program} PRIVATE test_truth test_meshes insitu_internal PkgConfig::CMOCKA insitu_flags)
+endforeach()
 add_test(NAME roots COMMAND test_roots)
 set_tests_properties(roots PROPERTIES TIMEOUT 120)
+add_test(NAME roots_bent COMMAND test_roots_bent)
+set_tests_properties(roots_bent PROPERTIES TIMEOUT 120)
 
 insitu_render_program(test_hits)
 add_test(NAME hits COMMAND test_hits)

@@ -8,7 +8,7 @@
  * beyond band on the other: the first hit must not come after that, and every hit must lie within band of 0. */
 #include <math.h>
 
-#include "kernel_roots.h"
+#include "root_bundle.h"
 #include "test_meshes.h"
 
 #include <setjmp.h>
@@ -25,16 +25,6 @@ static uint64_t drawn_numbers;
 typedef struct cubic {
     long double c[4];
 } cubic;
-
-/* A hex and the rays of a packet. */
-typedef struct bundle {
-    double values[8];
-    kernel_frame frame;
-    kernel_tile tile;
-    kernel_thread thread;
-    kernel_packet packet;
-    kernel_cell cell;
-} bundle;
 
 static double uniform(double low, double high)
 {
@@ -132,16 +122,6 @@ static truth find_truth(const cubic *g, long double low, long double high)
     return out;
 }
 
-static void aim(bundle *b, int lane, const double from[3], const double to[3])
-{
-    const double rise = to[2] - from[2];
-    for (int a = 0; a < 2; a++) {
-        const double slope = (to[a] - from[a]) / rise, origin = from[a] - slope * from[2];
-        (a ? &b->packet.slope_y : &b->packet.slope_x)[0][lane] = (float)slope;
-        (a ? &b->packet.origin_y : &b->packet.origin_x)[0][lane] = (float)origin;
-    }
-}
-
 /* Two points in the cube, not level. */
 static void random_points(double from[3], double to[3])
 {
@@ -158,7 +138,7 @@ static void aim_all(bundle *b, bool is_near)
 {
     double from[3], to[3];
     random_points(from, to);
-    aim(b, 0, from, to);
+    bundle_aim(b, 0, from, to);
     for (int lane = 1; lane < SIMD_WIDTH; lane++) {
         double p[3], q[3];
         random_points(p, q);
@@ -167,7 +147,7 @@ static void aim_all(bundle *b, bool is_near)
             p[a] = from[a] + off * (p[a] - 0.5);
             q[a] = to[a] + off * (q[a] - 0.5);
         }
-        aim(b, lane, p, q);
+        bundle_aim(b, lane, p, q);
     }
 }
 
@@ -218,12 +198,7 @@ static void make_bundle(bundle *b, int64_t n)
     if (kind == 4 || kind == 5) make_double_root(b, kind == 4 ? small : 0);
     if (kind == 6 || kind == 7) make_triple_root(b, uniform(0.2, 0.8), kind == 6 ? fabs(small) : 0);
     normalize(b->values);
-    b->packet.frame = &b->frame;
-    b->packet.tile = &b->tile;
-    b->packet.thread = &b->thread;
-    b->packet.active = vm_all_lanes();
-    b->packet.t_near = vf_set(-100);
-    b->packet.t_far = vf_set(INFINITY);
+    bundle_open(b);
     b->cell.type = GRID_HEX;
     b->cell.count = 8;
     for (int i = 0; i < 8; i++) {
@@ -232,13 +207,7 @@ static void make_bundle(bundle *b, int64_t n)
         for (int a = 0; a < 3; a++) b->cell.world[i][a] = c[a];
         b->cell.values[i] = b->values[i];
     }
-    kernel_cell_order(&b->cell);
-    for (int i = 0; i < 8; i++) {
-        b->cell.x[i] = (float)b->cell.world[i][0];
-        b->cell.y[i] = (float)b->cell.world[i][1];
-        b->cell.z[i] = (float)b->cell.world[i][2];
-        b->cell.f[i] = (float)b->cell.values[i];
-    }
+    bundle_place(b);
 }
 
 typedef struct count {
@@ -278,45 +247,6 @@ typedef struct rates {
     int64_t later;    /* further crossings that the robust search did not find, or found too many of */
 } rates;
 
-/* All of the packet's directions. */
-static kernel_beam beam_of(const kernel_packet *p)
-{
-    kernel_beam beam = {.spread = 0};
-    float *const middle[2] = {&beam.x, &beam.y};
-    const vf slopes[2] = {p->slope_x, p->slope_y};
-    for (int a = 0; a < 2; a++) {
-        const float low = vf_reduce_min(slopes[a]), high = vf_reduce_max(slopes[a]);
-        *middle[a] = 0.5f * (low + high);
-        beam.spread = fmaxf(beam.spread, fmaxf(high - *middle[a], *middle[a] - low) * 1.000001f);
-    }
-    return beam;
-}
-
-/* First hits on all rays, and how many hits there are. */
-static vm robust_hits(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i, vf *t,
-                      vf *hits)
-{
-    kernel_search s = {.map = map, .bounds = bounds, .interval = i};
-    vm hit = vm_none();
-    *t = *hits = vf_set(0);
-    kernel_search_begin(&b->packet, &s, i->mask);
-    for (;;) {
-        if (vm_any(s.found)) {
-            kernel_point place;
-            kernel_polish(&b->packet, &s, &place);
-            *t = vf_select(vm_andnot(s.found, hit), place.t, *t);
-            *hits += vf_select(s.found, vf_set(1), vf_set(0));
-            hit = vm_or(hit, s.found);
-        }
-        if (vm_any(s.open))
-            kernel_search_next(&b->packet, &s);
-        else if (vm_any(s.ended))
-            kernel_search_end(&s);
-        else
-            return hit;
-    }
-}
-
 static void judge_bundle(bundle *b, rates *r)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
@@ -324,14 +254,14 @@ static void judge_bundle(bundle *b, rates *r)
     kernel_bounds bounds;
     const int intervals = kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
     kernel_map_setup(&map, &b->cell);
-    const kernel_beam beam = beam_of(&b->packet);
+    const kernel_beam beam = bundle_beam(&b->packet);
     kernel_bounds_setup(&bounds, &map, GRID_HEX, &beam);
     r->monotone += bounds.is_monotone;
     for (int n = 0; n < intervals; n++) {
         vf t[6], hits;
         unsigned hit[6];
         const vm change = vm_xor(vf_lt(list[n].v_in, vf_set(0)), vf_lt(list[n].v_out, vf_set(0)));
-        hit[5] = vm_bits(robust_hits(b, &map, &bounds, &list[n], &t[5], &hits));
+        hit[5] = vm_bits(bundle_hits(b, &map, &bounds, &list[n], &t[5], &hits));
         for (int steps = 0; steps < 5; steps++) {
             kernel_point place;
             kernel_neubauer(&b->packet, &map, &list[n], list[n].mask, steps, &place);

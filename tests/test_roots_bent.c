@@ -1,0 +1,439 @@
+/* The robust root finder where a ray is curved in the cell's own coordinates: through warped, concave and twisted
+ * hexes, twisted wedges and pyramids near their apex, with double and triple roots made on purpose, against the
+ * reference's inverse map in double. The kernels' headers are compiled here, plain.
+ *
+ * The truth. The field along a ray is no polynomial, but smooth: it is halved into pieces until on each the cubic
+ * through both ends' values and slopes has the middle's value and slope to 1e-9, where it errs by less still. Between
+ * the pieces' ends and the cubics' turns the field is then monotone to 1e-9, and bisection finds where it passes a
+ * level.
+ *
+ * What rounding may decide. A polynomial of the eight coefficients c at coordinates in [0, 1] is evaluated in float32
+ * with one rounding (6e-8) of a coefficient and up to six of sums and products on the way of each term: it errs by
+ * 7 * 6e-8 sum |c|. So the field's polynomial does, and so do those of the three positions, beside the ray's point,
+ * which is rounded three times at a size of 1.5 and by t itself. An error of the position moves the value by the
+ * field's gradient. (Newton's method ends below a step of 5e-5, which leaves 1e-8.) band is the sum of both, of each
+ * cell and ray: the sign of a field below it is not told by float32. A crossing is certain where the field passes from
+ * beyond band on one side to beyond band on the other: the first hit must not come after that, and every hit must lie
+ * within band of 0. */
+#include "reference_cell.h"
+#include "root_bundle.h"
+#include "test_meshes.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+static int64_t rays_wanted = 150000;
+static uint64_t drawn_numbers;
+
+static double uniform(double low, double high)
+{
+    return low + (high - low) * test_uniform(drawn_numbers++, 78);
+}
+
+/* ---- the field along a ray ---- */
+
+typedef struct knot {
+    double t, f, slope;
+} knot;
+
+enum { COURSE_LEAST_HALVINGS = 3, COURSE_MOST_HALVINGS = 10, COURSE_MAX = 3 << COURSE_MOST_HALVINGS };
+
+typedef struct course {
+    const reference_cell *cell;
+    const double *values;
+    reference_line line;
+    double steepest[3]; /* the gradient's largest components */
+    bool has_failed;
+    int count;
+    knot knots[COURSE_MAX]; /* the field is monotone from each to the next */
+} course;
+
+static knot course_at(course *c, double t)
+{
+    const double point[3] = {c->line.base[0] + c->line.slope[0] * t, c->line.base[1] + c->line.slope[1] * t, t};
+    double gradient[3];
+    knot k = {.t = t};
+    if (!reference_interpolate(c->cell, point, c->values, &k.f, gradient)) c->has_failed = true;
+    for (int a = 0; a < 3; a++) c->steepest[a] = fmax(c->steepest[a], fabs(gradient[a]));
+    k.slope = gradient[0] * c->line.slope[0] + gradient[1] * c->line.slope[1] + gradient[2];
+    return k;
+}
+
+static void course_add(course *c, knot k)
+{
+    c->knots[c->count++] = k;
+}
+
+/* The end b, and before it where the cubic of both ends turns. */
+static void course_add_piece(course *c, knot a, knot b)
+{
+    const double h = b.t - a.t, d0 = a.slope * h, d1 = b.slope * h, rise = b.f - a.f;
+    /* Its slope is d0 + 2 q u + 3 p u^2. */
+    const double p = d0 + d1 - 2 * rise, q = 3 * rise - 2 * d0 - d1, square = q * q - 3 * p * d0;
+    const double root = sqrt(fmax(square, 0)), w = -(q + (q < 0 ? -root : root));
+    double turns[2] = {p != 0 ? w / (3 * p) : -1, w != 0 ? d0 / w : -1};
+    if (turns[0] > turns[1]) {
+        const double swap = turns[0];
+        turns[0] = turns[1];
+        turns[1] = swap;
+    }
+    for (int i = 0; i < 2 && square > 0; i++)
+        if (turns[i] > 0 && turns[i] < 1) course_add(c, course_at(c, a.t + turns[i] * h));
+    course_add(c, b);
+}
+
+static void course_halve(course *c, knot a, knot b, int halvings)
+{
+    const double h = b.t - a.t;
+    const knot middle = course_at(c, 0.5 * (a.t + b.t));
+    const double f = 0.5 * (a.f + b.f) + 0.125 * h * (a.slope - b.slope);
+    const double slope = 1.5 * (b.f - a.f) - 0.25 * h * (a.slope + b.slope);
+    const bool is_cubic = fabs(middle.f - f) < 1e-9 && fabs(middle.slope * h - slope) < 1e-9;
+    if (halvings >= COURSE_LEAST_HALVINGS && (is_cubic || halvings == COURSE_MOST_HALVINGS - 1)) {
+        course_add_piece(c, a, middle);
+        course_add_piece(c, middle, b);
+        return;
+    }
+    course_halve(c, a, middle, halvings + 1);
+    course_halve(c, middle, b, halvings + 1);
+}
+
+static void course_trace(course *c, double low, double high)
+{
+    const knot first = course_at(c, low);
+    c->count = 0;
+    course_add(c, first);
+    course_halve(c, first, course_at(c, high), 0);
+}
+
+/* Between two knots, where the field passes v. */
+static double course_pass(course *c, const knot *from, const knot *to, double v)
+{
+    const bool rises = to->f > from->f;
+    double low = from->t, high = to->t;
+    for (int i = 0; i < 50; i++) {
+        const double middle = 0.5 * (low + high);
+        if ((course_at(c, middle).f < v) == rises)
+            low = middle;
+        else
+            high = middle;
+    }
+    return high;
+}
+
+/* Is a crossing certain, and until where must a hit have come? */
+static bool course_certain(course *c, double band, double *t)
+{
+    int side = 0;
+    for (int i = 0; i < c->count; i++) {
+        const double v = c->knots[i].f;
+        if (fabs(v) <= band) continue;
+        const int now = v < 0 ? -1 : 1;
+        if (side && now != side) {
+            *t = course_pass(c, &c->knots[i - 1], &c->knots[i], now * band);
+            return true;
+        }
+        side = now;
+    }
+    return false;
+}
+
+/* ---- cells ---- */
+
+typedef enum bent { BENT_WARPED, BENT_CONCAVE, BENT_TWISTED, BENT_WEDGE, BENT_APEX, BENT_COUNT } bent;
+
+static const double unit_hex[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                      {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+static const double unit_wedge[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+static const double unit_pyramid[5][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}};
+
+static void twist(double *p, double angle)
+{
+    const double x = p[0] - 0.5, y = p[1] - 0.5;
+    p[0] = 0.5 + cos(angle) * x - sin(angle) * y;
+    p[1] = 0.5 + sin(angle) * x + cos(angle) * y;
+}
+
+static void place_vertices(bent kind, reference_cell *cell)
+{
+    static const double amounts[BENT_COUNT] = {0.15, 0.05, 0.05, 0.08, 0.15};
+    const bool is_hex = kind <= BENT_TWISTED;
+    const double(*unit)[3] = is_hex ? unit_hex : kind == BENT_WEDGE ? unit_wedge : unit_pyramid;
+    const double angle = uniform(-0.9, 0.9), dent = uniform(0.55, 0.65);
+    memset(cell, 0, sizeof *cell);
+    cell->type = is_hex ? GRID_HEX : kind == BENT_WEDGE ? GRID_WEDGE : GRID_PYRAMID;
+    cell->count = is_hex ? 8 : kind == BENT_WEDGE ? 6 : 5;
+    for (int i = 0; i < cell->count; i++) {
+        double p[3];
+        for (int a = 0; a < 3; a++) p[a] = unit[i][a] + uniform(-amounts[kind], amounts[kind]);
+        if ((kind == BENT_TWISTED || kind == BENT_WEDGE) && unit[i][2] > 0) twist(p, angle);
+        /* Almost to the plane of its neighbours. */
+        for (int a = 0; a < 3 && kind == BENT_CONCAVE && i == 6; a++) p[a] = dent + uniform(0, 0.1);
+        for (int a = 0; a < 3; a++) cell->position[i][a] = cell->world[i][a] = (double)(float)p[a];
+    }
+}
+
+/* A hex's or wedge's place, linear in each of its coordinates. */
+static void cell_place(const reference_cell *cell, const double r[3], double out[3])
+{
+    const int base = cell->count / 2;
+    for (int a = 0; a < 3; a++) {
+        double level[2];
+        for (int k = 0; k < 2; k++) {
+            const double(*v)[3] = cell->position + k * base;
+            level[k] = base == 4 ? (1 - r[1]) * ((1 - r[0]) * v[0][a] + r[0] * v[1][a]) +
+                                       r[1] * ((1 - r[0]) * v[3][a] + r[0] * v[2][a])
+                                 : (1 - r[0] - r[1]) * v[0][a] + r[0] * v[1][a] + r[1] * v[2][a];
+        }
+        out[a] = (1 - r[2]) * level[0] + r[2] * level[1];
+    }
+}
+
+static double cell_determinant(const reference_cell *cell, const double r[3])
+{
+    double column[3][3];
+    for (int k = 0; k < 3; k++) {
+        double low[3] = {r[0], r[1], r[2]}, high[3] = {r[0], r[1], r[2]}, p[3], q[3];
+        low[k] = 0;
+        high[k] = 1;
+        cell_place(cell, low, p);
+        cell_place(cell, high, q);
+        for (int a = 0; a < 3; a++) column[k][a] = q[a] - p[a];
+    }
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        sum += column[0][a] * (column[1][b] * column[2][c] - column[1][c] * column[2][b]);
+    }
+    return sum;
+}
+
+/* Not folded, nor nearly: where it is, a point has several values, or none. */
+static bool is_solid(const reference_cell *cell)
+{
+    enum { STEPS = 5 };
+    for (int n = 0; cell->type != GRID_PYRAMID && n < STEPS * STEPS * STEPS; n++) {
+        const double r[3] = {n % STEPS / (STEPS - 1.0), n / STEPS % STEPS / (STEPS - 1.0),
+                             n / STEPS / STEPS / (STEPS - 1.0)};
+        if (cell->type == GRID_WEDGE && r[0] + r[1] > 1) continue;
+        if (cell_determinant(cell, r) < 0.08) return false;
+    }
+    return true;
+}
+
+/* ---- rays and values ---- */
+
+/* Two points, not level; at a pyramid the ray between them passes the apex by 1e-4 to 1e-1. */
+static void random_points(const reference_cell *cell, double from[3], double to[3])
+{
+    do {
+        for (int a = 0; a < 3; a++) {
+            from[a] = uniform(0.05, 0.95);
+            to[a] = uniform(0.05, 0.95);
+        }
+        if (cell->type != GRID_PYRAMID) continue;
+        const double off = pow(10, uniform(-4, -1));
+        for (int a = 0; a < 3; a++) to[a] = cell->position[4][a] + off * uniform(-1, 1);
+        to[2] = cell->position[4][2] - off;
+    } while (fabs(to[2] - from[2]) < 0.2);
+}
+
+/* Rays near the first one, from 1e-7 to 1e-1 off, or anywhere. */
+static void aim_all(bundle *b, const reference_cell *cell, bool is_near)
+{
+    double from[3], to[3];
+    random_points(cell, from, to);
+    bundle_aim(b, 0, from, to);
+    for (int lane = 1; lane < SIMD_WIDTH; lane++) {
+        double p[3], q[3];
+        random_points(cell, p, q);
+        const double off = pow(10, uniform(-7, -1));
+        for (int a = 0; a < 3 && is_near; a++) {
+            p[a] = from[a] + off * (p[a] - 0.5);
+            q[a] = to[a] + off * (q[a] - 0.5);
+        }
+        bundle_aim(b, lane, p, q);
+    }
+}
+
+static reference_line line_of(const bundle *b, int lane)
+{
+    return (reference_line){{(double)b->packet.origin_x[lane], (double)b->packet.origin_y[lane]},
+                            {(double)b->packet.slope_x[lane], (double)b->packet.slope_y[lane]}};
+}
+
+/* Ray 0 in the cell. */
+static bool trace_first(const bundle *b, const reference_cell *cell, course *c)
+{
+    reference_crossing ends[REFERENCE_MAX_CROSSINGS];
+    *c = (course){.cell = cell, .values = b->values, .line = line_of(b, 0)};
+    if (reference_crossings(cell, &c->line, ends) < 2 || !(ends[1].z - ends[0].z > 0.01)) return false;
+    course_trace(c, ends[0].z, ends[1].z);
+    return true;
+}
+
+static void shift_values(bundle *b, const reference_cell *cell, double level, double slope)
+{
+    for (int i = 0; i < cell->count; i++) b->values[i] += level + slope * cell->position[i][2];
+}
+
+/* Shift the values so that the field on ray 0 turns at a depth of miss beyond 0. */
+static void make_double_root(bundle *b, const reference_cell *cell, course *c, double miss)
+{
+    if (!trace_first(b, cell, c)) return;
+    for (int i = 1; i + 1 < c->count; i++)
+        if ((c->knots[i].f < c->knots[i - 1].f) == (c->knots[i].f < c->knots[i + 1].f)) {
+            shift_values(b, cell, miss - c->knots[i].f, 0);
+            return;
+        }
+}
+
+/* t is itself a field that every cell holds: with a multiple of it and a constant added the field has its steepest or
+ * flattest point on ray 0 where it is 0, and there the given slope: a triple root, or close ones. */
+static void make_triple_root(bundle *b, const reference_cell *cell, course *c, double slope)
+{
+    if (!trace_first(b, cell, c)) return;
+    for (int i = 1; i + 1 < c->count; i++) {
+        const knot *k = &c->knots[i];
+        if ((k->slope < k[-1].slope) != (k->slope < k[1].slope)) continue;
+        double low = k[-1].t, high = k[1].t;
+        const double side = k->slope < k[-1].slope ? 1 : -1;
+        for (int step = 0; step < 60; step++) {
+            const double x = low + (high - low) / 3, y = high - (high - low) / 3;
+            if (side * course_at(c, x).slope < side * course_at(c, y).slope)
+                high = y;
+            else
+                low = x;
+        }
+        const knot flat = course_at(c, 0.5 * (low + high));
+        shift_values(b, cell, (flat.slope - slope) * flat.t - flat.f, slope - flat.slope);
+        return;
+    }
+}
+
+/* Largest value 1, as kernel_cell_relative() has it, in float32. */
+static void normalize(double *values, int count)
+{
+    double largest = 0;
+    for (int i = 0; i < count; i++) largest = fmax(largest, fabs(values[i]));
+    for (int i = 0; i < count; i++) values[i] = (double)(float)(values[i] / largest);
+}
+
+static void make_bundle(bundle *b, reference_cell *cell, course *scratch, bent kind, int roots)
+{
+    const double small = (uniform(0, 1) < 0.5 ? -1 : 1) * pow(10, uniform(-9, -1));
+    do place_vertices(kind, cell);
+    while (!is_solid(cell));
+    memset(b, 0, sizeof *b);
+    aim_all(b, cell, roots > 0);
+    for (int i = 0; i < cell->count; i++) b->values[i] = uniform(-1, 1);
+    if (roots == 1 || roots == 2) make_double_root(b, cell, scratch, roots == 1 ? small : 0);
+    if (roots == 3 || roots == 4) make_triple_root(b, cell, scratch, roots == 3 ? small : 0);
+    normalize(b->values, cell->count);
+    bundle_open(b);
+    b->cell.type = cell->type;
+    b->cell.count = cell->count;
+    memcpy(b->cell.world, cell->world, (size_t)cell->count * sizeof *cell->world);
+    memcpy(b->cell.values, b->values, sizeof b->values);
+    bundle_place(b);
+}
+
+/* ---- the comparison ---- */
+
+typedef struct count {
+    int64_t rays, certain, missed, off, inverse_failures;
+    double worst, worst_band; /* residual in bands; band */
+} count;
+
+static double sum_of(const kernel_polynomial *p)
+{
+    double sum = 0;
+    for (int i = 0; i < 8; i++) sum += fabs((double)p->c[i]);
+    return sum;
+}
+
+static double band_of(const kernel_map *map, const course *c)
+{
+    double band = 7 * 6e-8 * sum_of(&map->field);
+    for (int a = 0; a < 3; a++) band += c->steepest[a] * 6e-8 * (7 * sum_of(&map->position[a]) + 3 * 1.5 + 0.5);
+    return band;
+}
+
+static void judge_ray(count *n, const kernel_map *map, course *c, double low, double high, bool hit, double hit_t)
+{
+    double certain_t = 0;
+    course_trace(c, low, high);
+    const double band = band_of(map, c);
+    const bool certain = course_certain(c, band, &certain_t);
+    n->rays++;
+    n->certain += certain;
+    n->inverse_failures += c->has_failed;
+    n->worst_band = fmax(n->worst_band, band);
+    /* t itself is rounded: half a unit of 2. */
+    if (certain && (!hit || hit_t > certain_t + 1.2e-7)) n->missed++;
+    if (!hit) return;
+    const double residual = fabs(course_at(c, hit_t).f) / band;
+    n->worst = fmax(n->worst, residual);
+    n->off += residual > 1;
+}
+
+static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count *n)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    kernel_map map;
+    kernel_bounds bounds;
+    const int intervals = kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
+    kernel_map_setup(&map, &b->cell);
+    const kernel_beam beam = bundle_beam(&b->packet);
+    kernel_bounds_setup(&bounds, &map, b->cell.type, &beam);
+    for (int i = 0; i < intervals; i++) {
+        vf t, hits;
+        const unsigned hit = vm_bits(bundle_hits(b, &map, &bounds, &list[i], &t, &hits));
+        for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+            if (!(vm_bits(list[i].mask) >> lane & 1)) continue;
+            *c = (course){.cell = cell, .values = b->values, .line = line_of(b, lane)};
+            judge_ray(n, &map, c, (double)list[i].t_in[lane], (double)list[i].t_out[lane], hit >> lane & 1,
+                      (double)t[lane]);
+        }
+    }
+}
+
+static void curved_rays_miss_no_first_root(void **state)
+{
+    (void)state;
+    static const char *const names[BENT_COUNT] = {"warped hexes", "concave hexes", "twisted hexes", "twisted wedges",
+                                                  "pyramids near the apex"};
+    static course c;
+    static reference_cell cell;
+    for (bent kind = 0; kind < BENT_COUNT; kind++) {
+        count n = {.rays = 0};
+        bundle b;
+        int64_t map_failures = 0;
+        for (int roots = 0; n.rays < rays_wanted / BENT_COUNT; roots = (roots + 1) % 5) {
+            make_bundle(&b, &cell, &c, kind, roots);
+            judge_bundle(&b, &cell, &c, &n);
+            map_failures += b.thread.map_failures;
+        }
+        printf("%s: %lld rays, %lld with a certain crossing, %lld missed, %lld off; worst residual %.2g bands, of at "
+               "most %.2g; %lld failed maps\n",
+               names[kind], (long long)n.rays, (long long)n.certain, (long long)n.missed, (long long)n.off, n.worst,
+               n.worst_band, (long long)map_failures);
+        assert_true(n.certain > n.rays / 4);
+        assert_int_equal(n.inverse_failures, 0);
+        assert_int_equal(n.missed, 0);
+        assert_int_equal(n.off, 0);
+        assert_int_equal(map_failures, 0);
+    }
+}
+
+/* The argument is the number of rays. */
+int main(int argc, char **argv)
+{
+    if (argc > 1) rays_wanted = atoll(argv[1]);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(curved_rays_miss_no_first_root)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
