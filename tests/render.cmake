@@ -89,7 +89,7 @@ foreach(isa plain sse4.2 avx2 avx512)
 endforeach()
 
 # Rays' intervals: the kernels' headers compiled into the test, once an instruction set.
-add_executable(test_chords test_chords.c chord_aim.c test_mesh_honeycomb.c)
+add_executable(test_chords test_chords.c chord_aim.c chord_hull.c test_mesh_honeycomb.c)
 target_link_libraries(test_chords PRIVATE test_render_support insitu_flags)
 function(insitu_chords isa definition)
   add_library(chord_trace_${isa} OBJECT chord_trace.c)

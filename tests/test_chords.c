@@ -3,25 +3,10 @@
  * the hull of all of them being the cube [-1, 1]^3, for rays at random, to and along vertices, edges and faces, and
  * along the lattice. Every ray is traced twice: set up alone, its edge functions all projected (as differences for
  * normals have it), and as one of a tile, its edge functions by lines where these are good enough (as frames have it).
- * The tile is as wide as its rays are apart: a thousandth of a cell to several cells.
- *
- * Lengths are in sides of the hull, 1 in the kernels' scaled units. The chord is that of the ray that is traced: how
- * far it is off its tile's middle is rounded to float32, as the kernels have it, and all else is double. What is left
- * is the rounding of the hull's vertices. Along the ray it and that of weights and depths cost 1e-6 at most in two
- * crossings (kernel_line.h). Across the ray a vertex within 1 of the tile's middle is rounded by up to 3e-8 four times:
- * when it is placed, and the ray's origin, its slope's share and their difference when it is projected. So the hull is
- * one whose planes lie up to hull_shift = 1.2e-7 off, and a ray that meets them at an angle of the cosine c is longer
- * or shorter by 1.2e-7 / c. From that come three bounds:
- * - Of every ray the sum is between the chords of the hull shrunk by hull_shift and swollen by it, to 1e-6; every end
- *   within the shrunk hull is that of two intervals, no gap is there, and no end is beyond the swollen one, each to
- *   5e-7 along the ray.
- * - It is the chord to 1e-6 wherever the shift, from shrunk to swollen, changes that by no more than 3e-6 (the sum of
- *   both 1 / c is up to 12.5): roundings are not all at their worst at once. Rays beyond that are called slanted.
- * - There are two ends alone, or none, wherever the shift changes the chord by no more than 0.01, so c is 2.4e-5 and
- *   more: rounding tilts the plane of a face a quarter of the hull wide by 1e-6, so that it is crossed once. Rays
- *   beyond that run within the hull's surface; which cells of it they touch rounding decides, and the first bound is
- *   all that holds. */
+ * The tile is as wide as its rays are apart: a thousandth of a cell to several cells. What holds of the sum and of the
+ * ends is in chord_hull.h. */
 #include "chord_aim.h"
+#include "chord_hull.h"
 #include "cpu.h"
 #include "memory.h"
 #include "render_isa.h"
@@ -39,8 +24,7 @@
 
 enum { SIDE = 4 };
 
-static const double hull_shift = 1.2e-7, length_allowed = 1e-6, end_allowed = 5e-7;
-static const double slanted_from = 3e-6, touching_from = 0.01;
+static const double length_allowed = 1e-6;
 
 /* Two faces that meet at a vertex are each placed to float32, 6e-8 times a few: so far may one cell's interval reach
  * into the next one's, or, where a concave cell has several there, end before it. */
@@ -114,53 +98,6 @@ typedef struct tally {
     double worst_gap;
 } tally;
 
-typedef struct line {
-    double base[3], direction[3], length; /* of the direction */
-} line;
-
-typedef struct chord {
-    double in, out;
-} chord;
-
-/* The ray as the kernels have it: what it is off its tile's middle is float32, all else double. */
-static line ray_line(const render_job *job, const chord_rays *rays, int i)
-{
-    const render_camera *c = &job->camera;
-    const double unit = c->is_orthographic ? job->space.scale : 1;
-    const double x = rays->centre_x + (double)(float)((rays->x[i] - rays->centre_x) * unit) / unit;
-    const double y = rays->centre_y + (double)(float)((rays->y[i] - rays->centre_y) * unit) / unit;
-    line l;
-    for (int a = 0; a < 3; a++) {
-        const double sideways = x * c->right[a] + y * c->up[a];
-        l.base[a] = c->eye[a] + (c->is_orthographic ? sideways : 0);
-        l.direction[a] = c->forward[a] + (c->is_orthographic ? 0 : sideways);
-    }
-    l.length =
-        sqrt(l.direction[0] * l.direction[0] + l.direction[1] * l.direction[1] + l.direction[2] * l.direction[2]);
-    return l;
-}
-
-/* Where the ray is in the hull of this half side, from the eye's plane on: depths from the eye. */
-static chord hull_chord(const line *l, double half)
-{
-    chord c = {0, (double)INFINITY};
-    for (int a = 0; a < 3; a++) {
-        if (l->direction[a] == 0) {
-            if (!(fabs(l->base[a]) < half)) return (chord){0, 0};
-            continue;
-        }
-        const double t1 = (-half - l->base[a]) / l->direction[a], t2 = (half - l->base[a]) / l->direction[a];
-        c.in = fmax(c.in, fmin(t1, t2));
-        c.out = fmin(c.out, fmax(t1, t2));
-    }
-    return c.in < c.out ? c : (chord){0, 0};
-}
-
-static double chord_length(const line *l, chord c)
-{
-    return (c.out - c.in) * l->length / 2;
-}
-
 static int compare_spans(const void *left, const void *right)
 {
     const chord_span *a = left, *b = right;
@@ -201,70 +138,33 @@ static int clip_spans(chord_span *spans, int count, float near)
     return left;
 }
 
-/* A ray with its chords of the hull, of the shrunk and of the swollen one, as depths and as lengths. */
-typedef struct hull_ray {
-    line line;
-    chord within, about;
-    double length, least, most;
-} hull_ray;
-
-static hull_ray make_hull_ray(const render_job *job, const chord_rays *rays, int i)
-{
-    hull_ray r = {.line = ray_line(job, rays, i)};
-    const chord exact = hull_chord(&r.line, 1);
-    r.within = hull_chord(&r.line, 1 - 2 * hull_shift);
-    r.about = hull_chord(&r.line, 1 + 2 * hull_shift);
-    r.length = chord_length(&r.line, exact);
-    r.least = chord_length(&r.line, r.within);
-    r.most = chord_length(&r.line, r.about);
-    return r;
-}
-
-static bool is_touching(const hull_ray *r)
-{
-    return r->most - r->least > touching_from;
-}
-
-/* Is any of what is from depth low to high in the shrunk hull for longer than rounding along the ray? */
-static bool is_within(const hull_ray *r, double low, double high)
-{
-    const double margin = 2 * end_allowed / r->line.length;
-    return low < r->within.out - margin && high > r->within.in + margin;
-}
-
-static bool is_beyond(const hull_ray *r, double depth)
-{
-    const double margin = 2 * end_allowed / r->line.length;
-    return depth < r->about.in - margin || depth > r->about.out + margin;
-}
-
 static double depth_of(const render_job *job, float t)
 {
     return (double)t / job->space.scale + job->space.depth_origin;
 }
 
 /* Are ends alone only where they may be? */
-static bool is_paired(const render_job *job, const hull_ray *r, const chord_span *spans, int count)
+static bool is_paired(const render_job *job, const chord_ray *r, const chord_span *spans, int count)
 {
     float lone[2 * CHORD_MAX_SPANS];
     const int alone = lone_ends(spans, count, lone);
-    if (!is_touching(r) && alone != 0 && alone != 2) return false;
+    if (!chord_is_touching(r) && alone != 0 && alone != 2) return false;
     for (int i = 0; i < alone; i++) {
         const double depth = depth_of(job, lone[i]);
-        if (is_within(r, depth, depth) || is_beyond(r, depth)) return false;
+        if (chord_is_within(r, depth, depth) || chord_is_beyond(r, depth)) return false;
     }
     return true;
 }
 
 /* The longest overlap of intervals, which are sorted, and the longest gap; of rays that run within the hull's surface
  * only gaps in the shrunk hull count. */
-static void judge_neighbours(const render_job *job, const hull_ray *r, const chord_span *spans, int count, tally *t)
+static void judge_neighbours(const render_job *job, const chord_ray *r, const chord_span *spans, int count, tally *t)
 {
     double doubled = 0, gap = 0;
     for (int i = 1, last = 0; i < count; i++) {
         const chord_span *before = &spans[last], *now = &spans[i];
         doubled = fmax(doubled, fmin((double)before->t_out, (double)now->t_out) - (double)now->t_in);
-        if (!is_touching(r) || is_within(r, depth_of(job, before->t_out), depth_of(job, now->t_in)))
+        if (!chord_is_touching(r) || chord_is_within(r, depth_of(job, before->t_out), depth_of(job, now->t_in)))
             gap = fmax(gap, (double)now->t_in - (double)before->t_out);
         if (now->t_out > before->t_out) last = i;
     }
@@ -274,13 +174,13 @@ static void judge_neighbours(const render_job *job, const hull_ray *r, const cho
     t->worst_gap = fmax(t->worst_gap, gap * r->line.length);
 }
 
-static void judge_length(const hull_ray *r, double sum, tally *t)
+static void judge_length(const chord_ray *r, double sum, tally *t)
 {
     const double spread = r->most - r->least, off = fabs(sum - r->length);
     const double bracketed = fmax(r->least - sum, sum - r->most);
-    const bool is_slanted = !is_touching(r) && spread > slanted_from, is_plain = spread <= slanted_from;
+    const bool is_slanted = chord_is_slanted(r), is_plain = !is_slanted && !chord_is_touching(r);
     t->slanted += is_slanted;
-    t->touching += is_touching(r);
+    t->touching += chord_is_touching(r);
     t->worst_bracketed = fmax(t->worst_bracketed, bracketed);
     if (is_slanted) t->worst_slanted = fmax(t->worst_slanted, off / spread);
     if (is_plain) t->worst_length = fmax(t->worst_length, off);
@@ -292,7 +192,7 @@ static void judge_length(const hull_ray *r, double sum, tally *t)
 
 static void judge_ray(const render_job *job, const chord_rays *rays, int ray, chord_span *spans, int count, tally *t)
 {
-    const hull_ray r = make_hull_ray(job, rays, ray);
+    const chord_ray r = chord_hull_ray(job, rays, ray);
     double sum = 0;
     assert_true(count <= CHORD_MAX_SPANS);
     count = clip_spans(spans, count, (float)(-job->space.depth_origin * job->space.scale));
