@@ -40,7 +40,7 @@ typedef struct knot {
     double t, f, slope;
 } knot;
 
-enum { COURSE_LEAST_HALVINGS = 3, COURSE_MOST_HALVINGS = 10, COURSE_MAX = 3 << COURSE_MOST_HALVINGS };
+enum { COURSE_LEAST_HALVINGS = 3, COURSE_MOST_HALVINGS = 10, COURSE_MAX = (3 << COURSE_MOST_HALVINGS) + 1 };
 
 typedef struct course {
     const reference_cell *cell;
