@@ -22,11 +22,11 @@ typedef struct kernel_segment_state {
 /* A cell under way: how its field is known, and how finely it must be. */
 typedef struct kernel_course {
     const kernel_map *map;   /* NULL: linear */
-    const kernel_cell *cell; /* where there is a map */
+    const kernel_cell *cell; /* NULL: a tet or a polyhedron; without a map it is of one value */
     const kernel_interval *interval;
     float cost;                 /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
     int first_step, step_count; /* the steps of the opacity among the cell's values */
-    bool is_steep;              /* steep ramps are */
+    bool is_steep, is_narrow;   /* steep ramps are, narrow ones */
 } kernel_course;
 
 /* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
@@ -54,8 +54,11 @@ SIMD_INLINE void kernel_course_bound(const kernel_segment_state *state, const fl
     while (out->first_step < t->step_count && t->steps[out->first_step].cut < low) out->first_step++;
     while (out->first_step + out->step_count < t->step_count && t->steps[out->first_step + out->step_count].cut <= high)
         out->step_count++;
-    for (int i = 0; i < t->steep_count; i++)
-        out->is_steep = out->is_steep || (low <= t->steep[i].high && t->steep[i].low <= high);
+    for (int i = 0; i < t->steep_count; i++) {
+        const bool is_met = low <= t->steep[i].high && t->steep[i].low <= high;
+        out->is_steep = out->is_steep || is_met;
+        out->is_narrow = out->is_narrow || (is_met && t->steep[i].is_narrow);
+    }
 }
 
 SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
@@ -67,12 +70,13 @@ SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course
     return i->v_in + along * (i->v_out - i->v_in);
 }
 
-/* Rays whose values, from low to high, have a steep ramp among them. */
-SIMD_INLINE vm kernel_course_is_steep(const kernel_segment_state *state, vf low, vf high)
+/* Rays whose values, from low to high, have a steep ramp among them, or a narrow one. */
+SIMD_INLINE vm kernel_course_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
 {
     vm any = vm_none();
     for (int i = 0; i < state->pieces->steep_count; i++) {
         const kernel_steep *steep = &state->pieces->steep[i];
+        if (is_narrow && !steep->is_narrow) continue;
         any = vm_or(any, vm_and(vf_le(low, vf_set(steep->high)), vf_le(vf_set(steep->low), high)));
     }
     return any;
@@ -98,7 +102,8 @@ SIMD_INLINE vm kernel_course_steps(const kernel_segment_state *state, const kern
  * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
  * square of a part, and its mean is two thirds of it. Allowed is the stretch's share of the ray's length and of its
  * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. Where a step of
- * the opacity is among the values no number is enough, nor where a steep ramp is among them and asks for too many. */
+ * the opacity is among the values no number is enough, nor where a steep ramp is among them and asks for too many, nor
+ * where a narrow one is in which the values' rounding alone would take an eighth of what is allowed. */
 SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
                                     vm rays, vf t0, vf t1, vf v0, vf v1, vf *deviation)
 {
@@ -122,9 +127,15 @@ SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state
     const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
              high = vf_max(v0, v1) + wide;
     vm too_few = kernel_course_steps(state, course, low, high);
-    if (course->is_steep)
-        too_few =
-            vm_or(too_few, vm_and(vf_lt(vf_set(KERNEL_MAX_PARTS), wanted), kernel_course_is_steep(state, low, high)));
+    if (course->is_steep) {
+        const vm many = vf_lt(vf_set(KERNEL_MAX_PARTS), wanted);
+        too_few = vm_or(too_few, vm_and(many, kernel_course_is_steep(state, low, high, false)));
+    }
+    if (course->is_narrow) {
+        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * course->cost * distance;
+        const vm shows = vf_lt(allowed, rounded);
+        too_few = vm_or(too_few, vm_and(shows, kernel_course_is_steep(state, low, high, true)));
+    }
     return vf_select(too_few, vf_set(2 * KERNEL_MAX_PARTS), parts);
 }
 
@@ -156,6 +167,8 @@ SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state 
         }
     } else if (course->step_count && state->mixing > 0) {
         *halved = vm_and(rays, kernel_course_steps(state, course, vf_min(v0, v1), vf_max(v0, v1)));
+    } else if (course->is_narrow && course->cell) {
+        *halved = rays;
     }
     if (state->mixing > 0)
         parts = vf_max(parts, kernel_course_mixed(state, course, length, vf_abs(v1 - v0) + 2.0f * off));

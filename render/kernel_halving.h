@@ -32,17 +32,13 @@
 #define RENDER_KERNEL_HALVING_H
 
 #include "kernel_course.h"
+#include "kernel_exact.h"
 
 /* KERNEL_HALVING_DEPTH: 2^-40 of a stretch is nothing to any medium. The count of parts is a guard that no function in
  * use comes to: what is left of the stretch is then one part each time. */
-enum { KERNEL_HALVING_DEPTH = 40, KERNEL_HALVING_ROOM = 128, KERNEL_HALVING_PARTS = 8192, KERNEL_EXACT_STEPS = 24 };
+enum { KERNEL_HALVING_DEPTH = 40, KERNEL_HALVING_ROOM = 128, KERNEL_HALVING_PARTS = 8192 };
 
-/* ---- the field in double ---- */
-
-typedef struct kernel_exact_map {
-    bool is_pyramid;
-    double position[3][8], field[8];
-} kernel_exact_map;
+/* ---- the field on a ray ---- */
 
 /* A place of the ray: the field there, and the cell's own coordinates. */
 typedef struct kernel_knot {
@@ -53,92 +49,13 @@ typedef struct kernel_knot {
 typedef struct kernel_halving {
     const kernel_segment_state *state;
     const kernel_course *course;
-    const kernel_exact_map *map; /* NULL: linear */
+    const kernel_exact_map *map; /* NULL: linear, as the interval has it */
     double u, v, slope, shift;   /* at depth t the ray is at (u, v) (slope t + shift) */
     kernel_knot in, out;         /* of the interval, as the faces have it */
     double per_t, length, light; /* unit distances per t, of the stretch; what light gets to the part */
     int64_t *map_failures;
     int count;
 } kernel_halving;
-
-static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, const kernel_cell *c,
-                               const kernel_transfer *transfer)
-{
-    double d[4][GRID_MAX_CELL_VERTICES];
-    for (int i = 0; i < c->count; i++) {
-        const kernel_fine_spot spot = kernel_fine_place(p->frame, p->tile, c->world[i]);
-        d[0][i] = spot.x;
-        d[1][i] = spot.y;
-        d[2][i] = spot.t;
-        d[3][i] = fmax(fmin((c->values[i] - transfer->low) * transfer->inverse_width, 1e18), -1e18);
-    }
-    m->is_pyramid = c->type == GRID_PYRAMID;
-    for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);
-    kernel_polynomial_fit(m->field, c->type, d[3]);
-}
-
-/* m of kernel_map.h, and its derivatives. */
-static inline double kernel_exact_product(bool is_pyramid, const double r[3], double slopes[3])
-{
-    slopes[0] = r[1];
-    slopes[1] = r[0];
-    slopes[2] = 0;
-    if (!is_pyramid) return r[0] * r[1];
-    const double inverse = 1 / fmax(r[2], 1e-9);
-    slopes[0] = fmax(fmin(r[1] * inverse, 2), -1);
-    slopes[1] = fmax(fmin(r[0] * inverse, 2), -1);
-    slopes[2] = -slopes[0] * slopes[1];
-    return slopes[1] * r[1];
-}
-
-static inline double kernel_exact_value(const double c[8], const double r[3], double m)
-{
-    return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
-           r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
-}
-
-static inline void kernel_exact_gradient(const double c[8], const double r[3], double m, const double slopes[3],
-                                         double out[3])
-{
-    const double of_m = c[4] + r[2] * c[7];
-    out[0] = c[1] + r[2] * c[5] + slopes[0] * of_m;
-    out[1] = c[2] + r[2] * c[6] + slopes[1] * of_m;
-    out[2] = c[3] + (r[0] * c[5] + r[1] * c[6]) + m * c[7] + slopes[2] * of_m;
-}
-
-/* kernel_map_newton(), to the end: where a step is below 1e-8, the next would be below rounding. */
-static bool kernel_exact_newton(const kernel_exact_map *map, const double target[3], double r[3])
-{
-    for (int n = 0; n < KERNEL_EXACT_STEPS; n++) {
-        double slopes[3], row[3][3], off[3], cross[3][3], largest = 0;
-        const double m = kernel_exact_product(map->is_pyramid, r, slopes);
-        for (int a = 0; a < 3; a++) {
-            off[a] = target[a] - kernel_exact_value(map->position[a], r, m);
-            kernel_exact_gradient(map->position[a], r, m, slopes, row[a]);
-        }
-        for (int a = 0; a < 3; a++) {
-            const double *x = row[(a + 1) % 3], *y = row[(a + 2) % 3];
-            for (int b = 0; b < 3; b++) cross[a][b] = x[(b + 1) % 3] * y[(b + 2) % 3] - x[(b + 2) % 3] * y[(b + 1) % 3];
-        }
-        const double det = row[0][0] * cross[0][0] + row[0][1] * cross[0][1] + row[0][2] * cross[0][2];
-        if (det == 0) return false;
-        for (int b = 0; b < 3; b++) {
-            const double move = (cross[0][b] * off[0] + cross[1][b] * off[1] + cross[2][b] * off[2]) / det;
-            largest = fmax(largest, fabs(move));
-            r[b] = fmax(fmin(r[b] + fmax(fmin(move, 1), -1), 2), -1);
-        }
-        if (largest <= 1e-8) return true;
-    }
-    return false;
-}
-
-static inline bool kernel_exact_is_near(const double r[3])
-{
-    bool near = true;
-    for (int a = 0; a < 3; a++)
-        near = near && -r[a] <= (double)KERNEL_MAP_BEYOND && r[a] - 1 <= (double)KERNEL_MAP_BEYOND;
-    return near;
-}
 
 static inline double kernel_between(double from, double to, double share)
 {
@@ -221,10 +138,20 @@ static inline double kernel_extinction_most(double a)
     return fmin(x * (6 + x) / (6 + 4 * x), (double)KERNEL_OPAQUE);
 }
 
+static inline double kernel_piece_low(const kernel_piece *p)
+{
+    return (double)p->entry[KERNEL_PIECE_LOW] + (double)p->entry[KERNEL_PIECE_LOW_REST];
+}
+
+static inline double kernel_piece_high(const kernel_piece *p)
+{
+    return (double)p->entry[KERNEL_PIECE_HIGH] + (double)p->entry[KERNEL_PIECE_HIGH_REST];
+}
+
 static inline void kernel_span_widen(kernel_span *s, const kernel_piece *p, double low, double high)
 {
-    const double from = (double)p->entry[KERNEL_PIECE_LOW], slope = (double)p->entry[KERNEL_PIECE_SLOPE];
-    const double x0 = fmax(low, from), x1 = fmin(high, (double)p->entry[KERNEL_PIECE_HIGH]);
+    const double from = kernel_piece_low(p), slope = (double)p->entry[KERNEL_PIECE_SLOPE];
+    const double x0 = fmax(low, from), x1 = fmin(high, kernel_piece_high(p));
     const double a0 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x0 - from) * slope, 1), 0);
     const double a1 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x1 - from) * slope, 1), 0);
     const double most = fmax(a0, a1);
@@ -253,12 +180,12 @@ static kernel_span kernel_span_of(const kernel_pieces *t, double low, double hig
         return out;
     }
     int at = (int)t->bin_first[(int)fmin(fmax((low - begin) * (double)t->bin_inverse, 0), pieces_last)];
-    while (at > 0 && low < (double)t->pieces[at].entry[KERNEL_PIECE_LOW]) at--;
-    while (at + 1 < t->count && (double)t->pieces[at].entry[KERNEL_PIECE_HIGH] <= low) at++;
+    while (at > 0 && low < kernel_piece_low(&t->pieces[at])) at--;
+    while (at + 1 < t->count && kernel_piece_high(&t->pieces[at]) <= low) at++;
     do {
         kernel_span_widen(&out, &t->pieces[at], low, high);
         at++;
-    } while (at < t->count && (double)t->pieces[at].entry[KERNEL_PIECE_LOW] < high);
+    } while (at < t->count && kernel_piece_low(&t->pieces[at]) < high);
     return out;
 }
 
@@ -462,7 +389,8 @@ static __attribute__((noinline, cold)) void kernel_course_halve(kernel_packet *p
     kernel_exact_map map;
     kernel_lanes at;
     kernel_packet_lanes(p, &at);
-    if (course->map) kernel_exact_setup(&map, p, course->cell, &f->volumes[state->volume]);
+    const kernel_transfer *transfer = &f->volumes[state->volume];
+    if (course->map) kernel_exact_setup(&map, p, course->cell, transfer);
     for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
         const int n = __builtin_ctz(bits);
         kernel_halving h = {.state = state,
@@ -482,6 +410,7 @@ static __attribute__((noinline, cold)) void kernel_course_halve(kernel_packet *p
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];
         }
+        if (!course->map && course->cell) h.in.v = h.out.v = kernel_exact_domain(transfer, course->cell->values[0]);
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;

@@ -112,17 +112,38 @@ SIMD_INLINE vf kernel_piece_entry(const kernel_pieces *t, const kernel_piece_pla
     return vf_gather(t->pieces[0].entry + entry, place->at * KERNEL_PIECE_ENTRIES);
 }
 
-/* The piece that holds value x; at a knot the one above, or (where falling) below. */
-SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vm falling)
+/* A piece's ends. */
+typedef struct kernel_piece_ends {
+    vf low, high, low_rest, high_rest;
+} kernel_piece_ends;
+
+SIMD_INLINE kernel_piece_ends kernel_piece_ends_of(const kernel_pieces *t, const kernel_piece_place *at)
+{
+    kernel_piece_ends out = {kernel_piece_entry(t, at, KERNEL_PIECE_LOW), kernel_piece_entry(t, at, KERNEL_PIECE_HIGH),
+                             vf_set(0), vf_set(0)};
+    if (__builtin_expect(t->has_rests, 0)) {
+        out.low_rest = kernel_piece_entry(t, at, KERNEL_PIECE_LOW_REST);
+        out.high_rest = kernel_piece_entry(t, at, KERNEL_PIECE_HIGH_REST);
+    }
+    return out;
+}
+
+/* The piece that holds value x + rest; at a knot the one above, or (where falling) below. */
+SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest, vm falling)
 {
     const vf spot = vf_clamp((x - t->bin_low) * t->bin_inverse, vf_set(0), vf_set(KERNEL_PIECE_BINS - 1));
     vf piece = vf_gather(t->bin_first, vi_from_vf(spot));
     for (vm open = rays; vm_any(open);) {
         const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
-        const vf low = kernel_piece_entry(t, &at, KERNEL_PIECE_LOW),
-                 high = kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH);
-        const vm up = vm_and(open, vm_or(vf_lt(high, x), vm_andnot(vf_eq(high, x), falling)));
-        const vm down = vm_and(open, vm_or(vf_lt(x, low), vm_and(vf_eq(low, x), falling)));
+        const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
+        vf below = x - ends.low, above = ends.high - x;
+        if (__builtin_expect(t->has_rests, 0)) {
+            below += rest - ends.low_rest;
+            above += ends.high_rest - rest;
+        }
+        const vf zero = vf_set(0);
+        const vm up = vm_and(open, vm_or(vf_lt(above, zero), vm_andnot(vf_eq(above, zero), falling)));
+        const vm down = vm_and(open, vm_or(vf_lt(below, zero), vm_and(vf_eq(below, zero), falling)));
         piece = vf_select(up, piece + 1.0f, vf_select(down, piece - 1.0f, piece));
         open = vm_or(up, down);
     }
@@ -158,10 +179,11 @@ SIMD_INLINE kernel_leg kernel_leg_of(const kernel_run *run)
 }
 
 /* Rays of fresh enter their piece where they are. */
-SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, vf low, vf high)
+SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fresh, const kernel_piece_ends *ends)
 {
     const vf v = way->edge, zero = vf_set(0);
-    const vf below = vf_max((v - low) + way->rest, zero), above = vf_max((high - v) - way->rest, zero);
+    const vf below = vf_max((v - ends->low) + (way->rest - ends->low_rest), zero);
+    const vf above = vf_max((ends->high - v) + (ends->high_rest - way->rest), zero);
     const vf ahead = vf_abs((leg->v_out - v) + (leg->rest_out - way->rest));
     const vf most = vf_select(leg->falling, below, above), todo = vf_min(most, ahead);
     way->below = vf_select(fresh, below, way->below);
@@ -170,8 +192,8 @@ SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fre
     const vf left = vf_select(leg->level, leg->length, todo * leg->per_value);
     way->left = vf_select(fresh, left, way->left);
     way->shortest = vf_select(fresh, vf_min(left, vf_set(1)) * KERNEL_SHORT, way->shortest);
-    way->edge = vf_select(fresh, vf_select(leg->falling, low, high), way->edge);
-    way->rest = vf_select(fresh, zero, way->rest);
+    way->edge = vf_select(fresh, vf_select(leg->falling, ends->low, ends->high), way->edge);
+    way->rest = vf_select(fresh, vf_select(leg->falling, ends->low_rest, ends->high_rest), way->rest);
     way->is_last = vm_or(vm_andnot(way->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
@@ -269,13 +291,14 @@ SIMD_INLINE void kernel_integrate(const kernel_pieces *t, vm rays, const kernel_
     const kernel_leg leg = kernel_leg_of(run);
     const vf zero = vf_set(0);
     kernel_way way = {zero, zero, zero, zero, zero, run->v_in, run->rest_in, vm_none()};
-    vf piece = kernel_piece_find(t, rays, run->v_in, leg.falling);
+    vf piece = kernel_piece_find(t, rays, run->v_in, run->rest_in, leg.falling);
     vm open = rays, fresh = rays;
     while (vm_any(open)) {
         const kernel_piece_place at = kernel_piece_place_of(t, open, piece);
-        if (vm_any(fresh))
-            kernel_way_enter(&way, &leg, fresh, kernel_piece_entry(t, &at, KERNEL_PIECE_LOW),
-                             kernel_piece_entry(t, &at, KERNEL_PIECE_HIGH));
+        if (vm_any(fresh)) {
+            const kernel_piece_ends ends = kernel_piece_ends_of(t, &at);
+            kernel_way_enter(&way, &leg, fresh, &ends);
+        }
         kernel_stretch st = kernel_stretch_begin(t, &at, &way, leg.turn);
         kernel_stretch_limit(&st, way.left, way.shortest);
         const vf size = way.todo * st.share, move = leg.turn * size;

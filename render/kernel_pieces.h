@@ -26,6 +26,8 @@ enum { KERNEL_PIECE_BINS = 256, KERNEL_BOUND_BINS = 64 };
 enum {
     KERNEL_PIECE_LOW,
     KERNEL_PIECE_HIGH,
+    KERNEL_PIECE_LOW_REST, /* what the ends lost to their rounding: 0 unless has_rests */
+    KERNEL_PIECE_HIGH_REST,
     KERNEL_PIECE_OPACITY,
     KERNEL_PIECE_OPACITY_HIGH, /* at the upper end */
     KERNEL_PIECE_CLEAR,        /* 1 - opacity */
@@ -53,9 +55,10 @@ typedef struct kernel_step {
     float cut;
 } kernel_step;
 
-/* Values between which the opacity rises or falls nearly as at a step. */
+/* Values between which the opacity rises or falls nearly as at a step; is_narrow: one that has_rests is for. */
 typedef struct kernel_steep {
     float low, high;
+    bool is_narrow;
 } kernel_steep;
 
 /* A bin of the sums (kernel_preintegral.h), in units; read as ten floats. */
@@ -87,6 +90,8 @@ typedef struct kernel_pieces {
     /* Of the bounds' bins: also from bin_low; below and above the bins the function is constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
+    /* There is a ramp so narrow that its ends' rounding shows: they have rests, and values near it are to have them. */
+    bool has_rests;
     int step_count, steep_count;
     kernel_step steps[RENDER_MAX_OPACITY_POINTS]; /* by value */
     kernel_steep steep[RENDER_MAX_OPACITY_POINTS];

@@ -181,8 +181,8 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
         if (intervals && !c->is_constant) {
             kernel_map_setup(&map, c);
             course.map = &map;
-            kernel_course_bound(state, c->f, c->count, &course);
         }
+        if (intervals && (course.map || state->pieces->has_rests)) kernel_course_bound(state, c->f, c->count, &course);
         for (int k = 0; k < intervals; k++) {
             course.interval = &list[k];
             kernel_course_run(p, state, &course);

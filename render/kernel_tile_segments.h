@@ -43,7 +43,7 @@ static __attribute__((noinline)) void kernel_tile_poly_segments(kernel_packet *p
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_course course = {.map = map, .cell = c};
     const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
-    if (intervals && map) kernel_course_bound(state, c->f, c->count, &course);
+    if (intervals && (map || state->pieces->has_rests)) kernel_course_bound(state, c->f, c->count, &course);
     for (int k = 0; k < intervals; k++) {
         course.interval = &list[k];
         kernel_course_run(p, state, &course);

@@ -105,22 +105,48 @@ static void set_colours(const render_transfer *t, const int *entries, double mid
     }
 }
 
+/* Of the function's domain: in a narrower ramp 3e-8, by which float32 rounds its ends and a value, shows. */
+static const double narrow_width = 0.01;
+
+static bool is_narrow(const render_transfer *t, int i)
+{
+    const double width = domain_of(t, t->opacity_values[i + 1]) - domain_of(t, t->opacity_values[i]);
+    return 0 < width && width < narrow_width && t->opacities[i] != t->opacities[i + 1];
+}
+
+/* Where the narrow ramp that ends at the cut does so; the cut, where none does, or where points fall together there (a
+ * step). */
+static double cut_exactly(const render_transfer *t, kernel_real cut)
+{
+    double out = (double)cut;
+    int count = 0;
+    for (int i = 0; i < t->opacity_count; i++) {
+        const double at = domain_of(t, t->opacity_values[i]);
+        if ((kernel_real)at != cut) continue;
+        count++;
+        if ((i > 0 && is_narrow(t, i - 1)) || (i + 1 < t->opacity_count && is_narrow(t, i))) out = at;
+    }
+    return count == 1 ? out : (double)cut;
+}
+
 static void set_piece(const render_transfer *t, const int *entries, kernel_real low, kernel_real high,
                       kernel_piece *piece)
 {
-    const double middle = 0.5 * ((double)low + (double)high);
+    const double begin = cut_exactly(t, low), end = cut_exactly(t, high), middle = 0.5 * (begin + end);
     double slope;
     piece->entry[KERNEL_PIECE_LOW] = low;
     piece->entry[KERNEL_PIECE_HIGH] = high;
-    const double at_low = opacity_on(t, middle, (double)low, &slope),
-                 at_high = opacity_on(t, middle, (double)high, &slope);
+    piece->entry[KERNEL_PIECE_LOW_REST] = (kernel_real)(begin - (double)low);
+    piece->entry[KERNEL_PIECE_HIGH_REST] = (kernel_real)(end - (double)high);
+    const double at_low = opacity_on(t, middle, begin, &slope), at_high = opacity_on(t, middle, end, &slope);
     piece->entry[KERNEL_PIECE_OPACITY] = (kernel_real)at_low;
     piece->entry[KERNEL_PIECE_OPACITY_HIGH] = (kernel_real)at_high;
     piece->entry[KERNEL_PIECE_CLEAR] = (kernel_real)(1 - at_low);
     piece->entry[KERNEL_PIECE_CLEAR_HIGH] = (kernel_real)(1 - at_high);
     piece->entry[KERNEL_PIECE_SLOPE] = (kernel_real)slope;
-    piece->entry[KERNEL_PIECE_INVERSE] = 1 / (high - low);
-    set_colours(t, entries, middle, (double)low, piece);
+    piece->entry[KERNEL_PIECE_INVERSE] =
+        1 / ((high - low) + (piece->entry[KERNEL_PIECE_HIGH_REST] - piece->entry[KERNEL_PIECE_LOW_REST]));
+    set_colours(t, entries, middle, begin, piece);
 }
 
 /* ---- bins and bounds ---- */
@@ -154,9 +180,8 @@ static float largest(double a, float b)
 static double piece_opacity(const kernel_piece *p, double x)
 {
     const kernel_real *e = p->entry;
-    return fmin(
-        fmax((double)e[KERNEL_PIECE_OPACITY] + (x - (double)e[KERNEL_PIECE_LOW]) * (double)e[KERNEL_PIECE_SLOPE], 0),
-        1);
+    const double along = (x - (double)e[KERNEL_PIECE_LOW]) - (double)e[KERNEL_PIECE_LOW_REST];
+    return fmin(fmax((double)e[KERNEL_PIECE_OPACITY] + along * (double)e[KERNEL_PIECE_SLOPE], 0), 1);
 }
 
 /* What the piece is between two of its values, into a bin. */
@@ -204,8 +229,9 @@ static void fill_steep(kernel_pieces *out, const render_transfer *t)
 {
     for (int i = 0; i + 1 < t->opacity_count; i++) {
         const double low = domain_of(t, t->opacity_values[i]), high = domain_of(t, t->opacity_values[i + 1]);
-        if (low < high && high - low < steep_width && t->opacities[i] != t->opacities[i + 1])
-            out->steep[out->steep_count++] = (kernel_steep){(float)low, (float)high};
+        if (!(low < high && high - low < steep_width && t->opacities[i] != t->opacities[i + 1])) continue;
+        out->steep[out->steep_count++] = (kernel_steep){(float)low, (float)high, is_narrow(t, i)};
+        out->has_rests = out->has_rests || is_narrow(t, i);
     }
 }
 

@@ -239,6 +239,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
         const render_transfer *t = job->volumes[i].transfer;
         f->reach[i] = (float)fmax(reach / (t->unit_distance * job->space.scale), 1e-30);
         status = render_pieces_build(&f->pieces[i], t, error_of_each / 8, error);
+        f->is_fine = f->is_fine || f->pieces[i].has_rests;
         if (status == INSITU_OK && error_of_each > 0 && !is_apart)
             status = render_preintegral_build(&f->pieces[i], t, error_of_each, (double)f->reach[i], error);
     }

@@ -166,8 +166,11 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
     X(CYAML_FIELD_FLOAT_PTR("max_error", OPTIONAL, scene_file_sampling, max_error),                                    \
       .help = "No channel of a pixel is off by more, in linear light: cells are cut, and integrals taken, as "         \
               "finely as that takes, where the medium is of less than 1000 optical depths across the scene: of "       \
-              "a denser one single precision's places of faces may cost more. Steps of `opacity` are kept to it; a "   \
-              "ramp narrower than 0.01 of the function's range may cost 1e-7 / its share of that range more. On "      \
+              "a denser one single precision's places of faces may cost more. Steps of `opacity` and ramps as narrow " \
+              "as a millionth of the range are kept to it; but polyhedra, mixed volumes and cells that overlap "       \
+              "have values in single precision, which in a ramp narrower than 0.01 of the range may cost more: for "   \
+              "each unit distance in it 4e-7 times its rise / (its share of the range times the least 1 - opacity "    \
+              "in it). On "                                                                                            \
               "tetrahedra, and with tables of many colours, `1e-2` takes a fraction of the time of "                   \
               "`method: segments`. Not with `step`, "                                                                  \
               "`step_cells`, nor `method: samples`.",                                                                  \

@@ -1,0 +1,96 @@
+/* max_error where the opacity has a ramp of next to no width, and the field stays within it: what 3e-8 of the
+ * function's domain, a value's rounding to float32 or that of the ramp's ends, is to the opacity there. Of a ramp a
+ * millionth of the domain wide that is a tenth. Single cells, whose field is within the ramp and somewhat beyond it, or
+ * one value, or at its end in part. */
+#include "test_step_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { SIDE = 7, WIDTHS = 5, FIELDS = 3, SEEDS = 4 };
+static const double widths[WIDTHS] = {9e-3, 1e-3, 1e-4, 1e-5, 1e-6};
+
+/* As shares of the ramp: from a third below to a third above it, for half of the vertices (a hex's lower quad) at its
+ * begin, and all of one value. */
+static double share_of(int field, uint64_t vertex, uint64_t seed)
+{
+    const double share = test_uniform_in(vertex, 100 * seed + 5, -0.3, 1.3);
+    if (field == 1) return vertex < 4 ? 0 : share;
+    return field == 2 ? test_uniform_in(0, 100 * seed + 5, 0.1, 0.9) : share;
+}
+
+/* What a value off by 4e-7 of the domain, as float32 leaves those of polyhedra, may do to light: to opacity that times
+ * its slope, to extinction no more than 1 / (1 - opacity) of it, to light that times the way, if all of it is seen; of
+ * colours that differ by 1. */
+static double rounding_of(const step_function *function, double width, double unit)
+{
+    const double a = (double)function->opacities[1], b = (double)function->opacities[2], way = 1.8 * 1.24 * sqrt(3);
+    return 4e-7 * fabs(b - a) / width / (1 - fmax(a, b)) * way / unit;
+}
+
+/* The worst of each error asked for. Ramps do not begin at float32's numbers. */
+static void judge_ramp(test_cell_shape shape, bool is_polyhedron, double width, double worst[3])
+{
+    static const float opacities[3][4] = {{0, 0, 0.9f, 0.9f}, {0.8f, 0.8f, 0, 0.3f}, {0.1f, 0.2f, 0.6f, 0.1f}};
+    for (uint64_t seed = 0; seed < SEEDS * FIELDS; seed++) {
+        test_mesh mesh;
+        render_fixture f;
+        step_function function;
+        double cell_worst[3] = {0};
+        const double begin = 0.6 + 0.01 * test_uniform(seed, 77), unit = seed / 2 % 2 ? 0.02 : 0.3;
+        memcpy(function.opacities, opacities[seed / FIELDS % 3], sizeof function.opacities);
+        step_make_cell(shape, seed, &mesh);
+        for (int64_t i = 0; i < mesh.vertex_count; i++)
+            mesh.values[i] = begin + width * share_of((int)(seed % FIELDS), (uint64_t)i, seed);
+        if (is_polyhedron) test_mesh_to_polyhedra(&mesh, 1);
+        step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE);
+        step_set_function(&f, &function, begin, width, unit);
+        step_judge(&f, 1, 1e-7, cell_worst);
+        for (int i = 0; i < 3; i++) {
+            if (is_polyhedron) cell_worst[i] -= rounding_of(&function, width, unit);
+            worst[i] = test_worse(worst[i], cell_worst[i]);
+        }
+        fixture_free(&f);
+        test_mesh_free(&mesh);
+    }
+}
+
+static void judge_ramps(bool are_polyhedra)
+{
+    for (int kind = 0; kind < STEP_SHAPES; kind++)
+        for (int k = 0; k < WIDTHS; k++) {
+            double worst[3] = {0};
+            char what[80];
+            judge_ramp(step_shapes[kind], are_polyhedra, widths[k], worst);
+            snprintf(what, sizeof what, "%s%s within a ramp of %g", test_cell_shape_name(step_shapes[kind]),
+                     are_polyhedra ? " as polyhedron" : "", widths[k]);
+            step_assert_kept(worst, what);
+        }
+}
+
+static void fields_within_a_narrow_ramp(void **state)
+{
+    (void)state;
+    judge_ramps(false);
+}
+
+static void polyhedra_within_a_narrow_ramp(void **state)
+{
+    (void)state;
+    judge_ramps(true);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fields_within_a_narrow_ramp),
+        cmocka_unit_test(polyhedra_within_a_narrow_ramp),
+    };
+    if (argc > 1) cmocka_set_test_filter(argv[1]);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
