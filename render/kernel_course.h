@@ -9,6 +9,8 @@
 
 /* Of equal parts. */
 enum { KERNEL_MAX_PARTS = 256 };
+/* exp(-it) is KERNEL_BLACK. */
+#define KERNEL_DARK_DEPTH 18.4f
 
 typedef struct kernel_segment_state {
     kernel_segments *list;
@@ -175,15 +177,43 @@ SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state 
     return vf_clamp(-vf_floor(-parts), vf_set(1), most);
 }
 
-/* A segment as a fragment of its own. */
-static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
-                                vf v_in, vf v_out)
+/* The share of a segment from `from` to `to`. */
+SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to)
 {
-    kernel_light light = kernel_clear();
-    const kernel_run run = kernel_run_of((t_out - t_in) * state->list->per_t, v_in, v_out);
-    kernel_integrate(state->pieces, rays, &run, &light);
-    kernel_emit(p, vm_and(rays, vf_lt(light.transmittance, vf_set(1))), FRAGMENT_VOLUME, vf_set(0), t_in, t_out,
-                light.colour, light.transmittance);
+    const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in), one = vf_set(1);
+    const vm begins = vf_eq(from, vf_set(0)), ends = vf_eq(to, one);
+    kernel_run out = {.length = whole->length * (to - from)};
+    out.v_in = vf_select(begins, whole->v_in, whole->v_in + (rise * from + whole->rest_in));
+    out.rest_in = vf_select(begins, whole->rest_in, vf_set(0));
+    out.v_out = vf_select(ends, whole->v_out, whole->v_in + (rise * to + whole->rest_in));
+    out.rest_out = vf_select(ends, whole->rest_out, vf_set(0));
+    return out;
+}
+
+/* A segment as a fragment of its own. The integral ends where all but KERNEL_BLACK of the light is gone, and says no
+ * more of the depth; but what is mixed with others goes by its depth. So a segment as dense as that is cut until its
+ * fragments are not, and ends where light does. */
+static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *state, vm rays, vf t_in, vf t_out,
+                                const kernel_run *whole)
+{
+    const vf one = vf_set(1), black = vf_set(KERNEL_BLACK);
+    vf from = vf_set(0), to = one, depth = vf_set(0);
+    for (vm open = rays; vm_any(open);) {
+        kernel_light light = kernel_clear();
+        const kernel_run run = kernel_run_within(whole, from, to);
+        const vf begin = t_in + (t_out - t_in) * from;
+        const vf end = vf_select(vf_eq(to, one), t_out, t_in + (t_out - t_in) * to), middle = 0.5f * (from + to);
+        kernel_integrate(state->pieces, open, &run, &light);
+        const vm cut = vm_and(open, vm_and(vf_le(light.transmittance, black),
+                                           vm_and(vf_lt(begin, t_in + (t_out - t_in) * middle), vf_lt(middle, to))));
+        const vm put = vm_andnot(open, cut);
+        kernel_emit(p, vm_and(put, vf_lt(light.transmittance, one)), FRAGMENT_VOLUME, vf_set(0), begin, end,
+                    light.colour, light.transmittance);
+        depth += vf_select(put, light.depth, vf_set(0));
+        open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
+        from = vf_select(put, to, from);
+        to = vf_select(cut, middle, vf_select(put, one, to));
+    }
 }
 
 #endif

@@ -287,10 +287,13 @@ static void kernel_part_emit(kernel_packet *p, const kernel_halving *h, vm lane,
     for (int n = 1; n <= (int)parts; n++) {
         const double before = (n - 1) / parts, after = n / parts;
         const float end = n < (int)parts ? (float)kernel_between(from->t, to->t, after) : (float)to->t;
-        if (begin < end)
-            kernel_emit_segment(p, h->state, lane, vf_set(begin), vf_set(end),
-                                vf_set((float)kernel_between(v0, v1, before)),
-                                vf_set((float)kernel_between(v0, v1, after)));
+        const double in = kernel_between(v0, v1, before), out = kernel_between(v0, v1, after);
+        const kernel_run run = {.length = vf_set((float)((to->t - from->t) / parts * h->per_t)),
+                                .v_in = vf_set((float)in),
+                                .v_out = vf_set((float)out),
+                                .rest_in = vf_set((float)(in - (double)(float)in)),
+                                .rest_out = vf_set((float)(out - (double)(float)out))};
+        if (begin < end) kernel_emit_segment(p, h->state, lane, vf_set(begin), vf_set(end), &run);
         begin = end;
     }
 }
@@ -315,7 +318,8 @@ static void kernel_part_put(kernel_packet *p, const kernel_halving *h, vm lane, 
                              (contrast * fmin(change * s->slope, s->most - s->least) +
                               s->most * fmin(change * s->colour_slope, contrast));
         const double parts = sqrt(fmin(moved / (double)h->state->mixing, KERNEL_MAX_PARTS * KERNEL_MAX_PARTS));
-        kernel_part_emit(p, h, lane, from, &part->end, (double)v[0], (double)v[1], fmax(ceil(parts), 1));
+        kernel_part_emit(p, h, lane, from, &part->end, (double)v[0] + rest[0], (double)v[1] + rest[1],
+                         fmax(ceil(parts), 1));
         return;
     }
     const kernel_interval i = {.t_in = vf_set((float)from->t),

@@ -86,8 +86,10 @@ SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *
                 .t_in = s.from, .t_out = s.to, .v_in = s.before + lift, .v_out = s.after + lift};
             const kernel_fine fine = kernel_fine_of(&part);
             kernel_segments_add(state->pieces, list, vm_and(open, mine), &part, list->is_fine ? &fine : NULL);
-        } else if (vm_any(vm_and(open, mine)))
-            kernel_emit_segment(p, state, vm_and(open, mine), s.from, s.to, s.before + lift, s.after + lift);
+        } else if (vm_any(vm_and(open, mine))) {
+            const kernel_run run = kernel_run_of((s.to - s.from) * list->per_t, s.before + lift, s.after + lift);
+            kernel_emit_segment(p, state, vm_and(open, mine), s.from, s.to, &run);
+        }
         s.from = s.to;
         s.to = next;
         s.before = s.after;

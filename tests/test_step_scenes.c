@@ -1,0 +1,116 @@
+/* Steps of the opacity in scenes of more than a cell: in lattices of cells whose field is curved, where max_error holds
+ * of all of a ray's cells together; and in one of several volumes, which are mixed. */
+#include "test_step_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+/* ---- lattices ---- */
+
+enum { POINTS = 6, CELLS = 4, LATTICE_SIDE = 37, EVERY = 7 };
+
+/* Dense as it is at 0.02, rays end in the first cells whose field is beyond a step; at 0.3 they come through. */
+static void judge_lattice(test_mesh_kind kind, fixture_camera camera, double unit)
+{
+    static const double values[POINTS] = {-0.7, -0.15, -0.15, 0.3, 0.3, 0.7};
+    static const float opacities[POINTS] = {0.2f, 0.05f, 0.6f, 0.3f, 0, 0.1f};
+    render_fixture f;
+    test_mesh mesh;
+    double worst[3] = {0};
+    char what[80];
+    test_mesh_lattice(kind, CELLS, 0.2, test_wave, &mesh);
+    step_begin(&f, &mesh, camera, LATTICE_SIDE);
+    f.transfer.opacity_count = POINTS;
+    f.transfer.opacity_values = values;
+    f.transfer.opacities = opacities;
+    f.transfer.unit_distance = unit;
+    step_judge(&f, EVERY, 1e-7, worst);
+    snprintf(what, sizeof what, "steps in a lattice of %s, unit distance %g, %s", test_mesh_kind_name(kind), unit,
+             fixture_camera_name(camera));
+    step_assert_kept(worst, what);
+    fixture_free(&f);
+    test_mesh_free(&mesh);
+}
+
+static void lattices_of_curved_cells(void **state)
+{
+    static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
+    (void)state;
+    for (int k = 0; k < 4; k++)
+        for (fixture_camera camera = 0; camera <= CAMERA_INSIDE; camera++)
+            judge_lattice(kinds[k], camera, (k + (int)camera) % 2 ? 0.3 : 0.02);
+}
+
+/* ---- volumes that are mixed ---- */
+
+/* Two volumes by the step, which is a cell, over one field: the first one's opacity is level but for a step, the second
+ * one's throughout. A field off its chord changes nothing but at the step, whose stretches are halved: a share of the
+ * mixing's 0.4 RENDER_MIXING_ERROR by length and another by what is absorbed (kernel_halving.h), beside what mixing
+ * itself may cost. */
+static double judge_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
+{
+    static const float colours[12] = {0.9f, 0.2f, 0.1f, 0.9f, 0.2f, 0.1f, 0.1f, 0.4f, 0.9f, 0.1f, 0.4f, 0.9f};
+    static const double level_value = 0;
+    static const float level_opacity = 0.3f;
+    render_fixture f;
+    drawn_frame drawn;
+    step_function function = {.opacities = {0.02f, 0.02f, 0.9f, 0.9f}};
+    step_begin(&f, mesh, camera, STEP_SIDE);
+    step_set_function(&f, &function, 0.6, 0, unit);
+    f.transfer.colours = colours;
+    render_transfer level = f.transfer;
+    level.colours = colours + 6;
+    level.opacity_count = 1;
+    level.opacity_values = &level_value;
+    level.opacities = &level_opacity;
+    level.unit_distance = 0.5;
+    const render_volume_layer volumes[2] = {f.volume, {f.volume.field, &level}};
+    f.job.volumes = volumes;
+    f.job.volume_count = 2;
+    f.job.separate_samples = true;
+    fixture_draw(&f, &drawn);
+    double *truth = step_truth(&f, EVERY, 1e-7);
+    const double worst = step_worst(&drawn, truth, EVERY);
+    free(truth);
+    drawn_free(&drawn);
+    fixture_free(&f);
+    return worst;
+}
+
+static void mixed_volumes_by_step(void **state)
+{
+    enum { SEEDS = 4 };
+    const double bound = (2 + 1) * 0.4 * RENDER_MIXING_ERROR;
+    (void)state;
+    for (int kind = 0; kind < STEP_SHAPES; kind++) {
+        double worst = 0;
+        for (uint64_t seed = 0; seed < SEEDS; seed++) {
+            test_mesh mesh;
+            if (kind == 0 && seed == 0)
+                step_make_hex(&mesh);
+            else
+                step_make_cell(step_shapes[kind], 16 * seed + (uint64_t)kind, &mesh);
+            worst = test_worse(
+                worst, judge_mixed(&mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, seed / 2 % 2 ? 0.2 : 0.02));
+            test_mesh_free(&mesh);
+        }
+        fprintf(stderr, "a step in %s, mixed by step: %.2g\n", test_cell_shape_name(step_shapes[kind]), worst);
+        assert_true(worst <= bound);
+    }
+}
+
+/* An argument: the tests to run, as cmocka matches names. */
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lattices_of_curved_cells),
+        cmocka_unit_test(mixed_volumes_by_step),
+    };
+    if (argc > 1) cmocka_set_test_filter(argv[1]);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
