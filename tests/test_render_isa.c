@@ -18,11 +18,24 @@ enum {
     WIDTH = 53,
     HEIGHT = 43,
     NUMBERS = 5 * WIDTH * HEIGHT,
-    SCENES = 3,
+    SCENES = 4,
     FRAMES = TEST_KIND_COUNT * CAMERA_PLANE * SCENES
 };
 
 static const char *program;
+
+/* By segments, with steps and a narrow ramp of the opacity: stretches are halved in double (kernel_halving.h), ray by
+ * ray, from the caller's coordinates. */
+static void set_steps(render_fixture *f)
+{
+    static const double values[6] = {-0.7, -0.15, -0.15, 0.3, 0.301, 0.7};
+    static const float opacities[6] = {0.2f, 0.05f, 0.6f, 0.3f, 0, 0.1f};
+    f->transfer.opacity_count = 6;
+    f->transfer.opacity_values = values;
+    f->transfer.opacities = opacities;
+    f->job.integration = RENDER_SEGMENTS;
+    f->job.max_error = 1e-2;
+}
 
 static void draw_scene(int frame, float *numbers)
 {
@@ -32,9 +45,10 @@ static void draw_scene(int frame, float *numbers)
     drawn_frame drawn;
     fixture_create_lattice(&f, (test_mesh_kind)(frame / (SCENES * CAMERA_PLANE)), 4, 0.2, test_wave);
     fixture_look(&f, (fixture_camera)(frame / SCENES % CAMERA_PLANE), WIDTH, HEIGHT);
-    if (scene != 1) fixture_add_surface(&f, values, 2, scene == 0 ? 1 : 0.4f);
+    if (scene % 2 == 0) fixture_add_surface(&f, values, 2, scene == 0 ? 1 : 0.4f);
     f.surfaces[0].root = scene % 2 ? RENDER_NEUBAUER : RENDER_ROBUST;
     if (scene != 0) fixture_set_volume(&f, 0.3);
+    if (scene == 3) set_steps(&f);
     fixture_draw(&f, &drawn);
     memcpy(numbers, drawn.picture.rgba, 4 * WIDTH * HEIGHT * sizeof *numbers);
     memcpy(numbers + 4 * WIDTH * HEIGHT, drawn.picture.depth, WIDTH * HEIGHT * sizeof *numbers);
