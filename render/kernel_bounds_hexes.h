@@ -11,7 +11,8 @@ typedef struct kernel_hexes_bounds {
     float jump[SIMD_WIDTH]; /* less than nothing where the field is not known to be monotone; */
     /* there L and its thickness, which is infinite where that is of no use */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
-    float depth[2][SIMD_WIDTH]; /* the least and the largest of the vertices' */
+    /* The cell lies between pairs of planes: low <= normal . (X - vertex 0) <= high. */
+    float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
 } kernel_hexes_bounds;
 
 /* Half of the lanes. */
@@ -221,6 +222,31 @@ SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_hal
     memcpy(lanes + half * KERNEL_HALF, &floats, sizeof floats);
 }
 
+/* The planes across J0's columns that the vertices lie between, widened by what a ray's places may be off. */
+SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int i, kernel_half pad, int half,
+                                    kernel_hexes_bounds *out)
+{
+    kernel_half c[8], at[8], low, high;
+    for (int j = 1; j < 8; j++) {
+        c[j] =
+            b->inverse[i][0] * b->exact[0][j] + b->inverse[i][1] * b->exact[1][j] + b->inverse[i][2] * b->exact[2][j];
+    }
+    at[0] = (kernel_half){0};
+    at[1] = c[1];
+    at[2] = c[2];
+    at[3] = c[1] + c[2] + c[4];
+    for (int n = 0; n < 4; n++) at[4 + n] = at[n] + c[3] + (n & 1 ? c[5] : at[0]) + (n & 2 ? c[6] : at[0]);
+    at[7] += c[7];
+    low = high = at[0];
+    for (int n = 1; n < 8; n++) {
+        low = -kernel_half_more(-at[n], -low);
+        high = kernel_half_more(at[n], high);
+    }
+    for (int a = 0; a < 3; a++) kernel_half_store(out->normal[i][a], half, b->inverse[i][a]);
+    kernel_half_store(out->low[i], half, low - pad);
+    kernel_half_store(out->high[i], half, high + pad);
+}
+
 /* kernel_bounds_linear(), with kernel_bounds_jump() and kernel_bounds_rise() of rays about (0, 0, 1). */
 SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
                                     kernel_hexes_bounds *out)
@@ -244,6 +270,7 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
         length += w[i] * w[i];
         off += part * part;
         gap += blur * blur;
+        kernel_half_planes(&b, i, blur + 1e-5, half, out);
     }
     kernel_lanes_corners(&slopes, w, &most);
     const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));
@@ -275,26 +302,23 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
 static __attribute__((noinline)) void kernel_hexes_bound(const float at[4][8][SIMD_WIDTH], const kernel_beam *beam,
                                                          kernel_hexes_bounds *out)
 {
-    vf near = vf_load(at[2][0]), far = near;
-    for (int i = 1; i < 8; i++) {
-        near = vf_min(near, vf_load(at[2][i]));
-        far = vf_max(far, vf_load(at[2][i]));
-    }
-    vf_store(out->depth[0], near);
-    vf_store(out->depth[1], far);
     for (int half = 0; half < 2; half++) kernel_half_bounds(at, half, beam, out);
 }
 
-/* The same of a cell that has its bounds. */
+/* The same of a cell that has its bounds: of planes, those across the line of sight. */
 SIMD_INLINE void kernel_hexes_bounds_put(kernel_hexes_bounds *out, int lane, const kernel_bounds *b, const float z[8])
 {
-    float near = z[0], far = z[0];
+    float near = z[0], far = z[0], size = fabsf(z[0]);
     for (int i = 1; i < 8; i++) {
         near = simd_min(near, z[i]);
         far = simd_max(far, z[i]);
+        size = simd_max(fabsf(z[i]), size);
     }
-    out->depth[0][lane] = near;
-    out->depth[1][lane] = far;
+    for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 3; a++) out->normal[i][a][lane] = a == 2;
+        out->low[i][lane] = (near - z[0]) - 1e-5f * size;
+        out->high[i][lane] = (far - z[0]) + 1e-5f * size;
+    }
     out->jump[lane] = b->is_monotone ? b->jump : -1;
     out->level[lane] = b->level;
     for (int a = 0; a < 3; a++) out->gradient[a][lane] = b->gradient[a];

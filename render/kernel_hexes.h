@@ -5,13 +5,13 @@
  *     pixels of boxes       which faces does the ray cross?         signs of edge functions
  *     rays in two faces     where, and what is the field there?     patches
  *     rays with a root      where is it, and its normal?            Newton's method
- *     other rays            what roots are there?                   kernel_roots.h, cell by cell
+ *     other rays            what roots are there?                   kernel_roots.h
  *
  * Where the field is known to be monotone along all of the
- * tile's rays (kernel_roots.h), the signs at the faces tell of the root; rays of other cells are searched for roots,
- * all of one cell at once. Rays of which an edge function is in doubt, or which cross not just two of a cell's faces
- * once each, are for the cell alone (kernel_surface.h). Every operation is that of a cell alone in the same order, so
- * that a hit has the same bits however it came to be found. */
+ * tile's rays (kernel_roots.h), the signs at the faces tell of the root; rays of other cells are searched for roots.
+ * Rays of which an edge function is in doubt, or which cross not just two of a cell's faces once each, are for the cell
+ * alone (kernel_surface.h). Every operation is that of a cell alone in the same order, so that a hit has the same bits
+ * however it came to be found. */
 #ifndef RENDER_KERNEL_HEXES_H
 #define RENDER_KERNEL_HEXES_H
 
@@ -106,12 +106,29 @@ SIMD_INLINE vm kernel_hexes_far(const kernel_hexes *h, const kernel_hex_packet *
                   vf_lt(thick, side * kernel_hexes_linear_at(h, p, to)));
 }
 
-/* Rays that are so between the least and the largest depth of their cells: a face's value has L's sign on these, and
- * there is no root. */
+/* Rays that are so between the planes that their cells lie between: a face's value has L's sign on these, and there is
+ * no root. Depths are from vertex 0's on. */
 SIMD_INLINE vm kernel_hexes_beside(const kernel_hexes *h, const kernel_hex_packet *p)
 {
-    const vf from = kernel_hex_take(h->bounds.depth[0], p->lane), to = kernel_hex_take(h->bounds.depth[1], p->lane);
-    return kernel_hexes_far(h, p, kernel_side(kernel_hexes_linear_at(h, p, from)), from, to);
+    const kernel_rays *rays = &p->rays;
+    const vf z = kernel_hex_take(h->placed.at[2][0], p->lane);
+    const vf x = (rays->origin_x + rays->slope_x * z) - kernel_hex_take(h->placed.at[0][0], p->lane);
+    const vf y = (rays->origin_y + rays->slope_y * z) - kernel_hex_take(h->placed.at[1][0], p->lane);
+    const vf thick = kernel_hex_take(h->bounds.thickness, p->lane);
+    vf from = vf_set(-INFINITY), to = vf_set(INFINITY), g[3];
+    for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 3; a++) g[a] = kernel_hex_take(h->bounds.normal[i][a], p->lane);
+        const vf at = g[0] * x + g[1] * y, inverse = 1.0f / ((g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2]);
+        const vf low = (kernel_hex_take(h->bounds.low[i], p->lane) - at) * inverse;
+        const vf high = (kernel_hex_take(h->bounds.high[i], p->lane) - at) * inverse;
+        from = vf_max(vf_min(low, high), from);
+        to = vf_min(vf_max(low, high), to);
+    }
+    for (int a = 0; a < 3; a++) g[a] = kernel_hex_take(h->bounds.gradient[a], p->lane);
+    const vf level = kernel_hex_take(h->bounds.level, p->lane) + (g[0] * x + g[1] * y);
+    const vf rise = (g[0] * rays->slope_x + g[1] * rays->slope_y) + g[2];
+    const vf begin = level + rise * from, end = level + rise * to;
+    return vm_or(vf_lt(thick, vf_min(begin, end)), vf_lt(vf_max(begin, end), -thick));
 }
 
 /* The rays that cross two faces of their cells go on. Returns the blocks in which something is nearer. */
@@ -209,6 +226,14 @@ static __attribute__((noinline)) unsigned kernel_hexes_accept(kernel_tile_trace 
     return blocks;
 }
 
+/* kernel_map_normal() and kernel_unshear(). */
+SIMD_INLINE void kernel_hexes_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
+                                     vf normal[3])
+{
+    kernel_lanes_normal(map, r, normal);
+    normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
+}
+
 /* kernel_polish() and kernel_poly_accept(). */
 static __attribute__((noinline)) unsigned kernel_hexes_hit(kernel_tile_trace *t, kernel_hexes *h)
 {
@@ -229,40 +254,41 @@ static __attribute__((noinline)) unsigned kernel_hexes_hit(kernel_tile_trace *t,
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0)) nearer |= kernel_hexes_alone(t, h, &h->found, n, p.at, vm_bits(open));
         if (!vm_any(hit)) continue;
-        kernel_lanes_normal(&map, at.r, normal);
-        normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y; /* kernel_unshear() */
+        kernel_hexes_normal(t, &map, at.r, normal);
         nearer |= kernel_hexes_accept(t, h, &h->found, n, p.at, vm_bits(hit), at.t, normal);
     }
     return nearer;
 }
 
-/* So many of the others from n on, all of one cell: as a packet's. */
-static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace *t, kernel_hexes *h, int n, int count)
+/* kernel_limits_spread(), each lane with its own cell's. */
+SIMD_INLINE void kernel_hex_limits(const kernel_hexes *h, vi lane, kernel_limits *out)
+{
+    const vi at = lane * (int)(sizeof(kernel_poly) / sizeof(float));
+    const kernel_bounds *b = &h->polys[0].bounds;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 8; j++) out->bent[i][j] = vf_gather(&b->bent[i].c[j], at);
+        for (int a = 0; a < 3; a++) out->inverse[i][a] = vf_gather(&b->inverse[i][a], at);
+    }
+    out->stretch = vf_gather(&b->stretch, at);
+    out->slope = vf_gather(&b->slope, at);
+    out->curve = vf_gather(&b->curve, at);
+    out->twist = vf_gather(&b->twist, at);
+    out->coarsest = vf_gather(&b->coarsest, at);
+    out->is_monotone = vf_le(vf_set(0), kernel_hex_take(h->bounds.jump, lane));
+}
+
+/* kernel_poly_robust() of the others from n on, of which kernel_hexes_cross() has asked what their ends tell. */
+static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace *t, kernel_hexes *h, int n)
 {
     const kernel_hex_ends *ends = &h->other_ends;
-    const int lane = h->others.lane[n];
-    const vm wanted = count < SIMD_WIDTH ? vm_from_bits((1u << count) - 1) : vm_all_lanes();
     kernel_hex_packet p;
-    kernel_packet q = {0};
-    kernel_hits hits;
-    kernel_surface_state state = {.surface = t->surface, .layer = t->layer, .hits = &hits, .is_opaque = true};
-    kernel_interval i = {.mask = wanted, .w_in = vf_set(0), .w_out = vf_set(0)};
+    kernel_map_lanes map;
+    kernel_limits limits;
+    kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
+    vf depth = vf_set(0), normals[3] = {depth, depth, depth};
+    vm hits = vm_none();
     kernel_hex_packet_begin(&p, t, &h->others, n);
-    q.frame = t->frame;
-    q.tile = &t->tile;
-    q.thread = t->thread;
-    q.active = wanted;
-    q.is_nearer = q.has_view = false;
-    q.is_pencil = true;
-    q.origin_x = p.rays.origin_x;
-    q.origin_y = p.rays.origin_y;
-    q.slope_x = p.rays.slope_x;
-    q.slope_y = p.rays.slope_y;
-    q.u = p.u;
-    q.v = p.v;
-    q.t_near = vf_set(t->t_near);
-    q.t_far = p.far;
-    kernel_hits_begin(&hits);
+    i.mask = p.active;
     i.t_in = vf_load(ends->t[0] + n);
     i.t_out = vf_load(ends->t[1] + n);
     i.v_in = vf_load(ends->v[0] + n);
@@ -271,23 +297,30 @@ static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace 
         i.r_in[a] = vf_load(ends->r[0][a] + n);
         i.r_out[a] = vf_load(ends->r[1][a] + n);
     }
-    kernel_hex_ready(h, lane);
-    kernel_poly_setup(t->frame, &t->tile, &h->polys[lane], t->surface->layer, &h->cells[lane], h->value[lane]);
-    kernel_poly_robust(&q, &state, &h->cells[lane], &h->polys[lane], &i, wanted);
-    const unsigned found = vm_bits(vm_and(wanted, hits.found));
-    return found ? kernel_hexes_accept(t, h, &h->others, n, p.at, found, q.t_far, hits.normal) : 0;
-}
-
-static unsigned kernel_hexes_others(kernel_tile_trace *t, kernel_hexes *h)
-{
-    unsigned nearer = 0;
-    for (int n = 0, count; n < h->others.count; n += count) {
-        count = 1;
-        while (count < SIMD_WIDTH && n + count < h->others.count && h->others.lane[n + count] == h->others.lane[n])
-            count++;
-        nearer |= kernel_hexes_search(t, h, n, count);
+    for (int k = n; k < n + SIMD_WIDTH && k < h->others.count; k++) {
+        const int lane = h->others.lane[k];
+        kernel_hex_ready(h, lane);
+        kernel_poly_setup(t->frame, &t->tile, &h->polys[lane], t->surface->layer, &h->cells[lane], h->value[lane]);
     }
-    return nearer;
+    kernel_hex_maps(h, p.lane, &map);
+    kernel_hex_limits(h, p.lane, &limits);
+    kernel_search s = {
+        .rays = p.rays, .map = &map, .limits = &limits, .interval = &i, .failures = &t->thread->map_failures};
+    kernel_search_begin(&s);
+    kernel_search_whole(&s, p.active);
+    do {
+        kernel_point at;
+        vf normal[3];
+        if (!vm_any(s.found)) continue;
+        kernel_polish(&s, &at);
+        const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
+        kernel_hexes_normal(t, &map, at.r, normal);
+        for (int a = 0; a < 3; a++) normals[a] = vf_select(hit, normal[a], normals[a]);
+        depth = vf_select(hit, at.t, depth);
+        hits = vm_or(hits, hit);
+        kernel_search_close(&s, hit);
+    } while (kernel_search_on(&s));
+    return vm_any(hits) ? kernel_hexes_accept(t, h, &h->others, n, p.at, vm_bits(hits), depth, normals) : 0;
 }
 
 /* ---- batches ---- */
@@ -301,7 +334,7 @@ static __attribute__((noinline)) void kernel_hexes_trace(kernel_tile_trace *t, k
     kernel_hex_rays_close(&h->found);
     kernel_hex_rays_close(&h->others);
     nearer |= kernel_hexes_hit(t, h);
-    nearer |= kernel_hexes_others(t, h);
+    for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_hexes_search(t, h, n);
     for (; nearer; nearer &= nearer - 1) {
         const int block = __builtin_ctz(nearer);
         t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);

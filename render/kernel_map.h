@@ -197,29 +197,60 @@ SIMD_INLINE void kernel_jacobian_of(const vf position[3][8], bool is_pyramid, co
     out->det = kernel_dot(row[0], out->cross[0]);
 }
 
-SIMD_INLINE void kernel_map_jacobian(const kernel_map *map, const kernel_product *m, const vf r[3],
-                                     kernel_jacobian *out)
+/* Maps of cells of one kind, each lane's its own. */
+typedef struct kernel_map_lanes {
+    bool is_pyramid;
+    float tolerance;
+    vf origin[3], position[3][8], field[8];
+    kernel_half exact[2][4][8]; /* by halves of the lanes */
+} kernel_map_lanes;
+
+SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
 {
-    vf position[3][8];
-    for (int a = 0; a < 3; a++) kernel_polynomial_spread(&map->position[a], position[a]);
-    kernel_jacobian_of((const vf(*)[8])position, map->is_pyramid, m, r, out);
+    out->is_pyramid = map->is_pyramid;
+    out->tolerance = map->tolerance;
+    for (int a = 0; a < 3; a++) {
+        out->origin[a] = vf_set(map->origin[a]);
+        kernel_polynomial_spread(&map->position[a], out->position[a]);
+    }
+    kernel_polynomial_spread(&map->field, out->field);
+    for (int n = 0; n < 4; n++)
+        for (int i = 0; i < 8; i++) out->exact[0][n][i] = out->exact[1][n][i] = (kernel_half){0} + map->exact[n][i];
+}
+
+/* Rays in tile space. */
+typedef struct kernel_rays {
+    vf origin_x, origin_y, slope_x, slope_y;
+} kernel_rays;
+
+SIMD_INLINE kernel_rays kernel_packet_rays(const kernel_packet *p)
+{
+    return (kernel_rays){p->origin_x, p->origin_y, p->slope_x, p->slope_y};
+}
+
+/* Relative to the map's origin. */
+SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map_lanes *map, vf t, vf out[3])
+{
+    out[0] = (rays->origin_x + rays->slope_x * t) - map->origin[0];
+    out[1] = (rays->origin_y + rays->slope_y * t) - map->origin[1];
+    out[2] = t - map->origin[2];
 }
 
 /* From the guess in r to the coordinates of the point at depth t on each ray of wanted, by Newton's method. Returns the
  * rays that did not converge. A ray that has converged is left alone, so that its result
  * does not depend on the others of the packet. */
-SIMD_INLINE vm kernel_map_newton(const kernel_packet *p, const kernel_map *map, vm wanted, vf t, vf r[3])
+SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, vf t, vf r[3])
 {
-    const vf target[3] = {(p->origin_x + p->slope_x * t) - map->origin[0],
-                          (p->origin_y + p->slope_y * t) - map->origin[1], t - map->origin[2]};
+    vf target[3];
     vm open = wanted;
+    kernel_rays_at(rays, map, t, target);
     for (int step = 0; step < KERNEL_MAP_STEPS && vm_any(open); step++) {
-        const kernel_product m = kernel_map_product(map, r);
+        const kernel_product m = kernel_product_at(map->is_pyramid, r);
         kernel_jacobian j;
-        kernel_map_jacobian(map, &m, r, &j);
+        kernel_jacobian_of(map->position, map->is_pyramid, &m, r, &j);
         const vf inverse = vf_select(vf_eq(j.det, vf_set(0)), vf_set(0), 1.0f / j.det);
         vf residual[3], largest = vf_set(0);
-        for (int a = 0; a < 3; a++) residual[a] = target[a] - kernel_polynomial_value(map, &map->position[a], &m, r);
+        for (int a = 0; a < 3; a++) residual[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, &m, r);
         for (int a = 0; a < 3; a++) {
             const vf sum = (j.cross[0][a] * residual[0] + j.cross[1][a] * residual[1]) + j.cross[2][a] * residual[2];
             const vf move = vf_clamp(sum * inverse, vf_set(-1), vf_set(1));
@@ -247,14 +278,14 @@ SIMD_INLINE vf kernel_map_beyond(const vf r[3])
 /* The coordinates of the points at depth t. From a poor guess, or in a folded cell, Newton's method may diverge or come
  * to another solution outside of the cell: then once more from the middle of the cell. Returns the rays that found none
  * in the cell or near: theirs are not to be used. */
-SIMD_INLINE vm kernel_map_invert(const kernel_packet *p, const kernel_map *map, vm wanted, vf t, vf r[3])
+SIMD_INLINE vm kernel_map_invert(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, vf t, vf r[3])
 {
     const vf most = vf_set(KERNEL_MAP_BEYOND);
-    const vm failed = kernel_map_newton(p, map, wanted, t, r);
+    const vm failed = kernel_map_newton(rays, map, wanted, t, r);
     const vm again = vm_or(failed, vm_and(wanted, vf_lt(most, kernel_map_beyond(r))));
     if (__builtin_expect(!vm_any(again), 1)) return failed;
     vf middle[3] = {vf_set(0.4f), vf_set(0.4f), vf_set(0.5f)};
-    const vm worse = kernel_map_newton(p, map, again, t, middle);
+    const vm worse = kernel_map_newton(rays, map, again, t, middle);
     const vm better = vm_andnot(vm_andnot(again, worse), vf_lt(most, kernel_map_beyond(middle)));
     for (int a = 0; a < 3; a++) r[a] = vf_select(better, middle[a], r[a]);
     return vm_andnot(again, better);
@@ -264,27 +295,6 @@ SIMD_INLINE vf kernel_map_value(const kernel_map *map, const kernel_polynomial *
 {
     const kernel_product m = kernel_map_product(map, r);
     return kernel_polynomial_value(map, field, &m, r);
-}
-
-/* Maps of cells of one kind, each lane's its own. */
-typedef struct kernel_map_lanes {
-    bool is_pyramid;
-    float tolerance;
-    vf origin[3], position[3][8], field[8];
-    kernel_half exact[2][4][8]; /* by halves of the lanes */
-} kernel_map_lanes;
-
-SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
-{
-    out->is_pyramid = map->is_pyramid;
-    out->tolerance = map->tolerance;
-    for (int a = 0; a < 3; a++) {
-        out->origin[a] = vf_set(map->origin[a]);
-        kernel_polynomial_spread(&map->position[a], out->position[a]);
-    }
-    kernel_polynomial_spread(&map->field, out->field);
-    for (int n = 0; n < 4; n++)
-        for (int i = 0; i < 8; i++) out->exact[0][n][i] = out->exact[1][n][i] = (kernel_half){0} + map->exact[n][i];
 }
 
 /* The direction of the field's gradient at r, in tile space. */

@@ -20,17 +20,33 @@ SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
 
 /* Field and the cell's own coordinates at t, from the guess in r; on rays where the inverse map fails, the lines
  * between the faces' values and coordinates, counted. */
-SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t, vf r[3])
+SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_interval *i,
+                                  vm wanted, vf t, vf r[3], int64_t *failures)
 {
-    const vm failed = kernel_map_invert(p, map, rays, t, r);
-    if (!vm_any(failed)) return kernel_map_value(map, &map->field, r);
+    const vm failed = kernel_map_invert(rays, map, wanted, t, r);
+    kernel_product m;
+    if (!vm_any(failed)) {
+        m = kernel_product_at(map->is_pyramid, r);
+        return kernel_value_of(map->field, map->is_pyramid, &m, r);
+    }
     vf line[3];
     kernel_guess(i, t, line);
     for (int a = 0; a < 3; a++) r[a] = vf_select(failed, line[a], r[a]);
-    p->thread->map_failures += __builtin_popcount(vm_bits(failed));
+    *failures += __builtin_popcount(vm_bits(failed));
+    m = kernel_product_at(map->is_pyramid, r);
     const vf length = i->t_out - i->t_in;
     const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    return vf_select(failed, i->v_in + along * (i->v_out - i->v_in), kernel_map_value(map, &map->field, r));
+    return vf_select(failed, i->v_in + along * (i->v_out - i->v_in),
+                     kernel_value_of(map->field, map->is_pyramid, &m, r));
+}
+
+/* The packet's rays, all in one cell. */
+SIMD_INLINE vf kernel_solve(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t, vf r[3])
+{
+    const kernel_rays own = kernel_packet_rays(p);
+    kernel_map_lanes lanes;
+    kernel_map_spread(map, &lanes);
+    return kernel_solve_lanes(&own, &lanes, i, rays, t, r, &p->thread->map_failures);
 }
 
 SIMD_INLINE vf kernel_value_at(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, vf t)

@@ -45,18 +45,38 @@ typedef struct kernel_verdict {
     vm tiny;     /* all of it rounding */
 } kernel_verdict;
 
+/* kernel_bounds, each lane's own. */
+typedef struct kernel_limits {
+    vf bent[3][8], inverse[3][3], stretch, slope, curve, twist, coarsest;
+    vm is_monotone;
+} kernel_limits;
+
+SIMD_INLINE void kernel_limits_spread(const kernel_bounds *b, kernel_limits *out)
+{
+    for (int i = 0; i < 3; i++) {
+        kernel_polynomial_spread(&b->bent[i], out->bent[i]);
+        for (int a = 0; a < 3; a++) out->inverse[i][a] = vf_set(b->inverse[i][a]);
+    }
+    out->stretch = vf_set(b->stretch);
+    out->slope = vf_set(b->slope);
+    out->curve = vf_set(b->curve);
+    out->twist = vf_set(b->twist);
+    out->coarsest = vf_set(b->coarsest);
+    out->is_monotone = b->is_monotone ? vm_all_lanes() : vm_none();
+}
+
 /* Deviation of the chord from the line in Y: the largest of |e1|, |e2|, and of the derivative's coefficients / 3. */
-SIMD_INLINE void kernel_chord_bend(const kernel_map *map, const kernel_bounds *b, const kernel_point *from,
+SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, const kernel_point *from,
                                    const kernel_point *to, const kernel_product m[2], const vf move[3], vf *size,
                                    vf *slope)
 {
     vf first = vf_set(0), second = first, between = first;
     for (int i = 0; i < 3; i++) {
         vf g0[3], g1[3];
-        kernel_polynomial_gradient(map, &b->bent[i], &m[0], from->r, g0);
-        kernel_polynomial_gradient(map, &b->bent[i], &m[1], to->r, g1);
-        const vf rise = kernel_polynomial_value(map, &b->bent[i], &m[1], to->r) -
-                        kernel_polynomial_value(map, &b->bent[i], &m[0], from->r);
+        kernel_gradient_of(b->bent[i], is_pyramid, &m[0], from->r, g0);
+        kernel_gradient_of(b->bent[i], is_pyramid, &m[1], to->r, g1);
+        const vf rise = kernel_value_of(b->bent[i], is_pyramid, &m[1], to->r) -
+                        kernel_value_of(b->bent[i], is_pyramid, &m[0], from->r);
         const vf e1 = (kernel_dot(g0, move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, move)) * (1.0f / 3);
         first += e1 * e1;
         second += e2 * e2;
@@ -68,19 +88,20 @@ SIMD_INLINE void kernel_chord_bend(const kernel_map *map, const kernel_bounds *b
 }
 
 /* side: 1 or -1. gap: how far Y(from), Y(to) may be from the ray. */
-SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_bounds *b, const kernel_point *from,
+SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kernel_limits *b, const kernel_point *from,
                                         const kernel_point *to, vf gap, vf side)
 {
-    const kernel_product m[2] = {kernel_map_product(map, from->r), kernel_map_product(map, to->r)};
+    const bool is_pyramid = map->is_pyramid;
+    const kernel_product m[2] = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)};
     vf move[3], g0[3], g1[3], bend, bend_slope;
     for (int a = 0; a < 3; a++) move[a] = to->r[a] - from->r[a];
-    kernel_polynomial_gradient(map, &map->field, &m[0], from->r, g0);
-    kernel_polynomial_gradient(map, &map->field, &m[1], to->r, g1);
-    kernel_chord_bend(map, b, from, to, m, move, &bend, &bend_slope);
+    kernel_gradient_of(map->field, is_pyramid, &m[0], from->r, g0);
+    kernel_gradient_of(map->field, is_pyramid, &m[1], to->r, g1);
+    kernel_chord_bend(is_pyramid, b, from, to, m, move, &bend, &bend_slope);
     const vf d0 = kernel_dot(g0, move), d1 = kernel_dot(g1, move), rise = to->value - from->value;
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
-    if (map->is_pyramid) {
+    if (is_pyramid) {
         /* Where the tangents at the ends meet. */
         const vf turn = d0 - d1;
         const vf at = vf_select(vf_eq(turn, vf_set(0)), vf_set(0), (rise - d1) / turn);
@@ -88,7 +109,7 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_boun
         middle = d0;
         scale = 1.0f / vf_max(vf_min(from->r[2], to->r[2]) - b->stretch * (1.5f * bend + gap), vf_set(1e-30f));
     }
-    const vf off = b->stretch * ((map->is_pyramid ? 1.5f : 0.75f) * bend + gap);
+    const vf off = b->stretch * ((is_pyramid ? 1.5f : 0.75f) * bend + gap);
     const vf wrong = b->slope * off, bound = wrong + KERNEL_ROOT_BAND;
     const vf least = vf_min(vf_min(from->value * side, to->value * side), vf_min(b1 * side, b2 * side));
     const vf most = vf_max(vf_max(vf_abs(from->value), vf_abs(to->value)), vf_max(vf_abs(b1), vf_abs(b2)));
@@ -105,12 +126,14 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map *map, const kernel_boun
 
 /* A search under way: pieces [number, number + 1] * size of the interval, in order. */
 typedef struct kernel_search {
-    const kernel_map *map;
-    const kernel_bounds *bounds;
+    kernel_rays rays;
+    const kernel_map_lanes *map; /* set up where more is asked than the interval's ends tell, as the limits are */
+    const kernel_limits *limits;
     const kernel_interval *interval;
-    vm open;  /* rays that have pieces left */
-    vm ended; /* rays that came to the end: side is that of their last piece */
-    vf side;  /* of from: 1 or -1 */
+    int64_t *failures; /* of the map */
+    vm open;           /* rays that have pieces left */
+    vm ended;          /* rays that came to the end: side is that of their last piece */
+    vf side;           /* of from: 1 or -1 */
     vf number, size, pieces;
     kernel_point from, end;
     vm found; /* rays with a root between low and high, */
@@ -123,22 +146,22 @@ SIMD_INLINE vf kernel_side(vf v)
 }
 
 /* The interpolant at a face, or the face's value where that is the same but for rounding. */
-SIMD_INLINE void kernel_search_face(kernel_packet *p, const kernel_search *s, vm rays, vf face, kernel_point *at)
+SIMD_INLINE void kernel_search_face(const kernel_search *s, vm rays, vf face, kernel_point *at)
 {
-    const vf inside = kernel_solve(p, s->map, s->interval, rays, at->t, at->r);
+    const vf inside = kernel_solve_lanes(&s->rays, s->map, s->interval, rays, at->t, at->r, s->failures);
     at->value = vf_select(vf_le(vf_abs(inside - face), vf_set(KERNEL_FACE_BAND)), face, inside);
 }
 
 /* How far Y at the coordinates that a face gave is from the ray. */
-SIMD_INLINE vf kernel_face_gap(const kernel_packet *p, const kernel_search *s, const kernel_point *at)
+SIMD_INLINE vf kernel_face_gap(const kernel_search *s, const kernel_point *at)
 {
-    const kernel_product m = kernel_map_product(s->map, at->r);
-    const vf target[3] = {(p->origin_x + p->slope_x * at->t) - s->map->origin[0],
-                          (p->origin_y + p->slope_y * at->t) - s->map->origin[1], at->t - s->map->origin[2]};
-    vf off[3], sum = vf_set(0);
-    for (int a = 0; a < 3; a++) off[a] = kernel_polynomial_value(s->map, &s->map->position[a], &m, at->r) - target[a];
+    const kernel_map_lanes *map = s->map;
+    const kernel_product m = kernel_product_at(map->is_pyramid, at->r);
+    vf target[3], off[3], sum = vf_set(0);
+    kernel_rays_at(&s->rays, map, at->t, target);
+    for (int a = 0; a < 3; a++) off[a] = kernel_value_of(map->position[a], map->is_pyramid, &m, at->r) - target[a];
     for (int i = 0; i < 3; i++) {
-        const float *row = s->bounds->inverse[i];
+        const vf *row = s->limits->inverse[i];
         const vf y = (off[0] * row[0] + off[1] * row[1]) + off[2] * row[2];
         sum += y * y;
     }
@@ -146,53 +169,66 @@ SIMD_INLINE vf kernel_face_gap(const kernel_packet *p, const kernel_search *s, c
 }
 
 /* L on rays at depth t. */
-SIMD_INLINE vf kernel_linear_at(const kernel_packet *p, const kernel_search *s, vf t)
+SIMD_INLINE vf kernel_linear_at(const kernel_rays *rays, const kernel_map *map, const kernel_bounds *b, vf t)
 {
-    const float *g = s->bounds->gradient, *origin = s->map->origin;
-    const vf x = (p->origin_x + p->slope_x * t) - origin[0], y = (p->origin_y + p->slope_y * t) - origin[1];
-    return (s->bounds->level + g[0] * x) + (g[1] * y + g[2] * (t - origin[2]));
+    const float *g = b->gradient, *origin = map->origin;
+    const vf x = (rays->origin_x + rays->slope_x * t) - origin[0], y = (rays->origin_y + rays->slope_y * t) - origin[1];
+    return (b->level + g[0] * x) + (g[1] * y + g[2] * (t - origin[2]));
+}
+
+/* Nothing is known but the interval's ends. */
+SIMD_INLINE void kernel_search_begin(kernel_search *s)
+{
+    kernel_point_ends(s->interval, &s->low, &s->high);
+    s->from = s->low;
+    s->end = s->high;
+    s->side = kernel_side(s->interval->v_in);
+    s->ended = s->found = s->open = vm_none();
+    s->number = s->pieces = vf_set(0);
+    s->size = vf_set(0.5f);
+}
+
+SIMD_INLINE vm kernel_search_changes(const kernel_search *s)
+{
+    return vm_xor(vf_lt(s->interval->v_in, vf_set(0)), vf_lt(s->interval->v_out, vf_set(0)));
+}
+
+/* What the ends tell by bounds of the whole cell, which all rays are in: returns the rays that it leaves. */
+SIMD_INLINE vm kernel_search_ends(kernel_search *s, const kernel_map *map, const kernel_bounds *b, vm rays)
+{
+    const kernel_interval *i = s->interval;
+    const vm change = kernel_search_changes(s);
+    vm far;
+    if (b->coarsest < 1) return rays;
+    if (b->is_monotone) {
+        s->found = vm_and(rays, change);
+        rays = vm_andnot(rays, change);
+        far = vf_lt(vf_set(b->jump), vf_min(vf_abs(i->v_in), vf_abs(i->v_out)));
+    } else {
+        const vf thick = vf_set(b->thickness);
+        far = vm_and(vf_lt(thick, s->side * kernel_linear_at(&s->rays, map, b, i->t_in)),
+                     vf_lt(thick, s->side * kernel_linear_at(&s->rays, map, b, i->t_out)));
+        far = vm_andnot(far, change);
+    }
+    return vm_andnot(rays, far);
 }
 
 /* The whole interval first, by the faces' coordinates and values: most rays are done with it. */
-SIMD_INLINE void kernel_search_begin(kernel_packet *p, kernel_search *s, vm rays)
+SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
 {
     const kernel_interval *i = s->interval;
-    const vf zero = vf_set(0);
-    kernel_point_ends(i, &s->low, &s->high);
-    s->from = s->low;
-    s->end = s->high;
-    s->side = kernel_side(i->v_in);
-    s->ended = s->found = s->open = vm_none();
-    s->number = s->pieces = zero;
-    s->size = vf_set(0.5f);
-    const vm change = vm_xor(vf_lt(i->v_in, zero), vf_lt(i->v_out, zero));
-    if (s->bounds->coarsest == 1) {
-        vm far;
-        if (s->bounds->is_monotone) {
-            s->found = vm_and(rays, change);
-            rays = vm_andnot(rays, change);
-            far = vf_lt(vf_set(s->bounds->jump), vf_min(vf_abs(i->v_in), vf_abs(i->v_out)));
-        } else {
-            const vf thick = vf_set(s->bounds->thickness);
-            far = vm_and(vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_in)),
-                         vf_lt(thick, s->side * kernel_linear_at(p, s, i->t_out)));
-            far = vm_andnot(far, change);
-        }
-        rays = vm_andnot(rays, far);
-        if (!vm_any(rays)) return;
-    }
-    const vf gap = vf_max(kernel_face_gap(p, s, &s->low), kernel_face_gap(p, s, &s->high));
-    const kernel_verdict v = kernel_judge(s->map, s->bounds, &s->low, &s->high, gap, s->side);
-    const vf jump = s->bounds->slope * s->bounds->stretch * gap + KERNEL_ROOT_BAND;
+    const vm change = kernel_search_changes(s);
+    const vf gap = vf_max(kernel_face_gap(s, &s->low), kernel_face_gap(s, &s->high));
+    const kernel_verdict v = kernel_judge(s->map, s->limits, &s->low, &s->high, gap, s->side);
+    const vf jump = s->limits->slope * s->limits->stretch * gap + KERNEL_ROOT_BAND;
     const vm faced = vf_lt(jump, vf_min(i->v_in * s->side, i->v_out * s->side));
-    const vm monotone = s->bounds->is_monotone ? rays : v.monotone;
-    vm none = vm_or(v.clear, vm_and(monotone, faced)), one = vm_and(monotone, change);
-    if (s->bounds->coarsest < 1) none = one = vm_none();
+    const vm monotone = vm_or(s->limits->is_monotone, v.monotone), sure = vf_le(vf_set(1), s->limits->coarsest);
+    const vm none = vm_and(sure, vm_or(v.clear, vm_and(monotone, faced))), one = vm_and(sure, vm_and(monotone, change));
     s->found = vm_or(s->found, vm_and(rays, one));
     s->open = vm_andnot(vm_andnot(rays, none), one);
     if (!vm_any(s->open)) return;
-    kernel_search_face(p, s, s->open, i->v_in, &s->from);
-    kernel_search_face(p, s, s->open, i->v_out, &s->end);
+    kernel_search_face(s, s->open, i->v_in, &s->from);
+    kernel_search_face(s, s->open, i->v_out, &s->end);
     /* Just inside a warped face the other sign: a root in no room. */
     const vm jumps = vm_andnot(s->open, vf_eq(kernel_side(s->from.value), s->side));
     kernel_place_move(jumps, &s->from, &s->low);
@@ -201,8 +237,34 @@ SIMD_INLINE void kernel_search_begin(kernel_packet *p, kernel_search *s, vm rays
     s->found = vm_or(s->found, jumps);
 }
 
+/* What a search in one cell reads, each lane the same. */
+typedef struct kernel_search_cell {
+    kernel_map_lanes map;
+    kernel_limits limits;
+} kernel_search_cell;
+
+/* Begin it on the packet's rays, all in the cell. False where there is nothing to find. */
+SIMD_INLINE bool kernel_search_in(kernel_search *s, kernel_search_cell *cell, kernel_packet *p, const kernel_map *map,
+                                  const kernel_bounds *b, const kernel_interval *i, vm rays)
+{
+    s->rays = kernel_packet_rays(p);
+    s->map = &cell->map;
+    s->limits = &cell->limits;
+    s->interval = i;
+    s->failures = &p->thread->map_failures;
+    kernel_search_begin(s);
+    rays = kernel_search_ends(s, map, b, rays);
+    if (!vm_any(vm_or(rays, s->found))) return false;
+    kernel_map_spread(map, &cell->map);
+    if (vm_any(rays)) {
+        kernel_limits_spread(b, &cell->limits);
+        kernel_search_whole(s, rays);
+    }
+    return true;
+}
+
 /* The end of the current piece. */
-SIMD_INLINE void kernel_search_piece(kernel_packet *p, const kernel_search *s, vm rays, kernel_point *to)
+SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_point *to)
 {
     const kernel_interval *i = s->interval;
     const vf u = (s->number + 1.0f) * s->size;
@@ -211,7 +273,7 @@ SIMD_INLINE void kernel_search_piece(kernel_packet *p, const kernel_search *s, v
     if (!vm_any(inner)) return;
     kernel_point at = {.t = vf_select(inner, i->t_in + (i->t_out - i->t_in) * u, i->t_out)};
     kernel_place_between(&s->from, &s->end, at.t, at.r);
-    at.value = kernel_solve(p, s->map, i, inner, at.t, at.r);
+    at.value = kernel_solve_lanes(&s->rays, s->map, i, inner, at.t, at.r, s->failures);
     kernel_place_move(inner, &at, to);
 }
 
@@ -229,17 +291,17 @@ SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_p
 }
 
 /* To the next root of each open ray. */
-SIMD_INLINE void kernel_search_next(kernel_packet *p, kernel_search *s)
+SIMD_INLINE void kernel_search_next(kernel_search *s)
 {
     vm going = s->open;
     s->found = vm_none();
     while (vm_any(going)) {
         kernel_point to;
-        kernel_search_piece(p, s, going, &to);
-        const kernel_verdict v = kernel_judge(s->map, s->bounds, &s->from, &to, vf_set(0), s->side);
+        kernel_search_piece(s, going, &to);
+        const kernel_verdict v = kernel_judge(s->map, s->limits, &s->from, &to, vf_set(0), s->side);
         const vm small =
             vm_or(vf_le(s->size, vf_set(KERNEL_SMALLEST_PIECE)), vf_lt(vf_set(KERNEL_ROOT_PIECES), s->pieces));
-        const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, vf_set(s->bounds->coarsest)));
+        const vm certain = vm_and(vm_or(v.monotone, v.clear), vf_le(s->size, s->limits->coarsest));
         const vm decided = vm_and(going, vm_or(vm_or(certain, v.tiny), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
@@ -264,15 +326,34 @@ SIMD_INLINE void kernel_search_end(kernel_search *s)
     kernel_place_move(s->found, &s->end, &s->high);
 }
 
+/* On to further roots: false where there can be none. */
+SIMD_INLINE bool kernel_search_on(kernel_search *s)
+{
+    if (vm_any(s->open))
+        kernel_search_next(s);
+    else if (vm_any(s->ended))
+        kernel_search_end(s);
+    else
+        return false;
+    return true;
+}
+
+/* No more of these rays. */
+SIMD_INLINE void kernel_search_close(kernel_search *s, vm rays)
+{
+    s->open = vm_andnot(s->open, rays);
+    s->ended = vm_andnot(s->ended, rays);
+}
+
 /* Regula falsi that halves the value of an end that stays (Illinois), within low and high. */
-SIMD_INLINE void kernel_bracket(kernel_packet *p, const kernel_search *s, vm rays, kernel_point *out)
+SIMD_INLINE void kernel_bracket(const kernel_search *s, vm rays, kernel_point *out)
 {
     kernel_point low = s->low, high = s->high;
     for (int n = 0; n < KERNEL_BRACKET_STEPS && vm_any(rays); n++) {
         kernel_point at = {.t = kernel_secant(low.t, low.value, high.t, high.value)};
         if (n % 3 == 2) at.t = low.t + (high.t - low.t) * 0.5f;
         kernel_place_between(&low, &high, at.t, at.r);
-        at.value = kernel_solve(p, s->map, s->interval, rays, at.t, at.r);
+        at.value = kernel_solve_lanes(&s->rays, s->map, s->interval, rays, at.t, at.r, s->failures);
         const vm same = vf_eq(kernel_side(at.value), kernel_side(low.value));
         kernel_place_move(rays, &at, out);
         high.value = vf_select(same, high.value * 0.5f, high.value);
@@ -290,11 +371,6 @@ SIMD_INLINE kernel_half kernel_half_value(const kernel_half c[8], const kernel_h
     return ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4] +
            r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
-
-/* Rays in tile space. */
-typedef struct kernel_rays {
-    vf origin_x, origin_y, slope_x, slope_y;
-} kernel_rays;
 
 /* How far the places r at depth t are off their rays, and the field there, in double: exact but for the rounding of r
  * and t themselves. */
@@ -364,8 +440,8 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
     for (int a = 0; a < 3; a++) out->r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
     for (int n = 0; n < KERNEL_POLISH_STEPS && vm_any(open); n++) {
         const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
-        const vf target[3] = {(rays->origin_x + rays->slope_x * out->t) - map->origin[0],
-                              (rays->origin_y + rays->slope_y * out->t) - map->origin[1], out->t - map->origin[2]};
+        vf target[3];
+        kernel_rays_at(rays, map, out->t, target);
         for (int a = 0; a < 3; a++) off[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, &m, out->r);
         value = kernel_value_of(map->field, map->is_pyramid, &m, out->r);
         open = kernel_polish_step(rays, map, low, high, open, &m, off, value, out);
@@ -382,14 +458,11 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
     return open;
 }
 
-/* On the packet's rays, all in one cell; where steps do not converge, by the bracket alone. */
-SIMD_INLINE void kernel_polish(kernel_packet *p, const kernel_search *s, kernel_point *out)
+/* Of those that are found; where steps do not converge, by the bracket alone. */
+SIMD_INLINE void kernel_polish(const kernel_search *s, kernel_point *out)
 {
-    const kernel_rays rays = {p->origin_x, p->origin_y, p->slope_x, p->slope_y};
-    kernel_map_lanes map;
-    kernel_map_spread(s->map, &map);
-    const vm open = kernel_polish_lanes(&rays, &map, s->found, &s->low, &s->high, out);
-    if (vm_any(open)) kernel_bracket(p, s, open, out);
+    const vm open = kernel_polish_lanes(&s->rays, s->map, s->found, &s->low, &s->high, out);
+    if (vm_any(open)) kernel_bracket(s, open, out);
 }
 
 #endif

@@ -288,25 +288,16 @@ SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state,
 SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                     const kernel_poly *poly, const kernel_interval *i, vm rays)
 {
-    kernel_search s = {.map = &poly->map, .bounds = &poly->bounds, .interval = i};
-    kernel_search_begin(p, &s, rays);
-    for (;;) {
-        if (vm_any(s.found)) {
-            kernel_point at;
-            kernel_polish(p, &s, &at);
-            const vm hit = kernel_poly_accept(p, state, c, poly, s.found, &at);
-            if (state->is_opaque) {
-                s.open = vm_andnot(s.open, hit);
-                s.ended = vm_andnot(s.ended, hit);
-            }
-        }
-        if (vm_any(s.open))
-            kernel_search_next(p, &s);
-        else if (vm_any(s.ended))
-            kernel_search_end(&s);
-        else
-            return;
-    }
+    kernel_search_cell cell;
+    kernel_search s;
+    if (!kernel_search_in(&s, &cell, p, &poly->map, &poly->bounds, i, rays)) return;
+    do {
+        kernel_point at;
+        if (!vm_any(s.found)) continue;
+        kernel_polish(&s, &at);
+        const vm hit = kernel_poly_accept(p, state, c, poly, s.found, &at);
+        if (state->is_opaque) kernel_search_close(&s, hit);
+    } while (kernel_search_on(&s));
 }
 
 SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,

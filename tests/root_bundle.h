@@ -63,25 +63,20 @@ static inline kernel_beam bundle_beam(const kernel_packet *p)
 static inline vm bundle_hits(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i,
                              vf *t, vf *hits)
 {
-    kernel_search s = {.map = map, .bounds = bounds, .interval = i};
+    kernel_search_cell cell;
+    kernel_search s;
     vm hit = vm_none();
     *t = *hits = vf_set(0);
-    kernel_search_begin(&b->packet, &s, i->mask);
-    for (;;) {
-        if (vm_any(s.found)) {
-            kernel_point place;
-            kernel_polish(&b->packet, &s, &place);
-            *t = vf_select(vm_andnot(s.found, hit), place.t, *t);
-            *hits += vf_select(s.found, vf_set(1), vf_set(0));
-            hit = vm_or(hit, s.found);
-        }
-        if (vm_any(s.open))
-            kernel_search_next(&b->packet, &s);
-        else if (vm_any(s.ended))
-            kernel_search_end(&s);
-        else
-            return hit;
-    }
+    if (!kernel_search_in(&s, &cell, &b->packet, map, bounds, i, i->mask)) return hit;
+    do {
+        kernel_point place;
+        if (!vm_any(s.found)) continue;
+        kernel_polish(&s, &place);
+        *t = vf_select(vm_andnot(s.found, hit), place.t, *t);
+        *hits += vf_select(s.found, vf_set(1), vf_set(0));
+        hit = vm_or(hit, s.found);
+    } while (kernel_search_on(&s));
+    return hit;
 }
 
 #endif
