@@ -266,7 +266,7 @@ SIMD_INLINE void kernel_hex_limits(const kernel_hexes *h, vi lane, kernel_limits
     const vi at = lane * (int)(sizeof(kernel_poly) / sizeof(float));
     const kernel_bounds *b = &h->polys[0].bounds;
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 8; j++) out->bent[i][j] = vf_gather(&b->bent[i].c[j], at);
+        for (int j = 0; j < 8; j++) out->bent[i][j] = j < 4 ? vf_set(0) : vf_gather(&b->bent[i].c[j], at);
         for (int a = 0; a < 3; a++) out->inverse[i][a] = vf_gather(&b->inverse[i][a], at);
     }
     out->stretch = vf_gather(&b->stretch, at);
