@@ -10,6 +10,9 @@
 #include <math.h>
 #include <omp.h>
 #include <string.h>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 #include "comp_pixels.h"
 #include "memory.h"
@@ -100,6 +103,28 @@ static void clear(const comp_tiles *tiles, const pixel_area *area)
         }
 }
 
+/* Of a tile in which there is nothing: past the caches, which need not read what is written over, nor drop for it what
+ * tiles to come want. */
+static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
+{
+#if defined(__SSE2__)
+    const int64_t width = tiles->out->width;
+    const __m128 colour = _mm_loadu_ps(tiles->background), endless = _mm_set1_ps(INFINITY);
+    const bool is_whole = area->x % 4 == 0 && area->width % 4 == 0 && width % 4 == 0;
+    if (is_whole && ((uintptr_t)tiles->out->rgba | (uintptr_t)tiles->out->depth) % sizeof colour == 0) {
+        for (int64_t y = area->y; y < area->y + area->height; y++) {
+            float *rgba = tiles->out->rgba + 4 * (y * width + area->x);
+            float *depth = tiles->out->depth ? tiles->out->depth + y * width + area->x : NULL;
+            for (int x = 0; x < area->width; x++) _mm_stream_ps(rgba + 4 * x, colour);
+            for (int x = 0; depth && x < area->width; x += 4) _mm_stream_ps(depth + x, endless);
+        }
+        _mm_sfence();
+        return;
+    }
+#endif
+    clear(tiles, area);
+}
+
 /* The pixel's number in the area, row by row. The division is exact: half a pixel is far from where it would round. */
 static uint32_t place_in(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
 {
@@ -187,7 +212,7 @@ bool comp_tiles_take(void *state, int thread, const pixel_area *area, fragment *
     if (count)
         is_well = blend_tile(tiles, own, area, items, count);
     else
-        clear(tiles, area);
+        clear_empty(tiles, area);
     own->fragments += count;
     own->seconds += omp_get_wtime() - start;
     return is_well;
