@@ -122,7 +122,7 @@ typedef struct kernel_frame {
 
 /* One thread's state. */
 typedef struct kernel_thread {
-    void *cache;     /* cache_bytes of the kernel table, zeroed at the frame's begin */
+    void *cache;     /* cache_bytes of the kernel table, which its begin() has readied for the frame */
     uint32_t serial; /* of the tile, from 1: what the cache holds of other tiles is stale */
     fragment_list *out;
     /* Make room for more items in out; false where memory ran out. */
@@ -141,6 +141,7 @@ typedef struct kernel_thread {
 typedef struct kernel_table {
     int width;
     size_t cache_bytes;
+    void (*begin)(void *cache);
     /* Trace the tile of pixels whose upper left one is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
     /* What may show of the subtree is added to the list; grow() makes room for more, or the list full. */

@@ -59,7 +59,7 @@ static void trace_tiles(const kernel_frame *frame, kernel_thread *thread, const 
 /* Threads' states; false where memory ran out. */
 static bool begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
 {
-    const size_t cache_bytes = render_kernels()->cache_bytes;
+    const kernel_table *kernels = render_kernels();
     bool has_polyhedra = false, has_memory = true;
     for (int i = 0; i < frame->job->part_count; i++)
         has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
@@ -67,13 +67,14 @@ static bool begin_threads(const kernel_frame *frame, const frame_end *end, kerne
     {
         /* By the thread that will use it: first touch. */
         const int me = omp_get_thread_num();
-        states[me] = (kernel_thread){.cache = base_calloc(1, cache_bytes),
+        states[me] = (kernel_thread){.cache = base_alloc(kernels->cache_bytes),
                                      .out = &end->writers[me].list,
                                      .reserve = fragment_reserve,
                                      .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                      .find_polyhedron = polyhedra_find,
                                      .polyhedron_scratch = polyhedra_scratch,
                                      .now = now};
+        if (states[me].cache) kernels->begin(states[me].cache);
         has_memory = states[me].cache && (!has_polyhedra || states[me].polyhedra);
     }
     return has_memory;

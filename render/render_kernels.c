@@ -217,4 +217,12 @@ static void find_shown(const kernel_frame *f, kernel_thread *thread, const kerne
     kernel_find_shown(finder, subtree->node);
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), trace_tile, find_shown};
+/* Megabytes, most of which no tile of the frame may touch: only what is read before it is written is set. */
+static void begin(void *cache)
+{
+    kernel_memory *m = cache;
+    for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->cache.cells.cells[i].serial = 0;
+    m->segments.depth = 0;
+}
+
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), begin, trace_tile, find_shown};
