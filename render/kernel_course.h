@@ -9,7 +9,7 @@
 
 /* Of equal parts. */
 enum { KERNEL_MAX_PARTS = 256 };
-/* exp(-it) is KERNEL_BLACK. */
+/* exp(-it) is KERNEL_BLACK, or a little more. */
 #define KERNEL_DARK_DEPTH 18.4f
 
 typedef struct kernel_segment_state {

@@ -1,4 +1,5 @@
-/* The ends of a tet's segment in double, for segments of which no error is allowed, or hardly any.
+/* The ends of a tet's segment in double, for segments of which no error is allowed, or hardly any, and for functions
+ * with ramps of next to no width.
  *
  * In float32 a face's value errs by some 4e-7 of the transfer's domain: three weights, their sum, the vertices' places
  * and values, 6e-8 each. A steep function magnifies that, of opacity towards 1 a hundredfold; and the length of a short
@@ -62,6 +63,32 @@ SIMD_INLINE void kernel_fine_rays_of(const kernel_packet *p, kernel_fine_rays *o
     }
     memcpy(out->u, lanes.px, sizeof out->u);
     memcpy(out->v, lanes.py, sizeof out->v);
+}
+
+/* a + b, and what that loses to rounding (Knuth). */
+SIMD_INLINE vf kernel_fine_sum(vf a, vf b, vf *lost)
+{
+    const vf sum = a + b, other = sum - a;
+    *lost = (a - (sum - other)) + (b - other);
+    return sum;
+}
+
+/* The part from t0 to t1 of an interval that has these: the field is linear on it. */
+SIMD_INLINE kernel_fine kernel_fine_part(const kernel_interval *i, const kernel_fine *fine, vf t0, vf t1,
+                                         kernel_interval *part)
+{
+    const vf zero = vf_set(0), one = vf_set(1), length = i->t_out - i->t_in;
+    const vm is_long = vf_lt(zero, length);
+    const vf begin = vf_select(vf_lt(i->t_in, t0), vf_select(is_long, (t0 - i->t_in) / length, zero), zero);
+    const vf end = vf_select(vf_lt(t1, i->t_out), vf_select(is_long, (t1 - i->t_in) / length, one), one);
+    const vf rise = (i->v_out - i->v_in) + (fine->rest_out - fine->rest_in);
+    kernel_fine out = {.length = fine->length * (end - begin)};
+    *part = (kernel_interval){.t_in = t0, .t_out = t1};
+    part->v_in = kernel_fine_sum(i->v_in, rise * begin, &out.rest_in);
+    part->v_out = kernel_fine_sum(i->v_in, rise * end, &out.rest_out);
+    out.rest_in += fine->rest_in;
+    out.rest_out += fine->rest_in;
+    return out;
 }
 
 /* ---- a cell ---- */

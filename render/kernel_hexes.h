@@ -160,7 +160,7 @@ static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t
     return nearer;
 }
 
-/* kernel_poly_intervals() and the begin of kernel_poly_surface() and kernel_search_begin(). */
+/* kernel_poly_intervals() and the begin of kernel_poly_surface() and kernel_search_ends(). */
 static __attribute__((noinline)) void kernel_hexes_cross(const kernel_tile_trace *t, kernel_hexes *h)
 {
     h->found.count = h->others.count = 0;

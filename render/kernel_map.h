@@ -159,14 +159,6 @@ SIMD_INLINE vf kernel_polynomial_value(const kernel_map *map, const kernel_polyn
     return kernel_value_of(c, map->is_pyramid, m, r);
 }
 
-SIMD_INLINE void kernel_polynomial_gradient(const kernel_map *map, const kernel_polynomial *p, const kernel_product *m,
-                                            const vf r[3], vf out[3])
-{
-    vf c[8];
-    kernel_polynomial_spread(p, c);
-    kernel_gradient_of(c, map->is_pyramid, m, r, out);
-}
-
 SIMD_INLINE void kernel_cross(const vf a[3], const vf b[3], vf out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];

@@ -305,7 +305,7 @@ SIMD_INLINE void kernel_search_next(kernel_search *s)
         const vm decided = vm_and(going, vm_or(vm_or(certain, v.tiny), small));
         const vm roots = vm_andnot(decided, vf_eq(kernel_side(to.value), s->side));
         const vm halve = vm_andnot(going, decided);
-        s->pieces += 1.0f;
+        s->pieces += vf_select(going, vf_set(1), vf_set(0)); /* each ray's own: it is searched as alone */
         kernel_place_move(roots, &s->from, &s->low);
         kernel_place_move(roots, &to, &s->high);
         s->found = vm_or(s->found, roots);

@@ -118,6 +118,28 @@ SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state
     }
 }
 
+/* The same of a tet with its ends in double. */
+SIMD_INLINE void kernel_fine_run(kernel_packet *p, kernel_segment_state *state, const kernel_interval *i,
+                                 const kernel_fine *fine)
+{
+    kernel_segments *list = state->list;
+    vf from = vf_max(i->t_in, p->t_near);
+    const vf end = vf_min(i->t_out, p->t_far);
+    vm open = vm_and(i->mask, vm_and(p->active, vf_lt(from, end)));
+    while (vm_any(open)) {
+        vf to = end;
+        if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
+        const vm mine = vm_and(open, vm_and(vf_le(list->t_begin, from), vf_lt(from, list->t_end)));
+        if (vm_any(mine)) {
+            kernel_interval part;
+            const kernel_fine own = kernel_fine_part(i, fine, from, to, &part);
+            kernel_segments_add(state->pieces, list, mine, &part, &own);
+        }
+        from = to;
+        open = vm_and(open, vf_lt(from, end));
+    }
+}
+
 /* A tet is one segment, cut by surfaces alone. fine_cell is looked at where the list is fine. */
 static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kernel_segment_state *state,
                                                           const kernel_cell *c, const kernel_fine_cell *fine_cell,
@@ -132,6 +154,11 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     if (list->cuts.row_count) cut = vm_or(cut, vf_lt(kernel_next_cut(p, &list->cuts, i.t_in, true), i.t_out));
     if (__builtin_expect(state->mixing > 0 || vm_any(vm_and(i.mask, cut)), 0)) {
         kernel_course course = {.interval = &i};
+        if (list->is_fine && !(state->mixing > 0)) {
+            fine = kernel_tet_fine(p, c, fine_cell, &list->rays, &i);
+            kernel_fine_run(p, state, &i, &fine);
+            return;
+        }
         if (state->mixing > 0) kernel_course_bound(state, c->f, c->count, &course);
         kernel_course_run(p, state, &course);
         return;

@@ -345,7 +345,7 @@ static void make_bundle(bundle *b, reference_cell *cell, course *scratch, bent k
 /* ---- the comparison ---- */
 
 typedef struct count {
-    int64_t rays, certain, missed, off, inverse_failures;
+    int64_t rays, certain, missed, off, differing, inverse_failures;
     double worst, worst_band; /* residual in bands; band */
 } count;
 
@@ -381,6 +381,23 @@ static void judge_ray(count *n, const kernel_map *map, course *c, double low, do
     n->off += residual > 1;
 }
 
+/* What a ray is found does not depend on the others of its packet: rays whose first crossing, or number of crossings,
+ * is another when they are alone. */
+static int64_t differ_alone(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i,
+                            vf t, vf hits)
+{
+    int64_t differing = 0;
+    for (unsigned rays = vm_bits(i->mask); rays; rays &= rays - 1) {
+        const int lane = __builtin_ctz(rays);
+        kernel_interval alone = *i;
+        vf own_t, own_hits;
+        alone.mask = vm_from_bits(1u << lane);
+        bundle_hits(b, map, bounds, &alone, &own_t, &own_hits);
+        differing += own_t[lane] != t[lane] || own_hits[lane] != hits[lane];
+    }
+    return differing;
+}
+
 static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count *n)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
@@ -393,6 +410,7 @@ static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count
     for (int i = 0; i < intervals; i++) {
         vf t, hits;
         const unsigned hit = vm_bits(bundle_hits(b, &map, &bounds, &list[i], &t, &hits));
+        n->differing += differ_alone(b, &map, &bounds, &list[i], t, hits);
         for (int lane = 0; lane < SIMD_WIDTH; lane++) {
             if (!(vm_bits(list[i].mask) >> lane & 1)) continue;
             *c = (course){.cell = cell, .values = b->values, .line = line_of(b, lane)};
@@ -426,6 +444,7 @@ static void curved_rays_miss_no_first_root(void **state)
         assert_int_equal(n.inverse_failures, 0);
         assert_int_equal(n.missed, 0);
         assert_int_equal(n.off, 0);
+        assert_int_equal(n.differing, 0);
         assert_int_equal(map_failures, 0);
     }
 }

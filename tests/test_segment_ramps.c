@@ -34,7 +34,12 @@ static double rounding_of(const step_function *function, double width, double un
 }
 
 /* The worst of each error asked for. Ramps do not begin at float32's numbers. */
-static void judge_ramp(test_cell_shape shape, bool is_polyhedron, double width, double worst[3])
+typedef enum ramp_scene { ALONE, CUT, POLYHEDRON } ramp_scene;
+
+/* What a surface that cuts the cell takes of the light. */
+#define FILM 1e-7f
+
+static void judge_ramp(test_cell_shape shape, ramp_scene scene, double width, double worst[3])
 {
     static const float opacities[3][4] = {{0, 0, 0.9f, 0.9f}, {0.8f, 0.8f, 0, 0.3f}, {0.1f, 0.2f, 0.6f, 0.1f}};
     for (uint64_t seed = 0; seed < SEEDS * FIELDS; seed++) {
@@ -42,17 +47,19 @@ static void judge_ramp(test_cell_shape shape, bool is_polyhedron, double width, 
         render_fixture f;
         step_function function;
         double cell_worst[3] = {0};
-        const double begin = 0.6 + 0.01 * test_uniform(seed, 77), unit = seed / 2 % 2 ? 0.02 : 0.3;
+        const double begin = 0.6 + 0.01 * test_uniform(seed, 77), middle = begin + 0.5 * width,
+                     unit = seed / 2 % 2 ? 0.02 : 0.3;
         memcpy(function.opacities, opacities[seed / FIELDS % 3], sizeof function.opacities);
         step_make_cell(shape, seed, &mesh);
         for (int64_t i = 0; i < mesh.vertex_count; i++)
             mesh.values[i] = begin + width * share_of((int)(seed % FIELDS), (uint64_t)i, seed);
-        if (is_polyhedron) test_mesh_to_polyhedra(&mesh, 1);
+        if (scene == POLYHEDRON) test_mesh_to_polyhedra(&mesh, 1);
         step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, SIDE);
         step_set_function(&f, &function, begin, width, unit);
+        if (scene == CUT) fixture_add_surface(&f, &middle, 1, FILM);
         step_judge(&f, 1, 1e-7, cell_worst);
         for (int i = 0; i < 3; i++) {
-            if (is_polyhedron) cell_worst[i] -= rounding_of(&function, width, unit);
+            if (scene == POLYHEDRON) cell_worst[i] -= rounding_of(&function, width, unit);
             worst[i] = test_worse(worst[i], cell_worst[i]);
         }
         fixture_free(&f);
@@ -60,15 +67,16 @@ static void judge_ramp(test_cell_shape shape, bool is_polyhedron, double width, 
     }
 }
 
-static void judge_ramps(bool are_polyhedra)
+static void judge_ramps(ramp_scene scene)
 {
+    static const char *const how[] = {"", " cut by a surface", " as polyhedron"};
     for (int kind = 0; kind < STEP_SHAPES; kind++)
         for (int k = 0; k < WIDTHS; k++) {
             double worst[3] = {0};
             char what[80];
-            judge_ramp(step_shapes[kind], are_polyhedra, widths[k], worst);
-            snprintf(what, sizeof what, "%s%s within a ramp of %g", test_cell_shape_name(step_shapes[kind]),
-                     are_polyhedra ? " as polyhedron" : "", widths[k]);
+            judge_ramp(step_shapes[kind], scene, widths[k], worst);
+            snprintf(what, sizeof what, "%s%s within a ramp of %g", test_cell_shape_name(step_shapes[kind]), how[scene],
+                     widths[k]);
             step_assert_kept(worst, what);
         }
 }
@@ -76,19 +84,27 @@ static void judge_ramps(bool are_polyhedra)
 static void fields_within_a_narrow_ramp(void **state)
 {
     (void)state;
-    judge_ramps(false);
+    judge_ramps(ALONE);
+}
+
+/* By a surface that lets all but a ten-millionth through: the picture is the same. */
+static void cut_fields_within_a_narrow_ramp(void **state)
+{
+    (void)state;
+    judge_ramps(CUT);
 }
 
 static void polyhedra_within_a_narrow_ramp(void **state)
 {
     (void)state;
-    judge_ramps(true);
+    judge_ramps(POLYHEDRON);
 }
 
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fields_within_a_narrow_ramp),
+        cmocka_unit_test(cut_fields_within_a_narrow_ramp),
         cmocka_unit_test(polyhedra_within_a_narrow_ramp),
     };
     if (argc > 1) cmocka_set_test_filter(argv[1]);
