@@ -26,6 +26,7 @@ typedef struct kernel_course {
     const kernel_map *map;   /* NULL: linear */
     const kernel_cell *cell; /* NULL: a tet or a polyhedron; without a map it is of one value */
     const kernel_interval *interval;
+    const kernel_fine *fine;    /* of a tet's interval in double; NULL: none */
     float cost;                 /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
     int first_step, step_count; /* the steps of the opacity among the cell's values */
     bool is_steep, is_narrow;   /* steep ramps are, narrow ones */
@@ -66,10 +67,7 @@ SIMD_INLINE void kernel_course_bound(const kernel_segment_state *state, const fl
 SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
 {
     const kernel_interval *i = course->interval;
-    if (course->map) return kernel_value_at(p, course->map, i, rays, t);
-    const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    return i->v_in + along * (i->v_out - i->v_in);
+    return course->map ? kernel_value_at(p, course->map, i, rays, t) : kernel_line_value(i, t);
 }
 
 /* Rays whose values, from low to high, have a steep ramp among them, or a narrow one. */
@@ -177,16 +175,25 @@ SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state 
     return vf_clamp(-vf_floor(-parts), vf_set(1), most);
 }
 
+/* a + b, and what that loses to rounding (Knuth). */
+SIMD_INLINE vf kernel_exact_sum(vf a, vf b, vf *lost)
+{
+    const vf sum = a + b, other = sum - a;
+    *lost = (a - (sum - other)) + (b - other);
+    return sum;
+}
+
 /* The share of a segment from `from` to `to`. */
 SIMD_INLINE kernel_run kernel_run_within(const kernel_run *whole, vf from, vf to)
 {
-    const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in), one = vf_set(1);
-    const vm begins = vf_eq(from, vf_set(0)), ends = vf_eq(to, one);
+    const vf rise = (whole->v_out - whole->v_in) + (whole->rest_out - whole->rest_in);
+    const vm begins = vf_eq(from, vf_set(0)), ends = vf_eq(to, vf_set(1));
     kernel_run out = {.length = whole->length * (to - from)};
-    out.v_in = vf_select(begins, whole->v_in, whole->v_in + (rise * from + whole->rest_in));
-    out.rest_in = vf_select(begins, whole->rest_in, vf_set(0));
-    out.v_out = vf_select(ends, whole->v_out, whole->v_in + (rise * to + whole->rest_in));
-    out.rest_out = vf_select(ends, whole->rest_out, vf_set(0));
+    out.v_in =
+        vf_select(begins, whole->v_in, kernel_exact_sum(whole->v_in, rise * from + whole->rest_in, &out.rest_in));
+    out.v_out = vf_select(ends, whole->v_out, kernel_exact_sum(whole->v_in, rise * to + whole->rest_in, &out.rest_out));
+    out.rest_in = vf_select(begins, whole->rest_in, out.rest_in);
+    out.rest_out = vf_select(ends, whole->rest_out, out.rest_out);
     return out;
 }
 

@@ -13,11 +13,6 @@ typedef struct kernel_exact_map {
     double position[3][8], field[8];
 } kernel_exact_map;
 
-static inline double kernel_exact_domain(const kernel_transfer *transfer, double value)
-{
-    return fmax(fmin((value - transfer->low) * transfer->inverse_width, 1e18), -1e18);
-}
-
 static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, const kernel_cell *c,
                                const kernel_transfer *transfer)
 {
@@ -27,7 +22,7 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
         d[0][i] = spot.x;
         d[1][i] = spot.y;
         d[2][i] = spot.t;
-        d[3][i] = kernel_exact_domain(transfer, c->values[i]);
+        d[3][i] = kernel_fine_domain(transfer, c->values[i]);
     }
     m->is_pyramid = c->type == GRID_PYRAMID;
     for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);

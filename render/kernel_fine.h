@@ -65,32 +65,6 @@ SIMD_INLINE void kernel_fine_rays_of(const kernel_packet *p, kernel_fine_rays *o
     memcpy(out->v, lanes.py, sizeof out->v);
 }
 
-/* a + b, and what that loses to rounding (Knuth). */
-SIMD_INLINE vf kernel_fine_sum(vf a, vf b, vf *lost)
-{
-    const vf sum = a + b, other = sum - a;
-    *lost = (a - (sum - other)) + (b - other);
-    return sum;
-}
-
-/* The part from t0 to t1 of an interval that has these: the field is linear on it. */
-SIMD_INLINE kernel_fine kernel_fine_part(const kernel_interval *i, const kernel_fine *fine, vf t0, vf t1,
-                                         kernel_interval *part)
-{
-    const vf zero = vf_set(0), one = vf_set(1), length = i->t_out - i->t_in;
-    const vm is_long = vf_lt(zero, length);
-    const vf begin = vf_select(vf_lt(i->t_in, t0), vf_select(is_long, (t0 - i->t_in) / length, zero), zero);
-    const vf end = vf_select(vf_lt(t1, i->t_out), vf_select(is_long, (t1 - i->t_in) / length, one), one);
-    const vf rise = (i->v_out - i->v_in) + (fine->rest_out - fine->rest_in);
-    kernel_fine out = {.length = fine->length * (end - begin)};
-    *part = (kernel_interval){.t_in = t0, .t_out = t1};
-    part->v_in = kernel_fine_sum(i->v_in, rise * begin, &out.rest_in);
-    part->v_out = kernel_fine_sum(i->v_in, rise * end, &out.rest_out);
-    out.rest_in += fine->rest_in;
-    out.rest_out += fine->rest_in;
-    return out;
-}
-
 /* ---- a cell ---- */
 
 /* A vertex as kernel_place_in() has it before it rounds; depth: what u and v are multiplied by. */
@@ -131,6 +105,12 @@ SIMD_INLINE void kernel_fine_sums(const kernel_fine_spot *i, const kernel_fine_s
         out->least += KERNEL_FINE_EDGE * (n ? radius : 1) * ((fabs(ij->c[n]) + fabs(jk->c[n])) + fabs(ik->c[n]));
 }
 
+/* The value in the transfer's domain. */
+static inline double kernel_fine_domain(const kernel_transfer *transfer, double value)
+{
+    return fmax(fmin((value - transfer->low) * transfer->inverse_width, 1e18), -1e18);
+}
+
 /* c: a tet that is placed. */
 static __attribute__((noinline)) void kernel_fine_begin(const kernel_frame *f, const kernel_tile *tile,
                                                         const kernel_cell *c, const kernel_transfer *transfer,
@@ -140,7 +120,7 @@ static __attribute__((noinline)) void kernel_fine_begin(const kernel_frame *f, c
     kernel_affine edges[KERNEL_TET_EDGES];
     for (int i = 0; i < 4; i++) {
         spots[i] = kernel_fine_place(f, tile, c->world[i]);
-        spots[i].value = fmax(fmin((c->values[i] - transfer->low) * transfer->inverse_width, 1e18), -1e18);
+        spots[i].value = kernel_fine_domain(transfer, c->values[i]);
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++)
         edges[n] = kernel_fine_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]]);

@@ -414,7 +414,7 @@ static __attribute__((noinline, cold)) void kernel_course_halve(kernel_packet *p
             h.in.r[a] = (double)i->r_in[a][n];
             h.out.r[a] = (double)i->r_out[a][n];
         }
-        if (!course->map && course->cell) h.in.v = h.out.v = kernel_exact_domain(transfer, course->cell->values[0]);
+        if (!course->map && course->cell) h.in.v = h.out.v = kernel_fine_domain(transfer, course->cell->values[0]);
         const double whole = h.out.t - h.in.t;
         if (!(whole > 0)) continue;
         const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;

@@ -10,11 +10,22 @@ SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
     return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
 }
 
-/* A guess for the coordinates at t: on the line between those at the faces. */
-SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
+/* How much of the interval lies before t: 0 .. 1. */
+SIMD_INLINE vf kernel_share(const kernel_interval *i, vf t)
 {
     const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
+    return vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
+}
+
+/* The value at t on the line between those at the faces; and a guess for the coordinates there, likewise. */
+SIMD_INLINE vf kernel_line_value(const kernel_interval *i, vf t)
+{
+    return i->v_in + kernel_share(i, t) * (i->v_out - i->v_in);
+}
+
+SIMD_INLINE void kernel_guess(const kernel_interval *i, vf t, vf r[3])
+{
+    const vf along = kernel_share(i, t);
     for (int a = 0; a < 3; a++) r[a] = i->r_in[a] + along * (i->r_out[a] - i->r_in[a]);
 }
 
@@ -24,20 +35,16 @@ SIMD_INLINE vf kernel_solve_lanes(const kernel_rays *rays, const kernel_map_lane
                                   vm wanted, vf t, vf r[3], int64_t *failures)
 {
     const vm failed = kernel_map_invert(rays, map, wanted, t, r);
-    kernel_product m;
-    if (!vm_any(failed)) {
-        m = kernel_product_at(map->is_pyramid, r);
-        return kernel_value_of(map->field, map->is_pyramid, &m, r);
+    const bool has_failed = vm_any(failed);
+    if (has_failed) {
+        vf line[3];
+        kernel_guess(i, t, line);
+        for (int a = 0; a < 3; a++) r[a] = vf_select(failed, line[a], r[a]);
+        *failures += __builtin_popcount(vm_bits(failed));
     }
-    vf line[3];
-    kernel_guess(i, t, line);
-    for (int a = 0; a < 3; a++) r[a] = vf_select(failed, line[a], r[a]);
-    *failures += __builtin_popcount(vm_bits(failed));
-    m = kernel_product_at(map->is_pyramid, r);
-    const vf length = i->t_out - i->t_in;
-    const vf along = vf_select(vf_lt(vf_set(0), length), (t - i->t_in) / length, vf_set(0));
-    return vf_select(failed, i->v_in + along * (i->v_out - i->v_in),
-                     kernel_value_of(map->field, map->is_pyramid, &m, r));
+    const kernel_product m = kernel_product_at(map->is_pyramid, r);
+    const vf value = kernel_value_of(map->field, map->is_pyramid, &m, r);
+    return has_failed ? vf_select(failed, kernel_line_value(i, t), value) : value;
 }
 
 /* The packet's rays, all in one cell. */

@@ -56,12 +56,29 @@ SIMD_INLINE vf kernel_parts_lift(const kernel_parts *s, vm is_first, vm is_last)
     return bend * (-1.0f / 12);
 }
 
+/* The stretch from t0 to t1 of an interval in double, as one segment where it begins in the window. */
+SIMD_INLINE void kernel_course_fine(kernel_segment_state *state, const kernel_course *course, vm rays, vf t0, vf t1)
+{
+    const kernel_interval *i = course->interval;
+    const kernel_fine *fine = course->fine;
+    const kernel_run whole = {fine->length, i->v_in, i->v_out, fine->rest_in, fine->rest_out};
+    const kernel_run run = kernel_run_within(&whole, kernel_share(i, t0), kernel_share(i, t1));
+    const kernel_interval part = {.t_in = t0, .t_out = t1, .v_in = run.v_in, .v_out = run.v_out};
+    const kernel_fine own = {run.length, run.rest_in, run.rest_out};
+    const vm mine = vm_and(vf_le(state->list->t_begin, t0), vf_lt(t0, state->list->t_end));
+    kernel_segments_add(state->pieces, state->list, vm_and(rays, mine), &part, &own);
+}
+
 /* The stretch from t0 to t1 as segments; those that begin in the window are kept. */
 SIMD_INLINE void kernel_course_segments(kernel_packet *p, kernel_segment_state *state, const kernel_course *course,
                                         vm rays, vf t0, vf t1)
 {
     kernel_segments *list = state->list;
     kernel_parts s = {.t0 = t0, .t1 = t1, .from = t0};
+    if (course->fine) {
+        kernel_course_fine(state, course, rays, t0, t1);
+        return;
+    }
     s.before = kernel_course_value(p, course, rays, t0);
     s.last = kernel_course_value(p, course, rays, t1);
     vm halved;
@@ -118,26 +135,20 @@ SIMD_INLINE void kernel_course_run(kernel_packet *p, kernel_segment_state *state
     }
 }
 
-/* The same of a tet with its ends in double. */
-SIMD_INLINE void kernel_fine_run(kernel_packet *p, kernel_segment_state *state, const kernel_interval *i,
-                                 const kernel_fine *fine)
+/* The rays of a tet's interval that surfaces cut, or on which it is to be mixed with others. */
+static __attribute__((noinline)) void kernel_tet_course(kernel_packet *p, kernel_segment_state *state,
+                                                        const kernel_cell *c, const kernel_fine_cell *fine_cell,
+                                                        kernel_interval i)
 {
-    kernel_segments *list = state->list;
-    vf from = vf_max(i->t_in, p->t_near);
-    const vf end = vf_min(i->t_out, p->t_far);
-    vm open = vm_and(i->mask, vm_and(p->active, vf_lt(from, end)));
-    while (vm_any(open)) {
-        vf to = end;
-        if (list->cuts.row_count) to = vf_min(end, kernel_next_cut(p, &list->cuts, from, true));
-        const vm mine = vm_and(open, vm_and(vf_le(list->t_begin, from), vf_lt(from, list->t_end)));
-        if (vm_any(mine)) {
-            kernel_interval part;
-            const kernel_fine own = kernel_fine_part(i, fine, from, to, &part);
-            kernel_segments_add(state->pieces, list, mine, &part, &own);
-        }
-        from = to;
-        open = vm_and(open, vf_lt(from, end));
+    kernel_course course = {.interval = &i};
+    kernel_fine fine;
+    if (state->mixing > 0) {
+        kernel_course_bound(state, c->f, c->count, &course);
+    } else if (state->list->is_fine) {
+        fine = kernel_tet_fine(p, c, fine_cell, &state->list->rays, &i);
+        course.fine = &fine;
     }
+    kernel_course_run(p, state, &course);
 }
 
 /* A tet is one segment, cut by surfaces alone. fine_cell is looked at where the list is fine. */
@@ -147,26 +158,22 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
 {
     kernel_segments *list = state->list;
     kernel_interval i;
-    kernel_fine fine;
     kernel_tet_interval(p, c, rays, false, &i);
     if (!vm_any(i.mask)) return;
+    const vm hit = i.mask;
     vm cut = vm_or(vf_lt(i.t_in, p->t_near), vf_lt(p->t_far, i.t_out));
     if (list->cuts.row_count) cut = vm_or(cut, vf_lt(kernel_next_cut(p, &list->cuts, i.t_in, true), i.t_out));
-    if (__builtin_expect(state->mixing > 0 || vm_any(vm_and(i.mask, cut)), 0)) {
-        kernel_course course = {.interval = &i};
-        if (list->is_fine && !(state->mixing > 0)) {
-            fine = kernel_tet_fine(p, c, fine_cell, &list->rays, &i);
-            kernel_fine_run(p, state, &i, &fine);
-            return;
-        }
-        if (state->mixing > 0) kernel_course_bound(state, c->f, c->count, &course);
-        kernel_course_run(p, state, &course);
-        return;
+    cut = state->mixing > 0 ? hit : vm_and(hit, cut);
+    if (__builtin_expect(vm_any(cut), 0)) {
+        i.mask = cut;
+        kernel_tet_course(p, state, c, fine_cell, i);
+        i.mask = vm_andnot(hit, cut);
     }
     const vm window = vm_and(vf_le(list->t_begin, i.t_in), vf_lt(i.t_in, list->t_end));
     vm mine = vm_and(i.mask, window);
     if (!list->is_fine) mine = vm_and(mine, vf_lt(i.t_in, i.t_out));
     if (!vm_any(mine)) return;
+    kernel_fine fine;
     if (list->is_fine) {
         /* Of segments whose ends float32 does not tell apart, many may lie on one ray. */
         fine = kernel_tet_fine(p, c, fine_cell, &list->rays, &i);

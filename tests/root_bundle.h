@@ -59,6 +59,16 @@ static inline kernel_beam bundle_beam(const kernel_packet *p)
     return beam;
 }
 
+/* The packet's intervals in the cell, with its map and bounds; returns how many they are. */
+static inline int bundle_intervals(bundle *b, kernel_interval list[KERNEL_MAX_CELL_INTERVALS], kernel_map *map,
+                                   kernel_bounds *bounds)
+{
+    const kernel_beam beam = bundle_beam(&b->packet);
+    kernel_map_setup(map, &b->cell);
+    kernel_bounds_setup(bounds, map, b->cell.type, &beam);
+    return kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
+}
+
 /* First hits on all rays, and how many hits there are. */
 static inline vm bundle_hits(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i,
                              vf *t, vf *hits)

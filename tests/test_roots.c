@@ -252,10 +252,7 @@ static void judge_bundle(bundle *b, rates *r)
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
     kernel_bounds bounds;
-    const int intervals = kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
-    kernel_map_setup(&map, &b->cell);
-    const kernel_beam beam = bundle_beam(&b->packet);
-    kernel_bounds_setup(&bounds, &map, GRID_HEX, &beam);
+    const int intervals = bundle_intervals(b, list, &map, &bounds);
     r->monotone += bounds.is_monotone;
     for (int n = 0; n < intervals; n++) {
         vf t[6], hits;

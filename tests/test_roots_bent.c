@@ -403,10 +403,7 @@ static void judge_bundle(bundle *b, const reference_cell *cell, course *c, count
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     kernel_map map;
     kernel_bounds bounds;
-    const int intervals = kernel_poly_intervals(&b->packet, &b->cell, b->packet.active, false, list);
-    kernel_map_setup(&map, &b->cell);
-    const kernel_beam beam = bundle_beam(&b->packet);
-    kernel_bounds_setup(&bounds, &map, b->cell.type, &beam);
+    const int intervals = bundle_intervals(b, list, &map, &bounds);
     for (int i = 0; i < intervals; i++) {
         vf t, hits;
         const unsigned hit = vm_bits(bundle_hits(b, &map, &bounds, &list[i], &t, &hits));
