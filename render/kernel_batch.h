@@ -377,7 +377,6 @@ SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
 SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int part)
 {
     const int layer = t->layer;
-    const render_surface_layer *l = t->surface->layer;
     if (b->layer == layer && b->part == part) return;
     if (b->count) {
         kernel_tile_set_layer(t, b->layer);
@@ -386,7 +385,7 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     }
     b->layer = layer;
     b->part = part;
-    kernel_plain_begin(&b->plain, t->frame, t->frame->job->parts[part].cells, &l->field.fields[part]);
+    kernel_plain_surface(&b->plain, t->frame, layer, part);
     b->is_for_it = b->plain.is_so && kernel_tile_layer_batches(t);
 }
 
@@ -402,15 +401,15 @@ SIMD_INLINE void kernel_batch_add(kernel_tile_trace *t, kernel_batch *b, const k
 {
     if (b->count == SIMD_WIDTH) kernel_batch_run(t, b);
     const int n = b->count++;
-    const int32_t *vertices = b->plain.connectivity + 4 * (int64_t)shown->cell;
     b->cell[n] = shown->cell;
     b->blocks[n] = shown->blocks;
     b->box[n] = shown->box;
     b->near[n] = shown->near;
     b->value[n] = value;
     b->isovalue[n] = t->surface->layer->values[value];
-    for (int i = 0; i < 4; i++) b->vertex[i][n] = vertices[i];
-    for (int i = 0; i < 4; i++) kernel_plain_prefetch(&b->plain, vertices[i]);
+    for (int i = 0; i < 4; i++) b->vertex[i][n] = kernel_plain_vertex(&b->plain, shown->cell, 4, i);
+    if (b->plain.connectivity)
+        for (int i = 0; i < 4; i++) kernel_plain_prefetch(&b->plain, b->vertex[i][n]);
     for (unsigned blocks = shown->blocks & ~t->begun; blocks; blocks &= blocks - 1)
         kernel_block_begin(t, __builtin_ctz(blocks));
 }

@@ -50,6 +50,9 @@ typedef struct kernel_finder {
     kernel_crossed_hexes hexes;
     kernel_plain plain;
     int coming_count;
+    /* The other end: what is crossed is kept, and the picture is not asked. */
+    kernel_keeper *keeper; /* NULL: none */
+    bool (*keep)(kernel_keeper *keeper);
 } kernel_finder;
 
 /* The least float that is not below x. */
@@ -81,7 +84,11 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
     s->coming_count = s->tets.count = s->hexes.count = s->hexes.value = 0;
-    kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
+    s->keeper = NULL;
+    if (s->surface)
+        kernel_plain_surface(&s->plain, f, subtree->surface, s->part);
+    else
+        kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     s->plain.is_hexes = s->plain.is_hexes && s->surface;
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;

@@ -418,7 +418,6 @@ SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const 
 {
     if (h->count == SIMD_WIDTH) kernel_hexes_run(t, h);
     const int n = h->count++;
-    const int32_t *vertices = h->plain.connectivity + 8 * (int64_t)shown->cell;
     h->cell[n] = shown->cell;
     h->blocks[n] = shown->blocks;
     h->box[n] = shown->box;
@@ -426,8 +425,8 @@ SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const 
     h->value[n] = value;
     h->isovalue[n] = t->surface->layer->values[value];
     for (int i = 0; i < 8; i++) {
-        h->vertex[i][n] = vertices[i];
-        kernel_plain_prefetch(&h->plain, vertices[i]);
+        h->vertex[i][n] = kernel_plain_vertex(&h->plain, shown->cell, 8, i);
+        kernel_plain_prefetch(&h->plain, h->vertex[i][n]);
     }
 }
 

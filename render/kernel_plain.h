@@ -11,7 +11,7 @@ typedef struct kernel_plain {
     bool is_so;          /* of tets; */
     bool is_hexes;       /* of hexes */
     bool is_interleaved; /* a vertex's coordinates are side by side */
-    const int32_t *connectivity;
+    const int32_t *connectivity; /* NULL: the cells' vertices are one after the other */
     const float *coordinates[3], *values;
     int32_t stride, value_stride;
     float eye[3][2], scale; /* in two parts: the nearest float, and what is left */
@@ -53,6 +53,33 @@ static inline void kernel_plain_begin(kernel_plain *p, const kernel_frame *f, co
     p->is_so = p->is_so && g->cell_type == GRID_TET;
 }
 
+/* What is kept of a surface's cells on a part; NULL: nothing is. */
+SIMD_INLINE const kernel_kept *kernel_kept_of(const kernel_frame *f, int surface, int part)
+{
+    const kernel_kept *kept = f->kept ? &f->kept[surface * f->job->part_count + part] : NULL;
+    return kept && kept->records ? kept : NULL;
+}
+
+/* A surface's cells on a part: as they are kept, or else in the mesh. */
+static inline void kernel_plain_surface(kernel_plain *p, const kernel_frame *f, int surface, int part)
+{
+    const kernel_kept *kept = kernel_kept_of(f, surface, part);
+    kernel_plain_begin(p, f, f->job->parts[part].cells, &f->surfaces[surface].layer->field.fields[part]);
+    if (!kept) return;
+    p->connectivity = NULL;
+    for (int a = 0; a < 3; a++) p->coordinates[a] = kept->records + a;
+    p->values = kept->records + 3;
+    p->stride = p->value_stride = KERNEL_KEPT_FLOATS;
+    p->is_interleaved = true;
+}
+
+/* A cell's i-th vertex, of so many. */
+SIMD_INLINE int32_t kernel_plain_vertex(const kernel_plain *p, uint32_t cell, int vertices, int i)
+{
+    const int64_t at = (int64_t)cell * vertices + i;
+    return p->connectivity ? p->connectivity[at] : (int32_t)at;
+}
+
 SIMD_INLINE void kernel_plain_prefetch(const kernel_plain *p, int32_t vertex)
 {
     const int64_t at = (int64_t)vertex * p->stride;
@@ -66,14 +93,13 @@ SIMD_INLINE void kernel_plain_prefetch(const kernel_plain *p, int32_t vertex)
 SIMD_INLINE void kernel_plain_cell(kernel_cell *c, const kernel_plain *p, const kernel_frame *f,
                                    const kernel_tile *tile, uint32_t index)
 {
-    const int32_t *vertices = p->connectivity + 4 * (int64_t)index;
     c->index = index;
     c->type = GRID_TET;
     c->count = 4;
     c->is_finite = c->is_placed = true;
     c->has_lines = c->has_normal = false;
     for (int i = 0; i < 4; i++) {
-        const int64_t vertex = vertices[i];
+        const int64_t vertex = kernel_plain_vertex(p, index, 4, i);
         c->vertices[i] = vertex;
         c->values[i] = (double)p->values[vertex * p->value_stride];
         for (int a = 0; a < 3; a++) c->world[i][a] = (double)p->coordinates[a][vertex * p->stride];

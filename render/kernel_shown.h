@@ -15,12 +15,15 @@
 #ifndef RENDER_KERNEL_SHOWN_H
 #define RENDER_KERNEL_SHOWN_H
 
+#include "kernel_keep.h"
 #include "kernel_shown_hexes.h"
 
 /* Those that wait for their vertices. */
 static void kernel_find_waiting(kernel_finder *s)
 {
-    if (s->plain.is_hexes)
+    if (s->keeper)
+        kernel_keep_waiting(s);
+    else if (s->plain.is_hexes)
         kernel_find_plain_hexes(s);
     else if (s->plain.is_so)
         kernel_find_plain_tets(s);
@@ -36,11 +39,10 @@ static void kernel_find_coming_plain(kernel_finder *s)
     const kernel_plain *p = &s->plain;
     const int count = p->is_hexes ? 8 : 4;
     for (int n = 0; n < s->coming_count; n++) {
-        const int32_t *vertices = p->connectivity + count * (int64_t)s->coming[n];
         s->tets.cell[n] = s->coming[n];
         for (int i = 0; i < count; i++) {
-            s->tets.plain[i][n] = vertices[i];
-            kernel_plain_prefetch(p, vertices[i]);
+            s->tets.plain[i][n] = kernel_plain_vertex(p, s->coming[n], count, i);
+            kernel_plain_prefetch(p, s->tets.plain[i][n]);
         }
     }
     s->tets.count = s->coming_count;
@@ -164,8 +166,8 @@ static void kernel_find_shown(kernel_finder *s, int64_t root)
     const mmbvh_ranges *ranges = &s->field->ranges[s->part];
     int64_t stack[KERNEL_FRONT_ROOM + 2 * KERNEL_FRONT];
     int top = 0;
-    stack[top++] = 2 * root;
-    while (top && !s->list->is_full) {
+    stack[top++] = 2 * root + (s->keeper != NULL);
+    while (top && !(s->keeper ? s->keeper->is_refused : s->list->is_full)) {
         kernel_front front, leaves, children;
         const int most = top < KERNEL_FRONT_ROOM - MMBVH_MAX_DEPTH ? KERNEL_FRONT : 1;
         const int count = top < most ? top : most;
@@ -184,6 +186,30 @@ static void kernel_find_shown(kernel_finder *s, int64_t root)
         }
     }
     kernel_find_rest(s);
+}
+
+/* What is crossed of the subtree, if it is of a mesh that can be kept. */
+static void kernel_keep_subtree(kernel_finder *s, int64_t root)
+{
+    kernel_keeper *k = s->keeper;
+    k->vertices = s->plain.is_hexes ? 8 : 4;
+    k->is_refused = k->is_refused || !(s->plain.is_so || s->plain.is_hexes);
+    if (!k->is_refused) kernel_find_shown(s, root);
+}
+
+/* What shows of so many records that are kept, from the first on. */
+static void kernel_find_kept(kernel_finder *s, int64_t first, int64_t count)
+{
+    const int vertices = s->plain.is_hexes ? 8 : 4;
+    for (int64_t at = first, end = first + count; at < end && !s->list->is_full; at += SIMD_WIDTH) {
+        s->tets.count = end - at < SIMD_WIDTH ? (int)(end - at) : SIMD_WIDTH;
+        for (int n = 0; n < s->tets.count; n++) {
+            s->tets.cell[n] = (uint32_t)(at + n);
+            for (int i = 0; i < vertices; i++) s->tets.plain[i][n] = (int32_t)((at + n) * vertices + i);
+        }
+        kernel_find_waiting(s);
+    }
+    kernel_find_crossed_hexes(s);
 }
 
 #endif

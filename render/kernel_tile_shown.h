@@ -90,6 +90,19 @@ SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *p
     return isovalue->value;
 }
 
+/* What comes first of a cell: its vertices' indices, or all of it, where it is kept. */
+SIMD_INLINE void kernel_shown_prefetch(const kernel_frame *f, const kernel_tile_shown *shown)
+{
+    const int part = (int)(shown->source / RENDER_MAX_ISOVALUES);
+    const kernel_kept *kept = kernel_kept_of(f, f->isovalues[shown->source % RENDER_MAX_ISOVALUES].surface, part);
+    if (!kept) {
+        kernel_tile_prefetch_indices(f->job->parts[part].cells, shown->cell);
+        return;
+    }
+    const float *record = kept->records + (int64_t)shown->cell * kept->vertices * KERNEL_KEPT_FLOATS;
+    for (int at = 0; at < kept->vertices * KERNEL_KEPT_FLOATS; at += 16) __builtin_prefetch(record + at);
+}
+
 /* Cells whose vertices' indices are on their way from memory. */
 typedef struct kernel_waiting {
     int count;
@@ -148,7 +161,7 @@ static __attribute__((noinline)) void kernel_tile_trace_shown(kernel_tile_trace 
             const bool is_transparent =
                 t->frame->isovalues[source % RENDER_MAX_ISOVALUES].surface >= t->frame->opaque_count;
             if (is_transparent != transparent || !kernel_shown_blocks(t, shown)) continue;
-            kernel_tile_prefetch_indices(t->frame->job->parts[source / RENDER_MAX_ISOVALUES].cells, shown->cell);
+            kernel_shown_prefetch(t->frame, shown);
             waiting.items[waiting.count++] = shown;
             if (waiting.count == SIMD_WIDTH) kernel_tile_meet_waiting(t, &batch, &hexes, &waiting);
         }

@@ -13,7 +13,8 @@ enum {
     KERNEL_TILE = 16,
     KERNEL_BLOCK = 4, /* pixels along its side */
     KERNEL_MAX_GROUP = 64,
-    KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS
+    KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS,
+    KERNEL_KEPT_FLOATS = 4 /* of a vertex */
 };
 
 /* Values that show: a node whose range meets none of these intervals is skipped. Rounded outward. */
@@ -79,11 +80,38 @@ typedef struct kernel_shown_list {
     int64_t *bound;            /* how many more all lists together may have room for */
 } kernel_shown_list;
 
-/* A subtree to look for them in. */
+/* A subtree to look for them in, or so many records that are kept, from the first on. */
 typedef struct kernel_subtree {
     int surface, part; /* surface -1: cells of the first volume */
-    int64_t node;
+    int64_t node, first, count; /* count 0: the node's subtree */
 } kernel_subtree;
+
+/* The cells of a part that a layer's isovalues cross, side by side: of each its vertices in their order, of each vertex
+ * x, y, z and the value (render_kept.h). Tets or hexes. */
+typedef struct kernel_kept {
+    const float *records;
+    int64_t count;
+    int vertices; /* of a cell */
+} kernel_kept;
+
+/* No larger are a kept cell's values; nor its coordinates and the eye's times the space's scale. */
+#define KERNEL_KEPT_VALUE 4e29f
+#define KERNEL_KEPT_PLACE 4e14f
+
+/* A chain of chunks of them. */
+typedef struct kernel_kept_chunk {
+    struct kernel_kept_chunk *before;
+    int64_t floats; /* of one that is full */
+    float records[];
+} kernel_kept_chunk;
+
+typedef struct kernel_keeper {
+    kernel_kept_chunk *chunk; /* the one that is filled; NULL at first */
+    float *at, *end;          /* of its room */
+    int vertices;             /* of a cell; 0: of none yet */
+    bool is_refused;          /* none are to be kept: another mesh, odd numbers, no memory, or too many */
+    int64_t *left;            /* floats that all keepers together may make room for */
+} kernel_keeper;
 
 typedef struct kernel_isovalue {
     int surface, value;
@@ -95,6 +123,7 @@ typedef struct kernel_frame {
     kernel_surface *surfaces; /* opaque ones first */
     int opaque_count;
     kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
+    const kernel_kept *kept; /* surface by surface, part by part: records NULL where none are; NULL: nowhere */
     kernel_tile_shown *shown; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
     uint32_t *shown_starts;
     kernel_tile_shown *volume_shown; /* the same of the volume's cells */
@@ -147,6 +176,9 @@ typedef struct kernel_table {
     /* What may show of the subtree is added to the list; grow() makes room for more, or the list full. */
     void (*find_shown)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                        kernel_shown_list *list, bool (*grow)(kernel_shown_list *list));
+    /* Keep what the surface's isovalues cross of the subtree, whether or not it shows in the picture. */
+    void (*keep_crossed)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
+                         kernel_keeper *keeper, bool (*grow)(kernel_keeper *keeper));
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

@@ -7,6 +7,7 @@
 #include "memory.h"
 #include "render_fragments.h"
 #include "render_isa.h"
+#include "render_kept.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
 #include "render_shown.h"
@@ -107,6 +108,7 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (has_memory && frame->is_binned) {
         const double start = now();
+        render_kept_begin(frame, states, threads);
         render_shown_find(frame, states, threads);
         statistics->surface_ms = 1e3 * (now() - start);
     }
@@ -121,6 +123,7 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
         trace_tiles(frame, &states[omp_get_thread_num()], end);
     }
     render_shown_free(frame);
+    render_kept_end(frame);
     has_memory = end_threads(states, threads, statistics) && has_memory;
     base_free(states);
     return has_memory;

@@ -214,7 +214,20 @@ static void find_shown(const kernel_frame *f, kernel_thread *thread, const kerne
     kernel_finder_begin(finder, f, subtree);
     finder->list = list;
     finder->grow = grow;
-    kernel_find_shown(finder, subtree->node);
+    if (subtree->count)
+        kernel_find_kept(finder, subtree->first, subtree->count);
+    else
+        kernel_find_shown(finder, subtree->node);
+}
+
+static void keep_crossed(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
+                         kernel_keeper *keeper, bool (*grow)(kernel_keeper *keeper))
+{
+    kernel_finder *finder = &((kernel_memory *)thread->cache)->finder;
+    kernel_finder_begin(finder, f, subtree);
+    finder->keeper = keeper;
+    finder->keep = grow;
+    kernel_keep_subtree(finder, subtree->node);
 }
 
 /* Megabytes, most of which no tile of the frame may touch: only what is read before it is written is set. */
@@ -225,4 +238,4 @@ static void begin(void *cache)
     m->segments.depth = 0;
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), begin, trace_tile, find_shown};
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), begin, trace_tile, find_shown, keep_crossed};

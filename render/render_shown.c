@@ -9,9 +9,9 @@
 
 #include "memory.h"
 #include "render_isa.h"
+#include "render_subtrees.h"
 
 enum {
-    SUBTREES = 128,
     ITEMS = 1024,
     MOST_ITEMS = 64 * ITEMS,
     VOLUME_ITEMS = 1024 * ITEMS,
@@ -20,42 +20,17 @@ enum {
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
-typedef struct subtree_list {
-    kernel_subtree *items;
-    int64_t count;
-} subtree_list;
-
-/* The tree cut below its top, some SUBTREES of it, added to the list; which has room. */
-static void cut_tree(const mmbvh *tree, int surface, int part, subtree_list *list)
-{
-    const int64_t first = list->count;
-    list->items[list->count++] = (kernel_subtree){surface, part, 0};
-    for (int64_t next = first; next < list->count && list->count - first < SUBTREES;) {
-        const int64_t node = list->items[next].node;
-        if (mmbvh_node_count(tree, node)) {
-            next++;
-            continue;
-        }
-        const int64_t left = mmbvh_node_ref(tree, node);
-        memmove(list->items + next, list->items + next + 1, (size_t)(list->count - next - 1) * sizeof *list->items);
-        list->items[list->count - 1] = (kernel_subtree){surface, part, left};
-        list->items[list->count++] = (kernel_subtree){surface, part, left + 1};
-    }
-}
-
 /* Those of all surfaces, or of the volume. */
-static bool cut_trees(const kernel_frame *f, bool is_volume, subtree_list *list)
+static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *list)
 {
     const render_job *job = f->job;
     const int first = is_volume ? -1 : 0, end = is_volume ? 0 : f->surface_count;
-    const int64_t trees = (int64_t)(end - first) * job->part_count;
-    *list = (subtree_list){base_alloc((size_t)(trees * SUBTREES) * sizeof *list->items), 0};
-    if (!list->items) return false;
+    if (!render_subtrees_begin(list, (int64_t)(end - first) * job->part_count)) return false;
     for (int s = first; s < end; s++) {
         const render_field *field = is_volume ? &job->volumes[0].field : &f->surfaces[s].layer->field;
         for (int part = 0; part < job->part_count; part++)
             if (field->ranges[part].low && job->parts[part].tree->node_count)
-                cut_tree(job->parts[part].tree, s, part, list);
+                render_subtrees_add(list, f, s, part);
     }
     return true;
 }
@@ -172,7 +147,7 @@ static uint64_t place_tiles(uint32_t *counts, int threads, int64_t tiles, uint32
 
 typedef struct search {
     kernel_frame *frame;
-    subtree_list subtrees;
+    render_subtrees subtrees;
     kernel_shown_list *lists; /* one a thread */
     uint32_t *counts, *starts;
     kernel_tile_shown *shown;

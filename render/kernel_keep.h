@@ -1,0 +1,75 @@
+/* Crossed cells of a plain mesh put side by side, for pictures to come (render_kept.h). Sizes are such that each picture
+ * finds its numbers usual (kernel_shown_tets.h): a mesh that has others among them is not kept. */
+#ifndef RENDER_KERNEL_KEEP_H
+#define RENDER_KERNEL_KEEP_H
+
+#include "kernel_finder.h"
+
+/* Lanes that some isovalue crosses; unusual: some of these have a difference that float32 has not, or hardly. */
+SIMD_INLINE unsigned kernel_keep_crossed(const kernel_finder *s, const vf *v, int vertices, bool *unusual)
+{
+    const render_surface_layer *layer = s->surface->layer;
+    vf low = vf_set(INFINITY), high = vf_set(-INFINITY), largest = vf_set(0);
+    vm any = vm_none(), odd = vm_none();
+    for (int i = 0; i < vertices; i++) {
+        low = vf_min(v[i], low); /* one that is not a number passes neither */
+        high = vf_max(v[i], high);
+    }
+    for (int i = 0; i < vertices; i++) odd = vm_or(odd, vm_not(vf_lt(vf_abs(v[i]), vf_set(KERNEL_KEPT_VALUE))));
+    for (int value = 0; value < layer->value_count; value++) {
+        const double isovalue = layer->values[value];
+        const float middle = (float)isovalue, rest = (float)(isovalue - (double)middle);
+        const vf least = vf_set(kernel_not_below(isovalue));
+        const vm crossed = vm_and(vf_lt(low, least), vf_le(least, high));
+        for (int i = 0; i < vertices; i++) largest = vf_max(vf_abs((v[i] - middle) - rest), largest);
+        odd = vm_or(odd, vm_and(crossed, vm_not(vf_lt(vf_set(1e-30f), largest))));
+        any = vm_or(any, crossed);
+        largest = vf_set(0);
+    }
+    *unusual = vm_any(vm_and(any, odd));
+    return vm_bits(any) & ((1u << s->tets.count) - 1);
+}
+
+/* False where a coordinate is of no usual size. */
+SIMD_INLINE bool kernel_keep_cell(kernel_finder *s, int lane, int vertices)
+{
+    const kernel_plain *p = &s->plain;
+    const float most = KERNEL_KEPT_PLACE / p->scale;
+    float *at = s->keeper->at;
+    bool is_usual = true;
+    for (int i = 0; i < vertices; i++, at += KERNEL_KEPT_FLOATS) {
+        const int64_t vertex = s->tets.plain[i][lane];
+        for (int a = 0; a < 3; a++) {
+            at[a] = p->coordinates[a][vertex * p->stride];
+            is_usual = is_usual && fabsf(at[a]) < most;
+        }
+        at[3] = p->values[vertex * p->value_stride];
+    }
+    s->keeper->at = at;
+    return is_usual;
+}
+
+/* Cells whose vertices have come. */
+static void kernel_keep_waiting(kernel_finder *s)
+{
+    const int vertices = s->keeper->vertices;
+    kernel_keeper *k = s->keeper;
+    vf v[8];
+    bool unusual;
+    if (!s->tets.count) return;
+    kernel_tets_fill(&s->tets, vertices);
+    for (int i = 0; i < vertices; i++) {
+        vi vertex;
+        memcpy(&vertex, s->tets.plain[i], sizeof vertex);
+        v[i] = vf_gather(s->plain.values, vertex * s->plain.value_stride);
+    }
+    unsigned lanes = kernel_keep_crossed(s, v, vertices, &unusual);
+    k->is_refused = k->is_refused || unusual;
+    for (; lanes && !k->is_refused; lanes &= lanes - 1) {
+        if (k->at == k->end && !s->keep(k)) break;
+        if (!kernel_keep_cell(s, __builtin_ctz(lanes), vertices)) k->is_refused = true;
+    }
+    s->tets.count = 0;
+}
+
+#endif

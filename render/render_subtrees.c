@@ -1,0 +1,49 @@
+#include "render_subtrees.h"
+
+#include <string.h>
+
+#include "memory.h"
+
+enum { SUBTREES = 128, LEAST_PIECE = 1024 /* records */ };
+
+bool render_subtrees_begin(render_subtrees *list, int64_t trees)
+{
+    *list = (render_subtrees){base_alloc((size_t)(trees * SUBTREES) * sizeof *list->items), 0};
+    return list->items;
+}
+
+/* The tree cut below its top, some SUBTREES of it. */
+static void add_tree(render_subtrees *list, const mmbvh *tree, int surface, int part)
+{
+    const int64_t first = list->count;
+    list->items[list->count++] = (kernel_subtree){.surface = surface, .part = part};
+    for (int64_t next = first; next < list->count && list->count - first < SUBTREES;) {
+        const int64_t node = list->items[next].node;
+        if (mmbvh_node_count(tree, node)) {
+            next++;
+            continue;
+        }
+        const int64_t left = mmbvh_node_ref(tree, node);
+        memmove(list->items + next, list->items + next + 1, (size_t)(list->count - next - 1) * sizeof *list->items);
+        list->items[list->count - 1] = (kernel_subtree){.surface = surface, .part = part, .node = left};
+        list->items[list->count++] = (kernel_subtree){.surface = surface, .part = part, .node = left + 1};
+    }
+}
+
+static void add_records(render_subtrees *list, int64_t count, int surface, int part)
+{
+    const int64_t even = (count + SUBTREES - 1) / SUBTREES, piece = even > LEAST_PIECE ? even : LEAST_PIECE;
+    for (int64_t first = 0; first < count; first += piece)
+        list->items[list->count++] = (kernel_subtree){
+            .surface = surface, .part = part, .first = first, .count = count - first < piece ? count - first : piece};
+}
+
+void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part)
+{
+    const kernel_kept *kept =
+        surface >= 0 && frame->kept ? &frame->kept[surface * frame->job->part_count + part] : NULL;
+    if (kept && kept->records)
+        add_records(list, kept->count, surface, part);
+    else
+        add_tree(list, frame->job->parts[part].tree, surface, part);
+}

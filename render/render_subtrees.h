@@ -1,0 +1,17 @@
+/* A frame's search cut into pieces for threads. */
+#ifndef RENDER_RENDER_SUBTREES_H
+#define RENDER_RENDER_SUBTREES_H
+
+#include "kernel_types.h"
+
+typedef struct render_subtrees {
+    kernel_subtree *items; /* to be freed with base_free() */
+    int64_t count;
+} render_subtrees;
+
+/* With room for so many trees; false where there is no memory. */
+bool render_subtrees_begin(render_subtrees *list, int64_t trees);
+/* Those of a part's tree for a surface (-1: the volume); or what is kept of its cells, in pieces. */
+void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part);
+
+#endif
