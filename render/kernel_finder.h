@@ -246,11 +246,30 @@ SIMD_INLINE bool kernel_slab_shown(const kernel_finder *s, const kernel_cell *c,
     return kernel_extents_shown(s, extents[0], kernel_largest(c->z, 8) + fabsf(s->t_near), extents[1], extents[2], out);
 }
 
+/* One more in each of its tiles. Most have one, or two side by side: no branch foresees which. */
+SIMD_INLINE void kernel_count_tiles(kernel_shown_list *list, int x0, int x1, int y0, int y1)
+{
+    const int left = x0 / KERNEL_TILE, columns = x1 / KERNEL_TILE - left, top = y0 / KERNEL_TILE,
+              rows = y1 / KERNEL_TILE - top;
+    uint32_t *first = list->counts + top * list->tile_columns + left;
+    if (columns <= 1 && rows <= 1) {
+        const int below = rows * list->tile_columns;
+        first[0]++;
+        first[columns] += (uint32_t)columns;
+        first[below] += (uint32_t)rows;
+        first[below + columns] += (uint32_t)(rows & columns);
+        return;
+    }
+    for (int y = 0; y <= rows; y++)
+        for (int x = 0; x <= columns; x++) first[y * list->tile_columns + x]++;
+}
+
 SIMD_INLINE void kernel_add_shown(kernel_finder *s, const kernel_shown *shown)
 {
     kernel_shown_list *list = s->list;
     if (list->count == list->capacity && !s->grow(list)) return;
     list->items[list->count++] = *shown;
+    kernel_count_tiles(list, shown->x0, shown->x1, shown->y0, shown->y1);
 }
 
 static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)

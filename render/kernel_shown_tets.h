@@ -113,6 +113,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigne
                                                     .x1 = (uint16_t)ends[1][n],
                                                     .y0 = (uint16_t)ends[2][n],
                                                     .y1 = (uint16_t)ends[3][n]};
+        kernel_count_tiles(list, ends[0][n], ends[1][n], ends[2][n], ends[3][n]);
     }
 }
 

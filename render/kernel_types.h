@@ -76,6 +76,8 @@ typedef struct kernel_shown_list {
     kernel_shown_chunk *chunk; /* the one that is filled; NULL at first */
     kernel_shown *items;       /* its own, */
     int64_t count, capacity;   /* count of which are filled */
+    uint32_t *counts;          /* of a picture's tiles, row by row: how many of all there are of each */
+    int tile_columns;
     bool is_full;              /* no more are wanted: memory ran out, or the bound is reached */
     int64_t *bound;            /* how many more all lists together may have room for */
 } kernel_shown_list;

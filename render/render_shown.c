@@ -109,13 +109,6 @@ static kernel_tile_shown shown_within(const kernel_shown *s, within columns, wit
                                    (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
-static void count_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *counts)
-{
-    for (const kernel_shown *s = chunk->items, *end = s + chunk->count; s < end; s++)
-        for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++)
-            for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++) counts[y * across + x]++;
-}
-
 /* at: where each tile's next one goes. */
 static void bin_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_shown *out)
 {
@@ -167,8 +160,6 @@ static void run(search *s, kernel_thread *thread_of, int threads)
         for (int64_t i = 0; i < s->subtrees.count; i++)
             if (!list->is_full) kernels->find_shown(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
         if (list->chunk) list->chunk->count = list->count;
-        for (const kernel_shown_chunk *c = list->chunk; c; c = c->before)
-            count_tiles(c, across, s->counts + me * tiles);
 #pragma omp barrier
 #pragma omp single
         {
@@ -193,7 +184,9 @@ static kernel_tile_shown *find(kernel_frame *frame, bool is_volume, kernel_threa
     s.counts = base_calloc((size_t)(threads * tiles), sizeof *s.counts);
     s.starts = base_alloc((size_t)(tiles + 1) * sizeof *s.starts);
     if (s.lists && s.counts && s.starts && cut_trees(frame, is_volume, &s.subtrees)) {
-        for (int t = 0; t < threads; t++) s.lists[t].bound = &s.bound;
+        for (int t = 0; t < threads; t++)
+            s.lists[t] = (kernel_shown_list){
+                .bound = &s.bound, .counts = s.counts + t * tiles, .tile_columns = (int)tiles_across(frame)};
         run(&s, thread_of, threads);
     }
     for (int t = 0; s.lists && t < threads; t++) free_list(&s.lists[t]);
