@@ -8,9 +8,9 @@
 /* A mesh of tets alone, or of hexes, whose indices are int32 one after the other, and whose coordinates and values
  * float32, within reach of a gather: strides in elements. */
 typedef struct kernel_plain {
-    bool is_so;          /* of tets; */
-    bool is_hexes;       /* of hexes */
-    bool is_interleaved; /* a vertex's coordinates are side by side */
+    bool is_so;                  /* of tets; */
+    bool is_hexes;               /* of hexes */
+    bool is_interleaved;         /* a vertex's coordinates are side by side */
     const int32_t *connectivity; /* NULL: the cells' vertices are one after the other */
     const float *coordinates[3], *values;
     int32_t stride, value_stride;

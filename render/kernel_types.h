@@ -78,13 +78,13 @@ typedef struct kernel_shown_list {
     int64_t count, capacity;   /* count of which are filled */
     uint32_t *counts;          /* of a picture's tiles, row by row: how many of all there are of each */
     int tile_columns;
-    bool is_full;              /* no more are wanted: memory ran out, or the bound is reached */
-    int64_t *bound;            /* how many more all lists together may have room for */
+    bool is_full;   /* no more are wanted: memory ran out, or the bound is reached */
+    int64_t *bound; /* how many more all lists together may have room for */
 } kernel_shown_list;
 
 /* A subtree to look for them in, or so many records that are kept, from the first on. */
 typedef struct kernel_subtree {
-    int surface, part; /* surface -1: cells of the first volume */
+    int surface, part;          /* surface -1: cells of the first volume */
     int64_t node, first, count; /* count 0: the node's subtree */
 } kernel_subtree;
 
@@ -100,19 +100,12 @@ typedef struct kernel_kept {
 #define KERNEL_KEPT_VALUE 4e29f
 #define KERNEL_KEPT_PLACE 4e14f
 
-/* A chain of chunks of them. */
-typedef struct kernel_kept_chunk {
-    struct kernel_kept_chunk *before;
-    int64_t floats; /* of one that is full */
-    float records[];
-} kernel_kept_chunk;
-
+/* One thread's share of them while they are put there. */
 typedef struct kernel_keeper {
-    kernel_kept_chunk *chunk; /* the one that is filled; NULL at first */
-    float *at, *end;          /* of its room */
-    int vertices;             /* of a cell; 0: of none yet */
-    bool is_refused;          /* none are to be kept: another mesh, odd numbers, no memory, or too many */
-    int64_t *left;            /* floats that all keepers together may make room for */
+    float *at, *end;        /* of its room */
+    int vertices;           /* of a cell; 0: of none yet */
+    bool is_refused;        /* none are to be kept: of another mesh, with odd numbers, or too many */
+    struct kernel_room *of; /* render_kept.c */
 } kernel_keeper;
 
 typedef struct kernel_isovalue {
@@ -125,7 +118,7 @@ typedef struct kernel_frame {
     kernel_surface *surfaces; /* opaque ones first */
     int opaque_count;
     kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
-    const kernel_kept *kept; /* surface by surface, part by part: records NULL where none are; NULL: nowhere */
+    const kernel_kept *kept;  /* surface by surface, part by part: records NULL where none are; NULL: nowhere */
     kernel_tile_shown *shown; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
     uint32_t *shown_starts;
     kernel_tile_shown *volume_shown; /* the same of the volume's cells */

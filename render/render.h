@@ -138,9 +138,9 @@ typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integ
 
 /* The cells that isosurfaces cross, kept side by side for other pictures of the same cells and values: what a picture
  * needs of 556,000 of 12 million tets lies in 34 MiB then, in the order of the tree (docs/decisions.md has the gain). A
- * frame whose job has one fills it with what is not in it yet: tets or hexes with float32 coordinates and values and int32
- * indices, of opaque surfaces in one colour with the cells' gradients for normals, up to 64 MiB in all. Pictures are the
- * same to the last bit. For one frame at a time. */
+ * frame whose job has one fills it with what is not in it yet: tets or hexes with float32 coordinates and values and
+ * int32 indices, of opaque surfaces in one colour with the cells' gradients for normals, up to 64 MiB in all. Pictures
+ * are the same to the last bit. For one frame at a time. */
 typedef struct render_kept render_kept;
 render_kept *render_kept_create(void); /* NULL: no memory */
 void render_kept_free(render_kept *kept);
@@ -155,7 +155,7 @@ typedef struct render_job {
     int part_count;
     const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
     const render_surface_layer *surfaces;
-    int surface_count;          /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
+    int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
     render_traversal traversal;
     render_kept *kept; /* NULL: nothing is kept */
     const render_volume_layer *volumes;

@@ -1,8 +1,10 @@
-/* Threads put the crossed cells of the subtrees dealt to them into chunks of their own, which then are joined to
- * records in one piece: gathers reach them by index. */
+/* Threads put the crossed cells of the subtrees dealt to them into blocks of one array, and the gaps that their last
+ * blocks leave are closed from its end: gathers reach records by index. The array has room for all cells, or for as
+ * many as may be kept: memory that is not written to is none. */
 #include "render_kept.h"
 
 #include <omp.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "memory.h"
@@ -10,7 +12,7 @@
 #include "render_subtrees.h"
 
 enum {
-    CHUNK = 1 << 16,      /* floats: 256 KiB */
+    BLOCK = 1 << 14,      /* floats: 64 KiB */
     MOST_FLOATS = 1 << 24 /* of all that is kept: 64 MiB */
 };
 
@@ -54,78 +56,66 @@ int64_t render_kept_bytes(const render_kept *kept)
 
 /* ---- filling -------------------------------------------------------------------------------------------------- */
 
+/* Room for records, which threads take block by block. */
+typedef struct kernel_room {
+    float *floats;
+    int64_t blocks, taken;
+} kernel_room;
+
 static bool grow(kernel_keeper *keeper)
 {
-    int64_t left;
+    int64_t block;
 #pragma omp atomic capture
-    left = *keeper->left -= CHUNK;
-    kernel_kept_chunk *chunk = left < 0 ? NULL : base_alloc(sizeof *chunk + CHUNK * sizeof *chunk->records);
-    keeper->is_refused = !chunk;
-    if (!chunk) return false;
-    if (keeper->chunk) keeper->chunk->floats = keeper->at - keeper->chunk->records;
-    chunk->before = keeper->chunk;
-    keeper->chunk = chunk;
-    keeper->at = chunk->records;
-    keeper->end = keeper->at + CHUNK;
+    block = keeper->of->taken++;
+    keeper->is_refused = block >= keeper->of->blocks;
+    if (keeper->is_refused) return false;
+    keeper->at = keeper->of->floats + block * BLOCK;
+    keeper->end = keeper->at + BLOCK;
     return true;
 }
 
-/* Returns how many floats it has. */
-static int64_t end_keeper(kernel_keeper *keeper)
+static int by_place(const void *a, const void *b)
 {
-    int64_t floats = 0;
-    if (keeper->chunk) keeper->chunk->floats = keeper->at - keeper->chunk->records;
-    for (const kernel_kept_chunk *c = keeper->chunk; c; c = c->before) floats += c->floats;
-    return floats;
+    const float *x = ((const kernel_keeper *)a)->at, *y = ((const kernel_keeper *)b)->at;
+    return (x > y) - (x < y);
 }
 
-/* to: NULL where they are not wanted. */
-static void move_chunks(kernel_keeper *keeper, float *to)
+/* What threads left of their last blocks is filled from the end. Returns how many floats there are. */
+static int64_t close_gaps(const kernel_room *room, kernel_keeper *keepers, int threads)
 {
-    while (keeper->chunk) {
-        kernel_kept_chunk *chunk = keeper->chunk;
-        keeper->chunk = chunk->before;
-        if (to) {
-            memcpy(to, chunk->records, (size_t)chunk->floats * sizeof *to);
-            to += chunk->floats;
+    float *top = room->floats + room->taken * BLOCK;
+    int low = 0, high = threads;
+    qsort(keepers, (size_t)threads, sizeof *keepers, by_place);
+    while (low < threads && !keepers[low].at) low++;
+    while (low < high) {
+        const kernel_keeper *last = &keepers[high - 1];
+        kernel_keeper *gap = &keepers[low];
+        if (last->end == top) {
+            top = last->at;
+            high--;
+            continue;
         }
-        base_free(chunk);
+        const ptrdiff_t after = top - last->end, wanted = gap->end - gap->at, moved = wanted < after ? wanted : after;
+        top -= moved;
+        memcpy(gap->at, top, (size_t)moved * sizeof *top);
+        gap->at += moved;
+        if (gap->at == gap->end) low++;
     }
+    return top - room->floats;
 }
 
-/* The threads' keepers, into one piece. */
-typedef struct filling {
-    render_subtrees subtrees;
-    kernel_keeper *keepers; /* one a thread */
-    int64_t left, floats;
-    float *records;
-    bool is_refused;
-} filling;
-
-static void fill(filling *f, const kernel_frame *frame, kernel_thread *thread_of, int threads)
+static void fill(kernel_room *room, const render_subtrees *subtrees, kernel_keeper *keepers, const kernel_frame *frame,
+                 kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
 #pragma omp parallel num_threads(threads)
     {
         const int me = omp_get_thread_num();
-        kernel_keeper *keeper = &f->keepers[me];
+        kernel_keeper *keeper = &keepers[me];
+        keeper->of = room;
 #pragma omp for schedule(dynamic, 1)
-        for (int64_t i = 0; i < f->subtrees.count; i++)
-            if (!keeper->is_refused)
-                kernels->keep_crossed(frame, &thread_of[me], &f->subtrees.items[i], keeper, grow);
-        const int64_t own = end_keeper(keeper);
-        int64_t first;
-#pragma omp atomic capture
-        {
-            first = f->floats;
-            f->floats += own;
-        }
-#pragma omp critical
-        f->is_refused = f->is_refused || keeper->is_refused;
-#pragma omp barrier
-#pragma omp single
-        if (!f->is_refused) f->records = base_alloc((size_t)f->floats * sizeof *f->records);
-        move_chunks(keeper, f->records ? f->records + first : NULL);
+        for (int64_t i = 0; i < subtrees->count; i++)
+            if (!keeper->is_refused) kernels->keep_crossed(frame, &thread_of[me], &subtrees->items[i], keeper, grow);
     }
 }
 
@@ -152,21 +142,26 @@ static bool can_keep(const kernel_frame *frame, int surface, int part)
 static kernel_kept keep(const render_kept *kept, const kernel_frame *frame, int surface, int part,
                         kernel_thread *thread_of, int threads)
 {
-    filling f = {.left = MOST_FLOATS - kept->floats, .keepers = base_calloc((size_t)threads, sizeof *f.keepers)};
-    kernel_kept out = {0};
-    if (f.keepers && render_subtrees_begin(&f.subtrees, 1)) {
-        for (int t = 0; t < threads; t++) f.keepers[t].left = &f.left;
-        render_subtrees_add(&f.subtrees, frame, surface, part);
-        fill(&f, frame, thread_of, threads);
+    const bool is_hexes = frame->job->parts[part].cells->cell_type == GRID_HEX;
+    const int64_t size = (is_hexes ? 8 : 4) * KERNEL_KEPT_FLOATS, cells = frame->job->parts[part].tree->cell_count;
+    const int64_t most = (MOST_FLOATS - kept->floats) / BLOCK, all = (cells * size + BLOCK - 1) / BLOCK + threads;
+    kernel_room room = {.blocks = most < all ? most : all};
+    kernel_keeper *keepers = base_calloc((size_t)threads, sizeof *keepers);
+    render_subtrees subtrees = {0};
+    int64_t floats = 0;
+    bool is_refused = true;
+    room.floats = base_alloc((size_t)(room.blocks * BLOCK) * sizeof *room.floats);
+    if (keepers && room.floats && render_subtrees_begin(&subtrees, 1)) {
+        is_refused = false;
+        render_subtrees_add(&subtrees, frame, surface, part);
+        fill(&room, &subtrees, keepers, frame, thread_of, threads);
+        for (int t = 0; t < threads; t++) is_refused = is_refused || keepers[t].is_refused;
+        if (!is_refused) floats = close_gaps(&room, keepers, threads);
     }
-    if (f.records) {
-        out.vertices = frame->job->parts[part].cells->cell_type == GRID_HEX ? 8 : 4;
-        out.records = f.records;
-        out.count = f.floats / (out.vertices * KERNEL_KEPT_FLOATS);
-    }
-    base_free(f.keepers);
-    base_free(f.subtrees.items);
-    return out;
+    base_free(keepers);
+    base_free(subtrees.items);
+    if (is_refused) base_free(room.floats);
+    return is_refused ? (kernel_kept){0} : (kernel_kept){room.floats, floats / size, (int)size / KERNEL_KEPT_FLOATS};
 }
 
 /* ---- what there is -------------------------------------------------------------------------------------------- */

@@ -1,5 +1,5 @@
-/* Crossed cells kept from one picture to the next (render.h): a frame that has fewer cells to look at, and these side by
- * side, neither goes down trees nor gathers vertices from all over the mesh. */
+/* Crossed cells kept from one picture to the next (render.h): a frame that has fewer cells to look at, and these side
+ * by side, neither goes down trees nor gathers vertices from all over the mesh. */
 #ifndef RENDER_RENDER_KEPT_H
 #define RENDER_RENDER_KEPT_H
 

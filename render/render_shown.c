@@ -11,12 +11,7 @@
 #include "render_isa.h"
 #include "render_subtrees.h"
 
-enum {
-    ITEMS = 1024,
-    MOST_ITEMS = 64 * ITEMS,
-    VOLUME_ITEMS = 1024 * ITEMS,
-    BLOCKS = KERNEL_TILE / KERNEL_BLOCK
-};
+enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
@@ -29,8 +24,7 @@ static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *li
     for (int s = first; s < end; s++) {
         const render_field *field = is_volume ? &job->volumes[0].field : &f->surfaces[s].layer->field;
         for (int part = 0; part < job->part_count; part++)
-            if (field->ranges[part].low && job->parts[part].tree->node_count)
-                render_subtrees_add(list, f, s, part);
+            if (field->ranges[part].low && job->parts[part].tree->node_count) render_subtrees_add(list, f, s, part);
     }
     return true;
 }
