@@ -7,3 +7,6 @@ add_link_options(-fsanitize=address,undefined)
 file(WRITE ${CMAKE_BINARY_DIR}/keep_loaded.c "int dlclose(void *library);\nint dlclose(void *library) { return !library; }\n")
 add_library(keep_loaded OBJECT ${CMAKE_BINARY_DIR}/keep_loaded.c)
 link_libraries($<BUILD_INTERFACE:$<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:$<TARGET_OBJECTS:keep_loaded>>>)
+
+# The longest tests take ten times as long here.
+set(INSITU_TEST_PATIENCE 10)
