@@ -5,29 +5,32 @@
 
 #include "kernel_finder.h"
 
-/* Lanes that some isovalue crosses; unusual: some of these have a difference that float32 has not, or hardly. */
+/* Lanes that some isovalue crosses; unusual: one of these has a difference that float32 has not, or hardly. */
 SIMD_INLINE unsigned kernel_keep_crossed(const kernel_finder *s, const vf *v, int vertices, bool *unusual)
 {
     const render_surface_layer *layer = s->surface->layer;
-    vf low = vf_set(INFINITY), high = vf_set(-INFINITY), largest = vf_set(0);
-    vm any = vm_none(), odd = vm_none();
+    vf low = vf_set(INFINITY), high = vf_set(-INFINITY), most = vf_set(0);
+    vm finite = vm_all_lanes(), any = vm_none(), odd = vm_none();
     for (int i = 0; i < vertices; i++) {
-        low = vf_min(v[i], low); /* one that is not a number passes neither */
+        low = vf_min(v[i], low);
         high = vf_max(v[i], high);
+        most = vf_max(vf_abs(v[i]), most);
+        finite = vm_and(finite, vf_lt(vf_abs(v[i]), vf_set(INFINITY)));
     }
-    for (int i = 0; i < vertices; i++) odd = vm_or(odd, vm_not(vf_lt(vf_abs(v[i]), vf_set(KERNEL_KEPT_VALUE))));
     for (int value = 0; value < layer->value_count; value++) {
         const double isovalue = layer->values[value];
         const float middle = (float)isovalue, rest = (float)(isovalue - (double)middle);
         const vf least = vf_set(kernel_not_below(isovalue));
-        const vm crossed = vm_and(vf_lt(low, least), vf_le(least, high));
+        const vm crossed = vm_and(finite, vm_and(vf_lt(low, least), vf_le(least, high)));
+        vf largest = vf_set(0);
         for (int i = 0; i < vertices; i++) largest = vf_max(vf_abs((v[i] - middle) - rest), largest);
         odd = vm_or(odd, vm_and(crossed, vm_not(vf_lt(vf_set(1e-30f), largest))));
         any = vm_or(any, crossed);
-        largest = vf_set(0);
     }
-    *unusual = vm_any(vm_and(any, odd));
-    return vm_bits(any) & ((1u << s->tets.count) - 1);
+    odd = vm_or(odd, vm_and(any, vm_not(vf_lt(most, vf_set(KERNEL_KEPT_VALUE)))));
+    const unsigned lanes = (1u << s->tets.count) - 1;
+    *unusual = vm_bits(odd) & lanes;
+    return vm_bits(any) & lanes;
 }
 
 /* False where a coordinate is of no usual size. */
