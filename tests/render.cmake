@@ -28,6 +28,12 @@ foreach(isa plain sse4.2 avx2 avx512)
   set_tests_properties(render_batches_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 120)
 endforeach()
 
+insitu_render_program(test_render_kept)
+foreach(isa plain sse4.2 avx2 avx512)
+  add_test(NAME render_kept_${isa} COMMAND test_render_kept)
+  set_tests_properties(render_kept_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 180)
+endforeach()
+
 insitu_render_program(test_render_isa)
 add_test(NAME render_isa COMMAND test_render_isa)
 set_tests_properties(render_isa PROPERTIES TIMEOUT 120)
