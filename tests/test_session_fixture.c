@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "memory.h"
 #include "session_image.h"
 
 int own_rank, rank_count;
@@ -183,7 +184,7 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
     if (caught_count == MAX_CAUGHT) return base_fail(error, INSITU_ERROR_INTERNAL, "too many pictures for the test");
     caught_picture *picture = &caught[caught_count++];
     const size_t pixels = (size_t)image->width * (size_t)image->height;
-    *picture = (caught_picture){.width = image->width, .height = image->height};
+    *picture = (caught_picture){.width = image->width, .height = image->height, .held = base_memory_held()};
     snprintf(picture->path, sizeof picture->path, "%s", path);
     picture->rgba = malloc(pixels * 4 * sizeof(float));
     memcpy(picture->rgba, image->rgba, pixels * 4 * sizeof(float));

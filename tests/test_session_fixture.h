@@ -78,6 +78,7 @@ typedef struct caught_picture {
     int width, height;
     float *rgba, *depth; /* depth NULL where none was given */
     char path[256];
+    int64_t held; /* bytes that the library held when it was written */
 } caught_picture;
 
 enum { MAX_CAUGHT = 64 };

@@ -14,6 +14,7 @@
  *     session_shown.c      which values of them the images show
  *     session_tree.c       trees and ranges
  *     session_draw.c       frames, outputs (session_view.c: camera, lights, transfer functions)
+ *     session_kept.c       which images share the cells of isosurfaces
  *     session_frame.c      one frame: tracing, compositing, pixels where cells overlap
  *     session_report.c     what was done */
 #ifndef SESSION_SESSION_H

@@ -10,6 +10,7 @@
 #include "session_agree.h"
 #include "session_frame.h"
 #include "session_image.h"
+#include "session_kept.h"
 #include "session_layers.h"
 #include "session_plan.h"
 #include "session_recentre.h"
@@ -109,6 +110,7 @@ static render_job make_job(const insitu_session *session, const scene_image *ima
                         .parent = layers->part_count > 1 ? &session->parent : NULL,
                         .surfaces = layers->surfaces,
                         .surface_count = image->isosurface_count,
+                        .kept = layers->kept,
                         .volumes = layers->volumes,
                         .volume_count = image->volume_count,
                         .lights = view->lights,
@@ -204,7 +206,9 @@ static insitu_status write_outputs(insitu_session *session, const scene_image *i
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-static insitu_status draw_image(insitu_session *session, const scene_image *image, int64_t cycle, base_error *error)
+/* kept: NULL, or for the image's frames to fill and to draw from. */
+static insitu_status draw_image(insitu_session *session, const scene_image *image, render_kept *kept, int64_t cycle,
+                                base_error *error)
 {
     session_view view;
     session_layers layers = {0};
@@ -213,6 +217,7 @@ static insitu_status draw_image(insitu_session *session, const scene_image *imag
     if (status) return status;
     status = session_make_layers(session, image, &layers, error);
     if (status) return status;
+    layers.kept = kept;
     canvas_create(session, image, &target, error);
     status = session_agree(session->comm, error);
     if (!status) status = draw_frames(session, image, &view, &layers, &target, error);
@@ -235,19 +240,29 @@ static insitu_status prepare(insitu_session *session, const session_plan *plan, 
     return session_agree(session->comm, error);
 }
 
+/* The step's kept cells, made for the first image that shares some; without memory nothing is kept. */
+static render_kept *kept_for(const session_plan *plan, const scene_image *image, render_kept **kept)
+{
+    if (!session_kept_pays(plan, image)) return NULL;
+    if (!*kept) *kept = render_kept_create();
+    return *kept;
+}
+
 insitu_status session_draw_images(insitu_session *session, const scene_image *const *due, int count, int64_t cycle,
                                   base_error *error)
 {
     session_plan plan = {0};
     base_error first = {0};
+    render_kept *kept = NULL;
     insitu_status status = session_make_plan(session, due, count, &plan, &first, error);
     if (status) return status;
     status = prepare(session, &plan, error);
     for (int i = 0; i < plan.image_count && !status; i++) {
         base_error reason = {0};
-        draw_image(session, plan.images[i], cycle, &reason);
+        draw_image(session, plan.images[i], kept_for(&plan, plan.images[i], &kept), cycle, &reason);
         if (first.status == INSITU_OK) first = reason;
     }
+    render_kept_free(kept);
     session_plan_free(&plan);
     if (!status && first.status) *error = first;
     return error->status;
