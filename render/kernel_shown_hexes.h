@@ -160,6 +160,28 @@ SIMD_INLINE void kernel_hex_lanes_fetch(const kernel_finder *s, kernel_hex_lanes
     for (int i = 0; i < 8; i++) l->f[i] *= vf_from_bits(power);
 }
 
+/* One of those that wait, from the mesh or as it is kept: then its number is none of the mesh's. */
+static void kernel_hex_fetch(kernel_finder *s, int n)
+{
+    const kernel_plain *p = &s->plain;
+    kernel_cell *c = &s->cell;
+    if (p->connectivity) {
+        kernel_cell_fetch(c, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], s->hexes.cell[n]);
+        return;
+    }
+    c->index = s->hexes.cell[n];
+    c->type = GRID_HEX;
+    c->count = 8;
+    c->is_finite = c->is_placed = true;
+    c->has_lines = c->has_normal = false;
+    for (int i = 0; i < 8; i++) {
+        const int64_t vertex = c->vertices[i] = s->hexes.vertex[i][n];
+        c->values[i] = (double)p->values[vertex * p->value_stride];
+        for (int a = 0; a < 3; a++) c->world[i][a] = (double)p->coordinates[a][vertex * p->stride];
+        kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    }
+}
+
 /* Where those that wait show. */
 static __attribute__((noinline)) void kernel_find_crossed_hexes(kernel_finder *s)
 {
@@ -176,8 +198,7 @@ static __attribute__((noinline)) void kernel_find_crossed_hexes(kernel_finder *s
     const unsigned all = (1u << h->count) - 1, usual = all & vm_bits(l.usual);
     kernel_add_lanes(s, &e, usual & vm_bits(vf_le(e.near, e.far)), h->cell, s->source + (uint32_t)h->value);
     for (unsigned odd = all & ~usual; odd; odd &= odd - 1) {
-        kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part],
-                          h->cell[__builtin_ctz(odd)]);
+        kernel_hex_fetch(s, __builtin_ctz(odd));
         if (s->cell.is_finite) kernel_find_value(s, h->value);
     }
     h->count = 0;

@@ -123,7 +123,10 @@ static bool is_usual(const kernel_frame *frame, const kernel_surface *surface)
 {
     const double scale = frame->job->space.scale;
     bool is_so = scale > 1e-20 && scale < 1e20;
-    for (int a = 0; a < 3; a++) is_so = is_so && fabs(frame->job->camera.eye[a]) * scale < (double)KERNEL_KEPT_PLACE;
+    for (int a = 0; a < 3; a++) {
+        const double eye = fabs(frame->job->camera.eye[a]);
+        is_so = is_so && eye * scale < (double)KERNEL_KEPT_PLACE && eye < 1e15; /* kernel_plain_begin() */
+    }
     for (int i = 0; i < surface->layer->value_count; i++)
         is_so = is_so && fabs(surface->layer->values[i]) < (double)KERNEL_KEPT_VALUE;
     return is_so;
