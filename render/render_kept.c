@@ -132,6 +132,49 @@ static bool is_usual(const kernel_frame *frame, const kernel_surface *surface)
     return is_so;
 }
 
+/* Along the camera's axes, from the eye, of a point of the tree's box that is given by its shares. */
+static void place_in_box(const kernel_frame *frame, const mmbvh *tree, const double share[3], double at[3])
+{
+    const render_camera *camera = &frame->job->camera;
+    const double *axes[3] = {camera->right, camera->up, camera->forward};
+    float low[4], high[4];
+    mmbvh_node_box(tree, 0, low, high);
+    at[0] = at[1] = at[2] = 0;
+    for (int a = 0; a < 3; a++) {
+        const double scaled = (double)low[a] + share[a] * ((double)high[a] - (double)low[a]);
+        const double from_eye = tree->origin[a] + scaled / tree->scale - camera->eye[a];
+        for (int axis = 0; axis < 3; axis++) at[axis] += from_eye * axes[axis][a];
+    }
+}
+
+static bool is_in_picture(const kernel_frame *frame, const double at[3])
+{
+    const render_camera *camera = &frame->job->camera;
+    const double depth = camera->is_orthographic ? 1 : at[2];
+    const double column = (at[0] / depth - frame->slope_x0) / frame->slope_dx;
+    const double row = (at[1] / depth - frame->slope_y0) / frame->slope_dy;
+    return column >= -0.5 && column < camera->width - 0.5 && row >= -0.5 && row < camera->height - 0.5;
+}
+
+/* Do three quarters of the part's box lie in the picture, and all of it in front of the eye? What shows of others the
+ * tree finds sooner than all that is kept is gone through, let alone kept. */
+static bool is_in_view(const kernel_frame *frame, const mmbvh *tree)
+{
+    enum { SIDE = 4, POINTS = SIDE * SIDE * SIDE };
+    int inside = 0;
+    double at[3];
+    for (int n = 0; n < 8; n++) {
+        place_in_box(frame, tree, (const double[3]){n & 1, n >> 1 & 1, n >> 2}, at);
+        if (!(at[2] > 0)) return false;
+    }
+    for (int n = 0; n < POINTS; n++) {
+        const int i[3] = {n % SIDE, n / SIDE % SIDE, n / SIDE / SIDE};
+        place_in_box(frame, tree, (const double[3]){(i[0] + 0.5) / SIDE, (i[1] + 0.5) / SIDE, (i[2] + 0.5) / SIDE}, at);
+        inside += is_in_picture(frame, at);
+    }
+    return inside >= POINTS * 3 / 4;
+}
+
 /* Is all that the tiles ask of the layer's cells in records? (kernel_tile_shown.h) */
 static bool can_keep(const kernel_frame *frame, int surface, int part)
 {
@@ -139,6 +182,7 @@ static bool can_keep(const kernel_frame *frame, int surface, int part)
     const grid *cells = frame->job->parts[part].cells;
     if (surface >= frame->opaque_count || s->layer->colour_map || s->layer->normal == RENDER_DIFFERENCES) return false;
     if (!s->layer->field.ranges[part].low || !frame->job->parts[part].tree->node_count) return false;
+    if (!is_in_view(frame, frame->job->parts[part].tree)) return false;
     return cells->cell_type == GRID_TET || (cells->cell_type == GRID_HEX && s->layer->root == RENDER_ROBUST);
 }
 
@@ -153,7 +197,7 @@ static kernel_kept keep(const render_kept *kept, const kernel_frame *frame, int 
     render_subtrees subtrees = {0};
     int64_t floats = 0;
     bool is_refused = true;
-    room.floats = base_alloc((size_t)(room.blocks * BLOCK) * sizeof *room.floats);
+    room.floats = base_reserve((size_t)(room.blocks * BLOCK) * sizeof *room.floats);
     if (keepers && room.floats && render_subtrees_begin(&subtrees, 1)) {
         is_refused = false;
         render_subtrees_add(&subtrees, frame, surface, part);
@@ -163,7 +207,10 @@ static kernel_kept keep(const render_kept *kept, const kernel_frame *frame, int 
     }
     base_free(keepers);
     base_free(subtrees.items);
-    if (is_refused) base_free(room.floats);
+    if (is_refused)
+        base_free(room.floats);
+    else
+        base_use(room.floats, (size_t)floats * sizeof *room.floats);
     return is_refused ? (kernel_kept){0} : (kernel_kept){room.floats, floats / size, (int)size / KERNEL_KEPT_FLOATS};
 }
 

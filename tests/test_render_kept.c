@@ -664,8 +664,10 @@ static void more_than_the_bound_draws_the_same(void **state)
         f.job.surface_count = LAYERS;
         f.job.threads = threads;
         for (int turn = 0; turn < 3; turn++) {
-            fixture_look(&f, turn == 1 ? CAMERA_OUTSIDE : CAMERA_INSIDE, 48, 40);
-            if (turn != 1) f.job.camera.half_height = 0.01; /* few cells, which are listed */
+            /* A picture that lists fewer cells than show; one that has few of them; one that lists all. */
+            const bool is_large = turn == 2;
+            fixture_look(&f, turn == 1 ? CAMERA_INSIDE : CAMERA_OUTSIDE, is_large ? 900 : 48, is_large ? 700 : 40);
+            if (turn == 1) f.job.camera.half_height = 0.01;
             assert_true(compare(&f, kept, "sixteen layers") > 0);
             /* Less what room the threads leave at the end, 256 KiB each at most. */
             assert_true(render_kept_bytes(kept) <= MOST_BYTES);

@@ -27,16 +27,26 @@ static int must_fail(void)
     return atomic_fetch_sub(&fail_countdown, 1) == 1;
 }
 
-void *base_alloc(size_t bytes)
+static void *make_block(size_t bytes, size_t counted)
 {
     if (must_fail()) return NULL;
     if (bytes > SIZE_MAX - 2 * header_bytes) return NULL;
     const size_t rounded = (bytes + header_bytes - 1) / header_bytes * header_bytes;
     char *raw = aligned_alloc(header_bytes, rounded + header_bytes);
     if (!raw) return NULL;
-    memcpy(raw, &bytes, sizeof bytes);
-    count_bytes((long long)bytes);
+    memcpy(raw, &counted, sizeof counted);
+    count_bytes((long long)counted);
     return raw + header_bytes;
+}
+
+void *base_alloc(size_t bytes)
+{
+    return make_block(bytes, bytes);
+}
+
+void *base_reserve(size_t bytes)
+{
+    return make_block(bytes, 0);
 }
 
 void *base_calloc(size_t count, size_t size)
@@ -52,6 +62,12 @@ static size_t block_bytes(const void *block)
     size_t bytes;
     memcpy(&bytes, (const char *)block - header_bytes, sizeof bytes);
     return bytes;
+}
+
+void base_use(void *block, size_t bytes)
+{
+    count_bytes((long long)bytes - (long long)block_bytes(block));
+    memcpy((char *)block - header_bytes, &bytes, sizeof bytes);
 }
 
 void *base_realloc(void *block, size_t bytes)

@@ -13,6 +13,11 @@ void *base_alloc(size_t bytes);
 /* The same, zeroed. */
 void *base_calloc(size_t count, size_t size);
 
+/* Room for so many bytes, which count only from base_use() on, that says how many of them are in use: memory that is
+ * not written to is none. */
+void *base_reserve(size_t bytes);
+void base_use(void *block, size_t bytes);
+
 /* Grow or shrink, contents kept; on failure NULL and the old block stays. NULL block: base_alloc. */
 void *base_realloc(void *block, size_t bytes);
 
