@@ -1,5 +1,6 @@
 /* Crossed cells of a plain mesh put side by side, for pictures to come (render_kept.h). Sizes are such that each
- * picture finds its numbers usual (kernel_shown_tets.h): a mesh that has others among them is not kept. */
+ * picture of the same scale finds a tet's numbers usual (kernel_shown_tets.h): a mesh that has others among them is not
+ * kept. */
 #ifndef RENDER_KERNEL_KEEP_H
 #define RENDER_KERNEL_KEEP_H
 

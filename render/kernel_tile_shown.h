@@ -123,6 +123,7 @@ static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace
         kernel_tile_source(t, w->items[n]->source, &part);
         if (!b->count) kernel_batch_turn(t, b, part);
         const bool is_known = b->layer == t->layer && b->part == part;
+        if (kernel_kept_of(t->frame, t->layer, part)) continue;                     /* all of it was asked for */
         if (is_known && (b->is_for_it || kernel_hexes_fit(t, &b->plain))) continue; /* batches ask for theirs */
         kernel_tile_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                       w->items[n]->cell);

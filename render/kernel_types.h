@@ -103,7 +103,7 @@ typedef struct kernel_kept {
 /* One thread's share of them while they are put there. */
 typedef struct kernel_keeper {
     float *at, *end;        /* of its room */
-    int vertices;           /* of a cell; 0: of none yet */
+    int vertices;           /* of a cell */
     bool is_refused;        /* none are to be kept: of another mesh, with odd numbers, or too many */
     struct kernel_room *of; /* render_kept.c */
 } kernel_keeper;

@@ -19,6 +19,8 @@ enum {
 /* A layer's isovalues in a part's field; records NULL: they are not kept. */
 typedef struct kept_cells {
     const grid *cells;
+    const mmbvh *tree;
+    double scale; /* the space's, at which its numbers were found usual */
     grid_field field;
     int value_count;
     double values[RENDER_MAX_ISOVALUES];
@@ -216,35 +218,47 @@ static kernel_kept keep(const render_kept *kept, const kernel_frame *frame, int 
 
 /* ---- what there is -------------------------------------------------------------------------------------------- */
 
-static bool is_of(const kept_cells *k, const grid *cells, const grid_field *field, const render_surface_layer *layer)
+static bool is_same_field(const grid_field *a, const grid_field *b)
 {
-    return k->cells == cells && k->field.values.data == field->values.data &&
-           k->field.values.stride == field->values.stride && k->field.component == field->component &&
-           k->field.component_stride == field->component_stride && k->value_count == layer->value_count &&
+    return a->values.data == b->values.data && a->values.stride == b->values.stride &&
+           a->values.is_wide == b->values.is_wide && a->values.is_integer == b->values.is_integer &&
+           a->component == b->component && a->component_stride == b->component_stride &&
+           a->is_cell_centred == b->is_cell_centred;
+}
+
+static bool is_of(const kept_cells *k, const kernel_frame *frame, int surface, int part)
+{
+    const render_part *p = &frame->job->parts[part];
+    const render_surface_layer *layer = frame->surfaces[surface].layer;
+    return k->cells == p->cells && k->tree == p->tree && k->scale == frame->job->space.scale &&
+           is_same_field(&k->field, &layer->field.fields[part]) && k->value_count == layer->value_count &&
            !memcmp(k->values, layer->values, (size_t)layer->value_count * sizeof *layer->values);
 }
 
 /* A place for the layer's cells on the part; NULL where there is no memory. */
-static kept_cells *place(render_kept *kept, const grid *cells, const grid_field *field,
-                         const render_surface_layer *layer)
+static kept_cells *place(render_kept *kept, const kernel_frame *frame, int surface, int part)
 {
+    const render_part *p = &frame->job->parts[part];
+    const render_surface_layer *layer = frame->surfaces[surface].layer;
     kept_cells *items = base_realloc(kept->items, (size_t)(kept->count + 1) * sizeof *items);
     if (!items) return NULL;
     kept->items = items;
-    items[kept->count] = (kept_cells){.cells = cells, .field = *field, .value_count = layer->value_count};
-    memcpy(items[kept->count].values, layer->values, (size_t)layer->value_count * sizeof *layer->values);
-    return &items[kept->count++];
+    kept_cells *item = &items[kept->count++];
+    *item = (kept_cells){.cells = p->cells,
+                         .tree = p->tree,
+                         .scale = frame->job->space.scale,
+                         .field = layer->field.fields[part],
+                         .value_count = layer->value_count};
+    memcpy(item->values, layer->values, (size_t)layer->value_count * sizeof *layer->values);
+    return item;
 }
 
 static kernel_kept find(render_kept *kept, const kernel_frame *frame, int surface, int part, kernel_thread *thread_of,
                         int threads)
 {
-    const render_surface_layer *layer = frame->surfaces[surface].layer;
-    const grid *cells = frame->job->parts[part].cells;
-    const grid_field *field = &layer->field.fields[part];
     for (int i = 0; i < kept->count; i++)
-        if (is_of(&kept->items[i], cells, field, layer)) return kept->items[i].kept;
-    kept_cells *item = place(kept, cells, field, layer);
+        if (is_of(&kept->items[i], frame, surface, part)) return kept->items[i].kept;
+    kept_cells *item = place(kept, frame, surface, part);
     if (!item) return (kernel_kept){0};
     item->kept = keep(kept, frame, surface, part, thread_of, threads);
     kept->floats += item->kept.count * item->kept.vertices * KERNEL_KEPT_FLOATS;

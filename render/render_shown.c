@@ -1,11 +1,10 @@
-/* Subtrees are dealt to threads, each of which lists the cells it finds; then cells are counted tile by tile, room is
+/* Subtrees are dealt to threads, each of which lists the cells it finds and counts them by tile; then room is
  * made for each tile, and every thread bins its own cells. The bound on cells is a bound on memory and on time lost:
  * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. Of a volume nothing is
  * hidden: there a million may be listed in any case. */
 #include "render_shown.h"
 
 #include <omp.h>
-#include <string.h>
 
 #include "memory.h"
 #include "render_isa.h"

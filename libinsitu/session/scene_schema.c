@@ -244,9 +244,10 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .by_default = "`auto`")                                                                                          \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, 64),                           \
       .help =                                                                                                          \
-          "The images to draw. Three or more that show the same opaque isosurface in one step share the work of "      \
-          "finding its cells, where these are tets or hexes in arrays of float32 and int32: 64 bytes a crossed tet "   \
-          "and 128 a hex, at most 64 MiB a rank, are held while the step is drawn.",                                   \
+          "The images to draw. Three frames or more of a step that show the same isosurface, opaque, in one colour a " \
+          "value, normals by gradient and robust roots, share the work of finding its cells, where these are tets or " \
+          "hexes in arrays of float32 and int32 and the images have most of a rank's mesh in view: 64 bytes a "        \
+          "crossed tet and 128 a hex, at most 64 MiB a rank, are held while the step is drawn.",                       \
       .child = &image_mapping)
 static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};
 static const scene_key top_keys[] = {TOP_KEYS(AS_KEY)};
