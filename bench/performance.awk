@@ -73,9 +73,14 @@ function claim(what, m, n, ours, theirs, ratio, is_least, bar, aim,    holds) {
         is_least ? "≥" : "≤", bar, aim == "" ? "" : ", aim " aim, holds ? "yes" : "**no**"
 }
 
+# Of the faster of its trees.
+function embree_trace(m, n) {
+    return faster("peers", m, n, "isosurface embree trace low", "isosurface embree trace medium")
+}
+
 function claim_trace(m, n, what, measure,    theirs, ours, rays) {
     rays = 1000 * value("peers", m, n, "rays")
-    theirs = faster("peers", m, n, "isosurface embree trace low", "isosurface embree trace medium")
+    theirs = embree_trace(m, n)
     ours = value("peers", m, n, measure)
     if (!theirs || !ours) return
     claim("isosurface, speed of tracing" what ": Embree, packets of 16, extracted surface", m, n,
@@ -235,7 +240,7 @@ function section_views(    i, m, n) {
         if (!has("peers", m, n, "isosurface trace kept")) continue
         printf "| %s %d | %d | %s | %s | %s | %s |\n", m, n, cells["peers", m, n], spread("peers", m, n, "isosurface trace"),
             spread("peers", m, n, "isosurface trace keeping"), spread("peers", m, n, "isosurface trace kept"),
-            number(faster("peers", m, n, "isosurface embree trace low", "isosurface embree trace medium"))
+            number(embree_trace(m, n))
     }
 }
 

@@ -14,7 +14,7 @@ void *base_alloc(size_t bytes);
 void *base_calloc(size_t count, size_t size);
 
 /* Room for so many bytes, which count only from base_use() on, that says how many of them are in use: memory that is
- * not written to is none. */
+ * not written to is none. base_realloc() before that keeps nothing of it. */
 void *base_reserve(size_t bytes);
 void base_use(void *block, size_t bytes);
 
