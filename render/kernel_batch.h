@@ -408,8 +408,7 @@ SIMD_INLINE void kernel_batch_add(kernel_tile_trace *t, kernel_batch *b, const k
     b->value[n] = value;
     b->isovalue[n] = t->surface->layer->values[value];
     for (int i = 0; i < 4; i++) b->vertex[i][n] = kernel_plain_vertex(&b->plain, shown->cell, 4, i);
-    if (b->plain.connectivity)
-        for (int i = 0; i < 4; i++) kernel_plain_prefetch(&b->plain, b->vertex[i][n]);
+    for (int i = 0; i < 4; i++) kernel_plain_prefetch(&b->plain, b->vertex[i][n]);
     for (unsigned blocks = shown->blocks & ~t->begun; blocks; blocks &= blocks - 1)
         kernel_block_begin(t, __builtin_ctz(blocks));
 }

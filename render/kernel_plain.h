@@ -80,8 +80,10 @@ SIMD_INLINE int32_t kernel_plain_vertex(const kernel_plain *p, uint32_t cell, in
     return p->connectivity ? p->connectivity[at] : (int32_t)at;
 }
 
+/* Nothing of cells that are kept: all of one was asked for at once (kernel_shown_prefetch()). */
 SIMD_INLINE void kernel_plain_prefetch(const kernel_plain *p, int32_t vertex)
 {
+    if (!p->connectivity) return;
     const int64_t at = (int64_t)vertex * p->stride;
     __builtin_prefetch(p->values + (int64_t)vertex * p->value_stride);
     __builtin_prefetch(p->coordinates[0] + at);
@@ -89,21 +91,27 @@ SIMD_INLINE void kernel_plain_prefetch(const kernel_plain *p, int32_t vertex)
     __builtin_prefetch(p->coordinates[2] + at);
 }
 
-/* A tet with finite values, as kernel_cell_fetch() and kernel_cell_move() make it. */
-SIMD_INLINE void kernel_plain_cell(kernel_cell *c, const kernel_plain *p, const kernel_frame *f,
-                                   const kernel_tile *tile, uint32_t index)
+/* A tet or hex with finite values, as kernel_cell_fetch() makes it, and where its vertices are; for the
+ * caller to place. */
+SIMD_INLINE void kernel_plain_fetch(kernel_cell *c, const kernel_plain *p, uint32_t index, int vertices)
 {
     c->index = index;
-    c->type = GRID_TET;
-    c->count = 4;
+    c->type = vertices == 8 ? GRID_HEX : GRID_TET;
+    c->count = vertices;
     c->is_finite = c->is_placed = true;
     c->has_lines = c->has_normal = false;
-    for (int i = 0; i < 4; i++) {
-        const int64_t vertex = kernel_plain_vertex(p, index, 4, i);
-        c->vertices[i] = vertex;
+    for (int i = 0; i < vertices; i++) {
+        const int64_t vertex = c->vertices[i] = kernel_plain_vertex(p, index, vertices, i);
         c->values[i] = (double)p->values[vertex * p->value_stride];
         for (int a = 0; a < 3; a++) c->world[i][a] = (double)p->coordinates[a][vertex * p->stride];
     }
+}
+
+/* A tet, as kernel_cell_move() places it. */
+SIMD_INLINE void kernel_plain_cell(kernel_cell *c, const kernel_plain *p, const kernel_frame *f,
+                                   const kernel_tile *tile, uint32_t index)
+{
+    kernel_plain_fetch(c, p, index, 4);
     kernel_tet_place(c, f, tile);
 }
 

@@ -169,17 +169,8 @@ static void kernel_hex_fetch(kernel_finder *s, int n)
         kernel_cell_fetch(c, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], s->hexes.cell[n]);
         return;
     }
-    c->index = s->hexes.cell[n];
-    c->type = GRID_HEX;
-    c->count = 8;
-    c->is_finite = c->is_placed = true;
-    c->has_lines = c->has_normal = false;
-    for (int i = 0; i < 8; i++) {
-        const int64_t vertex = c->vertices[i] = s->hexes.vertex[i][n];
-        c->values[i] = (double)p->values[vertex * p->value_stride];
-        for (int a = 0; a < 3; a++) c->world[i][a] = (double)p->coordinates[a][vertex * p->stride];
-        kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
-    }
+    kernel_plain_fetch(c, p, s->hexes.cell[n], 8);
+    for (int i = 0; i < 8; i++) kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
 }
 
 /* Where those that wait show. */
