@@ -3,8 +3,6 @@
 
 #include <omp.h>
 
-enum { READ_AHEAD = 512 }; /* entries of the connectivity: what a core asks for by itself comes too late */
-
 #define DEFINE_READ(name, shape, wide_index, wide_number)                                                              \
     static void name(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes)                  \
     {                                                                                                                  \
@@ -20,8 +18,7 @@ MMBVH_INLINE void read_spans(const grid *g, const uint32_t *cells, int count, fe
 {
     for (int i = 0; i < count; i++) {
         fetch_span span = fetch_span_empty();
-        const int64_t soon = fetch_first(g, cells[i], fetch_vertex_count(g, cells[i], shape), shape) + READ_AHEAD;
-        __builtin_prefetch(g->connectivity.data + soon * g->connectivity.stride);
+        fetch_ahead(g, cells[i], shape);
         fetch_span_cell(&span, g, cells[i], shape, wide_index, is_packed);
         spans[i] = span;
     }

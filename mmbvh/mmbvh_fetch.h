@@ -48,35 +48,59 @@ MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const f
     return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
 }
 
+/* Of a pass over cells in the mesh's order: the connectivity that later ones will ask for. What a core asks for by
+ * itself, regular as it is, comes too late. */
+MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape shape)
+{
+    enum { AHEAD = 512 }; /* entries */
+    const int64_t soon = fetch_first(g, cell, fetch_vertex_count(g, cell, shape), shape) + AHEAD;
+    __builtin_prefetch(g->connectivity.data + soon * g->connectivity.stride);
+}
+
+/* Are an axis's floats, or values, one after the other? A stride that is a constant is part of an address. */
+static inline bool fetch_is_packed(const grid_array *a)
+{
+    return a->stride == (int64_t)sizeof(float);
+}
+
+/* A cell's values that are floats, four a vector; of fewer than eight vertices the last one again. Are all finite? */
+MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
+                                    const bool wide_index, const bool is_packed, vec4 out[2])
+{
+    const int64_t stride = is_packed ? (int64_t)sizeof(float) : values->stride;
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    float v[8];
+    for (int i = 0; i < 8; i++) {
+        const int64_t vertex = fetch_index(&g->connectivity, first + (i < count ? i : count - 1), wide_index);
+        v[i] = *(const float *)(const void *)(values->data + vertex * stride);
+    }
+    out[0] = (vec4){v[0], v[1], v[2], v[3]};
+    out[1] = shape == FETCH_TETS ? out[0] : (vec4){v[4], v[5], v[6], v[7]};
+    const vec4 poison = (out[0] - out[0]) + (out[1] - out[1]); /* 0 where both are finite, else not a number */
+    return vec4_all((ivec4)(poison == vec4_set1(0)));
+}
+
 /* A cell's values: their range, and whether all are finite. */
 typedef struct fetch_range {
     double low, high;
     bool is_finite;
 } fetch_range;
 
+/* Of values that are doubles. */
 MMBVH_INLINE fetch_range fetch_cell_range(const grid *g, const grid_array *values, int64_t cell,
-                                          const fetch_shape shape, const bool wide_index, const bool wide_number)
+                                          const fetch_shape shape, const bool wide_index)
 {
     const int count = fetch_vertex_count(g, cell, shape);
     const int64_t first = fetch_first(g, cell, count, shape);
     double low = INFINITY, high = -INFINITY, poison = 0;
-    float float_low = INFINITY, float_high = -INFINITY, float_poison = 0;
     for (int i = 0; i < count; i++) {
-        const char *at = values->data + fetch_index(&g->connectivity, first + i, wide_index) * values->stride;
-        if (wide_number) {
-            const double v = *(const double *)(const void *)at;
-            low = v < low ? v : low;
-            high = v > high ? v : high;
-            poison += v - v; /* 0 while all are finite, then not a number */
-        } else {
-            const float v = *(const float *)(const void *)at;
-            float_low = v < float_low ? v : float_low;
-            float_high = v > float_high ? v : float_high;
-            float_poison += v - v;
-        }
+        const double v = fetch_number(values, fetch_index(&g->connectivity, first + i, wide_index), true);
+        low = v < low ? v : low;
+        high = v > high ? v : high;
+        poison += v - v; /* 0 while all are finite, then not a number */
     }
-    if (wide_number) return (fetch_range){low, high, poison == 0};
-    return (fetch_range){(double)float_low, (double)float_high, float_poison == 0};
+    return (fetch_range){low, high, poison == 0};
 }
 
 /* The same of any cell and any field. */
@@ -150,12 +174,6 @@ static inline fetch_box fetch_span_box(const fetch_span *span)
 MMBVH_INLINE const char *fetch_vertex(const grid *g, int64_t entry, const bool wide_index)
 {
     return g->coordinates[0].data + fetch_index(&g->connectivity, entry, wide_index) * g->coordinates[0].stride;
-}
-
-/* Are an axis's floats one after the other? A stride that is a constant is part of an address. */
-static inline bool fetch_is_packed(const grid_array *a)
-{
-    return a->stride == (int64_t)sizeof(float);
 }
 
 /* The box grows by a cell whose coordinates are floats. */

@@ -5,7 +5,7 @@
 
 #include "mmbvh_fetch.h"
 
-enum { RUN_MAX = 4096, PREFETCH_CELLS = 48, PREFETCH_VALUES = 16 };
+enum { RUN_MAX = 4096, PREFETCH_CELLS = 48, PREFETCH_TETS = 96, PREFETCH_VALUES = 16 };
 
 int sweep_threads(const mmbvh_options *options)
 {
@@ -79,40 +79,73 @@ static inline range span_range(const span *s)
     return s->low <= s->high ? (range){round_down(s->low), round_up(s->high)} : range_empty();
 }
 
-/* The sweep goes down through the cells too: fetch what later leaves will ask for, connectivity first, values after. */
-MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
+/* The sweep goes down through the cells too: fetch the connectivity that later leaves will ask for. */
+MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const int64_t distance, const fetch_shape shape)
 {
-    if (entry < PREFETCH_CELLS) return;
-    const int64_t later = s->tree->cells[entry - PREFETCH_CELLS];
-    const int64_t sooner = s->tree->cells[entry - PREFETCH_VALUES];
-    const int later_count = fetch_vertex_count(s->g, later, shape), count = fetch_vertex_count(s->g, sooner, shape);
-    const int64_t later_first = fetch_first(s->g, later, later_count, shape);
-    const int64_t first = fetch_first(s->g, sooner, count, shape);
     const grid_array *connectivity = &s->g->connectivity;
-    __builtin_prefetch(connectivity->data + later_first * connectivity->stride);
+    if (entry < distance) return;
+    const int64_t later = s->tree->cells[entry - distance];
+    const int count = fetch_vertex_count(s->g, later, shape);
+    const int64_t first = fetch_first(s->g, later, count, shape);
+    __builtin_prefetch(connectivity->data + first * connectivity->stride);
+    if (shape != FETCH_TETS) __builtin_prefetch(connectivity->data + (first + count - 1) * connectivity->stride);
+}
+
+/* Of a cell whose connectivity has been asked for before. */
+MMBVH_INLINE void prefetch_values(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
+{
+    if (entry < PREFETCH_VALUES) return;
+    const int64_t sooner = s->tree->cells[entry - PREFETCH_VALUES];
+    const int count = fetch_vertex_count(s->g, sooner, shape);
+    const int64_t first = fetch_first(s->g, sooner, count, shape);
     for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_index(connectivity, first + i, wide_index);
+        const int64_t vertex = fetch_index(&s->g->connectivity, first + i, wide_index);
         __builtin_prefetch(s->values.data + vertex * s->values.stride);
     }
 }
 
+MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
+                               const bool wide_index, int64_t *unusable)
+{
+    span leaf = {INFINITY, -INFINITY, 0};
+    for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
+        prefetch_cell(s, entry, PREFETCH_CELLS, shape);
+        prefetch_values(s, entry, shape, wide_index);
+        span_add(&leaf, fetch_cell_range(s->g, &s->values, s->tree->cells[entry], shape, wide_index));
+    }
+    *unusable += leaf.unusable;
+    return span_range(&leaf);
+}
+
+/* Lanes grow by whole cells, and are one range at the end. */
+MMBVH_INLINE range float_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
+                              const bool wide_index, const bool is_packed, int64_t *unusable)
+{
+    vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY), v[2];
+    for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
+        prefetch_cell(s, entry, shape == FETCH_TETS ? PREFETCH_TETS : PREFETCH_CELLS, shape);
+        if (!fetch_cell_floats(s->g, &s->values, s->tree->cells[entry], shape, wide_index, is_packed, v)) {
+            ++*unusable;
+            continue;
+        }
+        low = vec4_min(vec4_min(v[0], v[1]), low);
+        high = vec4_max(vec4_max(v[0], v[1]), high);
+    }
+    return (range){vec4_least(low) + 0.0f, vec4_most(high) + 0.0f}; /* zero positive, as round_down() has it */
+}
+
 MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, const fetch_shape shape,
-                                const bool wide_index, const bool wide_number)
+                                const bool wide_index, const bool wide_number, const bool is_packed)
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
-        if (!count) {
+        if (!count)
             set_range(s, i, children_range(s, ref));
-            continue;
-        }
-        span leaf = {INFINITY, -INFINITY, 0};
-        for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
-            prefetch_cell(s, entry, shape, wide_index);
-            span_add(&leaf, fetch_cell_range(s->g, &s->values, s->tree->cells[entry], shape, wide_index, wide_number));
-        }
-        set_range(s, i, span_range(&leaf));
-        unusable += leaf.unusable;
+        else if (wide_number)
+            set_range(s, i, double_leaf(s, ref, count, shape, wide_index, &unusable));
+        else
+            set_range(s, i, float_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
     }
     return unusable;
 }
@@ -120,7 +153,9 @@ MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, cons
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
     static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
     {                                                                                                                  \
-        return run_ranges(s, first, end, shape, wide_index, wide_number);                                              \
+        return !wide_number && fetch_is_packed(&s->values)                                                             \
+                   ? run_ranges(s, first, end, shape, wide_index, wide_number, true)                                   \
+                   : run_ranges(s, first, end, shape, wide_index, wide_number, false);                                 \
     }
 FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 

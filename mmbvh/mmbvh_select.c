@@ -25,18 +25,38 @@ struct selector {
     uint64_t *bits;
 };
 
-MMBVH_INLINE bool meets(const mmbvh_wish *wish, const fetch_range *e)
+/* Of a cell: are its values finite, and does their range meet an interval? */
+typedef struct finding {
+    bool is_finite, meets;
+} finding;
+
+MMBVH_INLINE finding find_range(const selector *s, const fetch_range e)
 {
-    const float low = (float)e->low, high = (float)e->high;
-    bool any = false;
-    for (int i = 0; i < wish->interval_count; i++)
-        any |= (low <= wish->intervals[i].high) & (high >= wish->intervals[i].low);
-    return any;
+    const float low = (float)e.low, high = (float)e.high;
+    finding out = {e.is_finite, false};
+    for (int i = 0; i < s->wish->interval_count; i++)
+        out.meets |= (low <= s->wish->intervals[i].high) & (high >= s->wish->intervals[i].low);
+    return out;
+}
+
+/* A range meets an interval where a value is not above it, and one not below. */
+MMBVH_INLINE finding find_floats(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
+                                 const bool is_packed)
+{
+    vec4 v[2];
+    finding out = {fetch_cell_floats(s->g, &s->values, cell, shape, wide_index, is_packed, v), false};
+    const vec4 low = vec4_min(v[0], v[1]), high = vec4_max(v[0], v[1]);
+    for (int i = 0; i < s->wish->interval_count; i++) {
+        const mmbvh_interval *interval = &s->wish->intervals[i];
+        out.meets |=
+            vec4_any((ivec4)(low <= vec4_set1(interval->high))) & vec4_any((ivec4)(high >= vec4_set1(interval->low)));
+    }
+    return out;
 }
 
 /* Ghosts are passed over. */
 MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
-                          fetch_range (*const find)(const selector *, int64_t))
+                          finding (*const find)(const selector *, int64_t))
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
@@ -44,9 +64,9 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
         uint64_t word = s->bits[first / WORD_CELLS];
         for (int64_t i = 0; i < count; i++) {
             if (grid_is_ghost(s->g, first + i)) continue;
-            const fetch_range e = find(s, first + i);
-            unusable += !e.is_finite;
-            word |= (uint64_t)(e.is_finite & meets(s->wish, &e)) << i;
+            const finding cell = find(s, first + i);
+            unusable += !cell.is_finite;
+            word |= (uint64_t)(cell.is_finite & cell.meets) << i;
         }
         s->bits[first / WORD_CELLS] = word;
     }
@@ -54,24 +74,32 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
 }
 
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
-    MMBVH_INLINE fetch_range name##_range(const selector *s, int64_t cell)                                             \
+    MMBVH_INLINE finding name##_find(const selector *s, int64_t cell)                                                  \
     {                                                                                                                  \
-        return fetch_cell_range(s->g, &s->values, cell, shape, wide_index, wide_number);                               \
+        fetch_ahead(s->g, cell, shape);                                                                                \
+        return wide_number ? find_range(s, fetch_cell_range(s->g, &s->values, cell, shape, wide_index))                \
+                           : find_floats(s, cell, shape, wide_index, false);                                           \
+    }                                                                                                                  \
+    MMBVH_INLINE finding name##_find_packed(const selector *s, int64_t cell)                                           \
+    {                                                                                                                  \
+        fetch_ahead(s->g, cell, shape);                                                                                \
+        return find_floats(s, cell, shape, wide_index, true);                                                          \
     }                                                                                                                  \
     static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
     {                                                                                                                  \
-        return mark(s, begin, end, name##_range);                                                                      \
+        return !wide_number && fetch_is_packed(&s->values) ? mark(s, begin, end, name##_find_packed)                   \
+                                                           : mark(s, begin, end, name##_find);                         \
     }
 FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 
-MMBVH_INLINE fetch_range any_range(const selector *s, int64_t cell)
+MMBVH_INLINE finding find_any(const selector *s, int64_t cell)
 {
-    return fetch_any_cell_range(s->g, s->wish->field, cell);
+    return find_range(s, fetch_any_cell_range(s->g, s->wish->field, cell));
 }
 
 static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
 {
-    return mark(s, begin, end, any_range);
+    return mark(s, begin, end, find_any);
 }
 
 static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *bits)

@@ -40,6 +40,18 @@ static inline vec4 vec4_max(vec4 a, vec4 b)
 #endif
 }
 
+static inline float vec4_least(vec4 a)
+{
+    const vec4 two = vec4_min(a, (vec4){a[2], a[3], a[2], a[3]});
+    return two[0] < two[1] ? two[0] : two[1];
+}
+
+static inline float vec4_most(vec4 a)
+{
+    const vec4 two = vec4_max(a, (vec4){a[2], a[3], a[2], a[3]});
+    return two[0] > two[1] ? two[0] : two[1];
+}
+
 /* The spare lane to zero. */
 static inline vec4 vec4_xyz(vec4 a)
 {
@@ -101,6 +113,16 @@ static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
     vec4 placed;
     for (int i = 0; i < 4; i++) placed[i] = round_down(((double)a[i] - origin[i]) * scale);
     return placed;
+#endif
+}
+
+/* Is any lane's sign bit set? */
+static inline bool vec4_any(ivec4 a)
+{
+#if defined(__SSE2__)
+    return _mm_movemask_ps((__m128)a) != 0;
+#else
+    return (a[0] | a[1] | a[2] | a[3]) < 0;
 #endif
 }
 

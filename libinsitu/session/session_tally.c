@@ -333,6 +333,7 @@ MMBVH_INLINE bool run_lanes(const grid *g, int64_t cell, mesh_tally *t, lane_bou
     const int type = shape == FETCH_TETS ? GRID_TET : shape == FETCH_HEXES ? GRID_HEX : g->cell_type;
     const int count = grid_type_vertices(type);
     lanes at[GRID_MAX_CELL_VERTICES][3], volume;
+    for (int lane = 0; lane < LANES; lane++) fetch_ahead(g, cell + lane, shape);
     bool is_usual = are_vertices(g, cell * count, LANES * count, wide_index);
     if (g->ghosts)
         for (int lane = 0; lane < LANES; lane++) is_usual &= !grid_is_ghost(g, cell + lane);

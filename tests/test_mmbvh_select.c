@@ -1,0 +1,129 @@
+/* The cells that can show, against all cells one by one in double: of every kind of cell and layout, with ghosts and
+ * with values that are not finite. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <stdlib.h>
+
+#include "mmbvh.h"
+#include "test_meshes.h"
+
+enum { SIDE = 7, WISHES = 3 };
+
+/* A single isovalue, several, and what a transfer function shows. A vertex has the value 0.25. */
+static const mmbvh_interval at_one[] = {{0.25f, 0.25f}}, at_three[] = {{-1, -1}, {0.1f, 0.1f}, {0.9f, 0.9f}},
+                            in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}};
+
+static void make_wishes(const grid_field *field, mmbvh_wish wishes[WISHES])
+{
+    wishes[0] = (mmbvh_wish){field, 1, at_one};
+    wishes[1] = (mmbvh_wish){field, 3, at_three};
+    wishes[2] = (mmbvh_wish){field, 2, in_two};
+}
+
+/* Every fifth cell a ghost, and one value in two hundred not finite. */
+static test_mesh make_mesh(test_mesh_kind kind)
+{
+    test_mesh mesh;
+    test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+    test_mesh_round(&mesh);
+    mesh.values[mesh.vertex_count / 2] = 0.25;
+    for (int64_t v = 0; v < mesh.vertex_count; v++) {
+        const double u = test_uniform((uint64_t)v, 1);
+        if (u < 0.005) mesh.values[v] = u < 0.002 ? (double)NAN : u < 0.0035 ? (double)INFINITY : -(double)INFINITY;
+    }
+    for (int64_t cell = 0; cell < mesh.cell_count; cell++) mesh.ghosts[cell] = test_uniform((uint64_t)cell, 2) < 0.2;
+    return mesh;
+}
+
+/* -1: not to be used; else whether the wish can show it. */
+static int look(const test_view *view, const mmbvh_wish *wish, int64_t cell)
+{
+    double low = (double)INFINITY, high = -(double)INFINITY;
+    grid_walk walk = grid_walk_cell(&view->cells, cell);
+    int64_t vertex;
+    while (grid_walk_next(&walk, &vertex)) {
+        const double v = grid_field_value(&view->field, vertex);
+        if (!isfinite(v)) return -1;
+        low = fmin(v, low);
+        high = fmax(v, high);
+    }
+    for (int i = 0; i < wish->interval_count; i++)
+        if ((float)low <= wish->intervals[i].high && (float)high >= wish->intervals[i].low) return 1;
+    return 0;
+}
+
+/* Returns how many cells are selected. */
+static int64_t assert_selects(const test_view *view, const mmbvh_wish *wishes, int count)
+{
+    mmbvh_selection selection;
+    int64_t unusable[WISHES], unusable_by_hand[WISHES] = {0}, found = 0;
+    base_error error;
+    assert_int_equal(
+        mmbvh_select(&view->cells, wishes, count, &(mmbvh_options){.threads = 2}, &selection, unusable, &error),
+        INSITU_OK);
+    for (int64_t cell = 0; cell < view->cells.cell_count; cell++) {
+        bool shows = false;
+        for (int i = 0; i < count && !grid_is_ghost(&view->cells, cell); i++) {
+            const int seen = look(view, &wishes[i], cell);
+            shows |= seen > 0;
+            unusable_by_hand[i] += seen < 0;
+        }
+        if (!shows) continue;
+        assert_true(found < selection.count);
+        assert_int_equal(selection.cells[found++], cell);
+    }
+    assert_int_equal(found, selection.count);
+    for (int i = 0; i < count; i++) assert_int_equal(unusable[i], unusable_by_hand[i]);
+    mmbvh_selection_free(&selection);
+    return found;
+}
+
+static void just_the_cells_that_can_show_are_selected(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh = make_mesh((test_mesh_kind)kind);
+        for (int bits = 0; bits < 16; bits++) {
+            const test_layout layout = {false, bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3 & 1};
+            test_view view;
+            mmbvh_wish wishes[WISHES];
+            test_view_create(&mesh, layout, &view);
+            make_wishes(&view.field, wishes);
+            for (int i = 0; i < WISHES; i++) {
+                const int64_t count = assert_selects(&view, &wishes[i], 1);
+                assert_true(count > 0 && count < view.cells.cell_count);
+            }
+            assert_selects(&view, wishes, WISHES);
+            test_view_free(&view);
+        }
+        test_mesh_free(&mesh);
+    }
+}
+
+static void what_nobody_wishes_is_not_selected(void **state)
+{
+    (void)state;
+    test_mesh mesh = make_mesh(TEST_TETS);
+    test_view view;
+    test_view_create(&mesh, (test_layout){false}, &view);
+    const mmbvh_interval beyond = {7, 8};
+    assert_int_equal(assert_selects(&view, &(mmbvh_wish){&view.field, 1, &beyond}, 1), 0);
+    assert_int_equal(assert_selects(&view, &(mmbvh_wish){&view.field, 0, NULL}, 1), 0);
+    view.cells.cell_count = 0;
+    assert_int_equal(assert_selects(&view, &(mmbvh_wish){&view.field, 1, at_one}, 1), 0);
+    test_view_free(&view);
+    test_mesh_free(&mesh);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(just_the_cells_that_can_show_are_selected),
+        cmocka_unit_test(what_nobody_wishes_is_not_selected),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
