@@ -57,28 +57,59 @@ MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape sha
     __builtin_prefetch(g->connectivity.data + soon * g->connectivity.stride);
 }
 
-/* Are an axis's floats, or values, one after the other? A stride that is a constant is part of an address. */
+/* Are an axis's numbers, or a field's, one after the other? A stride that is a constant is part of an address. */
 static inline bool fetch_is_packed(const grid_array *a)
 {
-    return a->stride == (int64_t)sizeof(float);
+    return a->stride == (a->is_wide ? (int64_t)sizeof(double) : (int64_t)sizeof(float));
 }
 
-/* A cell's values that are floats, four a vector; of fewer than eight vertices the last one again. Are all finite? */
+/* Where the values of a cell's vertices are; of fewer than eight the last one's again. */
+MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
+                               const bool wide_index, const int64_t stride, const char *out[GRID_MAX_CELL_VERTICES])
+{
+    const int count = fetch_vertex_count(g, cell, shape);
+    const int64_t first = fetch_first(g, cell, count, shape);
+    for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++)
+        out[i] = values->data + fetch_index(&g->connectivity, first + (i < count ? i : count - 1), wide_index) * stride;
+}
+
+/* A cell's values that are floats. Are all finite? */
 MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                     const bool wide_index, const bool is_packed, vec4 out[2])
 {
-    const int64_t stride = is_packed ? (int64_t)sizeof(float) : values->stride;
-    const int count = fetch_vertex_count(g, cell, shape);
-    const int64_t first = fetch_first(g, cell, count, shape);
-    float v[8];
-    for (int i = 0; i < 8; i++) {
-        const int64_t vertex = fetch_index(&g->connectivity, first + (i < count ? i : count - 1), wide_index);
-        v[i] = *(const float *)(const void *)(values->data + vertex * stride);
-    }
+    const char *at[GRID_MAX_CELL_VERTICES];
+    float v[GRID_MAX_CELL_VERTICES];
+    fetch_values(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
+    for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const float *)(const void *)at[i];
     out[0] = (vec4){v[0], v[1], v[2], v[3]};
     out[1] = shape == FETCH_TETS ? out[0] : (vec4){v[4], v[5], v[6], v[7]};
     const vec4 poison = (out[0] - out[0]) + (out[1] - out[1]); /* 0 where both are finite, else not a number */
     return vec4_all((ivec4)(poison == vec4_set1(0)));
+}
+
+/* A cell's values, or a leaf's: their range, in lanes. */
+typedef struct fetch_doubles {
+    vec2 low, high;
+} fetch_doubles;
+
+/* Of a cell's values that are doubles. Are all finite? */
+MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
+                                     const bool wide_index, const bool is_packed, fetch_doubles *out)
+{
+    const char *at[GRID_MAX_CELL_VERTICES];
+    double v[GRID_MAX_CELL_VERTICES];
+    fetch_values(g, values, cell, shape, wide_index, is_packed ? (int64_t)sizeof *v : values->stride, at);
+    for (int i = 0; i < GRID_MAX_CELL_VERTICES; i++) v[i] = *(const double *)(const void *)at[i];
+    const vec2 a = {v[0], v[1]}, b = {v[2], v[3]};
+    vec2 poison = (a - a) + (b - b); /* 0 where both are finite, else not a number */
+    *out = (fetch_doubles){vec2_min(a, b), vec2_max(a, b)};
+    if (shape != FETCH_TETS) {
+        const vec2 c = {v[4], v[5]}, d = {v[6], v[7]};
+        poison += (c - c) + (d - d);
+        out->low = vec2_min(vec2_min(c, d), out->low);
+        out->high = vec2_max(vec2_max(c, d), out->high);
+    }
+    return poison[0] + poison[1] == 0;
 }
 
 /* A cell's values: their range, and whether all are finite. */
@@ -87,23 +118,13 @@ typedef struct fetch_range {
     bool is_finite;
 } fetch_range;
 
-/* Of values that are doubles. */
-MMBVH_INLINE fetch_range fetch_cell_range(const grid *g, const grid_array *values, int64_t cell,
-                                          const fetch_shape shape, const bool wide_index)
+MMBVH_INLINE fetch_range fetch_doubles_range(const fetch_doubles *v, bool is_finite)
 {
-    const int count = fetch_vertex_count(g, cell, shape);
-    const int64_t first = fetch_first(g, cell, count, shape);
-    double low = INFINITY, high = -INFINITY, poison = 0;
-    for (int i = 0; i < count; i++) {
-        const double v = fetch_number(values, fetch_index(&g->connectivity, first + i, wide_index), true);
-        low = v < low ? v : low;
-        high = v > high ? v : high;
-        poison += v - v; /* 0 while all are finite, then not a number */
-    }
-    return (fetch_range){low, high, poison == 0};
+    return (fetch_range){v->low[0] < v->low[1] ? v->low[0] : v->low[1],
+                         v->high[0] > v->high[1] ? v->high[0] : v->high[1], is_finite};
 }
 
-/* The same of any cell and any field. */
+/* Of any cell and any field. */
 static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *field, int64_t cell)
 {
     fetch_range range = {INFINITY, -INFINITY, true};

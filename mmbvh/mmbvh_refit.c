@@ -5,7 +5,7 @@
 
 #include "mmbvh_fetch.h"
 
-enum { RUN_MAX = 4096, PREFETCH_CELLS = 48, PREFETCH_TETS = 96, PREFETCH_VALUES = 16 };
+enum { RUN_MAX = 4096, PREFETCH_CELLS = 48, PREFETCH_TETS = 96 /* half as large */ };
 
 int sweep_threads(const mmbvh_options *options)
 {
@@ -58,72 +58,45 @@ int64_t sweep_tree(const sweep *s, int threads)
     return unusable + run_all(s, 0, 1);
 }
 
-/* Doubles that grow by whole cells; rounded once at the end. */
-typedef struct span {
-    double low, high;
-    int64_t unusable;
-} span;
-
-static inline void span_add(span *to, fetch_range cell)
-{
-    if (!cell.is_finite) {
-        to->unusable++;
-        return;
-    }
-    to->low = cell.low < to->low ? cell.low : to->low;
-    to->high = cell.high > to->high ? cell.high : to->high;
-}
-
-static inline range span_range(const span *s)
-{
-    return s->low <= s->high ? (range){round_down(s->low), round_up(s->high)} : range_empty();
-}
-
-/* The sweep goes down through the cells too: fetch the connectivity that later leaves will ask for. */
-MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const int64_t distance, const fetch_shape shape)
+/* The sweep goes down through the cells too: fetch the connectivity that later leaves will ask for. What is longer than
+ * a quarter of a cache line may lie across two. */
+MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
 {
     const grid_array *connectivity = &s->g->connectivity;
+    const int64_t distance = shape == FETCH_TETS ? PREFETCH_TETS : PREFETCH_CELLS;
     if (entry < distance) return;
     const int64_t later = s->tree->cells[entry - distance];
     const int count = fetch_vertex_count(s->g, later, shape);
     const int64_t first = fetch_first(s->g, later, count, shape);
     __builtin_prefetch(connectivity->data + first * connectivity->stride);
-    if (shape != FETCH_TETS) __builtin_prefetch(connectivity->data + (first + count - 1) * connectivity->stride);
-}
-
-/* Of a cell whose connectivity has been asked for before. */
-MMBVH_INLINE void prefetch_values(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
-{
-    if (entry < PREFETCH_VALUES) return;
-    const int64_t sooner = s->tree->cells[entry - PREFETCH_VALUES];
-    const int count = fetch_vertex_count(s->g, sooner, shape);
-    const int64_t first = fetch_first(s->g, sooner, count, shape);
-    for (int i = 0; i < count; i++) {
-        const int64_t vertex = fetch_index(&s->g->connectivity, first + i, wide_index);
-        __builtin_prefetch(s->values.data + vertex * s->values.stride);
-    }
-}
-
-MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
-                               const bool wide_index, int64_t *unusable)
-{
-    span leaf = {INFINITY, -INFINITY, 0};
-    for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
-        prefetch_cell(s, entry, PREFETCH_CELLS, shape);
-        prefetch_values(s, entry, shape, wide_index);
-        span_add(&leaf, fetch_cell_range(s->g, &s->values, s->tree->cells[entry], shape, wide_index));
-    }
-    *unusable += leaf.unusable;
-    return span_range(&leaf);
+    if (shape != FETCH_TETS || wide_index)
+        __builtin_prefetch(connectivity->data + (first + count - 1) * connectivity->stride);
 }
 
 /* Lanes grow by whole cells, and are one range at the end. */
+MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
+                               const bool wide_index, const bool is_packed, int64_t *unusable)
+{
+    fetch_doubles leaf = {vec2_set1((double)INFINITY), vec2_set1(-(double)INFINITY)}, cell;
+    for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
+        prefetch_cell(s, entry, shape, wide_index);
+        if (!fetch_cell_doubles(s->g, &s->values, s->tree->cells[entry], shape, wide_index, is_packed, &cell)) {
+            ++*unusable;
+            continue;
+        }
+        leaf.low = vec2_min(cell.low, leaf.low);
+        leaf.high = vec2_max(cell.high, leaf.high);
+    }
+    const fetch_range r = fetch_doubles_range(&leaf, true);
+    return r.low <= r.high ? (range){round_down(r.low), round_up(r.high)} : range_empty();
+}
+
 MMBVH_INLINE range float_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
                               const bool wide_index, const bool is_packed, int64_t *unusable)
 {
     vec4 low = vec4_set1(INFINITY), high = vec4_set1(-INFINITY), v[2];
     for (int64_t entry = ref + count - 1; entry >= ref; entry--) {
-        prefetch_cell(s, entry, shape == FETCH_TETS ? PREFETCH_TETS : PREFETCH_CELLS, shape);
+        prefetch_cell(s, entry, shape, wide_index);
         if (!fetch_cell_floats(s->g, &s->values, s->tree->cells[entry], shape, wide_index, is_packed, v)) {
             ++*unusable;
             continue;
@@ -143,7 +116,7 @@ MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, cons
         if (!count)
             set_range(s, i, children_range(s, ref));
         else if (wide_number)
-            set_range(s, i, double_leaf(s, ref, count, shape, wide_index, &unusable));
+            set_range(s, i, double_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
         else
             set_range(s, i, float_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
     }
@@ -153,29 +126,33 @@ MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, cons
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
     static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
     {                                                                                                                  \
-        return !wide_number && fetch_is_packed(&s->values)                                                             \
-                   ? run_ranges(s, first, end, shape, wide_index, wide_number, true)                                   \
-                   : run_ranges(s, first, end, shape, wide_index, wide_number, false);                                 \
+        return fetch_is_packed(&s->values) ? run_ranges(s, first, end, shape, wide_index, wide_number, true)           \
+                                           : run_ranges(s, first, end, shape, wide_index, wide_number, false);         \
     }
 FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 
 static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
 
-/* For whatever the instances above do not read. */
+/* For whatever the instances above do not read: rounded once at the end. */
+static range any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
+{
+    double low = (double)INFINITY, high = -low;
+    for (int64_t k = 0; k < count; k++) {
+        const fetch_range cell = fetch_any_cell_range(s->g, s->field, s->tree->cells[ref + k]);
+        *unusable += !cell.is_finite;
+        if (!cell.is_finite) continue;
+        low = cell.low < low ? cell.low : low;
+        high = cell.high > high ? cell.high : high;
+    }
+    return low <= high ? (range){round_down(low), round_up(high)} : range_empty();
+}
+
 static int64_t run_any(const sweep *s, int64_t first, int64_t end)
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
-        if (!count) {
-            set_range(s, i, children_range(s, ref));
-            continue;
-        }
-        span leaf = {INFINITY, -INFINITY, 0};
-        for (int64_t k = 0; k < count; k++)
-            span_add(&leaf, fetch_any_cell_range(s->g, s->field, s->tree->cells[ref + k]));
-        set_range(s, i, span_range(&leaf));
-        unusable += leaf.unusable;
+        set_range(s, i, count ? any_leaf(s, ref, count, &unusable) : children_range(s, ref));
     }
     return unusable;
 }

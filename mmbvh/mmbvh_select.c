@@ -54,9 +54,18 @@ MMBVH_INLINE finding find_floats(const selector *s, int64_t cell, const fetch_sh
     return out;
 }
 
+MMBVH_INLINE finding find_doubles(const selector *s, int64_t cell, const fetch_shape shape, const bool wide_index,
+                                  const bool is_packed)
+{
+    fetch_doubles v;
+    const bool is_finite = fetch_cell_doubles(s->g, &s->values, cell, shape, wide_index, is_packed, &v);
+    return find_range(s, fetch_doubles_range(&v, is_finite));
+}
+
+typedef finding (*const finder)(const selector *s, int64_t cell, const bool is_packed);
+
 /* Ghosts are passed over. */
-MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
-                          finding (*const find)(const selector *, int64_t))
+MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder find, const bool is_packed)
 {
     int64_t unusable = 0;
     for (int64_t first = begin; first < end; first += WORD_CELLS) {
@@ -64,7 +73,7 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
         uint64_t word = s->bits[first / WORD_CELLS];
         for (int64_t i = 0; i < count; i++) {
             if (grid_is_ghost(s->g, first + i)) continue;
-            const finding cell = find(s, first + i);
+            const finding cell = find(s, first + i, is_packed);
             unusable += !cell.is_finite;
             word |= (uint64_t)(cell.is_finite & cell.meets) << i;
         }
@@ -74,32 +83,28 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end,
 }
 
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
-    MMBVH_INLINE finding name##_find(const selector *s, int64_t cell)                                                  \
+    MMBVH_INLINE finding name##_find(const selector *s, int64_t cell, const bool is_packed)                            \
     {                                                                                                                  \
         fetch_ahead(s->g, cell, shape);                                                                                \
-        return wide_number ? find_range(s, fetch_cell_range(s->g, &s->values, cell, shape, wide_index))                \
-                           : find_floats(s, cell, shape, wide_index, false);                                           \
-    }                                                                                                                  \
-    MMBVH_INLINE finding name##_find_packed(const selector *s, int64_t cell)                                           \
-    {                                                                                                                  \
-        fetch_ahead(s->g, cell, shape);                                                                                \
-        return find_floats(s, cell, shape, wide_index, true);                                                          \
+        return wide_number ? find_doubles(s, cell, shape, wide_index, is_packed)                                       \
+                           : find_floats(s, cell, shape, wide_index, is_packed);                                       \
     }                                                                                                                  \
     static int64_t name(const selector *s, int64_t begin, int64_t end)                                                 \
     {                                                                                                                  \
-        return !wide_number && fetch_is_packed(&s->values) ? mark(s, begin, end, name##_find_packed)                   \
-                                                           : mark(s, begin, end, name##_find);                         \
+        return fetch_is_packed(&s->values) ? mark(s, begin, end, name##_find, true)                                    \
+                                           : mark(s, begin, end, name##_find, false);                                  \
     }
 FETCH_INSTANCES(DEFINE_RUN, mark_vertices)
 
-MMBVH_INLINE finding find_any(const selector *s, int64_t cell)
+MMBVH_INLINE finding find_any(const selector *s, int64_t cell, const bool is_packed)
 {
+    (void)is_packed;
     return find_range(s, fetch_any_cell_range(s->g, s->wish->field, cell));
 }
 
 static int64_t mark_any(const selector *s, int64_t begin, int64_t end)
 {
-    return mark(s, begin, end, find_any);
+    return mark(s, begin, end, find_any, false);
 }
 
 static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *bits)

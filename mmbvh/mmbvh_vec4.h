@@ -1,5 +1,5 @@
-/* Four floats at a time for the builder: three axes and one lane to spare. Every processor we build for has them
- * without an instruction set flag, so the builder is not a kernel of several instruction sets. */
+/* Four floats at a time, three axes with one lane to spare or four values, and two doubles. Every processor we build
+ * for has them without an instruction set flag, so trees are not made by kernels of several instruction sets. */
 #ifndef MMBVH_VEC4_H
 #define MMBVH_VEC4_H
 
@@ -50,6 +50,35 @@ static inline float vec4_most(vec4 a)
 {
     const vec4 two = vec4_max(a, (vec4){a[2], a[3], a[2], a[3]});
     return two[0] > two[1] ? two[0] : two[1];
+}
+
+/* Two doubles, by the same rules. */
+typedef double vec2 __attribute__((vector_size(16), may_alias));
+typedef int64_t ivec2 __attribute__((vector_size(16), may_alias));
+
+static inline vec2 vec2_set1(double x)
+{
+    return (vec2){x, x};
+}
+
+static inline vec2 vec2_min(vec2 a, vec2 b)
+{
+#if defined(__SSE2__)
+    return (vec2)_mm_min_pd((__m128d)a, (__m128d)b);
+#else
+    const ivec2 less = (ivec2)(a < b);
+    return (vec2)(((ivec2)a & less) | ((ivec2)b & ~less));
+#endif
+}
+
+static inline vec2 vec2_max(vec2 a, vec2 b)
+{
+#if defined(__SSE2__)
+    return (vec2)_mm_max_pd((__m128d)a, (__m128d)b);
+#else
+    const ivec2 more = (ivec2)(a > b);
+    return (vec2)(((ivec2)a & more) | ((ivec2)b & ~more));
+#endif
 }
 
 /* The spare lane to zero. */

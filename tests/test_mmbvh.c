@@ -317,6 +317,34 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
     free_lattice(&l);
 }
 
+/* Of every kind and layout, with zeros of both signs, and numbers that are no floats where there is room for them. */
+static void refitted_ranges_are_tight_in_every_layout(void **state)
+{
+    (void)state;
+    for (int kind = LATTICE_TETS; kind <= LATTICE_MIXED; kind++)
+        for (int bits = 0; bits < 8; bits++) {
+            const lattice_layout layout = {false, bits & 1, bits >> 1 & 1, bits >> 2 & 1};
+            lattice l = make_lattice(7, (lattice_kind)kind, layout);
+            mmbvh tree = build_by(&l, &l.field, 2);
+            for (int64_t v = 0; v < l.g.vertex_count; v++) {
+                const double u = hash_unit((uint64_t)v);
+                put_number(&l.field.values, v, u < 0.2 ? 0.0 : u < 0.4 ? -0.0 : u - 0.7);
+            }
+            const int64_t unusable = poison(&l);
+            assert_int_equal(mmbvh_refit_ranges(&tree, &l.g, &l.field, &(mmbvh_options){.threads = 2}), INSITU_OK);
+            assert_int_equal(tree.unusable_cells, unusable);
+            assert_proved(&tree, &l.g, &l.field);
+            assert_tight(&l, &tree, &l.field);
+            for (int64_t i = 0; i < tree.node_count; i++) {
+                const node_view node = view_node(&tree, i);
+                assert_true(node.range_low != 0 || !signbit(node.range_low));
+                assert_true(node.range_high != 0 || !signbit(node.range_high));
+            }
+            mmbvh_free(&tree);
+            free_lattice(&l);
+        }
+}
+
 static void refitted_bounds_contain_moved_vertices_tightly(void **state)
 {
     (void)state;
@@ -656,6 +684,7 @@ int main(void)
         cmocka_unit_test(values_beyond_floats_round_outward),
         cmocka_unit_test(no_field_gives_infinite_ranges),
         cmocka_unit_test(refitted_ranges_equal_a_fresh_build),
+        cmocka_unit_test(refitted_ranges_are_tight_in_every_layout),
         cmocka_unit_test(refitted_bounds_contain_moved_vertices_tightly),
         cmocka_unit_test(further_fields_have_ranges_beside_the_tree),
         cmocka_unit_test(coincident_cells_are_halved),

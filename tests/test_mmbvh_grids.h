@@ -1,4 +1,5 @@
-/* Grids for the tree's tests: jittered lattices of tets, hexes or a mixture, in any of the layouts a grid may have. */
+/* Grids for the tree's tests: jittered lattices of tets, hexes, wedges or a mixture, in any of the layouts a grid may
+ * have. */
 #ifndef TEST_MMBVH_GRIDS_H
 #define TEST_MMBVH_GRIDS_H
 
@@ -10,7 +11,7 @@
 
 #include "grid.h"
 
-typedef enum lattice_kind { LATTICE_TETS, LATTICE_HEXES, LATTICE_MIXED } lattice_kind;
+typedef enum lattice_kind { LATTICE_TETS, LATTICE_HEXES, LATTICE_WEDGES, LATTICE_MIXED } lattice_kind;
 
 typedef struct lattice_layout {
     bool wide_coordinates, wide_indices, wide_values;
@@ -113,7 +114,7 @@ static inline void write_cell(lattice_writer *w, int type, const signed char *co
 
 static inline void write_cube(lattice_writer *w, lattice_kind kind, int64_t cube)
 {
-    const int choice = kind == LATTICE_MIXED ? (int)(cube % 4) : kind == LATTICE_HEXES;
+    const int choice = kind == LATTICE_MIXED ? (int)(cube % 4) : (int)kind;
     if (choice == 0) {
         for (int i = 0; i < 6; i++) write_cell(w, GRID_TET, lattice_tets[i]);
     } else if (choice == 1) {
@@ -125,14 +126,14 @@ static inline void write_cube(lattice_writer *w, lattice_kind kind, int64_t cube
     }
 }
 
-/* n x n x n cubes: 6 tets each, or a hex, or by turns tets, a hex, two wedges, three pyramids. */
+/* n x n x n cubes: 6 tets each, or a hex, or 2 wedges, or by turns tets, a hex, two wedges, three pyramids. */
 static inline lattice make_lattice(int n, lattice_kind kind, lattice_layout layout)
 {
     lattice l = {0};
     make_points(&l, n, layout);
     const int64_t cubes = (int64_t)n * n * n, side = n + 1;
     l.g.connectivity = make_array(&l.connectivity, 24 * cubes, layout.wide_indices, true, layout.strided);
-    l.g.cell_type = kind == LATTICE_HEXES ? GRID_HEX : GRID_TET;
+    l.g.cell_type = kind == LATTICE_HEXES ? GRID_HEX : kind == LATTICE_WEDGES ? GRID_WEDGE : GRID_TET;
     if (kind == LATTICE_MIXED) {
         l.g.offsets = make_array(&l.offsets, 6 * cubes, layout.wide_indices, true, layout.strided);
         l.g.cell_types_bytes = 1;

@@ -11,30 +11,34 @@
 #include "mmbvh.h"
 #include "test_meshes.h"
 
-enum { SIDE = 7, WISHES = 3 };
+enum { SIDE = 7, LARGE_SIDE = 15 /* cells for several blocks of several threads */, WISHES = 5 };
 
-/* A single isovalue, several, and what a transfer function shows. A vertex has the value 0.25. */
+/* A single isovalue, several, and what a transfer function shows; and the least and the greatest of all values, that
+ * one vertex has. */
 static const mmbvh_interval at_one[] = {{0.25f, 0.25f}}, at_three[] = {{-1, -1}, {0.1f, 0.1f}, {0.9f, 0.9f}},
-                            in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}};
+                            in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}}, at_least[] = {{-2, -2}}, at_most[] = {{2, 2}};
 
 static void make_wishes(const grid_field *field, mmbvh_wish wishes[WISHES])
 {
     wishes[0] = (mmbvh_wish){field, 1, at_one};
     wishes[1] = (mmbvh_wish){field, 3, at_three};
     wishes[2] = (mmbvh_wish){field, 2, in_two};
+    wishes[3] = (mmbvh_wish){field, 1, at_least};
+    wishes[4] = (mmbvh_wish){field, 1, at_most};
 }
 
 /* Every fifth cell a ghost, and one value in two hundred not finite. */
-static test_mesh make_mesh(test_mesh_kind kind)
+static test_mesh make_mesh(test_mesh_kind kind, int side)
 {
     test_mesh mesh;
-    test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+    test_mesh_lattice(kind, side, 0.2, test_wave, &mesh);
     test_mesh_round(&mesh);
-    mesh.values[mesh.vertex_count / 2] = 0.25;
     for (int64_t v = 0; v < mesh.vertex_count; v++) {
         const double u = test_uniform((uint64_t)v, 1);
         if (u < 0.005) mesh.values[v] = u < 0.002 ? (double)NAN : u < 0.0035 ? (double)INFINITY : -(double)INFINITY;
     }
+    mesh.values[mesh.vertex_count / 2] = -2;
+    mesh.values[mesh.vertex_count / 3] = 2;
     for (int64_t cell = 0; cell < mesh.cell_count; cell++) mesh.ghosts[cell] = test_uniform((uint64_t)cell, 2) < 0.2;
     return mesh;
 }
@@ -46,7 +50,7 @@ static int look(const test_view *view, const mmbvh_wish *wish, int64_t cell)
     grid_walk walk = grid_walk_cell(&view->cells, cell);
     int64_t vertex;
     while (grid_walk_next(&walk, &vertex)) {
-        const double v = grid_field_value(&view->field, vertex);
+        const double v = grid_field_value(&view->field, view->field.is_cell_centred ? cell : vertex);
         if (!isfinite(v)) return -1;
         low = fmin(v, low);
         high = fmax(v, high);
@@ -82,24 +86,75 @@ static int64_t assert_selects(const test_view *view, const mmbvh_wish *wishes, i
     return found;
 }
 
+static void assert_selects_all_wishes(const test_mesh *mesh, test_layout layout)
+{
+    test_view view;
+    mmbvh_wish wishes[WISHES];
+    test_view_create(mesh, layout, &view);
+    make_wishes(&view.field, wishes);
+    for (int i = 0; i < WISHES; i++) {
+        const int64_t count = assert_selects(&view, &wishes[i], 1);
+        assert_true(count > 0 && count < view.cells.cell_count);
+    }
+    assert_selects(&view, wishes, WISHES);
+    test_view_free(&view);
+}
+
 static void just_the_cells_that_can_show_are_selected(void **state)
 {
     (void)state;
     for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
-        test_mesh mesh = make_mesh((test_mesh_kind)kind);
-        for (int bits = 0; bits < 16; bits++) {
-            const test_layout layout = {false, bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3 & 1};
-            test_view view;
-            mmbvh_wish wishes[WISHES];
-            test_view_create(&mesh, layout, &view);
-            make_wishes(&view.field, wishes);
-            for (int i = 0; i < WISHES; i++) {
-                const int64_t count = assert_selects(&view, &wishes[i], 1);
-                assert_true(count > 0 && count < view.cells.cell_count);
-            }
-            assert_selects(&view, wishes, WISHES);
-            test_view_free(&view);
+        test_mesh mesh = make_mesh((test_mesh_kind)kind, SIDE);
+        for (int bits = 0; bits < 16; bits++)
+            assert_selects_all_wishes(&mesh, (test_layout){false, bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3});
+        test_mesh_free(&mesh);
+        mesh = make_mesh((test_mesh_kind)kind, LARGE_SIDE);
+        assert_selects_all_wishes(&mesh, (test_layout){false});
+        test_mesh_free(&mesh);
+    }
+}
+
+/* Components, magnitudes, values of cells, integers, and doubles of which a float's rounding decides. */
+static void fields_of_other_kinds_are_selected_by(void **state)
+{
+    (void)state;
+    for (int kind = TEST_TETS; kind <= TEST_MIXED; kind++) {
+        test_mesh mesh = make_mesh((test_mesh_kind)kind, SIDE);
+        test_view view;
+        test_view_create(&mesh, (test_layout){false}, &view);
+        const int64_t count =
+            mesh.cell_count > mesh.vertex_count ? mesh.cell_count : mesh.vertex_count; /* cells' and vertices' */
+        double *vectors = malloc((size_t)count * 3 * sizeof *vectors);
+        int32_t *integers = malloc((size_t)count * sizeof *integers);
+        assert_true(vectors && integers);
+        for (int64_t i = 0; i < 3 * count; i++)
+            vectors[i] = 1 + (test_uniform((uint64_t)i, 3) < 0.4 ? 0 : test_uniform_in((uint64_t)i, 4, -5e-8, 5e-8));
+        for (int64_t i = 0; i < count; i++) integers[i] = (int32_t)test_uniform_in((uint64_t)i, 5, -3, 3);
+        vectors[3 * 11 + 2] = (double)NAN;
+        const grid_field fields[] = {
+            {.values = {(const char *)vectors, 24, true, false},
+             .component_stride = 8,
+             .component_count = 3,
+             .component = 2},
+            {.values = {(const char *)vectors, 24, true, false},
+             .component_stride = 8,
+             .component_count = 3,
+             .component = -1},
+            {.values = {(const char *)vectors, 8, true, false},
+             .component_stride = 8,
+             .component_count = 1,
+             .is_cell_centred = true},
+            {.values = {(const char *)integers, 4, false, true}, .component_count = 1},
+        };
+        for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
+            const float root = sqrtf(3);
+            const mmbvh_interval at[] = {{1, 1}, {root, root}, {2, 2}};
+            view.field = fields[i];
+            assert_true(assert_selects(&view, &(mmbvh_wish){&view.field, 3, at}, 1) > 0);
         }
+        free(vectors);
+        free(integers);
+        test_view_free(&view);
         test_mesh_free(&mesh);
     }
 }
@@ -107,7 +162,7 @@ static void just_the_cells_that_can_show_are_selected(void **state)
 static void what_nobody_wishes_is_not_selected(void **state)
 {
     (void)state;
-    test_mesh mesh = make_mesh(TEST_TETS);
+    test_mesh mesh = make_mesh(TEST_TETS, SIDE);
     test_view view;
     test_view_create(&mesh, (test_layout){false}, &view);
     const mmbvh_interval beyond = {7, 8};
@@ -123,6 +178,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(just_the_cells_that_can_show_are_selected),
+        cmocka_unit_test(fields_of_other_kinds_are_selected_by),
         cmocka_unit_test(what_nobody_wishes_is_not_selected),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
