@@ -82,16 +82,18 @@ function heading(    i) {
     print "  method misses every root on 11 % and the first one on 1 %), and is exact to rounding: a depth in float32 is off by 6e-8 of the"
     print "  scene, so the field there by that times its slope along the ray, which is more than 1e-6 of the range in small cells."
     print "- **Volumes of tets or polyhedra:** `max_error: 1e-2`, which errors stay well below; `method: segments` where it must be"
-    print "  exact to rounding."
+    print "  exact to rounding, at about twice the time."
     print "- **Volumes of hexes, wedges, pyramids:** `max_error`: 1e-2 for pictures on a screen, 1e-3 where pictures are compared,"
-    print "  1e-4 where numbers are taken from them. It is kept without knowing the data, with much to spare; a step that has been tried"
-    print "  out on them is cheaper for the same error, as the first table shows."
+    print "  1e-4 where numbers are taken from them. It is kept without knowing the data, so with much to spare: the errors below are a"
+    print "  fortieth of it and less. A step that has been tried out on the data is often cheaper for the same error, as the first table"
+    print "  shows."
     print "- **Samples** are for several volumes in one picture, whose segments are mixed pixel by pixel, which takes longer. Their error"
-    print "  is of first order, half the step for half of it. `group` changes the time alone: the finer the step, the larger the group"
+    print "  is of first order, on average half the step for half of it. `group` changes the time alone: the finer the step, the larger the group"
     print "  that pays."
     print "- **Frames of different jitter** average the noise of samples, not their bias: halve the step instead."
     print ""
-    print "An 8-bit picture is off by 0.002 by rounding alone; no error below that can be seen on a screen."
+    print "Errors are of linear light. A picture of 8 bits is off by half a step of sRGB by rounding alone: 0.002 in mid-tones, 0.0002 in"
+    print "the dark, 0.004 in the light."
 }
 
 function measured() {
@@ -113,7 +115,8 @@ function measured() {
     print "caster works in float and hands over 8 bits, cut off rather than rounded, 0.004 off at most: the errors here are the"
     print "float's. Its rays go through corners of pixels; the camera is shifted for it, so that all have the same rays. The"
     print "resampled images are of 15 bits with samples half a voxel apart. Projected tetrahedra are drawn by Mesa on the CPU."
-    print "Each peer runs in a process of its own, stopped after a minute."
+    print "Each peer runs in a process of its own, stopped after a minute. Pictures of 1024 x 1024 are drawn by segments and `max_error`"
+    print "alone, so that is what coarse peers stand beside there."
 }
 
 function settings_table(    i, j, m, best) {
@@ -199,10 +202,10 @@ function verdicts(    i, m) {
     print ""
     print "- VTK's **ray caster** walks from tet to tet over a list of all faces, with no search at all; libinsitu keeps no"
     print "  neighbours, finds its cells once a frame, and places them anew for every tile of 16 x 16 pixels. It gains as more rays share a cell, in larger"
-    print "  pictures and coarser meshes; VTK's time goes with the pixels alone. And libinsitu's cheapest setting is nearer by far than what"
-    print "  it is compared with: below `max_error: 1e-1` there is nothing left to save."
+    print "  pictures; VTK's time goes with the pixels and the faces that their rays cross. And on tets libinsitu's cheapest setting is nearer by"
+    print "  far than what it is compared with: below `max_error: 1e-1` there is nothing left to save."
     print "- A **resampled** image is drawn without cells: whoever accepts its error and has a standing field to look at from many sides"
-    print "  is served faster by it, and on grids of small cells the first picture comes sooner as well."
+    print "  is mostly served faster by it, and with few voxels on grids of small cells the first picture comes sooner as well."
     print "- **Projected tetrahedra** take colours at the vertices and mix them over the cell. Their error is that of a few samples"
     print "  a ray, and the time of so few is that of placing the cells and of rays that meet them, which coarser steps do not save."
 }

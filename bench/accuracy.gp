@@ -27,7 +27,7 @@ if (layer eq "volume") {
     set yrange [2e-8:1.5]
     floor = 4e-8
     set arrow 1 from graph 0, first 1/510. to graph 1, first 1/510. nohead lc rgb "#bbbbbb" dt 2
-    set label 1 "half a step of 8 bits" at graph 0.995, first 0.0027 right font ",8" tc rgb "#888888"
+    set label 1 "half a step of 8 bits in mid-tones" at graph 0.995, first 0.0027 right font ",8" tc rgb "#888888"
     set label 2 "better: left and down" at graph 0.01, graph 0.03 left font ",8" tc rgb "#888888"
     set multiplot layout 2,2 margins 0.06,0.975,0.16,0.965 spacing 0.06,0.085
     panel = 0

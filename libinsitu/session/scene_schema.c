@@ -120,8 +120,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .help = "How the surfaces take light.", .by_default = "a slight gloss", .child = &material_mapping)              \
     X(CHOICE("roots", scene_file_isosurface, roots, root_words),                                                       \
       .help = "How the surface is found in a cell along a ray: `robust` misses none of its crossings; `neubauer` is "  \
-              "the faster method of `root_steps` steps, which sees no surface that a ray enters and leaves in one "    \
-              "cell.",                                                                                                 \
+              "the method of so many `root_steps`, which sees no surface that a ray enters and leaves in one cell.",   \
       .by_default = "`robust`")                                                                                        \
     X(CYAML_FIELD_INT_PTR("root_steps", OPTIONAL, scene_file_isosurface, root_steps),                                  \
       .help = "Steps of the root search in a cell by `neubauer` after it has been bracketed.", .by_default = "`2`",    \
