@@ -48,8 +48,9 @@ MMBVH_INLINE finding find_floats(const selector *s, int64_t cell, const fetch_sh
     const vec4 low = vec4_min(v[0], v[1]), high = vec4_max(v[0], v[1]);
     for (int i = 0; i < s->wish->interval_count; i++) {
         const mmbvh_interval *interval = &s->wish->intervals[i];
-        out.meets |=
-            vec4_any((ivec4)(low <= vec4_set1(interval->high))) & vec4_any((ivec4)(high >= vec4_set1(interval->low)));
+        const bool reaches = vec4_any((ivec4)(low <= vec4_set1(interval->high)));
+        const bool rises = vec4_any((ivec4)(high >= vec4_set1(interval->low)));
+        out.meets |= reaches & rises;
     }
     return out;
 }
