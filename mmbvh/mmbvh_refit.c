@@ -73,6 +73,12 @@ MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape
         __builtin_prefetch(connectivity->data + (first + count - 1) * connectivity->stride);
 }
 
+/* Outward; empty where there was no cell to grow by. */
+static inline range rounded_range(const fetch_range *r)
+{
+    return r->low <= r->high ? (range){round_down(r->low), round_up(r->high)} : range_empty();
+}
+
 /* Lanes grow by whole cells, and are one range at the end. */
 MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
                                const bool wide_index, const bool is_packed, int64_t *unusable)
@@ -88,7 +94,7 @@ MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const
         leaf.high = vec2_max(cell.high, leaf.high);
     }
     const fetch_range r = fetch_doubles_range(&leaf, true);
-    return r.low <= r.high ? (range){round_down(r.low), round_up(r.high)} : range_empty();
+    return rounded_range(&r);
 }
 
 MMBVH_INLINE range float_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
@@ -133,18 +139,18 @@ FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 
 static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
 
-/* For whatever the instances above do not read: rounded once at the end. */
+/* For whatever the instances above do not read. */
 static range any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
 {
-    double low = (double)INFINITY, high = -low;
+    fetch_range leaf = {(double)INFINITY, -(double)INFINITY, true};
     for (int64_t k = 0; k < count; k++) {
         const fetch_range cell = fetch_any_cell_range(s->g, s->field, s->tree->cells[ref + k]);
         *unusable += !cell.is_finite;
         if (!cell.is_finite) continue;
-        low = cell.low < low ? cell.low : low;
-        high = cell.high > high ? cell.high : high;
+        leaf.low = cell.low < leaf.low ? cell.low : leaf.low;
+        leaf.high = cell.high > leaf.high ? cell.high : leaf.high;
     }
-    return low <= high ? (range){round_down(low), round_up(high)} : range_empty();
+    return rounded_range(&leaf);
 }
 
 static int64_t run_any(const sweep *s, int64_t first, int64_t end)
