@@ -100,6 +100,9 @@ set_tests_properties(roots PROPERTIES TIMEOUT 120)
 add_test(NAME roots_bent COMMAND test_roots_bent)
 set_tests_properties(roots_bent PROPERTIES TIMEOUT 120)
 
+insitu_add_long_test(roots_long test_roots 10000000)
+insitu_add_long_test(roots_bent_long test_roots_bent 1000000)
+
 insitu_render_program(test_hits)
 add_test(NAME hits COMMAND test_hits)
 set_tests_properties(hits PROPERTIES TIMEOUT 180)
@@ -136,6 +139,8 @@ foreach(isa plain sse4.2 avx2 avx512)
   add_test(NAME chords_${isa} COMMAND test_chords)
   set_tests_properties(chords_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 180)
 endforeach()
+
+insitu_add_long_test(chords_long test_chords 10000000)
 
 insitu_render_program(test_hard_cases)
 add_test(NAME hard_cases COMMAND test_hard_cases)
