@@ -32,7 +32,7 @@ LC_ALL=C awk -F, '
         if (meshes != 4) { print meshes + 0 " meshes of 4"; failed = 1 }
         exit failed
     }' "$csv"
-LC_ALL=C awk -f "$2/accuracy.awk" "$csv" >"$page"
+"$2/pages/accuracy.py" "$csv" >"$page"
 for text in '| tets:4 | 384 |' '| mixed:2 | robust |' '| hexes:4 | N = 3, SPMD |' '| tets:4 | robust, packets |' '| segments |' '| max_error: 1e-4 |' '| samples, step of 1/16 cell |'; do
     grep -qF "$text" "$page" || { echo "the page has no \"$text\"" && exit 1; }
 done

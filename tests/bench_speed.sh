@@ -42,7 +42,7 @@ LC_ALL=C awk -F, '
             if (!(wanted[i] in rows)) { print "no row: " wanted[i]; failed = 1 }
         exit failed
     }' "$csv"
-LC_ALL=C awk -f "$2/performance.awk" "$csv" >"$page"
+"$2/pages/performance.py" --partial "$csv" >"$page"
 for text in '| the full tree with one field | tets 4 |' '### Table 5.2' '### Table 4.2' '| tets 4, isosurfaces new mesh |'; do
     grep -qF "$text" "$page" || { echo "the page has no \"$text\"" && exit 1; }
 done

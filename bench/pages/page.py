@@ -1,0 +1,99 @@
+"""What the pages of the benchmarks share: the rows of CSV files, numbers as a page writes them, and templates."""
+
+import csv
+import math
+import pathlib
+import re
+import sys
+
+try:
+    import jinja2
+except ImportError:
+    sys.exit("the pages of the benchmarks need jinja2: Debian's package python3-jinja2")
+
+
+class PageError(Exception):
+    """A page cannot be drawn; the message names the file, the line and the column that are at fault."""
+
+
+class Row:
+    """A line of a CSV file, whose columns are asked for by name."""
+
+    def __init__(self, place, names, values):
+        if len(names) != len(values):
+            raise PageError(f"{place}: {len(values)} values under {len(names)} columns")
+        self.place = place
+        self.columns = dict(zip(names, values))
+
+    def text(self, column):
+        if column not in self.columns:
+            raise PageError(f"{self.place}: there is no column \"{column}\"")
+        return self.columns[column]
+
+    def number(self, column):
+        text = self.text(column)
+        try:
+            return float(text)
+        except ValueError:
+            raise PageError(f"{self.place}: \"{text}\" in column \"{column}\" is not a number") from None
+
+    def count(self, column):
+        return int(self.number(column))
+
+
+def read_csv(path):
+    """Return the rows of a benchmark's CSV file and its comments. Each line that begins with "program" names columns."""
+    rows, comments, names = [], [], None
+    for number, line in enumerate(_lines(path), 1):
+        place = f"{path}, line {number}"
+        if line.startswith("#"):
+            comments.append(line[1:].strip())
+        elif line.startswith("program,"):
+            names = next(csv.reader([line]))
+        elif line.startswith("bench_"):
+            if names is None:
+                raise PageError(f"{place}: no line of column names stands before it")
+            rows.append(Row(place, names, next(csv.reader([line]))))
+    return rows, comments
+
+
+def _lines(path):
+    try:
+        return pathlib.Path(path).read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise PageError(f"{path}: {error.strerror}") from None
+
+
+def is_load(comment):
+    """Say whether a comment tells of one section's load or duration, not of the machine."""
+    return comment.startswith("load average") or re.fullmatch(r"\d+ s", comment) is not None
+
+
+def write_number(x):
+    """Three digits, and no more than three decimals; a dash for what is not a number."""
+    if math.isnan(x):
+        return "-"
+    if x == 0:
+        return "0"
+    if x < 0.001:
+        return f"{x:.1e}"
+    decimals = 3 if x < 1 else 2 if x < 10 else 1 if x < 100 else 0
+    return f"{x:.{decimals}f}"
+
+
+def fill_template(name, **values):
+    """Return the page that a template of this folder makes of the values."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(pathlib.Path(__file__).parent), undefined=jinja2.StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment.filters["number"] = write_number
+    return environment.get_template(name).render(values)
+
+
+def run(program, arguments):
+    """Print what program(arguments) returns, or say in one line why there is no page."""
+    try:
+        sys.stdout.reconfigure(encoding="utf-8")
+        sys.stdout.write(program(arguments))
+    except PageError as error:
+        sys.exit(f"{pathlib.Path(sys.argv[0]).name}: {error}")
