@@ -33,6 +33,8 @@ LC_ALL=C awk -F, '
         exit failed
     }' "$csv"
 "$2/pages/accuracy.py" "$csv" >"$page"
-for text in '| tets:4 | 384 |' '| mixed:2 | robust |' '| hexes:4 | N = 3, SPMD |' '| tets:4 | robust, packets |' '| segments |' '| max_error: 1e-4 |' '| samples, step of 1/16 cell |'; do
-    grep -qF "$text" "$page" || { echo "the page has no \"$text\"" && exit 1; }
+time='[0-9.]*'
+for text in '| tets:4 | 384 |' '| mixed:2 | robust |' "| hexes:4 | N = 3 | .* | $time | $time | $time |" "| tets:4 | robust | .* | $time | $time | $time |" \
+    '| segments |' '| max_error: 1e-4 |' '| samples, step of 1/16 cell |'; do
+    grep -q "^$text" "$page" || { echo "the page has no \"$text\"" && exit 1; }
 done

@@ -11,14 +11,6 @@ TARGETS = ["1e-1", "1e-2", "1e-3", "1e-4", "1e-5"]
 ASKED = 10  # times as fast as each of VTK's mappers
 
 
-def times(x):
-    return f"{x:.1f}" if x < 10 else f"{x:.0f}"
-
-
-def bold_below(x):
-    return times(x) if x >= ASKED else f"**{times(x)}**"
-
-
 class Comparison(NamedTuple):
     """A setting of VTK's, and our cheapest one that is off by no more, if there is one."""
     mesh: accuracy_results.Mesh
@@ -33,69 +25,109 @@ class Comparison(NamedTuple):
     def first(self):
         return self.peer.first / self.ours.first
 
+    @property
+    def peer_label(self):
+        return self.mesh.label(self.peer).removeprefix("VTK ")
+
+    @property
+    def text(self):
+        """How many times as fast a frame and the first picture are."""
+        if not self.peer.is_drawn:
+            return self.peer.status
+        return f"{bold_below(self.frame)} / {bold_below(self.first)}" if self.ours else "none is so near"
+
+
+def write_times(x):
+    return f"{x:.1f}" if x < 10 else f"{x:.0f}"
+
+
+def bold_below(x):
+    return write_times(x) if x >= ASKED else f"**{write_times(x)}**"
+
 
 def all_comparisons(meshes):
     return [Comparison(mesh, setting, mesh.cheapest(setting.rms, setting.most) if setting.is_drawn else None)
             for mesh in meshes for setting in mesh.settings if setting.is_peer]
 
 
-class Verdict(NamedTuple):
-    """The comparisons of a mesh in which we are the least ahead, of cells drawn and of resampled images."""
-    mesh: accuracy_results.Mesh
-    cells_frame: Comparison
-    cells_first: Comparison
-    image_frame: Optional[Comparison]
-    image_first: Optional[Comparison]
+class Standing:
+    """All comparisons, and as a table: a row for each mesh, a column for each of VTK's mappers and settings."""
+
+    def __init__(self, comparisons):
+        self.comparisons = comparisons
+        self.peers = list(dict.fromkeys(c.peer_label for c in comparisons))
+        self.rows = {}
+        for c in comparisons:
+            self.rows.setdefault(str(c.mesh), {})[c.peer_label] = c
+
+    def _least(self, what, is_image):
+        """Return the least ratio on each mesh, of mappers that draw cells or of resampled images."""
+        ahead = [[getattr(c, what) for c in row.values() if c.ours and (c.peer.method == "VTK resample") == is_image]
+                 for row in self.rows.values()]
+        return [min(ratios) for ratios in ahead if ratios]
+
+    def nearest(self, what, is_image):
+        return span(self._least(what, is_image))
+
+    def span(self, method, what):
+        return span(getattr(c, what) for c in self.comparisons if c.ours and c.peer.method == f"VTK {method}")
 
     @property
-    def holds(self):
-        return self.cells_frame.frame >= ASKED and self.cells_first.first >= ASKED
-
-    def nearest(self, name, what):
-        comparison = getattr(self, name)
-        if comparison is None:
-            return "-"
-        return f"{times(getattr(comparison, what))} ({self.mesh.label(comparison.peer)})"
+    def reached(self):
+        """The number of meshes on which all mappers that draw cells are the asked times as slow."""
+        least = zip(self._least("frame", False), self._least("first", False))
+        return sum(frame >= ASKED and first >= ASKED for frame, first in least)
 
 
-def all_verdicts(meshes, comparisons):
-    verdicts = []
-    for mesh in meshes:
-        compared = [c for c in comparisons if c.mesh is mesh and c.ours]
-        images = [c for c in compared if c.peer.method == "VTK resample"]
-        cells = [c for c in compared if c.peer.method != "VTK resample"]
-        if cells:
-            verdicts.append(Verdict(mesh, *(min(some, key=lambda c: getattr(c, what), default=None)
-                                            for some in (cells, images) for what in ("frame", "first"))))
-    return verdicts
+def span(ratios):
+    ratios = sorted(ratios)
+    return f"{write_times(ratios[0])} to {write_times(ratios[-1])}" if ratios else "-"
+
+
+def greatest_share(meshes):
+    """Return the greatest error of max_error, as a share of what was asked for."""
+    return max((s.most / float(s.value) for mesh in meshes for s in mesh.of("max_error") if s.is_drawn), default=0)
 
 
 def ladder(meshes):
-    """Return the cells of the ladder's table by setting: a list of texts, one a mesh."""
+    """Return the entries of the ladder's table by our settings, method by method: a list of texts, one a mesh."""
+    ours = [(column, mesh, setting) for column, mesh in enumerate(meshes) for setting in mesh.volumes
+            if not setting.is_peer and not (setting.is_repeated and setting.method == "frames")]
+    methods = list(dict.fromkeys(setting.method for _, _, setting in ours))
     rows = {}
-    for column, mesh in enumerate(meshes):
-        for setting in mesh.volumes:
-            row = rows.setdefault(mesh.label(setting), ["-"] * len(meshes))
-            figures = (setting.rms, setting.most, setting.frame)
-            row[column] = ", ".join(map(page.write_number, figures)) if setting.is_drawn else setting.status
+    for column, mesh, setting in sorted(ours, key=lambda one: methods.index(one[2].method)):
+        row = rows.setdefault(mesh.label(setting), ["-"] * len(meshes))
+        figures = (setting.rms, setting.most, setting.frame)
+        row[column] = ", ".join(map(page.write_number, figures)) if setting.is_drawn else setting.status
     return rows
 
 
 class Surface(NamedTuple):
+    """A setting of isosurfaces, with the frames of the thesis's traversals, which have the same errors."""
     mesh: accuracy_results.Mesh
-    label: str
-    errors: accuracy_results.Setting
+    setting: accuracy_results.Setting
+    packets: str
+    spmd: str
+
+
+def traversal(mesh, setting, way):
+    """Return the time of one of the thesis's traversals, with its largest error where that is another."""
+    for other in mesh.of(f"{setting.method} {way}"):
+        if other.value == setting.value:
+            frame = page.write_number(other.frame)
+            return frame if other.errors == setting.errors else f"{frame} ({page.write_number(other.most)})"
+    return ""
 
 
 def all_surfaces(meshes):
-    """Where the field is linear more steps of Neubauer's method change nothing: every second one will do."""
+    """Settings that have the errors of the robust one, to the digit, are left out."""
     surfaces = []
     for mesh in meshes:
-        for setting in mesh.surfaces:
-            if mesh.is_linear and setting.value in ("N = 1", "N = 3", "N = 4"):
-                continue
-            _, _, way = setting.method.partition(" ")
-            surfaces.append(Surface(mesh, f"{setting.value}, {way}" if way else setting.value, setting))
+        robust = [setting.errors for setting in mesh.of("robust")]
+        for setting in mesh.of("Neubauer") + mesh.of("robust"):
+            if setting.method == "robust" or setting.errors not in robust:
+                ways = (traversal(mesh, setting, way) for way in ("packets", "SPMD"))
+                surfaces.append(Surface(mesh, setting, *ways))
     return surfaces
 
 
@@ -103,11 +135,10 @@ def draw(arguments):
     if len(arguments) != 1:
         raise page.PageError("name one CSV file: is there one in bench/results?")
     results = accuracy_results.Results(arguments[0])
-    comparisons = all_comparisons(results.meshes)
     return page.fill_template(
-        "accuracy.md.j2", results=results, targets=TARGETS, comparisons=comparisons,
-        verdicts=all_verdicts(results.meshes, comparisons), ladder=ladder(results.meshes[:4]),
-        surfaces=all_surfaces(results.meshes), figures=results.figures(), bold_below=bold_below)
+        "accuracy.md.j2", results=results, targets=TARGETS, standing=Standing(all_comparisons(results.meshes)),
+        share=greatest_share(results.meshes), ladder=ladder(results.meshes[:4]), surfaces=all_surfaces(results.meshes),
+        figures=results.figures(), asked=ASKED)
 
 
 if __name__ == "__main__":

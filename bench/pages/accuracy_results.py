@@ -13,6 +13,7 @@ class Setting:
         self.first, self.frame, self.rms, self.most, self.residual = map(
             row.number, ("first", "frame", "rms", "max", "residual"))
         self.wrong, self.pixels = row.count("wrong"), row.count("pixels")
+        self.errors = tuple(map(row.text, ("rms", "max", "wrong", "residual")))
         self.is_volume = self.layer == VOLUME
         self.is_peer = self.method.startswith("VTK")
         self.is_drawn = self.status == "ok"
@@ -35,10 +36,6 @@ class Mesh:
     @property
     def volumes(self):
         return [setting for setting in self.settings if setting.is_volume]
-
-    @property
-    def surfaces(self):
-        return [setting for setting in self.settings if not setting.is_volume]
 
     def of(self, method):
         return [setting for setting in self.settings if setting.method == method]
@@ -96,7 +93,8 @@ class Results:
 
     def figures(self):
         """Return the meshes of each figure by its name: those that have the finest setting, four a figure."""
-        volumes = [mesh for mesh in self.meshes if any(s.method == "samples" and s.value == "1/16" for s in mesh.settings)]
-        surfaces = [mesh for mesh in self.meshes if mesh.is_usual_size and not mesh.is_linear and mesh.of("segments")]
-        figures = {"accuracy_lattices": volumes[:4], "accuracy_grids": volumes[4:8], "accuracy_isosurfaces": surfaces[:4]}
+        volumes = [mesh for mesh in self.meshes if any(setting.value == "1/16" for setting in mesh.of("samples"))]
+        surfaces = [mesh for mesh in self.meshes if any(setting.value == "1/8" for setting in mesh.of("segments"))]
+        figures = {"accuracy_lattices": volumes[:4], "accuracy_grids": volumes[4:8],
+                   "accuracy_isosurfaces": surfaces[:4]}
         return {name: meshes for name, meshes in figures.items() if meshes}

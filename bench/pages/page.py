@@ -42,7 +42,7 @@ class Row:
 
 
 def read_csv(path):
-    """Return the rows of a benchmark's CSV file and its comments. Each line that begins with "program" names columns."""
+    """Return the rows of a benchmark's CSV file, and its comments. A line that begins with "program" names columns."""
     rows, comments, names = [], [], None
     for number, line in enumerate(_lines(path), 1):
         place = f"{path}, line {number}"
