@@ -4,6 +4,7 @@ csv_machine() {
     echo "# $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | sed q)"
     compiler=$(sed -n 's/^CMAKE_C_COMPILER:[^=]*=//p' build/release/CMakeCache.txt)
     echo "# $("$compiler" --version | sed -n 1p)"
+    echo "# measured $(date -u +%Y-%m-%dT%H:%MZ)" # of several files the pages take the newest
 }
 
 csv_load() {

@@ -64,6 +64,15 @@ shows '| ≥ 2 | **1.50** (1.00 / 0.667) |' # of a measure in two files the firs
 shows '1 of 1 bars are missed'
 shows 'SAH build, on tets 31: 1.50, asked ≥ 2'
 
+# Of several files the newest counts, those without a date last.
+sed 's/^# A machine/&\n# measured 2020-02-01T10:00Z/' "$folder/held.csv" >"$folder/newer.csv"
+sed 's/^# A machine/&\n# measured 2020-01-31T23:00Z/' "$folder/missed.csv" >"$folder/older.csv"
+$performance --partial "$folder/older.csv" "$folder/newer.csv" >"$folder/page"
+shows '| ≥ 2 | 3.00 (2.00 / 0.667) |'
+shows 'A machine; '
+$performance --partial "$folder/held.csv" "$folder/older.csv" >"$folder/page"
+shows '| ≥ 2 | **1.50** (1.00 / 0.667) |'
+
 # VTK's mapper is off by 0.1: the setting of 5 ms is too far off, and 40 / 10 is less than ten times. Of Neubauer's method N = 0
 # has the errors of the robust roots; packets of N = 1 have another error than the picture as a whole.
 head=program,isa,threads,mesh,cells,size,layer,method,setting,status,build,first,frame,frame_min,frame_max,runs,pixels,rms,max,wrong,residual

@@ -1,5 +1,5 @@
 #!/usr/bin/python3 -B
-"""Prints docs/accuracy.md, drawn from a CSV file of bench_accuracy: accuracy.py CSV"""
+"""Prints docs/accuracy.md, drawn from the newest CSV file of bench_accuracy: accuracy.py CSV ..."""
 
 import sys
 from typing import NamedTuple, Optional
@@ -132,9 +132,7 @@ def all_surfaces(meshes):
 
 
 def draw(arguments):
-    if len(arguments) != 1:
-        raise page.PageError("name one CSV file: is there one in bench/results?")
-    results = accuracy_results.Results(arguments[0])
+    results = accuracy_results.Results(arguments)
     return page.fill_template(
         "accuracy.md.j2", results=results, targets=TARGETS, standing=Standing(all_comparisons(results.meshes)),
         share=greatest_share(results.meshes), ladder=ladder(results.meshes[:4]), surfaces=all_surfaces(results.meshes),

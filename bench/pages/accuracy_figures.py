@@ -1,5 +1,5 @@
 #!/usr/bin/python3 -B
-"""Draws error over time, a panel a mesh, as FOLDER/accuracy_*.png: accuracy_figures.py CSV FOLDER"""
+"""Draws error over time, a panel a mesh, as FOLDER/accuracy_*.png: accuracy_figures.py FOLDER CSV ..."""
 
 import pathlib
 import sys
@@ -134,12 +134,12 @@ def draw_figure(path, meshes, is_volume):
 
 
 def draw(arguments):
-    if len(arguments) != 2:
-        raise page.PageError("name one CSV file and the folder of the figures")
+    if not arguments:
+        raise page.PageError("no folder for the figures is named")
     pyplot.switch_backend("agg")
     pyplot.rcParams.update({"font.size": 11, "axes.titlesize": 11, "axes.edgecolor": "#555555"})
-    for name, meshes in accuracy_results.Results(arguments[0]).figures().items():
-        draw_figure(pathlib.Path(arguments[1], f"{name}.png"), meshes, name != "accuracy_isosurfaces")
+    for name, meshes in accuracy_results.Results(arguments[1:]).figures().items():
+        draw_figure(pathlib.Path(arguments[0], f"{name}.png"), meshes, name != "accuracy_isosurfaces")
     return ""
 
 

@@ -72,10 +72,12 @@ def cell_count(value):
 
 
 class Results:
-    """The meshes of a file in the order of their rows; the size of the first row is the usual one."""
+    """The meshes of the newest file in the order of their rows; the size of the first row is the usual one."""
 
-    def __init__(self, path):
-        rows, comments = page.read_csv(path)
+    def __init__(self, paths):
+        if not paths:
+            raise page.PageError("no CSV file is named: is there one in bench/results?")
+        path, rows, comments = page.read_newest_first(paths)[0]
         rows = [row for row in rows if row.text("program") == "bench_accuracy"]
         if not rows:
             raise page.PageError(f"{path}: there is no row of bench_accuracy")

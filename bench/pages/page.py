@@ -64,9 +64,18 @@ def _lines(path):
         raise PageError(f"{path}: {error.strerror}") from None
 
 
-def is_load(comment):
-    """Say whether a comment tells of one section's load or duration, not of the machine."""
-    return comment.startswith("load average") or re.fullmatch(r"\d+ s", comment) is not None
+def is_of_section(comment):
+    """Say whether a comment tells of one section's date, load or duration, not of the machine."""
+    return comment.startswith(("measured ", "load average")) or re.fullmatch(r"\d+ s", comment) is not None
+
+
+def read_newest_first(paths):
+    """Return (path, rows, comments) of the files, those without a date last and in the order of their names here."""
+    return sorted(((path, *read_csv(path)) for path in paths), key=lambda file: _date(file[2]), reverse=True)
+
+
+def _date(comments):
+    return max((comment for comment in comments if comment.startswith("measured ")), default="")
 
 
 def write_number(x):

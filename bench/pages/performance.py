@@ -1,8 +1,8 @@
 #!/usr/bin/python3 -B
 """Prints docs/performance.md, drawn from CSV files: performance.py [--partial] CSV ...
 
-Where a measure stands in several files the first one counts: name the newest first. All sections must be there;
---partial leaves out those that no file has.
+Where a measure stands in several files the newest one counts. All sections must be there; --partial leaves out those
+that no file has.
 """
 
 import sys

@@ -89,9 +89,8 @@ class Results:
     def __init__(self, paths):
         self.programs = {}
         comments = []
-        for path in paths:
-            rows, more = page.read_csv(path)
-            comments += [comment for comment in more if not page.is_load(comment)]
+        for _, rows, more in page.read_newest_first(paths):
+            comments += [comment for comment in more if not page.is_of_section(comment)]
             for row in rows:
                 self._take(row)
         self.machine = "; ".join(dict.fromkeys(comments))
