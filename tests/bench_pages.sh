@@ -83,7 +83,7 @@ $head
 $row,samples,1,ok,1,7,5,5,5,5,9,0.02,0.2,0,nan
 $row,samples,1/2,ok,1,12,10,9,11,5,9,0.01,0.1,0,nan
 $row,samples,1/4,ok,1,22,20,19,21,5,9,0.001,0.01,0,nan
-$row,VTK Z-sweep,-,ok,1,240,40,40,40,5,9,0.01,0.1,0,nan
+$row,VTK Z-sweep,-,ok,1,6,40,40,40,5,9,0.01,0.1,0,nan
 $row,VTK ray cast,-,too slow,1,nan,nan,nan,nan,0,9,nan,nan,0,nan
 $surface,Neubauer,N = 0,ok,1,4,3,3,3,5,9,1e-7,2e-7,0,nan
 $surface,Neubauer,N = 1,ok,1,4,3,3,3,5,9,0.1,0.2,1,nan
@@ -93,9 +93,9 @@ $surface,Neubauer SPMD,N = 1,ok,1,10,9,9,9,5,9,0.1,0.2,1,nan
 END
 $accuracy "$folder/accuracy.csv" >"$folder/page"
 shows '| samples, step of 1/2 cell: 10.0 | samples, step of 1/4 cell: 20.0 | - | - | - |'
-shows '| hexes:9 | Z-sweep | 0.010 | 0.100 | 40.0 | 240 | samples, step of 1/2 cell | 0.100 | 10.0 | 12.0 |'
+shows '| hexes:9 | Z-sweep | 0.010 | 0.100 | 40.0 | 6.00 | samples, step of 1/2 cell | 0.100 | 10.0 | 12.0 |'
 shows '| mesh | Z-sweep | ray cast |'
-shows '| hexes:9 | **4.0** / 20 | too slow |'
+shows '| hexes:9 | 4.0 / **0.5** | too slow |'
 shows 'reached on 0 of 1 meshes'
 shows '| hexes:9 | N = 1 | 0.100, 0.200 | 1 of 9 | - | 3.00 | 8.00 (0.400) | 9.00 |'
 shows '| hexes:9 | robust | 1.0e-07, 2.0e-07 | 0 of 9 | - | 5.00 |  |  |'

@@ -34,15 +34,15 @@ class Comparison(NamedTuple):
         """How many times as fast a frame and the first picture are."""
         if not self.peer.is_drawn:
             return self.peer.status
-        return f"{bold_below(self.frame)} / {bold_below(self.first)}" if self.ours else "none is so near"
+        return f"{bold_where_slower(self.frame)} / {bold_where_slower(self.first)}" if self.ours else "none is so near"
 
 
 def write_times(x):
     return f"{x:.1f}" if x < 10 else f"{x:.0f}"
 
 
-def bold_below(x):
-    return write_times(x) if x >= ASKED else f"**{write_times(x)}**"
+def bold_where_slower(x):
+    return write_times(x) if x >= 1 else f"**{write_times(x)}**"
 
 
 def all_comparisons(meshes):
