@@ -33,7 +33,7 @@ typedef struct kernel_course {
 } kernel_course;
 
 /* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
- * unit distance (docs/decisions.md): the most of that over the cell's values, between steps. */
+ * unit distance (docs/error_budget.md): the most of that over the cell's values, between steps. */
 SIMD_INLINE void kernel_course_bound(const kernel_segment_state *state, const float *values, int count,
                                      kernel_course *out)
 {
@@ -93,7 +93,7 @@ SIMD_INLINE vm kernel_course_steps(const kernel_segment_state *state, const kern
     return any;
 }
 
-/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/decisions.md: 4e-7 at most).
+/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/error_budget.md: 4e-7 at most).
  */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 

@@ -17,7 +17,7 @@
  * So a field that barely reaches a step is halved about its extreme alone, until what is about it is of one side, or so
  * short that it does not show.
  *
- * The error of a part of length L, T being the light that comes to it from the stretch's begin (docs/decisions.md has
+ * The error of a part of length L, T being the light that comes to it from the stretch's begin (docs/error_budget.md has
  * the rest). Over the part's values let extinction be from s0 to s1 and change by no more than s' per value, the colour
  * by c', and let R be the colours' contrast. A field that is off by d on average changes extinction by ds <= s' d, and
  * no more than s1 - s0; light in the part falls at least as exp(-s0 t), so that

@@ -137,7 +137,7 @@ typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integ
 #define RENDER_MIXING_ERROR 1e-4
 
 /* The cells that isosurfaces cross, kept side by side for other pictures of the same cells and values: what a picture
- * needs of 662,000 of 12 million tets lies in 40 MiB then, in the order of the tree (docs/decisions.md has the gain). A
+ * needs of 662,000 of 12 million tets lies in 40 MiB then, in the order of the tree (docs/decisions/find.md has the gain). A
  * frame whose job has one fills it with what is not in it yet: tets or hexes with float32 coordinates and values and
  * int32 indices, of opaque surfaces in one colour with the cells' gradients for normals (hexes: robust roots), by
  * RENDER_BINNED and all pixels, of parts most of whose box the picture has, up to 64 MiB in all. Pictures are the same

@@ -222,7 +222,7 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* Of the function's domain: equal parts are enough for wider ramps, up to 1000 optical depths (docs/decisions.md). */
+/* Of the function's domain: equal parts are enough for wider ramps, up to 1000 optical depths (docs/error_budget.md). */
 static const double steep_width = 1.0 / 64;
 
 static void fill_steep(kernel_pieces *out, const render_transfer *t)

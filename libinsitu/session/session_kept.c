@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-/* Filling costs up to a third of a frame, of which one that follows may save less (docs/decisions.md). */
+/* Filling costs up to a third of a frame, of which one that follows may save less (docs/decisions/find.md). */
 enum { LEAST_FRAMES = 3 };
 
 /* As the renderer has it (render.h). */
