@@ -18,6 +18,7 @@ run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE} -B ${FOLDER}/project -DCMAKE_P
   "-DCMAKE_C_FLAGS=${FLAGS}" "-DCMAKE_CXX_FLAGS=${FLAGS}")
 run(${CMAKE_COMMAND} --build ${FOLDER}/project)
 run(${FOLDER}/project/outside_user)
+run(${FOLDER}/project/outside_user_cpp)
 if(WITH_VTK)
   run(${FOLDER}/project/outside_vtk)
 endif()

@@ -16,6 +16,14 @@
 #ifndef INSITU_INSITU_H
 #define INSITU_INSITU_H
 
+/* MPI's C bindings suffice: the C++ ones of old would want a library of their own. This is too late where mpi.h was
+ * included before. */
+#ifndef OMPI_SKIP_MPICXX
+#define OMPI_SKIP_MPICXX 1
+#endif
+#ifndef MPICH_SKIP_MPICXX
+#define MPICH_SKIP_MPICXX 1
+#endif
 #include <mpi.h>
 #include <stdint.h>
 
