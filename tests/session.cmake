@@ -25,6 +25,9 @@ insitu_add_mpi_test(session_shown test_session_shown 1 3 TIMEOUT 180 ARGS ${CMAK
 insitu_session_program(test_session_kept)
 insitu_add_mpi_test(session_kept test_session_kept 1 3 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_changes)
+insitu_add_mpi_test(session_changes test_session_changes 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 add_executable(test_session_guard test_session_guard.c)
 target_link_libraries(test_session_guard PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME session_guard COMMAND test_session_guard)

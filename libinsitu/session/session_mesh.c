@@ -208,6 +208,27 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            a->face_connectivity_count != b->face_connectivity_count;
 }
 
+static bool is_same_array(const insitu_array *a, const insitu_array *b)
+{
+    const grid_array x = as_grid_array(a), y = as_grid_array(b);
+    return x.data == y.data && x.stride == y.stride && (!x.data || a->type == b->type);
+}
+
+/* What must have changed by the looks of two descriptions of as many cells and vertices: arrays that lie elsewhere, or
+ * are read otherwise, hold what nobody has looked at. */
+static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
+{
+    bool has_same_cells = is_same_array(&a->cell_types, &b->cell_types) &&
+                          is_same_array(&a->connectivity, &b->connectivity) &&
+                          is_same_array(&a->offsets, &b->offsets) && is_same_array(&a->ghosts, &b->ghosts) &&
+                          is_same_array(&a->face_offsets, &b->face_offsets) &&
+                          is_same_array(&a->face_connectivity, &b->face_connectivity);
+    bool has_same_vertices = is_same_array(&a->vertex_ids, &b->vertex_ids);
+    for (int axis = 0; axis < 3; axis++)
+        has_same_vertices = has_same_vertices && is_same_array(&a->coordinates[axis], &b->coordinates[axis]);
+    return (has_same_cells ? 0 : INSITU_CHANGED_TOPOLOGY) | (has_same_vertices ? 0 : INSITU_CHANGED_GEOMETRY);
+}
+
 /* ---- meshes -------------------------------------------------------------------------------------------------- */
 
 void session_drop_scalars(session_mesh *mesh)
@@ -311,10 +332,15 @@ static void take_mesh(insitu_session *session, session_mesh *mesh, const insitu_
     unsigned changed = given->changed;
     if (!mesh->is_given || has_other_shape(&mesh->given, given)) changed = INSITU_CHANGED_ALL;
     if (changed & INSITU_CHANGED_TOPOLOGY) {
-        drop_contents(mesh);
+        drop_fields(mesh);
+        session->is_table_changed = true;
+    }
+    changed |= seen_changes(&mesh->given, given);
+    if (changed & INSITU_CHANGED_TOPOLOGY) {
+        session_drop_scalars(mesh);
+        session_drop_tree(mesh);
         mesh->rent = 0;
         mesh->is_topology_stale = true;
-        session->is_table_changed = true;
     }
     if (!mesh->given.vertex_ids.data != !given->vertex_ids.data) session->is_table_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
@@ -433,6 +459,12 @@ static void spoil_scalars(session_mesh *mesh, int field)
     }
 }
 
+/* Are the values read from where they were? */
+static bool is_same_place(const insitu_field *a, const insitu_field *b)
+{
+    return is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes;
+}
+
 static void take_field(insitu_session *session, session_mesh *mesh, int index, const insitu_field *given)
 {
     session_field *field = &mesh->fields[index];
@@ -442,7 +474,7 @@ static void take_field(insitu_session *session, session_mesh *mesh, int index, c
         /* The scalars' components may have changed their meaning. */
         session_drop_scalars(mesh);
         session->is_table_changed = true;
-    } else if (given->changed & INSITU_CHANGED_VALUES) {
+    } else if (given->changed & INSITU_CHANGED_VALUES || !is_same_place(&field->given, given)) {
         spoil_scalars(mesh, index);
     }
     const char *name = field->given.name;

@@ -62,7 +62,10 @@ typedef enum insitu_cell_type {
     INSITU_POLYHEDRON = 42 /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
 } insitu_cell_type;
 
-/* What of a mesh or a field differs from the last time it was set. The safe default is everything. */
+/* What of a mesh or a field differs from the last time it was set. The safe default is everything. Whatever is said,
+ * what the description alone tells counts too: other counts or another cell_type are another mesh (ALL); arrays at
+ * other addresses, of other types or strides are looked at again, as TOPOLOGY (but fields stay), GEOMETRY (vertex_ids
+ * too) or VALUES. What was written into the same arrays only the caller knows. */
 enum {
     INSITU_CHANGED_NOTHING = 0,
     INSITU_CHANGED_TOPOLOGY = 1, /* cells, their types, ghost flags: the tree is built again */
@@ -167,8 +170,8 @@ INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insi
 INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
 
 /* Hand over this rank's part of the mesh called name: borrowed arrays. Local. Ranks that have no part of it need not
- * call it; meshes of different names are drawn together. A mesh with INSITU_CHANGED_TOPOLOGY drops the fields set on it
- * before. NULL for mesh takes it away. A mesh that is not set again is taken as unchanged.
+ * call it; meshes of different names are drawn together. A mesh with INSITU_CHANGED_TOPOLOGY, or of other counts, drops
+ * the fields set on it before. NULL for mesh takes it away. A mesh that is not set again is taken as unchanged.
  *
  * What can be seen at once (counts, types, strides) is checked here; the arrays' contents when a step first needs
  * them: every cell's vertex indices and type, and the coordinates that cells without a ghost flag use. Either way the

@@ -1,0 +1,195 @@
+/* What a caller says has not changed, and lies elsewhere: it is looked at again. */
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+static const char scene_text[] = "images:\n"
+                                 "  - name: a\n"
+                                 "    size: [48, 36]\n"
+                                 "    layers:\n"
+                                 "      - isosurface: {field: f, values: [0.1]}\n"
+                                 "      - volume: {field: f}\n"
+                                 "    outputs:\n"
+                                 "      - path: a_{cycle}.exr\n";
+
+static session_input input;
+static const char *scene; /* written once: an edit would make sessions forget */
+
+static void create_input(void)
+{
+    input_create(&input, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
+    test_mesh_to_polyhedra(&input.part, 0.3);
+    input_describe(&input);
+}
+
+static insitu_session *open_and_draw(void)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_is_good(session, 0);
+    return session;
+}
+
+/* ---- spoilt elsewhere ----------------------------------------------------------------------------------------- */
+
+typedef union element {
+    double real;
+    int64_t index;
+    unsigned char byte;
+} element;
+
+/* An array of the mesh that is given anew in another place, with one element another. */
+typedef struct moved_array {
+    const char *name;
+    size_t place; /* of its insitu_array in insitu_mesh */
+    size_t bytes; /* of an element */
+    int64_t at;   /* where the element is another */
+    element value;
+    const char *words; /* of the error */
+} moved_array;
+
+static const moved_array moved_arrays[] = {
+    {"x", offsetof(insitu_mesh, coordinates[0]), 24, 0, {.real = NAN}, "not finite"},
+    {"z", offsetof(insitu_mesh, coordinates[2]), 24, 0, {.real = NAN}, "not finite"},
+    {"types", offsetof(insitu_mesh, cell_types), 1, 0, {.byte = 99}, "unknown cell type 99"},
+    {"connectivity", offsetof(insitu_mesh, connectivity), 8, 0, {.index = (int64_t)1 << 40}, "1099511627776"},
+    {"offsets", offsetof(insitu_mesh, offsets), 8, 1, {.index = (int64_t)1 << 40}, "1099511627776"},
+    {"face offsets", offsetof(insitu_mesh, face_offsets), 8, 1, {.index = (int64_t)1 << 40}, "1099511627776"},
+    {"faces", offsetof(insitu_mesh, face_connectivity), 8, 0, {.index = (int64_t)1 << 40}, "1099511627776"},
+};
+
+static int64_t element_count(const insitu_mesh *mesh, size_t place)
+{
+    if (place == offsetof(insitu_mesh, cell_types)) return mesh->cell_count;
+    if (place == offsetof(insitu_mesh, connectivity)) return mesh->connectivity_count;
+    if (place == offsetof(insitu_mesh, offsets)) return mesh->cell_count + 1;
+    if (place == offsetof(insitu_mesh, face_offsets)) return mesh->face_count + 1;
+    if (place == offsetof(insitu_mesh, face_connectivity)) return mesh->face_connectivity_count;
+    return mesh->vertex_count;
+}
+
+/* The array in memory of its own; coordinates stay interleaved, so that the last element is one number. */
+static char *copy_elsewhere(insitu_mesh *mesh, const moved_array *moved)
+{
+    insitu_array *array = (insitu_array *)((char *)mesh + moved->place);
+    const size_t bytes = (size_t)element_count(mesh, moved->place) * moved->bytes;
+    const size_t tail = moved->bytes == 24 ? 16 : 0;
+    char *copy = malloc(bytes);
+    assert_non_null(copy);
+    memcpy(copy, array->data, bytes - tail);
+    array->data = copy;
+    return copy;
+}
+
+static void spoilt_arrays_elsewhere_are_told(void **context)
+{
+    (void)context;
+    for (size_t i = 0; i < sizeof moved_arrays / sizeof moved_arrays[0]; i++) {
+        const moved_array *moved = &moved_arrays[i];
+        insitu_session *session = open_and_draw();
+        insitu_mesh mesh = input.mesh;
+        mesh.changed = INSITU_CHANGED_NOTHING;
+        char *copy = copy_elsewhere(&mesh, moved);
+        memcpy(copy + (size_t)moved->at * moved->bytes, &moved->value, moved->bytes == 1 ? 1 : 8);
+        everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
+        const insitu_status status = insitu_step(session, 1, 0);
+        told_everywhere(session, status, INSITU_ERROR_MESH, "rank 0: mesh \"m\": cell", moved->words);
+        insitu_destroy(&session);
+        free(copy);
+    }
+}
+
+/* ---- other pictures ------------------------------------------------------------------------------------------- */
+
+/* The picture of the session's next step is the one of a session that gets all as it now is. */
+static void next_picture_is(insitu_session *session, const session_input *now, insitu_session *fresh)
+{
+    const size_t pixels = (size_t)48 * 36;
+    caught_picture first = {0};
+    step_is_good(session, 1);
+    if (own_rank == 0) first = caught[0], caught_count = 0;
+    everywhere(hand_over(fresh, now) == INSITU_OK);
+    step_is_good(fresh, 0);
+    everywhere(own_rank != 0 || !memcmp(first.rgba, caught[0].rgba, 4 * pixels * sizeof(float)));
+    free(first.rgba);
+    free(first.depth);
+}
+
+/* now: the input with something elsewhere. Only the mesh, or only the field, is set again, as unchanged. */
+static void check_picture(const session_input *now, bool is_field)
+{
+    insitu_session *session = open_and_draw(), *fresh = open_session(MPI_COMM_WORLD, scene);
+    session_input unchanged = *now;
+    unchanged.mesh.changed = unchanged.field.changed = INSITU_CHANGED_NOTHING;
+    everywhere((is_field ? insitu_set_field(session, "m", &unchanged.field)
+                         : insitu_set_mesh(session, "m", &unchanged.mesh)) == INSITU_OK);
+    next_picture_is(session, now, fresh);
+    insitu_destroy(&session);
+    insitu_destroy(&fresh);
+}
+
+static void vertices_elsewhere_are_drawn_there(void **context)
+{
+    (void)context;
+    session_input now = input;
+    const size_t count = 3 * (size_t)input.part.vertex_count;
+    double *moved = malloc(count * sizeof *moved);
+    assert_non_null(moved);
+    for (size_t i = 0; i < count; i++)
+        moved[i] = 64 * input.part.coordinates[i]; /* far: the space is new, as the fresh one's */
+    insitu_mesh_interleaved(&now.mesh, moved, INSITU_FLOAT64);
+    check_picture(&now, false);
+    free(moved);
+}
+
+static void cells_elsewhere_are_drawn_with_their_fields(void **context)
+{
+    (void)context;
+    session_input now = input;
+    unsigned char *ghosts = malloc((size_t)input.part.cell_count);
+    assert_non_null(ghosts);
+    for (int64_t cell = 0; cell < input.part.cell_count; cell++) ghosts[cell] = cell % 2 != 0;
+    now.mesh.ghosts.data = ghosts;
+    check_picture(&now, false);
+    free(ghosts);
+}
+
+static void values_elsewhere_are_drawn(void **context)
+{
+    (void)context;
+    session_input now = input;
+    double *values = malloc(2 * (size_t)input.part.vertex_count * sizeof *values);
+    assert_non_null(values);
+    for (int64_t v = 0; v < input.part.vertex_count; v++) {
+        values[2 * v] = -input.part.values[v];
+        values[2 * v + 1] = input.part.values[v] + 1;
+    }
+    now.field.values = (insitu_array){values, INSITU_FLOAT64, 16};
+    check_picture(&now, true);
+    now.field.values.data = values + 1;
+    check_picture(&now, true);
+    free(values);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(spoilt_arrays_elsewhere_are_told),
+        cmocka_unit_test(vertices_elsewhere_are_drawn_there),
+        cmocka_unit_test(cells_elsewhere_are_drawn_with_their_fields),
+        cmocka_unit_test(values_elsewhere_are_drawn),
+    };
+    create_input();
+    scene = write_scene(scene_text);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    input_free(&input);
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
