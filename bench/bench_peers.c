@@ -42,7 +42,7 @@ static void run(bench_scene *scene, bench_routes *routes, peers_series *series, 
         const double build_began = bench_begin();
         bench_scene_build(scene);
         bench_end(build_began, number, &series->build[i]);
-        series->cost[i] = mmbvh_cost(&scene->tree);
+        series->cost[i] = mmbvh_cost(&scene->tree, NULL);
     }
     const double began = bench_begin();
     bench_scene_frame(scene);

@@ -164,8 +164,8 @@ static inline mmbvh_ranges mmbvh_pair_ranges(const float *pairs)
 }
 
 /* SAH cost of the tree as it stands: the expected number of boxes and cells a random ray that meets the root tests
- * (each box 1, each cell 1). */
-double mmbvh_cost(const mmbvh *tree);
+ * (each box 1, each cell 1). Of the options the threads count. */
+double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options);
 
 typedef struct mmbvh_statistics {
     int64_t leaves;

@@ -222,7 +222,7 @@ static insitu_status check_complete(const walk *w)
 
 static mmbvh_statistics statistics_of(const walk *w)
 {
-    mmbvh_statistics s = {.leaves = w->leaves, .depth = w->depth, .cost = mmbvh_cost(w->tree)};
+    mmbvh_statistics s = {.leaves = w->leaves, .depth = w->depth, .cost = mmbvh_cost(w->tree, NULL)};
     const int64_t inner = w->tree->node_count - w->leaves;
     s.cells_a_leaf = w->leaves ? (double)w->tree->cell_count / (double)w->leaves : 0;
     s.sibling_overlap = inner ? w->overlap / (double)inner : 0;

@@ -1,7 +1,7 @@
 /* A ray that meets a convex box meets one within it with the probability of their surface areas' ratio. */
 #include "mmbvh_cost.h"
 
-#include <omp.h>
+#include "mmbvh_sweep.h"
 
 /* Sums are of fixed parts of the nodes, so that no number of threads changes a bit. */
 enum { PARTS = 64 };
@@ -47,7 +47,7 @@ double cost_of_tree(const mmbvh *tree, int threads)
     return cost;
 }
 
-double mmbvh_cost(const mmbvh *tree)
+double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options)
 {
-    return cost_of_tree(tree, omp_get_max_threads());
+    return cost_of_tree(tree, sweep_threads(options));
 }

@@ -64,19 +64,19 @@ static bool begin_threads(const kernel_frame *frame, const frame_end *end, kerne
     bool has_polyhedra = false, has_memory = true;
     for (int i = 0; i < frame->job->part_count; i++)
         has_polyhedra = has_polyhedra || grid_has_faces(frame->job->parts[i].cells);
-#pragma omp parallel num_threads(threads) reduction(&& : has_memory)
-    {
-        /* By the thread that will use it: first touch. */
-        const int me = omp_get_thread_num();
-        states[me] = (kernel_thread){.cache = base_alloc(kernels->cache_bytes),
-                                     .out = &end->writers[me].list,
-                                     .reserve = fragment_reserve,
-                                     .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
-                                     .find_polyhedron = polyhedra_find,
-                                     .polyhedron_scratch = polyhedra_scratch,
-                                     .now = now};
-        if (states[me].cache) kernels->begin(states[me].cache);
-        has_memory = states[me].cache && (!has_polyhedra || states[me].polyhedra);
+        /* All of them, should OpenMP give fewer threads than asked for; else each by the thread that will use it, for
+         * its first touch. */
+#pragma omp parallel for num_threads(threads) schedule(static, 1) reduction(&& : has_memory)
+    for (int i = 0; i < threads; i++) {
+        states[i] = (kernel_thread){.cache = base_alloc(kernels->cache_bytes),
+                                    .out = &end->writers[i].list,
+                                    .reserve = fragment_reserve,
+                                    .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
+                                    .find_polyhedron = polyhedra_find,
+                                    .polyhedron_scratch = polyhedra_scratch,
+                                    .now = now};
+        if (states[i].cache) kernels->begin(states[i].cache);
+        has_memory = has_memory && states[i].cache && (!has_polyhedra || states[i].polyhedra);
     }
     return has_memory;
 }

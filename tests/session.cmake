@@ -28,6 +28,26 @@ insitu_add_mpi_test(session_kept test_session_kept 1 3 TIMEOUT 180 ARGS ${CMAKE_
 insitu_session_program(test_session_changes)
 insitu_add_mpi_test(session_changes test_session_changes 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+# The process around a session: few threads, small teams, traps.
+insitu_session_program(test_session_host)
+target_link_libraries(test_session_host PRIVATE ${CMAKE_DL_LIBS} OpenMP::OpenMP_C)
+insitu_add_mpi_test(session_host test_session_host 1 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
+# Stacks: of the widest kernels here, of the others in the long run. The address sanitizer has its own, larger frames.
+insitu_session_program(test_session_stack)
+target_link_libraries(test_session_stack PRIVATE OpenMP::OpenMP_C)
+if(NOT CMAKE_PROJECT_INCLUDE)
+  insitu_add_mpi_test(session_stack test_session_stack 1 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+  foreach(isa plain sse4.2 avx2)
+    insitu_add_long_test(session_stack_${isa} ${CMAKE_COMMAND} -E env ${INSITU_TEST_ENVIRONMENT} INSITU_ISA=${isa}
+      ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} 1 $<TARGET_FILE:test_session_stack> ${CMAKE_CURRENT_BINARY_DIR})
+  endforeach()
+endif()
+insitu_add_mpi_test(session_small_stacks test_session_stack 1 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+foreach(ranks 1 2)
+  set_property(TEST session_small_stacks_np${ranks} APPEND PROPERTY ENVIRONMENT OMP_STACKSIZE=100k SMALL_STACKS=1)
+endforeach()
+
 add_executable(test_session_guard test_session_guard.c)
 target_link_libraries(test_session_guard PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME session_guard COMMAND test_session_guard)

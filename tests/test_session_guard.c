@@ -12,6 +12,8 @@
 
 #include "session_guard.h"
 
+enum { TRAPS = FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW, THREADS = 3 };
+
 /* Kept from the optimizer, so that the divisions happen where they stand. */
 static volatile double zero = 0;
 
@@ -27,30 +29,79 @@ static void divide_by_zero_on(int threads)
 static void arm_traps(void)
 {
     feclearexcept(FE_ALL_EXCEPT);
-    feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
+    feenableexcept(TRAPS);
+}
+
+/* How many threads of a team have the traps, and the flag of a division by zero; all are disarmed. */
+static void count_armed(int threads, int *armed, int *flagged)
+{
+    int traps = 0, flags = 0;
+#pragma omp parallel num_threads(threads) reduction(+ : traps, flags)
+    {
+        traps += fegetexcept() == TRAPS;
+        flags += fetestexcept(FE_DIVBYZERO) != 0;
+        fedisableexcept(FE_ALL_EXCEPT);
+    }
+    *armed = traps;
+    *flagged = flags;
 }
 
 static void traps_are_off_inside_and_on_again_after(void **state)
 {
     (void)state;
-    enum { threads = 3 };
     session_guard guard;
+    int armed, flagged;
     arm_traps(); /* where workers take the calling thread's settings */
-#pragma omp parallel num_threads(threads)
+#pragma omp parallel num_threads(THREADS)
     arm_traps(); /* where they keep their own */
-    session_guard_begin(&guard, threads);
-    divide_by_zero_on(threads); /* unguarded, this ends the process */
+    session_guard_begin(&guard);
+    session_guard_begin_team(&guard, THREADS);
+    divide_by_zero_on(THREADS); /* unguarded, this ends the process */
+    session_guard_end_team(THREADS);
     session_guard_end(&guard);
-    int armed = 0, flags = 0;
-#pragma omp parallel num_threads(threads) reduction(+ : armed, flags)
-    {
-        armed += fegetexcept() == (FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
-        flags += fetestexcept(FE_DIVBYZERO) != 0;
-        fedisableexcept(FE_ALL_EXCEPT);
-    }
-    fedisableexcept(FE_ALL_EXCEPT);
-    assert_int_equal(armed, threads);
-    assert_int_equal(flags, 0);
+    count_armed(THREADS, &armed, &flagged);
+    assert_int_equal(armed, THREADS);
+    assert_int_equal(flagged, 0);
+}
+
+/* More threads than any team before had. */
+static void threads_first_needed_inside_are_as_the_callers_own(void **state)
+{
+    (void)state;
+    session_guard guard;
+    int armed, flagged;
+    arm_traps();
+#pragma omp parallel num_threads(THREADS)
+    arm_traps();
+    session_guard_begin(&guard);
+    session_guard_begin_team(&guard, 2 * THREADS);
+    divide_by_zero_on(2 * THREADS);
+    session_guard_end_team(2 * THREADS);
+    session_guard_end(&guard);
+    count_armed(2 * THREADS, &armed, &flagged);
+    assert_int_equal(armed, 2 * THREADS);
+    assert_int_equal(flagged, 0);
+}
+
+/* A team that is larger at the end than it was at the begin: threads of which nothing was kept are given nothing. */
+static void threads_that_come_later_keep_what_they_have(void **state)
+{
+    (void)state;
+    session_guard guard;
+    session_guard_begin(&guard);
+    session_guard_begin_team(&guard, 1);
+#pragma omp parallel num_threads(THREADS)
+    fesetround(FE_UPWARD);
+    fesetround(FE_UPWARD); /* LLVM's workers take the caller's at every begin of a region */
+    session_guard_end_team(THREADS);
+    int upward = 0;
+#pragma omp parallel num_threads(THREADS) reduction(+ : upward)
+    upward += fegetround() == FE_UPWARD;
+    session_guard_end(&guard);
+    assert_int_equal(upward, THREADS);
+    assert_int_equal(fegetround(), FE_TONEAREST);
+#pragma omp parallel num_threads(THREADS)
+    fesetround(FE_TONEAREST);
 }
 
 static void rounding_is_to_nearest_inside(void **state)
@@ -58,18 +109,36 @@ static void rounding_is_to_nearest_inside(void **state)
     (void)state;
     session_guard guard;
     fesetround(FE_UPWARD);
-    session_guard_begin(&guard, 1);
+    session_guard_begin(&guard);
     assert_int_equal(fegetround(), FE_TONEAREST);
     session_guard_end(&guard);
     assert_int_equal(fegetround(), FE_UPWARD);
     fesetround(FE_TONEAREST);
 }
 
+/* OpenMP may give teams of any size where the caller has allowed it; a step's are all of one. */
+static void teams_are_of_one_size_inside(void **state)
+{
+    (void)state;
+    for (int is_dynamic = 0; is_dynamic < 2; is_dynamic++) {
+        session_guard guard;
+        omp_set_dynamic(is_dynamic);
+        session_guard_begin(&guard);
+        assert_false(omp_get_dynamic());
+        session_guard_end(&guard);
+        assert_int_equal(omp_get_dynamic(), is_dynamic);
+    }
+    omp_set_dynamic(0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(traps_are_off_inside_and_on_again_after),
+        cmocka_unit_test(threads_first_needed_inside_are_as_the_callers_own),
+        cmocka_unit_test(threads_that_come_later_keep_what_they_have),
         cmocka_unit_test(rounding_is_to_nearest_inside),
+        cmocka_unit_test(teams_are_of_one_size_inside),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -235,8 +235,10 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
 
 #define TOP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_INT_PTR("threads", OPTIONAL, scene_file, threads),                                                   \
-      .help = "Threads of each rank. 0: the cores of the node, shared among its ranks.", .by_default = "`0`",          \
-      .low = 0, .high = 4096)                                                                                          \
+      .help =                                                                                                          \
+          "Threads of each rank, as far as there are cores and they can be started; the report warns where there are " \
+          "fewer. 0: the cores of the node, shared among its ranks.",                                                  \
+      .by_default = "`0`", .low = 0, .high = 4096)                                                                     \
     X(CHOICE("tree", scene_file, tree, tree_words),                                                                    \
       .help = "What the trees are built over: all cells (`full`), those that the images can show (`partial`), or "     \
               "whichever has cost less so far (`auto`). Changes the speed, not the images.",                           \

@@ -4,6 +4,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_guard.h"
 
 /* What insitu_error(NULL) tells: there is no session to ask after a failed insitu_create(). */
 static _Thread_local base_error thread_error;
@@ -96,6 +97,17 @@ fail:
     return status;
 }
 
+/* The communicators are the session's, or freed. */
+static insitu_status create_duplicated(MPI_Comm comm, const char *scene_file, insitu_session **out, base_error *error)
+{
+    MPI_Comm own = MPI_COMM_NULL, comp = MPI_COMM_NULL;
+    insitu_status status = duplicate(comm, &own, error);
+    if (status == INSITU_OK) status = duplicate(own, &comp, error);
+    if (status == INSITU_OK) status = create(own, comp, scene_file, out, error);
+    if (status != INSITU_OK) free_communicators(own, comp);
+    return status;
+}
+
 insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out)
 {
     base_error *error = &thread_error;
@@ -108,11 +120,10 @@ insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_sessio
     MPI_Comm_test_inter(comm, &is_inter);
     if (is_inter)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_create: an inter-communicator is not supported");
-    MPI_Comm own = MPI_COMM_NULL, comp = MPI_COMM_NULL;
-    insitu_status status = duplicate(comm, &own, error);
-    if (status == INSITU_OK) status = duplicate(own, &comp, error);
-    if (status == INSITU_OK) status = create(own, comp, scene_file, out, error);
-    if (status != INSITU_OK) free_communicators(own, comp);
+    session_guard guard;
+    session_guard_begin(&guard);
+    const insitu_status status = create_duplicated(comm, scene_file, out, error);
+    session_guard_end(&guard);
     return status;
 }
 

@@ -6,7 +6,8 @@
  *     session_step.c       one small reduction: cycle, pending errors, what changed anywhere; the order of the rest
  *     session_scene.c      the scene file, read again when it changed
  *     session_check.c      deep checks of meshes that changed, their bounds and counts
- *     session_space.c      global bounds, origin and scale, threads
+ *     session_team.c       how many threads there are, where more are wanted than before
+ *     session_space.c      global bounds, origin and scale
  *     session_catalogue.c  which meshes and fields there are, over all ranks
  *     session_plan.c       due images to the scalars they need; nothing else is computed from here on
  *     session_recentre.c   cell values to vertices, where an isosurface wants them (session_exchange.c: over ranks)
@@ -21,6 +22,7 @@
 #define SESSION_SESSION_H
 
 #include <mpi.h>
+#include <pthread.h>
 #include <sys/stat.h>
 
 #include "error.h"
@@ -125,6 +127,13 @@ typedef struct session_rates {
     double build, select, refit;
 } session_rates;
 
+/* How many threads are known to be there, or to be possible, for the thread that called last; 0: not yet tried. */
+typedef struct session_team {
+    int size;
+    pthread_t caller;
+    int64_t ended; /* threads of any team that had ended by then */
+} session_team;
+
 /* Growing text for the report; what memory cannot hold is left away. */
 typedef struct session_text {
     char *data;
@@ -135,7 +144,8 @@ struct insitu_session {
     MPI_Comm comm;      /* ours, errors return */
     MPI_Comm comp_comm; /* compositing's own */
     int rank, ranks, node_ranks;
-    int threads;
+    int threads; /* of this step's teams */
+    session_team team;
 
     char *scene_path; /* the same on every rank */
     scene scene;
@@ -206,7 +216,6 @@ const base_error *session_pending_error(const insitu_session *session);
 insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error);
 
 /* session_space.c */
-int session_thread_count(const insitu_session *session);
 int session_node_ranks(MPI_Comm comm);
 /* Check what changed, then global bounds, then origin and scale. Collective. */
 insitu_status session_update_extent(insitu_session *session, base_error *error);

@@ -1,22 +1,26 @@
-/* The floating-point environment while the library works. */
-#ifndef SESSION_SESSION_GUARD_H
-#define SESSION_SESSION_GUARD_H
+/* What of the caller's settings a call of the library must not work under, and must not change: the floating-point
+ * environment, and OpenMP's leave to give teams of any size (OMP_DYNAMIC). */
+#ifndef SESSION_GUARD_H
+#define SESSION_GUARD_H
 
 #include <fenv.h>
 
-enum { SESSION_MAX_THREADS = 1024 };
-
-/* What each thread of the step's teams had. */
 typedef struct session_guard {
-    fenv_t environments[SESSION_MAX_THREADS];
-    int threads;
+    fenv_t caller;
+    int is_dynamic;
 } session_guard;
 
-/* Give this thread and the others of teams of this size (at most SESSION_MAX_THREADS) the default environment, and
- * keep theirs. */
-void session_guard_begin(session_guard *guard, int threads);
+/* Give the calling thread the default environment and teams of the size asked for, and keep what it had. */
+void session_guard_begin(session_guard *guard);
 
 /* Give it back, exception flags too. */
-void session_guard_end(session_guard *guard);
+void session_guard_end(const session_guard *guard);
+
+/* The same for the other threads of teams of this size, between the calls above. Threads that OpenMP starts for it are
+ * born under the caller's own environment, as if the caller had needed them first. */
+void session_guard_begin_team(const session_guard *guard, int threads);
+
+/* Give those back what they had that were there at the begin. */
+void session_guard_end_team(int threads);
 
 #endif

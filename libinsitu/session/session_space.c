@@ -1,15 +1,12 @@
-/* Where everything lies: global bounds, the origin and scale of float32 numbers, and how many threads a rank takes.
+/* Where everything lies: global bounds, the origin and scale of float32 numbers.
  *
  * Every number here comes out of reductions, so that it is the same on every rank and for every partition. The space
  * is kept while the cells stay about where they were, since a new one means new trees: a moving mesh does not move it
  * at every step. */
 #include <float.h>
-#include <omp.h>
-#include <unistd.h>
 
 #include "session.h"
 #include "session_agree.h"
-#include "session_guard.h"
 
 int session_node_ranks(MPI_Comm comm)
 {
@@ -19,17 +16,6 @@ int session_node_ranks(MPI_Comm comm)
     MPI_Comm_size(node, &ranks);
     MPI_Comm_free(&node);
     return ranks;
-}
-
-int session_thread_count(const insitu_session *session)
-{
-    if (session->scene.threads > 0)
-        return session->scene.threads < SESSION_MAX_THREADS ? session->scene.threads : SESSION_MAX_THREADS;
-    /* A rank bound to some cores has them for itself; one that is bound to none shares the node's. */
-    int cores = omp_get_num_procs();
-    if (cores >= (int)sysconf(_SC_NPROCESSORS_ONLN)) cores /= session->node_ranks;
-    if (cores > omp_get_max_threads()) cores = omp_get_max_threads();
-    return cores > SESSION_MAX_THREADS ? SESSION_MAX_THREADS : cores > 1 ? cores : 1;
 }
 
 static insitu_status check_meshes(insitu_session *session, base_error *error)

@@ -2,14 +2,15 @@
  *
  * The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
  * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
- * all tables of names are alike, and, from rank 0, the time and whether the scene file was edited. After it, ranks
- * decide alike without another word. */
+ * all tables of names are alike, whether any wants more threads, and, from rank 0, the time and whether the scene file
+ * was edited. After it, ranks decide alike without another word. */
 #include <string.h>
 
 #include "session.h"
 #include "session_agree.h"
 #include "session_draw.h"
 #include "session_guard.h"
+#include "session_team.h"
 
 enum step_word {
     CYCLE_HIGH,
@@ -20,6 +21,7 @@ enum step_word {
     NAMES_HIGH,
     NAMES_LOW,
     SCENE_CHANGED,
+    TEAM_GROWS,
     ROOT_TIME, /* the bits of rank 0's */
     STEP_WORDS
 };
@@ -55,6 +57,7 @@ static insitu_status exchange_message(insitu_session *session, int64_t cycle, do
     mine.words[NAMES_HIGH] = names;
     mine.words[NAMES_LOW] = ~names;
     mine.words[SCENE_CHANGED] = session_scene_file_changed(session);
+    mine.words[TEAM_GROWS] = session_team_grows(session);
     mine.words[ROOT_TIME] = session->rank == 0 ? bits_of(time) : INT64_MIN;
     return session_mpi(error, MPI_Allreduce(mine.words, out->words, STEP_WORDS, MPI_INT64_T, MPI_MAX, session->comm),
                        "MPI_Allreduce");
@@ -100,17 +103,22 @@ static insitu_status draw_due(insitu_session *session, const step_message *messa
     return session_draw_images(session, due, count, cycle, error);
 }
 
-static insitu_status draw_guarded(insitu_session *session, const step_message *message, base_error *error)
+static insitu_status draw_by_team(insitu_session *session, const step_message *message, const session_guard *guard,
+                                  base_error *error)
 {
-    session_guard guard;
-    session->threads = session_thread_count(session);
-    session_guard_begin(&guard, session->threads);
-    const insitu_status status = draw_due(session, message, error);
-    session_guard_end(&guard);
+    const bool is_new = message->words[TEAM_GROWS] || message->words[SCENE_CHANGED];
+    insitu_status status = is_new ? session_team_probe(session, error) : INSITU_OK;
+    if (status) return status;
+    session->threads = session_team_threads(session);
+    session_guard_begin_team(guard, session->threads);
+    if (is_new) status = session_team_check(session, error);
+    if (!status) status = draw_due(session, message, error);
+    session_guard_end_team(session->threads);
     return status;
 }
 
-static insitu_status step(insitu_session *session, int64_t cycle, double time, base_error *error)
+static insitu_status step(insitu_session *session, int64_t cycle, double time, const session_guard *guard,
+                          base_error *error)
 {
     step_message message;
     const insitu_status status = exchange_message(session, cycle, time, &message, error);
@@ -122,17 +130,20 @@ static insitu_status step(insitu_session *session, int64_t cycle, double time, b
     if (high != low)
         return base_fail(error, INSITU_ERROR_MPI, "ranks disagree on the cycle: %lld on one, %lld on another",
                          (long long)low, (long long)high);
-    return due_count(&session->scene, high) ? draw_guarded(session, &message, error) : INSITU_OK;
+    return due_count(&session->scene, high) ? draw_by_team(session, &message, guard, error) : INSITU_OK;
 }
 
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
 {
     if (!session) return INSITU_ERROR_ARGUMENT;
+    session_guard guard;
+    session_guard_begin(&guard);
     const double start = MPI_Wtime();
     session->error = (base_error){0};
     session_begin_report(session, cycle, time);
-    const insitu_status status = step(session, cycle, time, &session->error);
+    const insitu_status status = step(session, cycle, time, &guard, &session->error);
     session_end_report(session);
     session->report.total_ms = 1e3 * (MPI_Wtime() - start);
+    session_guard_end(&guard);
     return status;
 }

@@ -94,7 +94,7 @@ static insitu_status refit_bounds(insitu_session *session, session_mesh *mesh, b
     if (status) return base_fail(error, status, "mesh \"%s\": its tree could not be refitted", mesh->name);
     session->is_parent_stale = true;
     session->report.refit_ms += 1e3 * (MPI_Wtime() - start);
-    if (mmbvh_cost(&mesh->tree) > worst_cost * mesh->tree.built_cost) return build_tree(session, mesh, NULL, error);
+    if (mmbvh_cost(&mesh->tree, &options) > worst_cost * mesh->tree.built_cost) return build_tree(session, mesh, NULL, error);
     mesh->is_geometry_stale = false;
     return INSITU_OK;
 }

@@ -186,7 +186,12 @@ INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *m
 
 /* Draw what is due at this cycle and time. Collective. Where nothing is due it costs one small reduction. An error
  * on any rank is returned on every rank, with the rank and the place in the message; images that could be drawn
- * are drawn, and the session stays usable: the simulation goes on. */
+ * are drawn, and the session stays usable: the simulation goes on.
+ *
+ * A step that draws works on threads of OpenMP's, as many as the scene asks for, there are cores for, and can be
+ * started; within a parallel region of the caller's, on the calling thread alone. That one needs 320 kB of stack, the
+ * others 256 kB (OMP_STACKSIZE); less is an error. Traps and rounding modes of the caller's are off meanwhile, on all
+ * of them, here and in insitu_create(). */
 INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, double time);
 
 /* What the last step did. Local. Valid until the next step; all zero before the first; NULL for a NULL session. */

@@ -1,0 +1,357 @@
+/* The process that a session is a guest in: one that can start few threads or none, whose OpenMP gives smaller teams
+ * than asked for, that traps floating-point exceptions.
+ *
+ * The number of cores, the starting of threads and (GNU's) parallel regions are ours here, so that any limit can be
+ * had on any machine. A thread that cannot be started ends the process where OpenMP is left to find that out. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fenv.h>
+#include <limits.h>
+#include <omp.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+#define VISIBLE __attribute__((visibility("default")))
+
+/* ---- the process ---------------------------------------------------------------------------------------------- */
+
+static int cores = 8;
+
+VISIBLE int omp_get_num_procs(void)
+{
+    return cores;
+}
+
+static atomic_int live_threads;
+static atomic_int most_threads = INT_MAX;
+
+typedef struct thread_start {
+    void *(*function)(void *);
+    void *argument;
+} thread_start;
+
+static void count_end(void *value)
+{
+    (void)value;
+    atomic_fetch_sub(&live_threads, 1);
+}
+
+static void *run_counted(void *given)
+{
+    const thread_start start = *(thread_start *)given;
+    void *result;
+    free(given);
+    pthread_cleanup_push(count_end, NULL);
+    result = start.function(start.argument);
+    pthread_cleanup_pop(1);
+    return result;
+}
+
+typedef int create_function(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+
+VISIBLE int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*function)(void *),
+                           void *argument)
+{
+    create_function *real = NULL;
+    *(void **)&real = dlsym(RTLD_NEXT, "pthread_create");
+    thread_start *start = malloc(sizeof *start);
+    int code = EAGAIN;
+    if (start && atomic_fetch_add(&live_threads, 1) < atomic_load(&most_threads)) {
+        *start = (thread_start){function, argument};
+        code = real(thread, attributes, run_counted, start);
+    }
+    if (code == 0) return 0;
+    free(start);
+    atomic_fetch_sub(&live_threads, 1);
+    return code;
+}
+
+/* So many more threads than there are now. */
+static void allow_threads(int more)
+{
+    atomic_store(&most_threads, atomic_load(&live_threads) + more);
+}
+
+/* GNU's OpenMP ends threads that a next region does not need; LLVM's keeps them. */
+static int other_threads; /* MPI's */
+
+static void end_threads(void)
+{
+    int given = 0;
+    atomic_store(&most_threads, INT_MAX);
+#pragma omp parallel num_threads(2) reduction(+ : given)
+    given++;
+    assert_int_equal(given, 2);
+    for (int wait = 0; wait < 500 && atomic_load(&live_threads) > other_threads + 1; wait++)
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+}
+
+static bool gives_smaller_teams;
+static unsigned team_turn;
+
+static unsigned team_given(unsigned asked)
+{
+    if (!gives_smaller_teams || asked < 2 || omp_get_level() > 0) return asked;
+    team_turn = team_turn * 1664525 + 1013904223;
+    return 1 + (team_turn >> 16) % asked;
+}
+
+typedef void parallel_function(void (*)(void *), void *, unsigned, unsigned);
+typedef void loop_function(void (*)(void *), void *, unsigned, long, long, long, long, unsigned);
+
+VISIBLE void GOMP_parallel(void (*body)(void *), void *data, unsigned threads, unsigned flags);
+VISIBLE void GOMP_parallel(void (*body)(void *), void *data, unsigned threads, unsigned flags)
+{
+    parallel_function *real = NULL;
+    *(void **)&real = dlsym(RTLD_NEXT, "GOMP_parallel");
+    real(body, data, team_given(threads), flags);
+}
+
+VISIBLE void GOMP_parallel_loop_nonmonotonic_dynamic(void (*body)(void *), void *data, unsigned threads, long begin,
+                                                     long end, long step, long chunk, unsigned flags);
+VISIBLE void GOMP_parallel_loop_nonmonotonic_dynamic(void (*body)(void *), void *data, unsigned threads, long begin,
+                                                     long end, long step, long chunk, unsigned flags)
+{
+    loop_function *real = NULL;
+    *(void **)&real = dlsym(RTLD_NEXT, "GOMP_parallel_loop_nonmonotonic_dynamic");
+    real(body, data, team_given(threads), begin, end, step, chunk, flags);
+}
+
+/* ---- a session ------------------------------------------------------------------------------------------------ */
+
+static session_input input;
+static caught_picture expected; /* by one thread */
+
+static const char *scene_by(int threads)
+{
+    char text[1024];
+    snprintf(text, sizeof text,
+             "threads: %d\n"
+             "images:\n"
+             "  - name: a\n"
+             "    size: [120, 90]\n"
+             "    layers:\n"
+             "      - isosurface: {field: f, values: [0.1]}\n"
+             "      - volume: {field: f}\n"
+             "    outputs:\n"
+             "      - path: a_{cycle}.exr\n",
+             threads);
+    return write_scene(text);
+}
+
+static insitu_session *open_by(int threads)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene_by(threads));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    return session;
+}
+
+/* A step draws what one thread draws. */
+static void step_draws_the_same(insitu_session *session, int cycle)
+{
+    const size_t pixels = (size_t)120 * 90;
+    step_is_good(session, cycle);
+    const bool is_first = own_rank == 0 && !expected.rgba;
+    if (is_first) {
+        expected = caught[0];
+        caught_count = 0;
+    }
+    everywhere(own_rank != 0 || is_first ||
+               (!memcmp(expected.rgba, caught[0].rgba, 4 * pixels * sizeof(float)) &&
+                !memcmp(expected.depth, caught[0].depth, pixels * sizeof(float))));
+}
+
+static bool warns_of(const insitu_session *session, const char *words)
+{
+    return strstr(insitu_last_report(session)->warnings, words) != NULL;
+}
+
+static int begin_test(void **context)
+{
+    (void)context;
+    gives_smaller_teams = false;
+    end_threads();
+    cores = 8;
+    return 0;
+}
+
+/* ---- threads -------------------------------------------------------------------------------------------------- */
+
+static void one_thread_draws(void **context)
+{
+    (void)context;
+    insitu_session *session = open_by(1);
+    step_draws_the_same(session, 0);
+    everywhere(!*insitu_last_report(session)->warnings);
+    insitu_destroy(&session);
+}
+
+static void threads_are_at_most_the_cores(void **context)
+{
+    (void)context;
+    cores = 3;
+    allow_threads(3 - 1 + 4); /* what the step may try for these */
+    insitu_session *session = open_by(1024);
+    step_draws_the_same(session, 0);
+    everywhere(
+        warns_of(session, "the scene asks for 1024 threads, at most 3 are used: this rank may run on no more cores"));
+    everywhere(!warns_of(session, "can be started"));
+    insitu_destroy(&session);
+}
+
+static void threads_that_cannot_be_started_are_done_without(void **context)
+{
+    (void)context;
+    static const struct {
+        int allowed;
+        const char *words;
+    } cases[] = {{0, "1 of 8 threads"}, {1, "1 of 8 threads"}, {4, "1 of 8 threads"},
+                 {5, "2 of 8 threads"}, {9, "6 of 8 threads"}, {10, "7 of 8 threads"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        end_threads();
+        allow_threads(cases[i].allowed);
+        insitu_session *session = open_by(8);
+        step_draws_the_same(session, 0);
+        everywhere(warns_of(session, cases[i].words));
+        everywhere(warns_of(session, "are used: no more can be started"));
+        for (int cycle = 1; cycle < 4; cycle++) step_draws_the_same(session, cycle);
+        allow_threads(30);
+        step_draws_the_same(session, 4);
+        everywhere(!*insitu_last_report(session)->warnings);
+        insitu_destroy(&session);
+    }
+}
+
+static void an_edit_of_the_scene_starts_no_more_than_can_be(void **context)
+{
+    (void)context;
+    cores = 2;
+    insitu_session *session = open_by(2);
+    step_draws_the_same(session, 0);
+    cores = 64;
+    allow_threads(20);
+    scene_by(4096);
+    step_draws_the_same(session, 1);
+    everywhere(warns_of(session, "the scene asks for 4096 threads, at most 64 are used"));
+    everywhere(warns_of(session, "18 of 64 threads are used: no more can be started"));
+    for (int cycle = 2; cycle < 5; cycle++) step_draws_the_same(session, cycle);
+    insitu_destroy(&session);
+}
+
+static void threads_that_ended_are_tried_again(void **context)
+{
+    (void)context;
+    insitu_session *session = open_by(8);
+    step_draws_the_same(session, 0);
+    end_threads();
+    allow_threads(5);
+    step_draws_the_same(session, 1);
+    insitu_destroy(&session);
+}
+
+static void smaller_teams_draw_the_same(void **context)
+{
+    (void)context;
+    cores = 5;
+    gives_smaller_teams = true;
+    insitu_session *session = open_by(5);
+    for (int cycle = 0; cycle < 30; cycle++) {
+        everywhere(hand_over(session, &input) == INSITU_OK);
+        input.mesh.changed = cycle % 3 == 0 ? INSITU_CHANGED_ALL : cycle % 3 == 1 ? INSITU_CHANGED_GEOMETRY : 0;
+        step_draws_the_same(session, cycle);
+    }
+    input.mesh.changed = INSITU_CHANGED_ALL;
+    insitu_destroy(&session);
+}
+
+static void teams_of_any_size_are_the_callers_own_affair(void **context)
+{
+    (void)context;
+    insitu_session *session = open_by(4);
+    omp_set_dynamic(1);
+    step_draws_the_same(session, 0);
+    everywhere(omp_get_dynamic());
+    omp_set_dynamic(0);
+    step_draws_the_same(session, 1);
+    everywhere(!omp_get_dynamic());
+    insitu_destroy(&session);
+}
+
+static void a_parallel_region_of_the_caller_gets_one_thread(void **context)
+{
+    (void)context;
+    omp_set_max_active_levels(2);
+    insitu_session *session = open_by(4);
+#pragma omp parallel num_threads(2)
+#pragma omp master
+    {
+        allow_threads(0);
+        step_draws_the_same(session, 0);
+        everywhere(warns_of(session, "within a parallel region"));
+    }
+    insitu_destroy(&session);
+    omp_set_max_active_levels(1);
+}
+
+/* ---- floating-point exceptions -------------------------------------------------------------------------------- */
+
+enum { TRAPS = FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW };
+
+static const char too_large[] = "images:\n"
+                                "  - name: a\n"
+                                "    camera: {automatic: {zoom: 1e999}}\n"
+                                "    layers: [isosurface: {field: f, values: [1]}]\n"
+                                "    outputs: [path: a.png]\n";
+
+static void a_number_too_large_for_a_scene_is_no_trap(void **context)
+{
+    (void)context;
+    insitu_session *session = NULL, *open = open_by(2);
+    step_is_good(open, 0);
+    const char *path = write_scene(too_large);
+    feclearexcept(FE_ALL_EXCEPT);
+    feenableexcept(TRAPS);
+    const insitu_status created = insitu_create(MPI_COMM_WORLD, path, &session);
+    const bool is_refused = created == INSITU_ERROR_SCENE && !session && strstr(insitu_error(NULL), "1e999");
+    const insitu_status stepped = insitu_step(open, 1, 0);
+    const bool is_as_before = fegetexcept() == TRAPS && fetestexcept(FE_ALL_EXCEPT) == 0;
+    fedisableexcept(FE_ALL_EXCEPT);
+    everywhere(is_refused && is_as_before);
+    everywhere(stepped == INSITU_OK && warns_of(open, "1e999"));
+    insitu_destroy(&open);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(one_thread_draws, begin_test),
+        cmocka_unit_test_setup(threads_are_at_most_the_cores, begin_test),
+        cmocka_unit_test_setup(threads_that_cannot_be_started_are_done_without, begin_test),
+        cmocka_unit_test_setup(an_edit_of_the_scene_starts_no_more_than_can_be, begin_test),
+        cmocka_unit_test_setup(threads_that_ended_are_tried_again, begin_test),
+        cmocka_unit_test_setup(smaller_teams_draw_the_same, begin_test),
+        cmocka_unit_test_setup(teams_of_any_size_are_the_callers_own_affair, begin_test),
+        cmocka_unit_test_setup(a_parallel_region_of_the_caller_gets_one_thread, begin_test),
+        cmocka_unit_test_setup(a_number_too_large_for_a_scene_is_no_trap, begin_test),
+    };
+    other_threads = atomic_load(&live_threads);
+    input_create(&input, TEST_MIXED, 7, TEST_BLOCK, own_rank, rank_count);
+    test_mesh_to_polyhedra(&input.part, 0.3);
+    input_describe(&input);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    input_free(&input);
+    free(expected.rgba);
+    free(expected.depth);
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}

@@ -1,0 +1,144 @@
+/* How much of its stack a step takes, of the calling thread's and of a worker's: less than it is checked for
+ * (session_team.h). The stacks are painted before a step, and looked at after it.
+ *
+ * With SMALL_STACKS in the environment OpenMP's are too small, and the step says so. */
+#define _GNU_SOURCE
+#include <omp.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render_isa.h"
+#include "session_team.h"
+#include "test_session_fixture.h"
+
+enum { PAINT = 0xa5, PAINTED = 1 << 20, NEAR = 1024 /* frames of the painter itself */ };
+
+/* Two threads wherever the test runs. */
+__attribute__((visibility("default"))) int omp_get_num_procs(void)
+{
+    return 2;
+}
+
+static __attribute__((noinline)) void paint_stack(volatile unsigned char **top)
+{
+    volatile unsigned char *here = __builtin_frame_address(0);
+    *top = here;
+    for (int i = NEAR; i < PAINTED; i++) here[-i] = PAINT;
+}
+
+/* How far below top the paint is gone. */
+static __attribute__((noinline)) int taken_stack(volatile unsigned char *top)
+{
+    int taken = PAINTED - 1;
+    while (taken > NEAR && top[-taken] == PAINT) taken--;
+    return taken;
+}
+
+static volatile unsigned char *tops[2];
+
+static void paint_both(void)
+{
+#pragma omp parallel num_threads(2)
+    paint_stack(&tops[omp_get_thread_num()]);
+}
+
+static void look_at_both(int most[2])
+{
+#pragma omp parallel num_threads(2)
+    {
+        const int me = omp_get_thread_num(), taken = taken_stack(tops[me]);
+        if (taken > most[me]) most[me] = taken;
+    }
+}
+
+static const char *const layers[] = {
+    "isosurface: {field: f, values: [0.1, 0.5]}",
+    "isosurface: {field: f, values: [0.1], roots: neubauer, normals: differences, opacity: 0.5}",
+    "volume: {field: f}\n    sampling: {method: samples, group: 64}",
+    "volume: {field: f}\n    sampling: {method: segments}",
+    "volume: {field: f, opacity: [[0, 0], [0.5, 0], [0.5, 1], [1, 1]]}\n    sampling: {max_error: 0.01}",
+    "volume: {field: f}\n      - volume: {field: f, map: grey}\n      - isosurface: {field: f, values: [0.3]}",
+};
+
+enum { LAYERS = sizeof layers / sizeof layers[0] };
+
+static const char *scene_of(const char *layer)
+{
+    char text[1024];
+    snprintf(text, sizeof text,
+             "threads: 2\nimages:\n  - name: a\n    size: [24, 16]\n    layers:\n      - %s\n"
+             "    outputs:\n      - path: a_{cycle}.exr\n",
+             layer);
+    return write_scene(text);
+}
+
+static void measure(const session_input *in, const char *layer, int most[2])
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layer));
+    for (int cycle = 0; cycle < 2; cycle++) {
+        insitu_mesh mesh = in->mesh;
+        mesh.changed = cycle == 1 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
+        everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
+        everywhere(insitu_set_field(session, "m", &in->field) == INSITU_OK);
+        paint_both();
+        step_is_good(session, cycle);
+        look_at_both(most);
+    }
+    insitu_destroy(&session);
+}
+
+static void steps_take_less_than_they_are_checked_for(void **context)
+{
+    (void)context;
+    int most[2] = {0, 0};
+    for (int kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input in;
+        input_create(&in, (test_mesh_kind)kind, 3, TEST_BLOCK, 0, 1);
+        for (int layer = 0; layer < LAYERS; layer++) measure(&in, layers[layer], most);
+        input_free(&in);
+    }
+    session_input in; /* enough cells for a build by branches */
+    input_create(&in, TEST_TETS, 15, TEST_BLOCK, 0, 1);
+    measure(&in, layers[0], most);
+    input_free(&in);
+    printf("%s: of %d kB the calling thread takes %d, of %d kB a worker %d\n", render_isa(), SESSION_CALLER_STACK >> 10,
+           most[0] >> 10, SESSION_WORKER_STACK >> 10, most[1] >> 10);
+    assert_true(most[0] > 4 * NEAR && most[1] > 4 * NEAR); /* they were measured */
+    assert_true(4 * most[0] <= 3 * SESSION_CALLER_STACK);
+    assert_true(4 * most[1] <= 3 * SESSION_WORKER_STACK);
+}
+
+static void small_stacks_are_told(void **context)
+{
+    (void)context;
+    session_input in;
+    input_create(&in, TEST_MIXED, 5, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(layers[0]));
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    for (int cycle = 0; cycle < 2; cycle++) {
+        const insitu_status status = insitu_step(session, cycle, 0);
+        told_everywhere(session, status, INSITU_ERROR_ARGUMENT, "rank 0: OpenMP's threads have ",
+                        "of stack, a step needs 256 kB (OMP_STACKSIZE");
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(steps_take_less_than_they_are_checked_for)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+static int run_small(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(small_stacks_are_told)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, getenv("SMALL_STACKS") ? run_small : run);
+}
