@@ -36,9 +36,9 @@ static pixel_area area_of(const render_camera *camera, int column, int row)
                         camera->height - y < KERNEL_TILE ? camera->height - y : KERNEL_TILE};
 }
 
-static void trace_tiles(const kernel_frame *frame, kernel_thread *thread, const frame_end *end)
+static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, kernel_thread *thread,
+                        const frame_end *end)
 {
-    const kernel_table *kernels = render_kernels();
     const render_camera *camera = &frame->job->camera;
     const int columns = (camera->width + KERNEL_TILE - 1) / KERNEL_TILE;
     const int rows = (camera->height + KERNEL_TILE - 1) / KERNEL_TILE;
@@ -119,8 +119,9 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     }
     frame->needs_planes = (job->surface_count && !frame->shown) || job->volume_count;
     if (has_memory) {
+        const kernel_table *kernels = render_kernels();
 #pragma omp parallel num_threads(threads)
-        trace_tiles(frame, &states[omp_get_thread_num()], end);
+        trace_tiles(kernels, frame, &states[omp_get_thread_num()], end);
     }
     render_shown_free(frame);
     render_kept_end(frame);

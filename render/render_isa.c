@@ -9,6 +9,7 @@
 
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 static cpu_isa chosen;
+static _Thread_local int limit = CPU_ISA_COUNT - 1;
 static char warning[160];
 
 static void choose(void)
@@ -33,13 +34,24 @@ static void choose(void)
 
 const kernel_table *render_kernels(void)
 {
-    pthread_once(&once, choose);
 #if defined(RENDER_HAS_X86)
-    if (chosen == CPU_AVX512) return &kernel_table_avx512;
-    if (chosen == CPU_AVX2) return &kernel_table_avx2;
-    if (chosen == CPU_SSE42) return &kernel_table_sse42;
+    const int level = render_isa_level() < limit ? render_isa_level() : limit;
+    if (level == CPU_AVX512) return &kernel_table_avx512;
+    if (level == CPU_AVX2) return &kernel_table_avx2;
+    if (level == CPU_SSE42) return &kernel_table_sse42;
 #endif
     return &kernel_table_plain;
+}
+
+int render_isa_level(void)
+{
+    pthread_once(&once, choose);
+    return (int)chosen;
+}
+
+void render_isa_limit(int level)
+{
+    limit = level;
 }
 
 const char *render_isa(void)

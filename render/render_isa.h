@@ -1,9 +1,16 @@
-/* The kernels of the instruction set in use, chosen once a process (render_isa() in render.h). */
+/* The kernels of the instruction set in use. A process has one (render_isa() in render.h), and the calling thread may
+ * be held to a lower one: the ranks of a picture take the highest that all have, since sets differ in roundings, and
+ * cells on two sides of a face must not. */
 #ifndef RENDER_RENDER_ISA_H
 #define RENDER_RENDER_ISA_H
 
 #include "kernel_types.h"
 
+/* Of the calling thread: for the whole of a frame they are asked for on the one that draws it. */
 const kernel_table *render_kernels(void);
+
+/* The process's set, as a cpu_isa; and the highest that the calling thread's frames may use from now on. */
+int render_isa_level(void);
+void render_isa_limit(int level);
 
 #endif

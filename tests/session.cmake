@@ -33,6 +33,9 @@ insitu_session_program(test_session_host)
 target_link_libraries(test_session_host PRIVATE ${CMAKE_DL_LIBS} OpenMP::OpenMP_C)
 insitu_add_mpi_test(session_host test_session_host 1 2 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_isa)
+insitu_add_mpi_test(session_isa test_session_isa 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 # Stacks: of the widest kernels here, of the others in the long run. The address sanitizer has its own, larger frames.
 insitu_session_program(test_session_stack)
 target_link_libraries(test_session_stack PRIVATE OpenMP::OpenMP_C)

@@ -2,10 +2,12 @@
  *
  * The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
  * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
- * all tables of names are alike, whether any wants more threads, and, from rank 0, the time and whether the scene file
- * was edited. After it, ranks decide alike without another word. */
+ * all tables of names are alike, whether any wants more threads, the lowest of the instruction sets, and, from rank 0,
+ * the time and whether the scene file was edited. After it, ranks decide alike without another word. */
 #include <string.h>
 
+#include "cpu.h"
+#include "render_isa.h"
 #include "session.h"
 #include "session_agree.h"
 #include "session_draw.h"
@@ -22,6 +24,7 @@ enum step_word {
     NAMES_LOW,
     SCENE_CHANGED,
     TEAM_GROWS,
+    ISA_LOW,
     ROOT_TIME, /* the bits of rank 0's */
     STEP_WORDS
 };
@@ -58,6 +61,7 @@ static insitu_status exchange_message(insitu_session *session, int64_t cycle, do
     mine.words[NAMES_LOW] = ~names;
     mine.words[SCENE_CHANGED] = session_scene_file_changed(session);
     mine.words[TEAM_GROWS] = session_team_grows(session);
+    mine.words[ISA_LOW] = -render_isa_level();
     mine.words[ROOT_TIME] = session->rank == 0 ? bits_of(time) : INT64_MIN;
     return session_mpi(error, MPI_Allreduce(mine.words, out->words, STEP_WORDS, MPI_INT64_T, MPI_MAX, session->comm),
                        "MPI_Allreduce");
@@ -103,12 +107,23 @@ static insitu_status draw_due(insitu_session *session, const step_message *messa
     return session_draw_images(session, due, count, cycle, error);
 }
 
+/* The kernels that every rank has: two sets differ in roundings, and at a face between their cells volumes would
+ * overlap. */
+static void take_common_kernels(insitu_session *session, int level)
+{
+    render_isa_limit(level);
+    if (level < render_isa_level())
+        session_text_add(&session->warnings, "kernels are %s, the best that all ranks have, where %s ones would do",
+                         cpu_isa_name((cpu_isa)level), cpu_isa_name((cpu_isa)render_isa_level()));
+}
+
 static insitu_status draw_by_team(insitu_session *session, const step_message *message, const session_guard *guard,
                                   base_error *error)
 {
     const bool is_new = message->words[TEAM_GROWS] || message->words[SCENE_CHANGED];
     insitu_status status = is_new ? session_team_probe(session, error) : INSITU_OK;
     if (status) return status;
+    take_common_kernels(session, (int)-message->words[ISA_LOW]);
     session->threads = session_team_threads(session);
     session_guard_begin_team(guard, session->threads);
     if (is_new) status = session_team_check(session, error);

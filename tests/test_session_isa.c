@@ -1,0 +1,102 @@
+/* Ranks on nodes of different kinds: every rank has another instruction set, and the picture is that of the rank with
+ * the lowest alone. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render_isa.h"
+#include "test_session_fixture.h"
+
+enum { WIDTH = 60, HEIGHT = 45 };
+
+static const char *const layers[] = {
+    "isosurface: {field: f, values: [0.1, -0.6]}",
+    "volume: {field: f, opacity: [[0, 0.2], [1, 0.9]]}\n    sampling: {method: samples}",
+    "volume: {field: f, opacity: [[0, 0.2], [1, 0.9]]}\n    sampling: {method: segments}",
+    "volume: {field: f, opacity: [[0, 0.2], [1, 0.9]]}\n    sampling: {max_error: 0.01}",
+};
+
+static const char *scene_of(const char *layer)
+{
+    char text[1024];
+    snprintf(text, sizeof text,
+             "images:\n  - name: a\n    size: [%d, %d]\n    layers:\n      - %s\n"
+             "    outputs:\n      - path: a_{cycle}.exr\n",
+             WIDTH, HEIGHT, layer);
+    return write_scene(text);
+}
+
+/* Rank 0's picture of the whole, by itself. */
+static caught_picture draw_alone(const char *scene, test_mesh_kind kind)
+{
+    caught_picture picture = {0};
+    bool is_drawn = own_rank != 0;
+    if (own_rank == 0) {
+        session_input whole;
+        input_create(&whole, kind, 5, TEST_BLOCK, 0, 1);
+        insitu_session *session = open_session(MPI_COMM_SELF, scene);
+        forget_pictures();
+        is_drawn =
+            hand_over(session, &whole) == INSITU_OK && insitu_step(session, 0, 0) == INSITU_OK && caught_count == 1;
+        picture = caught[0];
+        caught_count = 0;
+        insitu_destroy(&session);
+        input_free(&whole);
+    }
+    everywhere(is_drawn);
+    return picture;
+}
+
+static double worst_colour(const caught_picture *a, const caught_picture *b)
+{
+    double worst = 0;
+    for (int i = 0; i < 4 * WIDTH * HEIGHT; i++)
+        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    return worst;
+}
+
+static void check(test_mesh_kind kind, int layer)
+{
+    const char *scene = scene_of(layers[layer]);
+    caught_picture alone = draw_alone(scene, kind);
+    session_input part;
+    input_create(&part, kind, 5, TEST_RANDOM, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+    everywhere(hand_over(session, &part) == INSITU_OK);
+    step_is_good(session, 0);
+    const char *warnings = insitu_last_report(session)->warnings;
+    everywhere(!strstr(warnings, "overlap"));
+    everywhere(render_isa_level() == 0 || strstr(warnings, "kernels are plain, the best that all ranks have"));
+    const bool is_same = own_rank != 0 || (!memcmp(alone.rgba, caught[0].rgba, sizeof(float) * 4 * WIDTH * HEIGHT) &&
+                                           !memcmp(alone.depth, caught[0].depth, sizeof(float) * WIDTH * HEIGHT));
+    everywhere(is_same || layer > 0);
+    everywhere(own_rank != 0 || worst_colour(&alone, &caught[0]) <= 1e-6);
+    insitu_destroy(&session);
+    input_free(&part);
+    free(alone.rgba);
+    free(alone.depth);
+}
+
+static void ranks_of_several_instruction_sets_draw_what_the_lowest_draws(void **context)
+{
+    (void)context;
+    for (int kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int layer = 0; layer < (int)(sizeof layers / sizeof layers[0]); layer++)
+            check((test_mesh_kind)kind, layer);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ranks_of_several_instruction_sets_draw_what_the_lowest_draws),
+    };
+    static const char *const sets[] = {"plain", "avx2", "sse4.2"};
+    setenv("INSITU_ISA", sets[own_rank % 3], 1); /* before the library first looks */
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
