@@ -51,6 +51,7 @@ typedef struct kernel_passage {
     vf *edge;               /* edge functions: of the edges, then of the spokes, from each vertex to the centre */
     kernel_meeting *facets; /* by number; only those met are set */
     vm *left;               /* rays whose crossing is not yet taken into an interval */
+    vm uneven;              /* rays that meet both halves of a quad, but not its patch, or the patch twice alone */
     int *met;
     int met_count;
     kernel_meeting *sheets; /* by edge; only those met are set */
@@ -104,6 +105,7 @@ static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, ker
     out->segments = kernel_carve(&at, facets * sizeof(kernel_tet_span));
     out->met_count = out->sheet_count = out->segment_count = 0;
     out->has_sheets = false;
+    out->uneven = vm_none();
     return true;
 }
 
@@ -254,6 +256,7 @@ static void kernel_passage_quad(const kernel_packet *p, const polyhedron *c, int
     const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
     const int count = kernel_quad_places(&quad, once, twice, places);
     if (count == 2) kernel_places_pair(m, places);
+    r->uneven = vm_or(r->uneven, vm_xor(vm_and(m[0]->mask, m[1]->mask), count == 2 ? places[1].mask : vm_none()));
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();
         if (vm_any(left)) kernel_facet_face(c, corner, &places[0], left, has_colour, m[half]);

@@ -1,5 +1,19 @@
-/* Isosurfaces in polyhedra: the first place on the profile where the sign is no longer that of the entry. It is exact:
- * a linear piece has one root at most. */
+/* Isosurfaces in polyhedra: the places on the profile where the sign changes. They are exact: a linear piece has one
+ * root at most. Neubauer's method takes the first where the faces' values differ in sign; the robust finder takes all
+ * of them, on rays too that are on one side of the isovalue at both faces.
+ *
+ * Most such rays stay on that side, and need not be followed. A bound says which do, from the faces' values alone:
+ *
+ *      v |                               along the tile's rays the field of no tet falls faster than fall, nor rises
+ *        | in                . out       faster than rise, so between the faces' triangles it is above both lines. They
+ *        |   '.           .'             meet below the isovalue where
+ *        |      '.     .'  rise
+ *        |   fall  '.'                       rise v_in + fall v_out < fall rise (t_out - t_in),
+ *        +-----------------------> t
+ *                                        and alike below it. A field that nowhere turns has fall or rise 0.
+ *
+ * What is beyond the range of the vertices' values is not looked for: where tets overlap their sum may go there, but no
+ * isovalue that the vertices do not straddle has a surface in the cell, as the tree and the plan have it. */
 #ifndef RENDER_KERNEL_POLYHEDRON_SURFACE_H
 #define RENDER_KERNEL_POLYHEDRON_SURFACE_H
 
@@ -23,8 +37,8 @@ SIMD_INLINE void kernel_polyhedron_relative(polyhedron *c, double value)
         const double size = fabs(c->values[i] - value);
         largest = size > largest ? size : largest;
     }
-    const double scale = kernel_mirrored_power(largest);
-    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
+    c->scale = kernel_mirrored_power(largest);
+    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = (float)((c->values[i] - value) * c->scale);
 }
 
 static void kernel_polyhedron_colours(polyhedron *c, const kernel_surface *s, int part)
@@ -40,22 +54,29 @@ static void kernel_polyhedron_colours(polyhedron *c, const kernel_surface *s, in
     c->g[c->vertex_count] = (float)sum;
 }
 
-/* The gradient of the field in a tet, in camera axes, by Cramer's rule in double. */
-static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
+/* The gradient of a field that changes by df along d, by Cramer's rule. */
+SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], double g[3])
 {
-    const int *vertex = c->facets[facet].vertex, centre = c->vertex_count;
-    const double scale = p->frame->job->space.scale;
-    double d[3][3], df[3], g[3], n[3][3];
-    for (int i = 0; i < 3; i++) {
-        df[i] = (double)c->f[vertex[i]] - (double)c->f[centre];
-        for (int a = 0; a < 3; a++) d[i][a] = (c->world[vertex[i]][a] - c->world[centre][a]) * scale;
-    }
+    double n[3][3];
     for (int i = 0; i < 3; i++) {
         const double *u = d[(i + 1) % 3], *v = d[(i + 2) % 3];
         for (int a = 0; a < 3; a++) n[i][a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
     }
     const double volume = d[0][0] * n[0][0] + d[0][1] * n[0][1] + d[0][2] * n[0][2];
     for (int a = 0; a < 3; a++) g[a] = (df[0] * n[0][a] + df[1] * n[1][a] + df[2] * n[2][a]) / volume;
+}
+
+/* The gradient of the field in a tet, in camera axes, in double. */
+static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
+{
+    const int *vertex = c->facets[facet].vertex, centre = c->vertex_count;
+    const double scale = p->frame->job->space.scale;
+    double d[3][3], df[3], g[3];
+    for (int i = 0; i < 3; i++) {
+        df[i] = (double)c->f[vertex[i]] - (double)c->f[centre];
+        for (int a = 0; a < 3; a++) d[i][a] = (c->world[vertex[i]][a] - c->world[centre][a]) * scale;
+    }
+    kernel_gradient(d, df, g);
     for (int a = 0; a < 3; a++) {
         const double *axis = p->frame->scaled_axes[a];
         const double along = (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) / scale;
@@ -99,53 +120,171 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c
     }
 }
 
-/* The inside's value at an end, or the face's where the two do not agree on the side. */
-SIMD_INLINE vf kernel_polyhedron_end(vf inside, vf face)
+/* ---- which rays to follow ---- */
+
+/* The steepest that the tet's field falls and rises along rays of the tile, a unit of depth. */
+static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
+                              double *rise)
 {
-    const vm differ = vm_xor(vf_lt(inside, vf_set(0)), vf_lt(face, vf_set(0)));
-    return vf_select(differ, face, inside);
+    const int centre = c->vertex_count;
+    double d[3][3], df[3], g[3];
+    for (int i = 0; i < 3; i++) {
+        const int v = facet->vertex[i];
+        d[i][0] = (double)c->x[v] - (double)c->x[centre];
+        d[i][1] = (double)c->y[v] - (double)c->y[centre];
+        d[i][2] = (double)c->z[v] - (double)c->z[centre];
+        df[i] = c->values[v] - c->values[centre];
+    }
+    kernel_gradient((const double(*)[3])d, df, g);
+    const double aside = spread * (fabs(g[0]) + fabs(g[1]));
+    *fall = aside - g[2];
+    *rise = aside + g[2];
 }
 
-/* The root on each ray of change, and the colour field there. */
-static vf kernel_polyhedron_root(const kernel_passage *r, const kernel_stay *stay, vm change, vf *w)
+/* Of all tets. Those without a volume have any slope. */
+static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
+{
+    const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
+    c->has_slopes = true;
+    c->fall = c->rise = 0;
+    for (int i = 0; i < c->facet_count; i++) {
+        double fall = (double)INFINITY, rise = (double)INFINITY;
+        if (c->facets[i].sign != 0) kernel_tet_slopes(c, &c->facets[i], spread, &fall, &rise);
+        if (!(fall <= c->fall)) c->fall = fall <= 1e300 ? fall : (double)INFINITY;
+        if (!(rise <= c->rise)) c->rise = rise <= 1e300 ? rise : (double)INFINITY;
+    }
+}
+
+/* In the values' scale, and such that products of two are numbers. */
+SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
+{
+    const double scaled = slope * c->scale;
+    return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
+}
+
+/* Rays with one sign at both faces that may have another between. Where tets overlap, or a quad's patch and its
+ * triangles are not met by the same rays, the bound does not hold. */
+SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_passage *r,
+                                       const kernel_stay *stay)
 {
     const kernel_interval *i = &stay->interval;
-    const vf v_in = kernel_polyhedron_end(stay->u_in, i->v_in), v_out = kernel_polyhedron_end(stay->u_out, i->v_out);
-    const vm below = vf_lt(v_in, vf_set(0));
-    kernel_profile_piece piece = kernel_profile_begin(stay, v_in);
-    vf root = i->t_out;
-    vm open = change;
-    while (vm_any(open)) {
-        const vm last = vm_not(kernel_profile_open(stay, &piece, open));
-        kernel_profile_next(r, stay, v_out, &piece);
-        const vm cross = vm_and(open, vm_xor(vf_lt(piece.v1, vf_set(0)), below));
-        const vf t = kernel_secant(piece.t0, piece.v0, piece.t1, piece.v1), length = piece.t1 - piece.t0;
-        const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece.t0) / length, vf_set(0));
-        root = vf_select(cross, t, root);
-        *w = vf_select(cross, piece.w0 + along * (piece.w1 - piece.w0), *w);
-        open = vm_andnot(vm_andnot(open, cross), last);
-    }
-    return root;
+    const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
+    if (!c->is_star || !p->is_pencil) return longer;
+    if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
+    const vf zero = vf_set(0), fall = kernel_slope_of(c, c->fall), rise = kernel_slope_of(c, c->rise);
+    const vf in = stay->in.v, out = stay->out.v;
+    const vm below = vf_lt(i->v_in, zero);
+    const vm differs = vm_or(vm_xor(vf_lt(in, zero), below), vm_xor(vf_lt(out, zero), below));
+    const vf away = vf_select(below, fall, rise) * vf_abs(in) + vf_select(below, rise, fall) * vf_abs(out);
+    const vm turns = vf_lt(away, fall * rise * (stay->out.t - stay->in.t));
+    return vm_and(longer, vm_or(turns, vm_or(differs, r->uneven)));
 }
 
-static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
-                                      vm rays)
+/* ---- along the profile ---- */
+
+/* A ray that follows its profile from crossing to crossing. Where tets overlap at a face, the field behind it may be on
+ * the other side of the isovalue than the face's own value, which decides: it jumps there, and the jump is a crossing.
+ */
+typedef struct kernel_walk {
+    vm open;                    /* rays whose profile goes on */
+    vm below;                   /* who is below the isovalue at the end of the piece */
+    vm jump_in, jump_out;       /* rays of which the face's value is on the other side than the profile's end */
+    kernel_profile_piece piece; /* each ray's own */
+    vf t, w;                    /* of the crossing that was found, and the colour field there */
+} kernel_walk;
+
+static void kernel_walk_begin(const kernel_stay *stay, vm rays, kernel_walk *walk)
 {
-    const bool has_colour = state->surface->layer->colour_map != NULL;
+    const kernel_interval *i = &stay->interval;
+    const vf zero = vf_set(0);
+    const vm below = vf_lt(i->v_in, zero);
+    walk->open = rays;
+    walk->below = vf_lt(stay->u_in, zero);
+    walk->jump_in = vm_and(rays, vm_xor(walk->below, below));
+    walk->jump_out = vm_and(rays, vm_xor(vf_lt(stay->u_out, zero), vf_lt(i->v_out, zero)));
+    walk->piece = kernel_profile_begin(stay, stay->u_in);
+}
+
+SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
+{
+    to->t0 = vf_select(rays, from->t0, to->t0);
+    to->t1 = vf_select(rays, from->t1, to->t1);
+    to->v0 = vf_select(rays, from->v0, to->v0);
+    to->v1 = vf_select(rays, from->v1, to->v1);
+    to->w0 = vf_select(rays, from->w0, to->w0);
+    to->w1 = vf_select(rays, from->w1, to->w1);
+}
+
+/* To the next piece; returns rays of left whose profile goes on behind it. The jump at the last face is a piece too. */
+SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, vm left, kernel_walk *walk)
+{
+    kernel_profile_piece next = walk->piece;
+    const vm inside = kernel_profile_open(stay, &next, left);
+    kernel_profile_next(r, stay, vf_select(inside, stay->u_out, stay->interval.v_out), &next);
+    kernel_piece_take(left, &next, &walk->piece);
+    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
+}
+
+/* The next crossing of every open ray; returns who has one. */
+static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, kernel_walk *walk)
+{
+    vm found = walk->jump_in, left = vm_andnot(walk->open, found);
+    walk->jump_in = vm_none();
+    while (vm_any(left)) {
+        const vm on = kernel_walk_on(r, stay, left, walk);
+        const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v1, vf_set(0)), walk->below));
+        walk->below = vm_xor(walk->below, cross);
+        walk->open = vm_andnot(walk->open, vm_andnot(left, on));
+        found = vm_or(found, cross);
+        left = vm_andnot(on, cross);
+    }
+    const kernel_profile_piece *piece = &walk->piece;
+    const vf length = piece->t1 - piece->t0;
+    const vf t = kernel_secant(piece->t0, piece->v0, piece->t1, piece->v1);
+    const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece->t0) / length, vf_set(0));
+    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, piece->t0);
+    walk->w = piece->w0 + along * (piece->w1 - piece->w0);
+    return found;
+}
+
+static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
+                                     vm rays, kernel_passage *r, vm hit, const kernel_walk *walk)
+{
+    vf normal[3];
+    if (!vm_any(hit)) return;
+    kernel_passage_segments(c, rays, r);
+    kernel_polyhedron_normal(p, c, r, hit, walk->t, normal);
+    kernel_accept(p, state, NULL, value, hit, walk->t, normal, walk->w);
+}
+
+/* The crossings of a stay. An opaque surface's first before the eye is the ray's last. */
+static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
+                                    vm rays, vm wanted, kernel_passage *r, kernel_stay *stay)
+{
+    const render_surface_layer *layer = state->surface->layer;
+    kernel_walk walk;
+    kernel_passage_profile(p, c, rays, layer->colour_map != NULL, r, stay);
+    kernel_walk_begin(stay, wanted, &walk);
+    do {
+        const vm found = kernel_walk_next(r, stay, &walk);
+        kernel_polyhedron_accept(p, state, c, value, rays, r, kernel_visible(p, found, walk.t), &walk);
+        if (state->is_opaque) walk.open = vm_andnot(walk.open, vm_and(found, vf_le(p->t_near, walk.t)));
+    } while (layer->root == RENDER_ROBUST && vm_any(walk.open));
+}
+
+static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *state, polyhedron *c, int value, vm rays)
+{
+    const render_surface_layer *layer = state->surface->layer;
     kernel_passage r;
     kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, has_colour, &r)) return;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, layer->colour_map != NULL, &r)) return;
     while (kernel_passage_next(&r, &stay)) {
-        const vm change = vm_and(kernel_changes_sign(&stay.interval), kernel_is_near(p, &stay.interval));
-        if (!vm_any(change)) continue;
-        vf normal[3], w = vf_set(0);
-        kernel_passage_profile(p, c, rays, has_colour, &r, &stay);
-        const vf t = kernel_polyhedron_root(&r, &stay, change, &w);
-        const vm hit = kernel_visible(p, change, t);
-        if (!vm_any(hit)) continue;
-        kernel_passage_segments(c, rays, &r);
-        kernel_polyhedron_normal(p, c, &r, hit, t, normal);
-        kernel_accept(p, state, NULL, value, hit, t, normal, w);
+        const vm near = kernel_is_near(p, &stay.interval);
+        vm wanted = kernel_changes_sign(&stay.interval);
+        if (!vm_any(near)) continue;
+        if (layer->root == RENDER_ROBUST) wanted = vm_or(wanted, kernel_polyhedron_turns(p, c, &r, &stay));
+        wanted = vm_and(wanted, near);
+        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, c, value, rays, wanted, &r, &stay);
     }
 }
 

@@ -65,8 +65,11 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
     kernel_cell *c = &cells->cell;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell_fetch(c, g, &t->frame->job->volumes[volume].field.fields[part], index);
-    if (c->type != GRID_POLYHEDRON)
-        blocks = kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, blocks);
+    if (c->type == GRID_POLYHEDRON) {
+        take(t, part, c, NULL, blocks);
+        return;
+    }
+    blocks = kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, blocks);
     if (blocks) take(t, part, c, c->type == GRID_TET || c->is_constant ? NULL : &cells->map, blocks);
 }
 

@@ -24,11 +24,14 @@ typedef struct polyhedron {
     int part, layer;
     bool is_finite, is_placed, is_constant;
     bool is_star; /* no sign is negative */
+    bool has_slopes;
     int vertex_count, edge_count, facet_count;
     double (*world)[3]; /* vertex_count + 1 each, from here */
     double *values;
     float *x, *y, *z;  /* tile space */
     float *f, *g;      /* values as the kernels want them; of the colour field */
+    double scale;      /* of the values in f */
+    double fall, rise; /* by how much values change at most along the tile's rays, down and up, a unit of depth */
     float (*lines)[4]; /* kernel_line.h: of the edges, then from each vertex to the centre */
     float least;       /* of all its triangles: kernel_blur_least() */
     int64_t *vertices; /* vertex_count */

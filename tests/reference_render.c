@@ -234,7 +234,7 @@ static double dip(const along *a, double low, double high, double side)
     return 0.5 * (low + high);
 }
 
-enum { CROSSING_PIECES = 24, CROSSING_MAX = 3 * CROSSING_PIECES };
+enum { CROSSING_PIECES = 24 };
 
 /* Points between which the field passes the isovalue at most once: even ones, and the bottom of every dip towards it
  * between two of one side. */
@@ -262,6 +262,18 @@ static int crossing_fence(const along *a, double z_in, double z_out, double *z, 
         n++;
     }
     return n;
+}
+
+/* Where a polyhedron's profile bends: between two such places it is linear. Near the isovalue a bend may be seen on
+ * either side of it. */
+static int profile_fence(const along *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
+{
+    const int count = reference_profile_breaks(&a->c->cell, &a->t->line, a->c->ends, z);
+    for (int i = 0; i < count; i++) {
+        v[i] = relative_along(a, z[i]);
+        lessen(&a->t->out->value_margin, fabs(v[i]) / a->range);
+    }
+    return count;
 }
 
 /* A polyhedron's first root: on the first piece of the profile whose end has the other side. */
@@ -354,12 +366,13 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
 static void cross_every(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index, int surface,
                         const double *values, const reference_crossing ends[2], const double face[2])
 {
-    double z[CROSSING_MAX], v[CROSSING_MAX], low, high;
+    double z[REFERENCE_MAX_BREAKS], v[REFERENCE_MAX_BREAKS], low, high; /* more than the fence's */
     along a = {t, c, values, layer->values[value_index], 0};
     range_of(values, c->cell.count, &low, &high);
     if (a.iso > high || a.iso < low || ends[1].z < 0) return;
     a.range = high - low;
-    const int count = crossing_fence(&a, ends[0].z, ends[1].z, z, v);
+    const bool is_polyhedron = c->cell.type == GRID_POLYHEDRON;
+    const int count = is_polyhedron ? profile_fence(&a, z, v) : crossing_fence(&a, ends[0].z, ends[1].z, z, v);
     bool side = face[0] >= a.iso;
     for (int i = 0; i <= count; i++) {
         const bool is_end = i == count, now = is_end ? face[1] >= a.iso : v[i] >= 0;
@@ -369,6 +382,7 @@ static void cross_every(trace *t, const placed_cell *c, const render_surface_lay
         if (!is_end && i > 0) depth = bisect(t, c, values, a.iso, z[i - 1], z[i], side);
         side = now;
         lessen(&t->out->eye_margin, fabs(depth) / c->size);
+        if (is_polyhedron) keep_off_sheets(t, c, depth);
         if (depth >= 0) add_hit(t, c, layer, value_index, surface, values, depth);
     }
 }
@@ -387,7 +401,7 @@ static void cross_surface(trace *t, const placed_cell *c, const render_surface_l
         const double iso = layer->values[i];
         for (int end = 0; end < 2 && high > low; end++)
             lessen(&t->out->value_margin, fabs(face[end] - iso) / (high - low));
-        if (layer->root == RENDER_ROBUST && c->cell.type != GRID_TET && c->cell.type != GRID_POLYHEDRON) {
+        if (layer->root == RENDER_ROBUST && c->cell.type != GRID_TET) {
             cross_every(t, c, layer, i, first_surface + i, values, ends, face);
             continue;
         }

@@ -2,7 +2,8 @@
 # benchmarks'.
 set(here ${CMAKE_CURRENT_LIST_DIR})
 add_library(test_meshes STATIC
-  ${here}/test_meshes.c ${here}/test_mesh_changes.c ${here}/test_mesh_lattice.c ${here}/test_mesh_parts.c
+  ${here}/test_meshes.c ${here}/test_mesh_changes.c ${here}/test_mesh_dual.c ${here}/test_mesh_lattice.c
+  ${here}/test_mesh_parts.c
   ${here}/test_mesh_polyhedra.c ${here}/test_mesh_shapes.c ${here}/test_mesh_views.c)
 target_include_directories(test_meshes PUBLIC ${here} ${PROJECT_SOURCE_DIR}/libinsitu/base)
 target_link_libraries(test_meshes PUBLIC m PRIVATE insitu_flags)

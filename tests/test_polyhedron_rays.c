@@ -1,0 +1,567 @@
+/* Robust roots in polyhedra, on rays at random: every crossing is found, and every hit is one. The truth is brute force
+ * in double over the tets that the cell's triangles and its centre span: each is clipped to the ray, and where the ray
+ * is in the cell the field is the sum over the tets there, each with its sign.
+ *
+ * What rounding may decide. Places are off by some 3e-6 of the scene in all: vertices by half a unit of 1 along each
+ * axis (1e-7), crossings of sheets by what their weights' roundings may move them, 2.4e-7 along the ray and four times
+ * as much across (kernel_line.h), and where tets overlap sums are taken up to 16 times 2.4e-7 beside a sheet. So values
+ * are off by that times the field's slope, and by 2e-6 of their range, some ten roundings of theirs: the band. A
+ * crossing is certain where the field passes from beyond the band on one side to beyond it on the other within one stay
+ * of the ray in the cell. Each must have a hit, and a hit must be where the field comes within the band. Rays that pass
+ * an edge of the cell at less than the error of places may miss the cell or not, and do not count. */
+#include "reference_cell.h"
+#include "reference_polyhedron.h"
+#include "test_mesh_dual.h"
+#include "test_render_fixture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+enum { WIDTH = 40, HEIGHT = 25, MOST_POINTS = 16 * REFERENCE_MAX_TRIANGLES };
+
+static int64_t wanted_rays = 30000;
+
+/* A linear function of a place, by a gradient. */
+typedef struct linear {
+    double at_origin, gradient[3];
+} linear;
+
+typedef struct tet {
+    linear inside[4]; /* at least 0 in the tet: the last on its triangle 0 */
+    linear value;
+    double slope; /* the gradient's size */
+    int sign;
+} tet;
+
+/* The cell in camera coordinates. */
+typedef struct subject {
+    reference_cell cell;
+    double values[REFERENCE_MAX_VERTICES], low, high;
+    int tet_count;
+    tet tets[REFERENCE_MAX_TRIANGLES];
+    bool is_star;
+} subject;
+
+/* A ray in a tet, from z[0] to z[1] with the values v; is_face: this end is on the cell's surface. */
+typedef struct span {
+    double z[2], v[2], slope;
+    bool is_face[2];
+    int sign;
+} span;
+
+/* The field along a stay in the cell, jumps as two points in one place. */
+typedef struct path {
+    int count;
+    double z[MOST_POINTS], v[MOST_POINTS];
+} path;
+
+typedef struct tally {
+    int64_t rays, certain, inner, missed, wrong, at_edges, bends, in_band;
+    int cells, stars;
+} tally;
+
+/* ---- the cell ---- */
+
+static double at_place(const linear *f, const double p[3])
+{
+    return f->at_origin + f->gradient[0] * p[0] + f->gradient[1] * p[1] + f->gradient[2] * p[2];
+}
+
+/* 1 at apex and 0 on the triangle of the others; false where there is no volume. */
+static bool make_weight(const double *apex, const double *const base[3], linear *out)
+{
+    double d[3][3], volume = 0;
+    for (int a = 0; a < 3; a++) {
+        d[0][a] = base[1][a] - base[0][a];
+        d[1][a] = base[2][a] - base[0][a];
+        d[2][a] = apex[a] - base[0][a];
+    }
+    for (int a = 0; a < 3; a++) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        out->gradient[a] = d[0][b] * d[1][c] - d[0][c] * d[1][b];
+        volume += out->gradient[a] * d[2][a];
+    }
+    if (volume == 0) return false;
+    for (int a = 0; a < 3; a++) out->gradient[a] /= volume;
+    out->at_origin = 0;
+    out->at_origin = -at_place(out, base[0]);
+    return true;
+}
+
+static bool make_tet(const subject *s, int triangle, double mean, tet *out)
+{
+    const int *t = s->cell.poly.triangles[triangle];
+    const double *corners[4] = {s->cell.position[t[0]], s->cell.position[t[1]], s->cell.position[t[2]],
+                                s->cell.position[s->cell.count]};
+    const double f[4] = {s->values[t[0]], s->values[t[1]], s->values[t[2]], mean};
+    out->sign = s->cell.poly.sign[triangle];
+    out->value = (linear){0, {0, 0, 0}};
+    for (int i = 0; i < 4; i++) {
+        const double *const base[3] = {corners[(i + 1) % 4], corners[(i + 2) % 4], corners[(i + 3) % 4]};
+        linear *w = &out->inside[i];
+        if (!make_weight(corners[i], base, w)) return false;
+        out->value.at_origin += f[i] * w->at_origin;
+        for (int a = 0; a < 3; a++) out->value.gradient[a] += f[i] * w->gradient[a];
+    }
+    const double *g = out->value.gradient;
+    out->slope = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    return out->sign != 0;
+}
+
+static void make_tets(subject *s)
+{
+    double mean = 0;
+    s->low = s->high = s->values[0];
+    for (int i = 0; i < s->cell.count; i++) {
+        mean += s->values[i] / s->cell.count;
+        s->low = fmin(s->low, s->values[i]);
+        s->high = fmax(s->high, s->values[i]);
+    }
+    s->tet_count = 0;
+    s->is_star = true;
+    for (int i = 0; i < s->cell.poly.triangle_count; i++) {
+        tet *t = &s->tets[s->tet_count];
+        if (!make_tet(s, i, mean, t)) continue;
+        s->is_star = s->is_star && t->sign > 0;
+        s->tet_count++;
+    }
+}
+
+static void make_subject(const render_fixture *f, subject *s)
+{
+    const grid *g = f->job.parts[0].cells;
+    const render_camera *camera = &f->job.camera;
+    const double *axes[3] = {camera->right, camera->up, camera->forward};
+    int64_t vertices[REFERENCE_MAX_VERTICES];
+    s->cell.type = GRID_POLYHEDRON;
+    reference_polyhedron_read(g, 0, &s->cell, vertices);
+    for (int i = 0; i < s->cell.count; i++) {
+        grid_vertex(g, vertices[i], s->cell.world[i]);
+        s->values[i] = grid_field_value(&f->fields[0], vertices[i]);
+        for (int a = 0; a < 3; a++) {
+            s->cell.position[i][a] = 0;
+            for (int b = 0; b < 3; b++) s->cell.position[i][a] += axes[a][b] * (s->cell.world[i][b] - camera->eye[b]);
+        }
+    }
+    reference_polyhedron_setup(&s->cell);
+    make_tets(s);
+}
+
+/* ---- a ray ---- */
+
+static reference_line line_of(const render_camera *camera, int x, int y)
+{
+    double base[3], direction[3];
+    reference_line line = {{0, 0}, {0, 0}};
+    render_camera_ray(camera, x, y, base, direction);
+    for (int b = 0; b < 3; b++) {
+        line.base[0] += camera->right[b] * (base[b] - camera->eye[b]);
+        line.base[1] += camera->up[b] * (base[b] - camera->eye[b]);
+        line.slope[0] += camera->right[b] * direction[b];
+        line.slope[1] += camera->up[b] * direction[b];
+    }
+    return line;
+}
+
+/* value + slope z along the line. */
+static void along_line(const linear *f, const reference_line *line, double *value, double *slope)
+{
+    *value = at_place(f, (const double[3]){line->base[0], line->base[1], 0});
+    *slope = f->gradient[0] * line->slope[0] + f->gradient[1] * line->slope[1] + f->gradient[2];
+}
+
+static bool clip(const tet *t, const reference_line *line, span *out)
+{
+    double value, slope;
+    *out = (span){.z = {-(double)INFINITY, (double)INFINITY}, .slope = t->slope, .sign = t->sign};
+    for (int i = 0; i < 4; i++) {
+        along_line(&t->inside[i], line, &value, &slope);
+        if (slope == 0 && value < 0) return false;
+        if (slope == 0) continue;
+        const int end = slope < 0;
+        const double z = -value / slope;
+        if (end ? z >= out->z[1] : z <= out->z[0]) continue;
+        out->z[end] = z;
+        out->is_face[end] = i == 3;
+    }
+    along_line(&t->value, line, &value, &slope);
+    for (int end = 0; end < 2; end++) out->v[end] = value + slope * out->z[end];
+    return out->z[0] < out->z[1];
+}
+
+static int compare_numbers(const void *left, const void *right)
+{
+    const double a = *(const double *)left, b = *(const double *)right;
+    return (a > b) - (a < b);
+}
+
+static double span_at(const span *s, double z)
+{
+    return s->v[0] + (z - s->z[0]) / (s->z[1] - s->z[0]) * (s->v[1] - s->v[0]);
+}
+
+/* The ray's spans, and their ends in order. */
+static int spans_of(const subject *s, const reference_line *line, span *spans, double *ends)
+{
+    int count = 0;
+    for (int i = 0; i < s->tet_count; i++) count += clip(&s->tets[i], line, &spans[count]);
+    for (int i = 0; i < 2 * count; i++) ends[i] = spans[i / 2].z[i % 2];
+    qsort(ends, 2 * (size_t)count, sizeof *ends, compare_numbers);
+    return count;
+}
+
+/* The value of the face that is met at z. */
+static double face_value(const span *spans, int count, double z)
+{
+    double nearest = (double)INFINITY, value = 0;
+    for (int i = 0; i < count; i++)
+        for (int end = 0; end < 2; end++) {
+            const double away = fabs(spans[i].z[end] - z);
+            if (!spans[i].is_face[end] || away >= nearest) continue;
+            nearest = away;
+            value = spans[i].v[end];
+        }
+    assert_true(nearest < 1e-9);
+    return value;
+}
+
+static void add_point(path *p, double z, double v)
+{
+    assert_true(p->count < MOST_POINTS);
+    p->z[p->count] = z;
+    p->v[p->count++] = v;
+}
+
+/* Add the field from one end of a tet to the next, where the place is in the cell. */
+static bool add_piece(const span *spans, int count, double z0, double z1, path *p)
+{
+    const double middle = 0.5 * (z0 + z1);
+    double v[2] = {0, 0};
+    int cover = 0;
+    for (int i = 0; i < count; i++) {
+        if (!(spans[i].z[0] < middle && middle < spans[i].z[1])) continue;
+        cover += spans[i].sign;
+        v[0] += spans[i].sign * span_at(&spans[i], z0);
+        v[1] += spans[i].sign * span_at(&spans[i], z1);
+    }
+    if (cover != 1) {
+        if (cover && z1 - z0 > 1e-9) fail_msg("a place is in the cell %d times", cover);
+        return false;
+    }
+    if (!p->count) add_point(p, z0, face_value(spans, count, z0));
+    add_point(p, z0, v[0]);
+    add_point(p, z1, v[1]);
+    return true;
+}
+
+/* The next stay from the end number *next on; false where there is none. */
+static bool next_stay(const span *spans, int count, const double *ends, int *next, path *p)
+{
+    p->count = 0;
+    for (; *next + 1 < 2 * count; ++*next) {
+        if (ends[*next + 1] - ends[*next] < 1e-13) continue;
+        if (!add_piece(spans, count, ends[*next], ends[*next + 1], p) && p->count) break;
+    }
+    if (p->count) add_point(p, p->z[p->count - 1], face_value(spans, count, p->z[p->count - 1]));
+    return p->count > 0;
+}
+
+/* What of the path is before the eye. */
+static void cut_at_eye(path *p)
+{
+    int first = 0;
+    while (first < p->count && p->z[first] < 0) first++;
+    if (first == 0) return;
+    if (first < p->count) {
+        const double along = -p->z[first - 1] / (p->z[first] - p->z[first - 1]);
+        p->v[first - 1] += along * (p->v[first] - p->v[first - 1]);
+        p->z[first - 1] = 0;
+        first--;
+    }
+    p->count -= first;
+    memmove(p->z, p->z + first, (size_t)p->count * sizeof *p->z);
+    memmove(p->v, p->v + first, (size_t)p->count * sizeof *p->v);
+}
+
+/* ---- hits ---- */
+
+typedef struct ray_hits {
+    int count;
+    double z[REFERENCE_MAX_HITS];
+    bool is_good[REFERENCE_MAX_HITS];
+} ray_hits;
+
+typedef struct judge {
+    const render_fixture *f;
+    const subject *s;
+    double iso, place;
+    bool is_opaque;
+    tally *t;
+} judge;
+
+/* Hits in [from, to], a little more on both sides. */
+static bool has_hit(const judge *j, const ray_hits *hits, double from, double to)
+{
+    for (int i = 0; i < hits->count; i++)
+        if (from - j->place <= hits->z[i] && hits->z[i] <= to + j->place) return true;
+    return false;
+}
+
+/* Mark the hits that are beside a place where the path comes within the band. */
+static void mark_hits(const judge *j, const path *p, double band, ray_hits *hits)
+{
+    for (int i = 0; i < hits->count; i++)
+        for (int k = 0; k + 1 < p->count; k++) {
+            const double z0 = fmax(p->z[k], hits->z[i] - j->place), z1 = fmin(p->z[k + 1], hits->z[i] + j->place);
+            if (z0 > z1) continue;
+            const double length = p->z[k + 1] - p->z[k], rise = p->v[k + 1] - p->v[k];
+            const double v0 = length > 0 ? p->v[k] + (z0 - p->z[k]) / length * rise : p->v[k];
+            const double v1 = length > 0 ? p->v[k] + (z1 - p->z[k]) / length * rise : p->v[k + 1];
+            if (fmin(v0, v1) - j->iso <= band && fmax(v0, v1) - j->iso >= -band) hits->is_good[i] = true;
+        }
+}
+
+/* Each certain crossing of the path; of an opaque surface, where a hit hides the rest, the first. */
+static bool judge_path(const judge *j, const path *p, double band, const ray_hits *hits)
+{
+    const bool is_inner = (p->v[0] >= j->iso) == (p->v[p->count - 1] >= j->iso);
+    int side = 0;
+    double since = 0;
+    for (int k = 0; k < p->count; k++) {
+        const double v = p->v[k] - j->iso;
+        const int now = v > band ? 1 : v < -band ? -1 : 0;
+        j->t->bends++;
+        j->t->in_band += !now;
+        if (now && side && now != side) {
+            j->t->certain++;
+            j->t->inner += is_inner;
+            if (!has_hit(j, hits, j->is_opaque ? 0 : since, p->z[k])) {
+                j->t->missed++;
+                return false;
+            }
+            if (j->is_opaque) return false;
+        }
+        if (now) side = now, since = p->z[k];
+    }
+    return true;
+}
+
+/* Where tets overlap the slopes of a sum's terms add up, mostly of three. */
+static double band_of(const judge *j, const span *spans, int count)
+{
+    double steepest = 0;
+    for (int i = 0; i < count; i++) steepest = fmax(steepest, spans[i].slope);
+    return 2e-6 * (j->s->high - j->s->low) + j->place * steepest * (j->s->is_star ? 1 : 3);
+}
+
+static void judge_ray(const judge *j, const reference_line *line, ray_hits *hits)
+{
+    static span spans[REFERENCE_MAX_TRIANGLES];
+    static double ends[2 * REFERENCE_MAX_TRIANGLES];
+    static path p;
+    const int count = spans_of(j->s, line, spans, ends);
+    int next = 0;
+    bool goes_on = true;
+    if (!count && !hits->count) return;
+    if (reference_edge_distance(&j->s->cell, line) < j->place) {
+        j->t->at_edges++;
+        return;
+    }
+    j->t->rays++;
+    const double band = band_of(j, spans, count);
+    while (next_stay(spans, count, ends, &next, &p)) {
+        cut_at_eye(&p);
+        if (!p.count) continue;
+        mark_hits(j, &p, band, hits);
+        goes_on = goes_on && judge_path(j, &p, band, hits);
+    }
+    for (int i = 0; i < hits->count; i++) j->t->wrong += !hits->is_good[i];
+}
+
+static void hits_of(const render_fixture *f, const drawn_frame *drawn, int64_t pixel, ray_hits *out)
+{
+    *out = (ray_hits){.count = 0};
+    for (int64_t i = drawn->first[pixel]; i < drawn->first[pixel + 1] && out->count < REFERENCE_MAX_HITS; i++)
+        out->z[out->count++] = fixture_depth(f, drawn->list.items[i].t_in);
+}
+
+/* ---- frames ---- */
+
+/* From a random side, now and then from the inside or without perspective. */
+static void look_at_random(render_fixture *f, uint64_t seed)
+{
+    const double angle = test_uniform_in(0, seed, 0, 6.283), height = test_uniform_in(1, seed, -0.9, 0.9);
+    const double distance = seed % 8 == 7 ? 0.1 : 3, across = distance * sqrt(1 - height * height);
+    const double eye[3] = {across * cos(angle), across * sin(angle), distance * height};
+    const double target[3] = {test_uniform_in(2, seed, -0.02, 0.02), test_uniform_in(3, seed, -0.02, 0.02), 0};
+    render_camera *c = &f->job.camera;
+    assert_true(render_camera_look_at(c, eye, target, (const double[]){0, 0.1, 1}, 30, WIDTH, HEIGHT));
+    c->is_orthographic = seed % 8 == 3;
+    c->half_height = 0.8;
+    f->job.space.depth_origin = seed % 8 == 7 ? 0 : distance;
+}
+
+static void judge_frame(const render_fixture *f, const double iso, tally *t)
+{
+    static subject s;
+    drawn_frame drawn;
+    make_subject(f, &s);
+    const judge j = {.f = f,
+                     .s = &s,
+                     .iso = iso,
+                     .place = 3e-6 / f->job.space.scale,
+                     .is_opaque = f->surfaces[0].opacity >= 1,
+                     .t = t};
+    t->cells++;
+    t->stars += s.is_star;
+    fixture_draw(f, &drawn);
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < WIDTH; x++) {
+            ray_hits hits;
+            hits_of(f, &drawn, (int64_t)y * WIDTH + x, &hits);
+            const reference_line line = line_of(&f->job.camera, x, y);
+            judge_ray(&j, &line, &hits);
+        }
+    drawn_free(&drawn);
+}
+
+static void judge_cell(const test_mesh *mesh, uint64_t seed, tally *t)
+{
+    render_fixture f;
+    const double values[1] = {test_uniform_in(4, seed, -0.6, 0.6)};
+    fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                   (const double[]){0, 0, 0});
+    look_at_random(&f, seed);
+    fixture_add_surface(&f, values, 1, seed % 2 ? 1 : 0.4f);
+    f.surfaces[0].root = RENDER_ROBUST;
+    judge_frame(&f, values[0], t);
+    fixture_free(&f);
+}
+
+static void assert_none_missed(const char *what, const tally *t)
+{
+    printf(
+        "%s: %lld rays in %d cells, %d star-shaped: %lld certain crossings, %lld of them with both ends on one "
+        "side; %lld missed, %lld hits that are none; %lld of %lld bends within the band, %lld rays at edges left out\n",
+        what, (long long)t->rays, t->cells, t->stars, (long long)t->certain, (long long)t->inner, (long long)t->missed,
+        (long long)t->wrong, (long long)t->in_band, (long long)t->bends, (long long)t->at_edges);
+    assert_int_equal(t->missed, 0);
+    assert_int_equal(t->wrong, 0);
+    assert_true(t->inner > t->rays / 100);
+    assert_true(100 * t->in_band < t->bends && 1000 * t->at_edges < t->rays);
+}
+
+static void random_polyhedra_miss_no_crossing(void **state)
+{
+    (void)state;
+    for (test_random_polyhedron kind = 0; kind < TEST_RANDOM_COUNT; kind++) {
+        tally t = {.rays = 0};
+        for (uint64_t seed = 0; t.rays < wanted_rays / 4; seed++) {
+            test_mesh mesh;
+            test_mesh_random(kind, 1000 * kind + seed, &mesh);
+            test_mesh_split_quads(&mesh);
+            judge_cell(&mesh, seed, &t);
+            test_mesh_free(&mesh);
+        }
+        assert_none_missed(test_random_name(kind), &t);
+    }
+}
+
+/* Moved across x alone, so that the L's bases keep their smallest vertex, which sees all of them: a face that is not
+ * plane and folds over itself is passed more than once. */
+static void concave_polyhedra_miss_no_crossing(void **state)
+{
+    static const test_polyhedron_shape shapes[4] = {TEST_L_PRISM, TEST_SPIKES, TEST_BENT_SPIKES, TEST_CAVITY};
+    tally t = {.rays = 0};
+    (void)state;
+    for (uint64_t seed = 0; t.rays < wanted_rays / 4; seed++) {
+        test_mesh mesh;
+        test_mesh_polyhedron(shapes[seed / 2 % 4], test_linear, &mesh);
+        for (uint64_t i = 0; i < (uint64_t)mesh.vertex_count; i++) {
+            for (uint64_t a = 1; a < 3; a++)
+                mesh.coordinates[3 * i + a] += test_uniform_in(3 * i + a, seed, -0.02, 0.02);
+            mesh.values[i] = test_uniform_in(i, seed + 1000, -1, 1);
+        }
+        test_mesh_split_quads(&mesh);
+        judge_cell(&mesh, seed, &t);
+        test_mesh_free(&mesh);
+    }
+    assert_none_missed("concave cells", &t);
+}
+
+/* Does the field pass the value on the ray? */
+static bool passes(const subject *s, const reference_line *line, double value)
+{
+    static span spans[REFERENCE_MAX_TRIANGLES];
+    static double ends[2 * REFERENCE_MAX_TRIANGLES];
+    static path p;
+    int next = 0;
+    const int count = spans_of(s, line, spans, ends);
+    while (next_stay(spans, count, ends, &next, &p))
+        for (int k = 0; k < p.count; k++)
+            if (p.v[k] > value) return true;
+    return false;
+}
+
+/* A prism on a hook, in whose stem the centre is: the tets of the hook's two sides, one with its sign turned, reach
+ * through the stem. On the inner one values are -1, else 1, and the sum at the stem's wall is some
+ * 1 + 1.5 / 4 + 0.5 / 6. */
+static void make_hook(test_mesh *out)
+{
+    static const double base[8][2] = {{-1.2, -0.5}, {0, -0.5},   {0, 0.3},   {0.3, 0.3},
+                                      {0.3, -0.5},  {0.5, -0.5}, {0.5, 0.5}, {-1.2, 0.5}};
+    test_mesh_polyhedron(TEST_U_PRISM, test_linear, out);
+    for (int i = 0; i < 16; i++) {
+        out->coordinates[3 * i] = base[i % 8][0];
+        out->coordinates[3 * i + 1] = base[i % 8][1];
+        out->values[i] = i % 8 == 3 || i % 8 == 4 ? -1 : 1;
+    }
+    test_mesh_split_quads(out);
+}
+
+/* Where tets overlap, their sum may pass the range of the vertices' values. No tree looks for an isovalue there: it has
+ * no surface in the cell. */
+static void sums_beyond_the_vertices_show_no_surface(void **state)
+{
+    static const double value = 1.1;
+    static subject s;
+    test_mesh mesh;
+    render_fixture f;
+    drawn_frame drawn;
+    int beyond = 0;
+    (void)state;
+    make_hook(&mesh);
+    fixture_create(&f, &mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 1, 1,
+                   (const double[]){0, 0, 0});
+    look_at_random(&f, 0);
+    make_subject(&f, &s);
+    fixture_add_surface(&f, &value, 1, 0.4f);
+    f.surfaces[0].root = RENDER_ROBUST;
+    fixture_draw(&f, &drawn);
+    assert_int_equal(drawn.list.count, 0);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        const reference_line line = line_of(&f.job.camera, i % WIDTH, i / WIDTH);
+        beyond += passes(&s, &line, value);
+    }
+    printf("%d rays pass values beyond those of the vertices\n", beyond);
+    assert_true(beyond > 10);
+    drawn_free(&drawn);
+    fixture_free(&f);
+    test_mesh_free(&mesh);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1) wanted_rays = atoll(argv[1]);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(random_polyhedra_miss_no_crossing),
+        cmocka_unit_test(concave_polyhedra_miss_no_crossing),
+        cmocka_unit_test(sums_beyond_the_vertices_show_no_surface),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
