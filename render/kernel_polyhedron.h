@@ -20,10 +20,10 @@
  * without a jump, and one with both on one side brings or takes f - f = 0). It is summed where the ray crosses sheets,
  * by each tet's [t0, t1).
  *
- * Whether an isosurface crosses is decided by the faces' own values (kernel_surface.h): triangles linear, quads
- * bilinear as their neighbours may have them, larger faces linear on their triangles. The interior field may say
- * otherwise at a warped quad, and in a cell that is not star-shaped: where the signs differ, the face's value takes the
- * place of the profile's end. */
+ * On which side of an isovalue a ray enters and leaves, the faces' own values say (kernel_surface.h): triangles linear,
+ * quads bilinear as their neighbours may have them, larger faces linear on their triangles. In a cell that is not
+ * star-shaped the field just inside may be on the other side of the isovalue than the face: then it jumps at the face,
+ * and the isosurface is there. */
 #ifndef RENDER_KERNEL_POLYHEDRON_H
 #define RENDER_KERNEL_POLYHEDRON_H
 

@@ -1,7 +1,10 @@
 /* The Voronoi cells of INSITU_TEST_DATA, 8,000 polyhedra of up to 21 faces, against the brute-force renderer: surfaces,
- * samples and segments. 77 where INSITU_TEST_DATA is not set. */
+ * samples and segments; and moved, so that their faces are not plane, against the same field on their own tets. 77
+ * where INSITU_TEST_DATA is not set. */
 #include "reference_integral.h"
 #include "test_data_mesh.h"
+#include "test_mesh_dual.h"
+#include "test_own_tets.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -64,11 +67,27 @@ static void segments_are_the_integral(void **state)
     fixture_free(&f);
 }
 
+/* Vertices moved by up to 1 % of a cell along each axis. After all others: the mesh is another then. */
+static void moved_cells_are_their_own_tets(void **state)
+{
+    (void)state;
+    for (uint64_t i = 0; i < 3 * (uint64_t)mesh.vertex_count; i++)
+        mesh.coordinates[i] += test_uniform_in(i, 41, -0.001, 0.001);
+    test_mesh_split_quads(&mesh);
+    const own_tets_tally t = own_tets_compare(&mesh, 0.1, 0.2, 320, 240);
+    fprintf(stderr, "%d cells not star-shaped; %d pixels, %d missing, %d added; %d left out\n", (int)t.ghosts,
+            (int)t.pixels, (int)t.missing, (int)t.added, (int)t.in_band);
+    assert_true(t.pixels > 10000 && 1000 * t.in_band < t.pixels && 10 * t.ghosts < mesh.cell_count);
+    assert_int_equal(t.missing, 0);
+    assert_int_equal(t.added, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(surfaces_and_samples_are_the_reference),
         cmocka_unit_test(segments_are_the_integral),
+        cmocka_unit_test(moved_cells_are_their_own_tets),
     };
     char path[4096];
     const char *folder = getenv("INSITU_TEST_DATA");

@@ -289,7 +289,8 @@ static void random_ownership_changes_nothing(void **state)
     }
 }
 
-int main(void)
+/* Under valgrind those that a pattern names. */
+int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shapes_are_the_reference),
@@ -300,5 +301,6 @@ int main(void)
         cmocka_unit_test(linear_surface_of_warped_polyhedra_is_a_plane),
         cmocka_unit_test(random_ownership_changes_nothing),
     };
+    if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

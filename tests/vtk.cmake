@@ -35,6 +35,7 @@ foreach(noun volumes polyhedra)
   set_tests_properties(data_${noun} PROPERTIES
     ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
 endforeach()
+target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 
 set_tests_properties(vtk_tool vtk_images PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
