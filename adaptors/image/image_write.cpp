@@ -1,34 +1,27 @@
 /* insitu_image_write() by OpenImageIO: the one place that knows image formats.
  *
- * A picture appears whole or not at all: it is written under a temporary name in its own folder, which rename() then
- * swaps in at once even on most network file systems. libinsitu loads this file by dlopen() inside someone's run, so
- * nothing may be thrown out of it, it starts no threads, and what goes wrong is said in a message. */
+ * libinsitu loads this file by dlopen() inside someone's run, so nothing may be thrown out of it, it starts no threads,
+ * and what goes wrong is said in a message. */
 #include "insitu/image_output.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
-#include <cerrno>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
+#include <exception>
 #include <memory>
 #include <new>
-#include <stdexcept>
 #include <string>
-#include <unistd.h>
 #include <vector>
+
+#include "memory_reserve.h"
+#include "picture_file.h"
 
 namespace
 {
-
-namespace fs = std::filesystem;
-
-struct io_error : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
 
 std::size_t pixel_count(const insitu_image &image)
 {
@@ -82,103 +75,82 @@ std::vector<float> with_depth(const insitu_image &image)
     return all;
 }
 
-/* A file of the temporary name that is gone again unless keep() renames it. */
-class temporary_file
-{
-  public:
-    temporary_file(const fs::path &target, const char *ending)
-        : target_(target), path_(target.parent_path() /
-                                 ("." + target.filename().string() + "." + std::to_string(getpid()) + ".part" + ending))
-    {
-    }
-    temporary_file(const temporary_file &) = delete;
-    temporary_file &operator=(const temporary_file &) = delete;
-    ~temporary_file()
-    {
-        std::error_code ignored;
-        if (!is_kept_) fs::remove(path_, ignored);
-    }
-    const fs::path &path() const { return path_; }
-    void keep()
-    {
-        std::error_code code;
-        fs::rename(path_, target_, code);
-        if (code) throw io_error(code.message());
-        is_kept_ = true;
-    }
-
-  private:
-    fs::path target_, path_;
-    bool is_kept_ = false;
+struct layout {
+    int channels;
+    OIIO::TypeDesc type;
+    const char *file_name; /* by whose ending OpenImageIO knows the format */
+    OIIO::ImageSpec (*describe)(const insitu_image &, const layout &);
 };
 
-/* The file as OpenImageIO makes it, in memory: its PNG writer does not notice a full disk. */
-std::vector<unsigned char> encode_file(const fs::path &path, const OIIO::ImageSpec &spec, const void *pixels)
+OIIO::ImageSpec describe_png(const insitu_image &image, const layout &l)
 {
-    std::vector<unsigned char> bytes;
-    OIIO::Filesystem::IOVecOutput memory(bytes);
-    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(path.string(), &memory);
-    if (!output) throw io_error(OIIO::geterror());
-    output->threads(1);
-    if (!output->open(path.string(), spec)) throw io_error(output->geterror());
-    if (!output->write_image(spec.format, pixels)) throw io_error(output->geterror());
-    if (!output->close()) throw io_error(output->geterror());
-    return bytes;
-}
-
-void write_pixels(const fs::path &path, const OIIO::ImageSpec &spec, const void *pixels)
-{
-    const std::vector<unsigned char> bytes = encode_file(path, spec, pixels);
-    std::FILE *file = std::fopen(path.c_str(), "wb");
-    if (!file) throw io_error(std::strerror(errno));
-    errno = 0;
-    const bool is_written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-    const int write_error = errno;
-    const bool is_closed = std::fclose(file) == 0;
-    if (!is_written || !is_closed) throw io_error(std::strerror(is_written ? errno : write_error));
-}
-
-template <typename code> void write_png(const insitu_image &image, const fs::path &path, OIIO::TypeDesc type)
-{
-    const int channels = is_opaque(image) ? 3 : 4;
-    OIIO::ImageSpec spec(image.width, image.height, channels, type);
+    OIIO::ImageSpec spec(image.width, image.height, l.channels, l.type);
     spec.attribute("oiio:ColorSpace", "sRGB");
     spec.attribute("oiio:UnassociatedAlpha", 1); /* the codes are straight already */
-    write_pixels(path, spec, encode<code>(image, static_cast<std::size_t>(channels)).data());
+    return spec;
 }
 
-void write_exr(const insitu_image &image, const fs::path &path)
+OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
 {
-    OIIO::ImageSpec spec(image.width, image.height, image.depth ? 5 : 4, OIIO::TypeDesc::FLOAT);
+    OIIO::ImageSpec spec(image.width, image.height, l.channels, l.type);
     spec.channelnames = {"R", "G", "B", "A"};
     if (image.depth) spec.channelnames.push_back("Z");
     spec.alpha_channel = 3;
     spec.z_channel = image.depth ? 4 : -1;
     spec.attribute("oiio:ColorSpace", "Linear");
     spec.attribute("compression", "zip");
-    if (image.depth) {
-        write_pixels(path, spec, with_depth(image).data());
-    } else {
-        write_pixels(path, spec, image.rgba);
-    }
+    return spec;
 }
 
-void write(const insitu_image &image, insitu_image_format format, const fs::path &target)
+/* The file as OpenImageIO makes it, in memory: its PNG writer does not notice a full disk. */
+void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixels, std::vector<unsigned char> &bytes)
 {
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1); /* none but the caller's */
-    if (target.has_parent_path()) {
-        std::error_code code;
-        fs::create_directories(target.parent_path(), code);
-        if (code) throw io_error("its folder cannot be made: " + code.message());
-    }
-    temporary_file file(target, format == INSITU_EXR ? ".exr" : ".png");
+    OIIO::Filesystem::IOVecOutput memory(bytes);
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(name, &memory);
+    if (!output) throw io_error(OIIO::geterror());
+    output->threads(1);
+    if (!output->open(name, spec)) throw io_error(output->geterror());
+    if (!output->write_image(spec.format, pixels)) throw io_error(output->geterror());
+    if (!output->close()) throw io_error(output->geterror());
+}
+
+/* What is large is allocated first, so that the reserve is left to what OpenImageIO and the libraries below it allocate
+ * beside: tables that they fill at the first picture, a few rows, and the compressors' room. */
+void write_pixels(const insitu_image &image, const layout &l, const void *pixels, const std::string &path)
+{
+    enum { ROWS = 128, TABLES = 16 << 20, ADDED = 1 << 20 };
+    const std::size_t row = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(l.channels) * l.type.size();
+    const std::size_t raw = row * static_cast<std::size_t>(image.height);
+    std::vector<unsigned char> bytes;
+    bytes.reserve(raw + raw / 8 + ADDED); /* noise does not compress, and formats add to it */
+    const memory_reserve reserve(TABLES + ROWS * row);
+    encode_file(l.file_name, l.describe(image, l), pixels, bytes);
+    write_picture_file(path, bytes.data(), bytes.size());
+}
+
+template <typename code> void write_png(const insitu_image &image, OIIO::TypeDesc type, const std::string &path)
+{
+    const int channels = is_opaque(image) ? 3 : 4;
+    const std::vector<code> codes = encode<code>(image, static_cast<std::size_t>(channels));
+    write_pixels(image, {channels, type, "picture.png", describe_png}, codes.data(), path);
+}
+
+void write_exr(const insitu_image &image, const std::string &path)
+{
+    const layout l{image.depth ? 5 : 4, OIIO::TypeDesc(OIIO::TypeDesc::FLOAT), "picture.exr", describe_exr};
+    const std::vector<float> all = image.depth ? with_depth(image) : std::vector<float>();
+    write_pixels(image, l, image.depth ? all.data() : image.rgba, path);
+}
+
+void write(const insitu_image &image, insitu_image_format format, const std::string &path)
+{
     switch (format) {
-    case INSITU_PNG8: write_png<std::uint8_t>(image, file.path(), OIIO::TypeDesc::UINT8); break;
-    case INSITU_PNG16: write_png<std::uint16_t>(image, file.path(), OIIO::TypeDesc::UINT16); break;
-    case INSITU_EXR: write_exr(image, file.path()); break;
+    case INSITU_PNG8: write_png<std::uint8_t>(image, OIIO::TypeDesc::UINT8, path); break;
+    case INSITU_PNG16: write_png<std::uint16_t>(image, OIIO::TypeDesc::UINT16, path); break;
+    case INSITU_EXR: write_exr(image, path); break;
     }
-    file.keep();
 }
 
 insitu_status fail(insitu_status status, const char *path, const char *what, char *message, std::size_t size)

@@ -107,6 +107,7 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic pop
 }
 
+/* The cell is looked at again: what is found good now lacked memory before. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_place place = {0};
@@ -136,7 +137,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
                          mesh->name, at, type, vertex, place.position[0], place.position[1], place.position[2]);
     case CELL_GOOD: break;
     }
-    return INSITU_OK;
+    return session_describe_faces(mesh, cell, FACES_NO_MEMORY, &place.faces, error);
 }
 
 /* Cells of any layout, one by one. */

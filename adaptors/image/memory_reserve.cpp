@@ -1,0 +1,45 @@
+#include "memory_reserve.h"
+
+#include <atomic>
+#include <cstdlib>
+#include <mutex>
+#include <new>
+
+namespace
+{
+
+std::atomic<void *> reserve;
+std::atomic<std::new_handler> handler_before;
+std::mutex lock; /* one holds a reserve at a time */
+
+void give_back()
+{
+    void *block = reserve.exchange(nullptr);
+    if (block) {
+        std::free(block);
+        return;
+    }
+    const std::new_handler before = handler_before;
+    if (!before) throw std::bad_alloc();
+    before();
+}
+
+} // namespace
+
+memory_reserve::memory_reserve(std::size_t bytes)
+{
+    lock.lock();
+    reserve = std::malloc(bytes);
+    if (!reserve) {
+        lock.unlock();
+        throw std::bad_alloc();
+    }
+    handler_before = std::set_new_handler(give_back);
+}
+
+memory_reserve::~memory_reserve()
+{
+    if (std::get_new_handler() == give_back) std::set_new_handler(handler_before);
+    std::free(reserve.exchange(nullptr));
+    lock.unlock();
+}
