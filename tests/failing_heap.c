@@ -17,12 +17,8 @@ int64_t heap_disarm(void)
 {
     return 0;
 }
-void heap_pause(void)
-{
-}
-void heap_resume(void)
-{
-}
+void heap_pause(void) {}
+void heap_resume(void) {}
 bool heap_can_fail(void)
 {
     return false;

@@ -23,3 +23,14 @@ target_link_libraries(test_image_output PRIVATE
   insitu_flags insitu_internal ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY} PkgConfig::CMOCKA)
 add_test(NAME image_output COMMAND test_image_output ${CMAKE_CURRENT_BINARY_DIR}/image_output)
 set_tests_properties(image_output PROPERTIES TIMEOUT 120)
+
+# Memory runs out: quickly at every 41st allocation of the first picture, in the long tests at each.
+add_library(test_failing_heap OBJECT failing_heap.c)
+target_link_libraries(test_failing_heap PRIVATE insitu_flags ${CMAKE_DL_LIBS})
+set_target_properties(test_failing_heap PROPERTIES C_VISIBILITY_PRESET default) # libraries are to find it
+add_executable(test_image_memory test_image_memory.c)
+add_dependencies(test_image_memory insitu_image)
+target_link_libraries(test_image_memory PRIVATE test_failing_heap insitu_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME image_memory COMMAND test_image_memory ${CMAKE_CURRENT_BINARY_DIR}/image_memory)
+set_tests_properties(image_memory PROPERTIES TIMEOUT 180)
+insitu_add_long_test(image_memory_long test_image_memory ${CMAKE_CURRENT_BINARY_DIR}/image_memory_long 1)

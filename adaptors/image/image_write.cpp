@@ -7,6 +7,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -102,6 +103,14 @@ OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
     return spec;
 }
 
+/* Its C libraries' words are all that tells of memory there. */
+[[noreturn]] void fail_with(std::string what)
+{
+    if (what.find("memory") != std::string::npos || what.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    throw io_error(what);
+}
+
 /* The file as OpenImageIO makes it, in memory: its PNG writer does not notice a full disk. */
 void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixels, std::vector<unsigned char> &bytes)
 {
@@ -109,11 +118,11 @@ void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixe
     OIIO::attribute("exr_threads", -1); /* none but the caller's */
     OIIO::Filesystem::IOVecOutput memory(bytes);
     const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(name, &memory);
-    if (!output) throw io_error(OIIO::geterror());
+    if (!output) fail_with(OIIO::geterror());
     output->threads(1);
-    if (!output->open(name, spec)) throw io_error(output->geterror());
-    if (!output->write_image(spec.format, pixels)) throw io_error(output->geterror());
-    if (!output->close()) throw io_error(output->geterror());
+    if (!output->open(name, spec)) fail_with(output->geterror());
+    if (!output->write_image(spec.format, pixels)) fail_with(output->geterror());
+    if (!output->close()) fail_with(output->geterror());
 }
 
 /* What is large is allocated first, so that the reserve is left to what OpenImageIO and the libraries below it allocate
@@ -121,7 +130,8 @@ void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixe
 void write_pixels(const insitu_image &image, const layout &l, const void *pixels, const std::string &path)
 {
     enum { ROWS = 128, TABLES = 16 << 20, ADDED = 1 << 20 };
-    const std::size_t row = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(l.channels) * l.type.size();
+    const std::size_t row =
+        static_cast<std::size_t>(image.width) * static_cast<std::size_t>(l.channels) * l.type.size();
     const std::size_t raw = row * static_cast<std::size_t>(image.height);
     std::vector<unsigned char> bytes;
     bytes.reserve(raw + raw / 8 + ADDED); /* noise does not compress, and formats add to it */

@@ -130,8 +130,7 @@ class temporary_file
   private:
     int make() const
     {
-        const int number =
-            openat(folder_, name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+        const int number = openat(folder_, name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
         if (number < 0) fail("", errno);
         return number;
     }
@@ -153,7 +152,8 @@ void temporary_file::write(const unsigned char *bytes, std::size_t size)
     }
 }
 
-/* False where it is not there any more. The lock goes with the close: some file systems tell only then of a full disk. */
+/* False where it is not there any more. The lock goes with the close: some file systems tell only then of a full disk.
+ */
 bool temporary_file::keep(const std::string &name)
 {
     const int code = file_.close();

@@ -1,8 +1,8 @@
 /* A picture's file: it appears whole or not at all.
  *
- * What is written goes to a temporary file in the picture's own folder, which then takes the picture's name at once. The
- * temporary file is one that nobody else can have made: of a random name, opened where there was nothing before. It is
- * locked for as long as its writer lives, and so those that killed runs left are told from those being written. */
+ * What is written goes to a temporary file in the picture's own folder, which then takes the picture's name at once.
+ * The temporary file is one that nobody else can have made: of a random name, opened where there was nothing before. It
+ * is locked for as long as its writer lives, and so those that killed runs left are told from those being written. */
 #ifndef ADAPTORS_PICTURE_FILE_H
 #define ADAPTORS_PICTURE_FILE_H
 

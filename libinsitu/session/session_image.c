@@ -1,19 +1,26 @@
-/* The image library is looked for where a person would put it: on the loader's own path (beside libinsitu, by its
- * RUNPATH), then beside the object this code is in, then in the lib folder next to that one's, which is where it
- * stands for a program in bin that links libinsitu statically. It stays loaded until the process ends: C++ libraries
- * with threads and static objects do not survive being unloaded.
+/* The image library is the one beside the object this code is in (libinsitu), or in the lib folder next to that one's,
+ * which is where it stands for a program in bin that links libinsitu statically: by its full path, so that no other of
+ * its name gets into someone's run. Only where neither is there the loader looks for it, and not where LD_LIBRARY_PATH
+ * would have it look in the working directory. It stays loaded until the process ends: C++ libraries with threads and
+ * static objects do not survive being unloaded.
  *
  * Some library behind OpenImageIO starts threads as it is loaded. They sleep, but they would take the simulation's
- * signals and run its handlers; so they are born with every signal blocked. */
-#define _GNU_SOURCE 1 /* dladdr */
+ * signals and run its handlers; so they are born with every signal blocked. Others end the process where their
+ * constructors find no memory; so nothing is loaded unless there is some to spare. */
+#define _GNU_SOURCE 1 /* dladdr1 */
 #include "session_image.h"
 
 #include <dlfcn.h>
+#include <limits.h>
+#include <link.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 static const char library[] = "libinsitu_image.so";
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
@@ -33,31 +40,76 @@ static void *open_library(const char *path, char *why, size_t size)
     return NULL;
 }
 
-/* folder: between the object's own folder and the library's name. */
-static void *open_beside(const char *folder, char *why, size_t size)
+/* The folder of the object this code is in, as it was when that was loaded. */
+static bool find_own_folder(char folder[PATH_MAX])
 {
     Dl_info object;
-    if (!dladdr((const void *)library, &object) || !object.dli_fname) return NULL;
-    const char *slash = strrchr(object.dli_fname, '/');
-    if (!slash) return NULL;
-    char path[4096];
-    const int length =
-        snprintf(path, sizeof path, "%.*s/%s%s", (int)(slash - object.dli_fname), object.dli_fname, folder, library);
+    struct link_map *map = NULL;
+    if (!dladdr1((const void *)library, &object, (void **)&map, RTLD_DL_LINKMAP) || !map) return false;
+    if (*map->l_name) return dlinfo(map, RTLD_DI_ORIGIN, folder) == 0;
+    const ssize_t length = readlink("/proc/self/exe", folder, PATH_MAX - 1); /* the program: it has no name there */
+    if (length <= 0) return false;
+    folder[length] = '\0';
+    char *slash = strrchr(folder, '/');
+    if (slash) *slash = '\0';
+    return slash;
+}
+
+static void *open_beside(const char *own_folder, const char *between, char *why, size_t size)
+{
+    char path[PATH_MAX];
+    const int length = snprintf(path, sizeof path, "%s/%s%s", own_folder, between, library);
     return length > 0 && (size_t)length < sizeof path ? open_library(path, why, size) : NULL;
+}
+
+/* An empty entry, or a relative one, is the working directory or below it. */
+static bool searches_working_directory(void)
+{
+    const char *entries = getenv("LD_LIBRARY_PATH");
+    if (!entries || !*entries) return false;
+    for (const char *entry = entries;; entry++) {
+        if (*entry != '/') return true;
+        entry += strcspn(entry, ":;");
+        if (!*entry) return false;
+    }
+}
+
+static void *open_anywhere(char *why, size_t size)
+{
+    char folder[PATH_MAX];
+    void *handle = NULL;
+    if (find_own_folder(folder)) {
+        handle = open_beside(folder, "", why, size);
+        if (!handle) handle = open_beside(folder, "../lib/", why, size);
+    }
+    if (!handle && !searches_working_directory()) handle = open_library(library, why, size);
+    return handle;
+}
+
+/* What the libraries take as they are loaded, rounded up: 430 MiB of addresses, of them 100 MiB of memory. */
+static bool has_memory_to_load(void)
+{
+    const size_t addresses = (size_t)512 << 20, memory = (size_t)128 << 20;
+    void *block = mmap(NULL, addresses, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (block == MAP_FAILED) return false;
+    const bool has_memory = mprotect(block, memory, PROT_READ | PROT_WRITE) == 0;
+    munmap(block, addresses);
+    return has_memory;
 }
 
 static insitu_status load(base_error *error)
 {
     char why[400] = "";
-    void *handle = open_library(library, why, sizeof why);
-    if (!handle) handle = open_beside("", why, sizeof why);
-    if (!handle) handle = open_beside("../lib/", why, sizeof why);
-    if (!handle) {
+    if (!has_memory_to_load())
+        return base_fail(error, INSITU_ERROR_MEMORY,
+                         "no memory to load %s (512 MiB of addresses); no image can be written", library);
+    void *handle = open_anywhere(why, sizeof why);
+    if (!handle)
         return base_fail(
             error, INSITU_ERROR_IO,
-            "%s cannot be loaded, expected beside libinsitu or on LD_LIBRARY_PATH; no image can be written: %s",
-            library, why);
-    }
+            "%s cannot be loaded, expected beside libinsitu or on LD_LIBRARY_PATH%s; no image can be written: %s",
+            library,
+            searches_working_directory() ? " (not searched: it has an entry that is not an absolute path)" : "", why);
     void *symbol = dlsym(handle, "insitu_image_write");
     if (!symbol) {
         dlclose(handle);

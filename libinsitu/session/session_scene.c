@@ -2,8 +2,9 @@
  * word about its structure. A file edited while the simulation runs is taken at the next step; an edit that does not
  * parse leaves the old scene in place and a warning in the reports until it is mended. */
 #include <errno.h>
-#include <stdio.h>
+#include <fcntl.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "memory.h"
 #include "session.h"
@@ -14,28 +15,44 @@ enum { MAX_SCENE_BYTES = 1 << 22 };
 typedef struct scene_file_text {
     char *data;
     int64_t size;
+    bool has_stamp;
     struct stat stamp;
 } scene_file_text;
 
-static insitu_status read_stream(FILE *file, const char *path, scene_file_text *text, base_error *error)
+static const char *kind_of(mode_t mode)
 {
+    if (S_ISDIR(mode)) return "a directory";
+    if (S_ISFIFO(mode)) return "a named pipe (FIFO)";
+    if (S_ISSOCK(mode)) return "a socket";
+    return "a device";
+}
+
+/* Waits for nobody: what is not a regular file is refused before it is read. */
+static insitu_status read_regular(int file, const char *path, scene_file_text *text, base_error *error)
+{
+    if (fstat(file, &text->stamp) != 0) return base_fail(error, INSITU_ERROR_SCENE, "%s: %s", path, strerror(errno));
+    text->has_stamp = true;
+    if (!S_ISREG(text->stamp.st_mode))
+        return base_fail(error, INSITU_ERROR_SCENE, "%s: is %s, expected a regular file", path,
+                         kind_of(text->stamp.st_mode));
     text->data = base_alloc(MAX_SCENE_BYTES);
     if (!text->data) return session_no_memory(error, MAX_SCENE_BYTES, "scene text");
-    if (fstat(fileno(file), &text->stamp) != 0)
-        return base_fail(error, INSITU_ERROR_SCENE, "%s: %s", path, strerror(errno));
-    text->size = (int64_t)fread(text->data, 1, MAX_SCENE_BYTES, file);
-    if (ferror(file)) return base_fail(error, INSITU_ERROR_SCENE, "%s: %s", path, strerror(errno));
-    if (text->size == MAX_SCENE_BYTES)
-        return base_fail(error, INSITU_ERROR_SCENE, "%s: is no scene: larger than %d bytes", path, MAX_SCENE_BYTES);
-    return INSITU_OK;
+    while (text->size < MAX_SCENE_BYTES) {
+        const ssize_t more = read(file, text->data + text->size, (size_t)(MAX_SCENE_BYTES - text->size));
+        if (more < 0 && errno == EINTR) continue;
+        if (more < 0) return base_fail(error, INSITU_ERROR_SCENE, "%s: %s", path, strerror(errno));
+        if (more == 0) return INSITU_OK;
+        text->size += more;
+    }
+    return base_fail(error, INSITU_ERROR_SCENE, "%s: is no scene: larger than %d bytes", path, MAX_SCENE_BYTES);
 }
 
 static insitu_status read_file(const char *path, scene_file_text *text, base_error *error)
 {
-    FILE *file = fopen(path, "rb");
-    if (!file) return base_fail(error, INSITU_ERROR_SCENE, "%s: cannot be read: %s", path, strerror(errno));
-    const insitu_status status = read_stream(file, path, text, error);
-    fclose(file);
+    const int file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (file < 0) return base_fail(error, INSITU_ERROR_SCENE, "%s: cannot be read: %s", path, strerror(errno));
+    const insitu_status status = read_regular(file, path, text, error);
+    close(file);
     return status;
 }
 
@@ -80,7 +97,7 @@ static insitu_status read_scene(insitu_session *session, scene *out, base_error 
     if (session->rank == 0) read_file(session->scene_path, &text, error);
     insitu_status status = session_agree_as_is(session->comm, error);
     if (status == INSITU_OK) status = parse_shared(session, &text, out, error);
-    if (session->rank == 0 && text.data && status != INSITU_ERROR_MEMORY) {
+    if (session->rank == 0 && text.has_stamp && status != INSITU_ERROR_MEMORY) {
         session->stamp = text.stamp;
         session->has_stamp = true;
     }

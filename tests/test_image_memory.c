@@ -1,0 +1,264 @@
+/* Memory runs out while a picture is written: an error or the same file, and the next picture is as if nothing had
+ * been. Tables that the image library fills at the first picture are part of it, so that each try has a process of its
+ * own. */
+#define _GNU_SOURCE 1 /* memmem */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include <dirent.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "failing_heap.h"
+#include "session_image.h"
+
+enum { WIDTH = 40, HEIGHT = 30, MOST_BYTES = 1 << 16, SECONDS = 60 };
+
+static const char *folder = "test_image_memory_files";
+static int stride = 41; /* between the allocations that are tried */
+static float rgba[4 * WIDTH * HEIGHT], depth[WIDTH * HEIGHT];
+
+typedef struct picture_case {
+    const char *name;
+    insitu_image_format format;
+    bool has_depth;
+} picture_case;
+
+static const picture_case cases[] = {
+    {"a.png", INSITU_PNG8, false}, {"b.png", INSITU_PNG16, false}, {"c.exr", INSITU_EXR, true}};
+
+typedef struct file_bytes {
+    size_t count;
+    unsigned char bytes[MOST_BYTES];
+} file_bytes;
+
+static void path_of(const picture_case *c, char path[1024])
+{
+    snprintf(path, 1024, "%s/%s", folder, c->name);
+}
+
+static insitu_status write_picture(const picture_case *c, base_error *error)
+{
+    const insitu_image image = {WIDTH, HEIGHT, rgba, c->has_depth ? depth : NULL};
+    char path[1024];
+    path_of(c, path);
+    *error = (base_error){0};
+    return session_write_image(&image, c->format, path, error);
+}
+
+/* EXR has the second in which it was written: a text behind its length. */
+static void forget_date(file_bytes *file)
+{
+    static const char before[] = "capDate\0string";
+    enum { DATE = 19 };
+    unsigned char *at = memmem(file->bytes, file->count, before, sizeof before);
+    if (at) memset(at + sizeof before + 4, 0, DATE);
+}
+
+static bool read_picture(const picture_case *c, file_bytes *out)
+{
+    char path[1024];
+    path_of(c, path);
+    FILE *file = fopen(path, "rb");
+    out->count = file ? fread(out->bytes, 1, MOST_BYTES, file) : 0;
+    if (file) fclose(file);
+    forget_date(out);
+    return file;
+}
+
+static bool is_same(const file_bytes *a, const file_bytes *b)
+{
+    return a->count == b->count && !memcmp(a->bytes, b->bytes, a->count);
+}
+
+static int files_in_folder(void)
+{
+    DIR *entries = opendir(folder);
+    int count = 0;
+    for (const struct dirent *e; entries && (e = readdir(entries));)
+        count += strcmp(e->d_name, ".") && strcmp(e->d_name, "..");
+    if (entries) closedir(entries);
+    return count;
+}
+
+static void remove_picture(const picture_case *c)
+{
+    char path[1024];
+    path_of(c, path);
+    unlink(path);
+}
+
+/* ---- a process of its own ------------------------------------------------------------------------------------- */
+
+typedef enum verdict { GOOD, REFUSED, OTHER_PICTURE, OTHER_ERROR, LEFT_FILES, NEXT_FAILED } verdict;
+
+typedef struct outcome {
+    verdict verdict;
+    int64_t allocations;
+    char message[256];
+} outcome;
+
+/* How memory is made short: by the heap from a number on, or by a limit of the process's addresses. */
+typedef struct shortage {
+    int64_t n;
+    rlim_t spare;
+} shortage;
+
+static rlim_t address_bytes(void)
+{
+    long pages = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    if (file && fscanf(file, "%ld", &pages) != 1) pages = 0;
+    if (file) fclose(file);
+    return (rlim_t)pages * (rlim_t)sysconf(_SC_PAGESIZE);
+}
+
+static insitu_status write_in_shortage(const picture_case *c, const shortage *s, outcome *out)
+{
+    struct rlimit before, tight;
+    base_error error;
+    getrlimit(RLIMIT_AS, &before);
+    tight = before;
+    tight.rlim_cur = address_bytes() + s->spare;
+    if (s->n)
+        heap_arm(s->n, false);
+    else
+        setrlimit(RLIMIT_AS, &tight);
+    const insitu_status status = write_picture(c, &error);
+    if (s->n) out->allocations = heap_disarm();
+    setrlimit(RLIMIT_AS, &before);
+    snprintf(out->message, sizeof out->message, "%.255s", error.message);
+    return status;
+}
+
+static verdict judge(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
+{
+    static file_bytes found;
+    const insitu_status status = write_in_shortage(c, s, out);
+    const bool is_there = read_picture(c, &found);
+    if (status == INSITU_OK && !(is_there && is_same(&found, expected))) return OTHER_PICTURE;
+    if (status != INSITU_OK && is_there) return OTHER_PICTURE;
+    if (status != INSITU_OK && status != INSITU_ERROR_MEMORY) return OTHER_ERROR;
+    if (files_in_folder() != is_there) return LEFT_FILES;
+    base_error error;
+    if (write_picture(c, &error) || !read_picture(c, &found) || !is_same(&found, expected)) {
+        snprintf(out->message, sizeof out->message, "%.255s", error.message);
+        return NEXT_FAILED;
+    }
+    return status ? REFUSED : GOOD;
+}
+
+/* False where the process was ended. */
+static bool try_in_child(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
+{
+    int pipe_ends[2], status = 0;
+    assert_int_equal(pipe(pipe_ends), 0);
+    const pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        const struct rlimit no_core = {0, 0};
+        setrlimit(RLIMIT_CORE, &no_core);
+        alarm(SECONDS);
+        outcome mine = {0};
+        mine.verdict = judge(c, expected, s, &mine);
+        _exit(write(pipe_ends[1], &mine, sizeof mine) == (ssize_t)sizeof mine ? 0 : 1);
+    }
+    close(pipe_ends[1]);
+    const bool is_told = read(pipe_ends[0], out, sizeof *out) == (ssize_t)sizeof *out;
+    close(pipe_ends[0]);
+    waitpid(child, &status, 0);
+    remove_picture(c);
+    return is_told && WIFEXITED(status);
+}
+
+static void expect(const picture_case *c, file_bytes *expected)
+{
+    const pid_t child = fork();
+    base_error error;
+    assert_true(child >= 0);
+    if (child == 0) _exit(write_picture(c, &error) != INSITU_OK);
+    int status = 1;
+    waitpid(child, &status, 0);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    assert_true(read_picture(c, expected));
+    remove_picture(c);
+}
+
+/* True where the picture was written. */
+static bool survives(const picture_case *c, const file_bytes *expected, const shortage *s, outcome *out)
+{
+    const bool is_alive = try_in_child(c, expected, s, out);
+    if (!is_alive || (out->verdict != GOOD && out->verdict != REFUSED))
+        fail_msg("%s, allocation %lld, %lld bytes to spare: %s, verdict %d: %s", c->name, (long long)s->n,
+                 (long long)s->spare, is_alive ? "alive" : "the process was ended", (int)out->verdict, out->message);
+    return out->verdict == GOOD;
+}
+
+/* ---- tests ---------------------------------------------------------------------------------------------------- */
+
+static void failing_allocation_is_the_same_picture_or_an_error(void **context)
+{
+    (void)context;
+    static file_bytes expected;
+    if (!heap_can_fail()) skip();
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        outcome out;
+        int64_t n = 1;
+        int refused = 0;
+        expect(&cases[i], &expected);
+        for (;; n += stride) {
+            refused += !survives(&cases[i], &expected, &(shortage){.n = n}, &out);
+            if (out.allocations < n) break; /* there are no more */
+        }
+        assert_true(n > 500);
+        assert_true(refused > 0); /* the first: the picture's own */
+    }
+}
+
+static void tight_memory_is_the_same_picture_or_an_error(void **context)
+{
+    (void)context;
+    static file_bytes expected;
+    if (!heap_can_fail()) skip();
+    const rlim_t most = 48 << 20, step = (rlim_t)stride << 16;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        outcome out = {0};
+        int refused = 0;
+        expect(&cases[i], &expected);
+        for (rlim_t spare = 0; spare < most; spare += step)
+            refused += !survives(&cases[i], &expected, &(shortage){.spare = spare}, &out);
+        assert_true(refused > 0);
+        assert_int_equal(out.verdict, GOOD);
+    }
+}
+
+int main(int argument_count, char **arguments)
+{
+    if (argument_count > 1) folder = arguments[1];
+    if (argument_count > 2) stride = atoi(arguments[2]);
+    for (int i = 0; i < 4 * WIDTH * HEIGHT; i++) rgba[i] = (float)(i * 7919 % 1000) / 1000;
+    for (int i = 0; i < WIDTH * HEIGHT; i++) depth[i] = (float)(i * 31 % 100);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) remove_picture(&cases[i]);
+    mkdir(folder, 0777);
+    /* Loads the image library, which then refuses the picture. */
+    base_error error = {0};
+    const insitu_image nothing = {0, 0, NULL, NULL};
+    if (session_write_image(&nothing, INSITU_PNG8, "none.png", &error) != INSITU_ERROR_ARGUMENT) {
+        fprintf(stderr, "%s\n", error.message);
+        return 1;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(failing_allocation_is_the_same_picture_or_an_error),
+        cmocka_unit_test(tight_memory_is_the_same_picture_or_an_error),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
