@@ -109,12 +109,12 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     if (has_memory && frame->is_binned) {
         const double start = now();
         render_kept_begin(frame, states, threads);
-        has_memory = render_shown_find(frame, states, threads);
+        render_shown_find(frame, states, threads);
         statistics->surface_ms = 1e3 * (now() - start);
     }
     if (has_memory && frame->bins_volume) {
         const double start = now();
-        has_memory = render_shown_find_volume(frame, states, threads);
+        render_shown_find_volume(frame, states, threads);
         statistics->volume_ms = 1e3 * (now() - start);
     }
     frame->needs_planes = (job->surface_count && !frame->shown) || job->volume_count;

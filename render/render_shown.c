@@ -30,9 +30,10 @@ static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *li
 
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
-/* Another chunk. */
+/* Another chunk. A list that is full stays so: cells that found no room are missing from it. */
 static bool grow(kernel_shown_list *list)
 {
+    if (list->is_full) return false;
     const int64_t twice = 2 * list->capacity, capacity = !twice ? ITEMS : twice < MOST_ITEMS ? twice : MOST_ITEMS;
     int64_t left;
 #pragma omp atomic capture
@@ -137,8 +138,7 @@ typedef struct search {
     kernel_shown_list *lists; /* one a thread */
     uint32_t *counts, *starts;
     kernel_tile_shown *shown;
-    int64_t bound; /* less than 0: more cells show than may be listed */
-    bool has_memory;
+    int64_t bound;
 } search;
 
 static void run(search *s, kernel_thread *thread_of, int threads)
@@ -159,20 +159,17 @@ static void run(search *s, kernel_thread *thread_of, int threads)
         {
             for (int t = 0; t < threads; t++) is_full = is_full || s->lists[t].is_full;
             const uint64_t count = is_full ? 0 : place_tiles(s->counts, threads, tiles, s->starts);
-            s->has_memory = !is_full || s->bound < 0;
             is_full = is_full || count > (uint64_t)most;
             if (!is_full) s->shown = base_alloc(count * sizeof *s->shown);
-            s->has_memory = s->has_memory && (is_full || s->shown);
         }
         for (const kernel_shown_chunk *c = s->shown ? list->chunk : NULL; c; c = c->before)
             bin_tiles(c, across, s->counts + me * tiles, s->shown);
     }
 }
 
-/* Sets shown and starts to what the search has found, or to NULL where more cells show than may be listed; false where
- * memory ran out. */
-static bool find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads, kernel_tile_shown **shown,
-                 uint32_t **starts)
+/* What the search has found, or NULL. */
+static kernel_tile_shown *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads,
+                               uint32_t **starts)
 {
     const int64_t tiles = tile_count(frame), pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
@@ -192,18 +189,17 @@ static bool find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, 
     base_free(s.subtrees.items);
     if (!s.shown) base_free(s.starts);
     *starts = s.shown ? s.starts : NULL;
-    *shown = s.shown;
-    return s.has_memory;
+    return s.shown;
 }
 
-bool render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
+void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
-    return find(frame, false, thread_of, threads, &frame->shown, &frame->shown_starts);
+    frame->shown = find(frame, false, thread_of, threads, &frame->shown_starts);
 }
 
-bool render_shown_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
+void render_shown_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
-    return find(frame, true, thread_of, threads, &frame->volume_shown, &frame->volume_starts);
+    frame->volume_shown = find(frame, true, thread_of, threads, &frame->volume_starts);
 }
 
 void render_shown_free(kernel_frame *frame)

@@ -4,12 +4,11 @@
 
 #include "kernel_types.h"
 
-/* Fill frame->shown, which render_shown_free() frees; thread_of is one state a thread. Where more cells show than pay it
- * stays NULL, and tiles go down the trees themselves. That is no way out where memory runs out, of which false tells:
- * cells are met in another order there, and a volume's picture may differ within max_error. */
-bool render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
+/* Fill frame->shown, which render_shown_free() frees; thread_of is one state a thread. Where more cells show than pay,
+ * or there is no memory for them, it stays NULL, and tiles go down the trees themselves. */
+void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
 /* The same of the only volume's cells, as frame->volume_shown. */
-bool render_shown_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
+void render_shown_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
 void render_shown_free(kernel_frame *frame);
 
 #endif

@@ -55,8 +55,34 @@ add_executable(test_session_guard test_session_guard.c)
 target_link_libraries(test_session_guard PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME session_guard COMMAND test_session_guard)
 
+# Memory runs out: quickly at every 97th allocation, in the long tests at each.
+insitu_session_program(test_step_memory)
+target_sources(test_step_memory PRIVATE failing_heap_mpi.c)
+target_link_libraries(test_step_memory PRIVATE test_failing_heap)
+set_target_properties(test_step_memory PROPERTIES C_VISIBILITY_PRESET default)
+insitu_add_mpi_test(step_memory test_step_memory 1 2 TIMEOUT 300 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+foreach(ranks 1 2)
+  insitu_add_long_test(step_memory_long_np${ranks} ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks}
+    $<TARGET_FILE:test_step_memory> ${CMAKE_CURRENT_BINARY_DIR} 1)
+  set_tests_properties(step_memory_long_np${ranks} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+endforeach()
+
 # The shared library and the public header alone.
 add_executable(test_api test_api.c)
 target_link_libraries(test_api PRIVATE insitu_flags insitu PkgConfig::CMOCKA)
 add_dependencies(test_api insitu_image)
 insitu_add_mpi_test(api test_api 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
+# An empty entry of LD_LIBRARY_PATH is the working directory. By the shared library, and by a program that has its objects.
+add_library(planted_image MODULE planted_image.c)
+target_link_libraries(planted_image PRIVATE insitu_flags insitu_headers)
+set_target_properties(planted_image PROPERTIES
+  PREFIX lib OUTPUT_NAME insitu_image LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
+add_test(NAME image_library_is_not_of_the_working_directory
+  COMMAND test_api ${CMAKE_CURRENT_BINARY_DIR} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
+add_test(NAME image_library_of_programs_is_not_of_the_working_directory
+  COMMAND test_image_output ${CMAKE_CURRENT_BINARY_DIR}/planted_output
+  WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/planted)
+set_tests_properties(image_library_is_not_of_the_working_directory
+  image_library_of_programs_is_not_of_the_working_directory PROPERTIES
+  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};LD_LIBRARY_PATH=:" TIMEOUT 120)

@@ -147,7 +147,7 @@ static verdict judge(const picture_case *c, const file_bytes *expected, const sh
     const bool is_there = read_picture(c, &found);
     if (status == INSITU_OK && !(is_there && is_same(&found, expected))) return OTHER_PICTURE;
     if (status != INSITU_OK && is_there) return OTHER_PICTURE;
-    if (status != INSITU_OK && status != INSITU_ERROR_MEMORY) return OTHER_ERROR;
+    if (status != INSITU_OK && status != INSITU_ERROR_MEMORY && status != INSITU_ERROR_IO) return OTHER_ERROR;
     if (files_in_folder() != is_there) return LEFT_FILES;
     base_error error;
     if (write_picture(c, &error) || !read_picture(c, &found) || !is_same(&found, expected)) {

@@ -9,11 +9,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <fcntl.h>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <string>
+#include <sys/file.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <vector>
 
 /* Last, for it defines macros as short as fail(). */
@@ -247,6 +252,76 @@ void full_disk_is_told_and_leaves_the_old_picture(void **)
     }
 }
 
+/* What stands in a folder beside the pictures. */
+std::size_t count_others(const fs::path &in, const std::string &name)
+{
+    std::size_t count = 0;
+    for (const auto &entry : fs::directory_iterator(in)) count += entry.path().filename() != name;
+    return count;
+}
+
+/* Its old temporary name had the picture's and some more. */
+void longest_legal_name_is_written(void **)
+{
+    const fs::path in = folder / "long";
+    const picture p = make_picture(3, 2, true);
+    for (const std::size_t length : {244, 255}) {
+        const fs::path path = in / (std::string(length - 4, 'a') + ".png");
+        write_well(p.view(false), INSITU_PNG8, path);
+        assert_true(fs::is_regular_file(path));
+    }
+    assert_int_equal(count_files(in), 2);
+}
+
+/* Whoever may write to the folder plants links of the name that the temporary file once had. */
+void planted_links_keep_their_victims(void **)
+{
+    const fs::path in = folder / "planted", victim = folder / "victim";
+    fs::create_directories(in);
+    std::ofstream(victim) << "precious";
+    fs::create_symlink(fs::absolute(victim), in / (".a.png." + std::to_string(getpid()) + ".part.png"));
+    write_well(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
+    std::string found;
+    std::ifstream(victim) >> found;
+    assert_string_equal(found.c_str(), "precious");
+    assert_true(fs::is_regular_file(fs::symlink_status(in / "a.png")));
+    assert_int_equal(count_others(in, "a.png"), 1);
+}
+
+/* Files of the temporary names: one that a killed run left, one that is being written, a link, a pipe, and others'
+ * names.
+ */
+void files_of_killed_runs_are_removed(void **)
+{
+    const fs::path in = folder / "left";
+    const std::string left = ".insitu-0123456789abcdef.part", held = ".insitu-fedcba9876543210.part";
+    const std::string link = ".insitu-00000000000000ff.part", pipe = ".insitu-00000000000000fe.part";
+    const std::string others[] = {".insitu-0123456789abcdef.part2", ".insitu-0123456789ABCDEF.part", "a.part"};
+    fs::create_directories(in);
+    for (const std::string &name : {left, held, others[0], others[1], others[2]}) std::ofstream(in / name) << "half";
+    fs::create_symlink(fs::absolute(in / others[2]), in / link);
+    assert_int_equal(mkfifo((in / pipe).c_str(), 0600), 0);
+    const int writer = open((in / held).c_str(), O_RDWR);
+    assert_int_equal(flock(writer, LOCK_EX), 0);
+    write_well(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png");
+    assert_false(fs::exists(in / left));
+    for (const std::string &name : {held, others[0], others[1], others[2]}) assert_true(fs::exists(in / name));
+    assert_true(fs::is_symlink(fs::symlink_status(in / link)) && fs::is_fifo(in / pipe));
+    close(writer);
+}
+
+void pipe_in_the_picture_s_place_is_told(void **)
+{
+    const fs::path in = folder / "pipe";
+    fs::create_directories(in);
+    assert_int_equal(mkfifo((in / "a.png").c_str(), 0600), 0);
+    base_error error;
+    assert_int_equal(write(make_picture(3, 2, true).view(false), INSITU_PNG8, in / "a.png", error), INSITU_ERROR_IO);
+    assert_non_null(std::strstr(error.message, "a.png: cannot be written: there is a named pipe"));
+    assert_true(fs::is_fifo(in / "a.png"));
+    assert_int_equal(count_files(in), 1);
+}
+
 void nonsense_is_refused(void **)
 {
     const picture p = make_picture(3, 2, true);
@@ -276,6 +351,10 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(writing_leaves_the_picture_alone),
         cmocka_unit_test(unwritable_places_are_told),
         cmocka_unit_test(full_disk_is_told_and_leaves_the_old_picture),
+        cmocka_unit_test(longest_legal_name_is_written),
+        cmocka_unit_test(planted_links_keep_their_victims),
+        cmocka_unit_test(files_of_killed_runs_are_removed),
+        cmocka_unit_test(pipe_in_the_picture_s_place_is_told),
         cmocka_unit_test(nonsense_is_refused),
     };
     const int failures = cmocka_run_group_tests(tests, nullptr, nullptr);

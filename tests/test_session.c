@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "memory.h"
 #include "session.h"
@@ -527,6 +529,30 @@ static insitu_status hand_over_both(insitu_session *session, insitu_field *cells
     return status ? status : insitu_set_field(session, "m", cells);
 }
 
+/* Opening a pipe that nobody writes to would wait for ever. */
+static void scene_that_is_no_file_is_told(void **context)
+{
+    (void)context;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain_scene));
+    const char *scene = write_scene(plain_scene);
+    char kept[1100];
+    snprintf(kept, sizeof kept, "%s.kept", scene);
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    step_draws(session, 0, 1);
+    everywhere(own_rank != 0 || (rename(scene, kept) == 0 && mkfifo(scene, 0600) == 0));
+    for (int cycle = 1; cycle < 3; cycle++) {
+        step_draws(session, cycle, 1);
+        everywhere(strstr(insitu_last_report(session)->warnings, "is a named pipe (FIFO), expected a regular file"));
+    }
+    insitu_session *other = NULL;
+    const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &other);
+    told_everywhere(NULL, status, INSITU_ERROR_SCENE, scene, "is a named pipe (FIFO), expected a regular file");
+    everywhere(own_rank != 0 || (unlink(scene) == 0 && rename(kept, scene) == 0));
+    const insitu_status of_folder = insitu_create(MPI_COMM_WORLD, "/", &other);
+    told_everywhere(NULL, of_folder, INSITU_ERROR_SCENE, "/: is a directory, expected a regular file");
+    insitu_destroy(&session);
+}
+
 static void memory_is_given_back(void **context)
 {
     (void)context;
@@ -660,6 +686,7 @@ static int run(void)
         cmocka_unit_test(picture_that_cannot_be_written_is_told_to_all),
         cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
         cmocka_unit_test(bad_scene_opens_no_session),
+        cmocka_unit_test(scene_that_is_no_file_is_told),
         cmocka_unit_test(memory_is_given_back),
         cmocka_unit_test(picture_memory_is_kept_to_a_limit),
         cmocka_unit_test(failing_allocation_is_an_error_and_no_more),

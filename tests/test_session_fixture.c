@@ -182,15 +182,18 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
     (void)format;
     if (unwritable && strstr(path, unwritable)) return base_fail(error, INSITU_ERROR_IO, "%s: cannot be written", path);
     if (caught_count == MAX_CAUGHT) return base_fail(error, INSITU_ERROR_INTERNAL, "too many pictures for the test");
-    caught_picture *picture = &caught[caught_count++];
     const size_t pixels = (size_t)image->width * (size_t)image->height;
-    *picture = (caught_picture){.width = image->width, .height = image->height, .held = base_memory_held()};
-    snprintf(picture->path, sizeof picture->path, "%s", path);
-    picture->rgba = malloc(pixels * 4 * sizeof(float));
-    memcpy(picture->rgba, image->rgba, pixels * 4 * sizeof(float));
-    if (image->depth) {
-        picture->depth = malloc(pixels * sizeof(float));
-        memcpy(picture->depth, image->depth, pixels * sizeof(float));
+    caught_picture picture = {.width = image->width, .height = image->height, .held = base_memory_held()};
+    snprintf(picture.path, sizeof picture.path, "%s", path);
+    picture.rgba = malloc(pixels * 4 * sizeof(float));
+    if (image->depth) picture.depth = malloc(pixels * sizeof(float));
+    if (!picture.rgba || (image->depth && !picture.depth)) {
+        free(picture.rgba);
+        free(picture.depth);
+        return base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory to catch it", path);
     }
+    memcpy(picture.rgba, image->rgba, pixels * 4 * sizeof(float));
+    if (image->depth) memcpy(picture.depth, image->depth, pixels * sizeof(float));
+    caught[caught_count++] = picture;
     return INSITU_OK;
 }

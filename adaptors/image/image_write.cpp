@@ -103,10 +103,39 @@ OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
     return spec;
 }
 
-/* Its C libraries' words are all that tells of memory there. */
+/* Of so many bytes, the least first. */
+std::uint64_t number_at(const std::vector<unsigned char> &file, std::size_t at, int bytes)
+{
+    std::uint64_t number = 0;
+    for (int i = bytes; i-- > 0;) number = number << 8 | file[at + static_cast<std::size_t>(i)];
+    return number;
+}
+
+/* OpenEXR may lose rows that its compressor has no memory for, and say nothing. In the table of blocks of rows, behind
+ * the attributes (name, type, size and value each), such a block's place stays 0. */
+bool has_all_rows(const std::vector<unsigned char> &file, int height)
+{
+    enum { VERSION_END = 8, SIZE_BYTES = 4, PLACE_BYTES = 8, ZIP_ROWS = 16 };
+    std::size_t at = VERSION_END;
+    while (at < file.size() && file[at]) {
+        for (int text = 0; text < 2; text++) {
+            while (at < file.size() && file[at]) at++;
+            at++;
+        }
+        if (at + SIZE_BYTES > file.size()) return false;
+        at += SIZE_BYTES + static_cast<std::size_t>(number_at(file, at, SIZE_BYTES));
+    }
+    at++;
+    for (int row = 0; row < height; row += ZIP_ROWS, at += PLACE_BYTES)
+        if (at + PLACE_BYTES > file.size() || !number_at(file, at, PLACE_BYTES)) return false;
+    return true;
+}
+
+/* Of memory that C libraries lacked their words tell, if anything does. */
 [[noreturn]] void fail_with(std::string what)
 {
-    if (what.find("memory") != std::string::npos || what.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
+    for (const char *words : {"memory", "bad_alloc"})
+        if (what.find(words) != std::string::npos) throw std::bad_alloc();
     std::replace(what.begin(), what.end(), '\n', ' ');
     throw io_error(what);
 }
@@ -122,7 +151,7 @@ void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixe
     output->threads(1);
     if (!output->open(name, spec)) fail_with(output->geterror());
     if (!output->write_image(spec.format, pixels)) fail_with(output->geterror());
-    if (!output->close()) fail_with(output->geterror());
+    if (!output->close() || output->has_error()) fail_with(output->geterror());
 }
 
 /* What is large is allocated first, so that the reserve is left to what OpenImageIO and the libraries below it allocate
@@ -137,6 +166,7 @@ void write_pixels(const insitu_image &image, const layout &l, const void *pixels
     bytes.reserve(raw + raw / 8 + ADDED); /* noise does not compress, and formats add to it */
     const memory_reserve reserve(TABLES + ROWS * row);
     encode_file(l.file_name, l.describe(image, l), pixels, bytes);
+    if (l.describe == describe_exr && !has_all_rows(bytes, image.height)) throw std::bad_alloc();
     write_picture_file(path, bytes.data(), bytes.size());
 }
 

@@ -12,6 +12,10 @@ std::atomic<void *> reserve;
 std::atomic<std::new_handler> handler_before;
 std::mutex lock; /* one holds a reserve at a time */
 
+/* Left free beside the reserve for what does not come by operator new: the loader ends the process where it finds no
+ * room for a thread's variables, and compressors give up. */
+enum { SPARE_BYTES = 4 << 20 };
+
 void give_back()
 {
     void *block = reserve.exchange(nullptr);
@@ -29,11 +33,15 @@ void give_back()
 memory_reserve::memory_reserve(std::size_t bytes)
 {
     lock.lock();
-    reserve = std::malloc(bytes);
-    if (!reserve) {
+    void *spare = std::malloc(SPARE_BYTES);
+    void *block = std::malloc(bytes);
+    std::free(spare);
+    if (!spare || !block) {
+        std::free(block);
         lock.unlock();
         throw std::bad_alloc();
     }
+    reserve = block;
     handler_before = std::set_new_handler(give_back);
 }
 

@@ -45,6 +45,18 @@ static cyaml_config_t reader_settings(base_error *log)
                             .flags = CYAML_CFG_NO_ALIAS};
 }
 
+/* libyaml has read the text twice before: what it cannot do now is for want of memory. */
+static bool is_lack_of_memory(cyaml_err_t result)
+{
+    switch (result) {
+    case CYAML_ERR_OOM:
+    case CYAML_ERR_LIBYAML_EVENT_INIT:
+    case CYAML_ERR_LIBYAML_PARSER_INIT:
+    case CYAML_ERR_LIBYAML_PARSER: return true;
+    default: return false;
+    }
+}
+
 /* What the document check lets pass, libcyaml reads; were the two ever to disagree, its own words are passed on. */
 static insitu_status load_file(const scene_document *d, const char *text, size_t size, scene_file **file)
 {
@@ -53,7 +65,7 @@ static insitu_status load_file(const scene_document *d, const char *text, size_t
     const cyaml_err_t result =
         cyaml_load_data((const uint8_t *)text, size, &settings, &scene_top_value, (cyaml_data_t **)file, NULL);
     if (result == CYAML_OK) return INSITU_OK;
-    if (result == CYAML_ERR_OOM) return scene_no_memory(d);
+    if (is_lack_of_memory(result)) return scene_no_memory(d);
     return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:1: %s (%.400s)", d->file_name, cyaml_strerror(result),
                      log.message);
 }

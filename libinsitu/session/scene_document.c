@@ -29,7 +29,8 @@ static size_t lines_before(const char *text, size_t size, size_t offset)
 
 static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text, size_t size)
 {
-    if (parser->error == YAML_MEMORY_ERROR) {
+    /* libyaml has no word for some of the memory that it lacks. */
+    if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
         return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
     }
     const bool is_encoding = parser->error == YAML_READER_ERROR; /* such errors know an offset, but no line */

@@ -25,8 +25,10 @@ typedef struct insitu_image {
                            +infinity where there is nothing */
 } insitu_image;
 
-/* Write to a temporary name beside path and rename, so that path is never half a picture; missing folders are made. On
- * an error message (size bytes) says what, with the path. Local. */
+/* Write to a temporary file beside path and rename, so that path is never half a picture; missing folders are made. The
+ * temporary file is named ".insitu-", 16 random digits and ".part", and is locked while it is written; the first picture
+ * that a process writes to a folder removes those that killed runs of the same user left there. A pipe, device or
+ * directory of the picture's name is an error. On an error message (size bytes) says what, with the path. Local. */
 typedef insitu_status insitu_image_write_function(const insitu_image *image, insitu_image_format format,
                                                   const char *path, char *message, size_t size);
 

@@ -164,9 +164,9 @@ INSITU_API void insitu_field_defaults(insitu_field *field);
  * INSITU_FLOAT64. Local. */
 INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insitu_type type);
 
-/* Open a session. Collective over comm, which is duplicated; its error handler is left alone. scene_file is read on
- * rank 0 only, and read again when it changes on disk. On an error *out is NULL on every rank, and the message is
- * insitu_error(NULL). MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
+/* Open a session. Collective over comm, which is duplicated; its error handler is left alone. scene_file, a regular
+ * file, is read on rank 0 only, and read again when it changes on disk. On an error *out is NULL on every rank, and the
+ * message is insitu_error(NULL). MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
 INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
 
 /* Hand over this rank's part of the mesh called name: borrowed arrays. Local. Ranks that have no part of it need not

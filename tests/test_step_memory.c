@@ -1,0 +1,369 @@
+/* Every allocation of a session's life fails in turn, on one rank or on all: as it is created, as meshes and fields are
+ * set and drawn, as its scene is edited. What comes of it is an error on all ranks or the picture, to the bit; and the
+ * next step draws the picture, whatever failed before. The heap that fails is the process's own, so that what libyaml,
+ * libcyaml and the C library ask for is of it. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "failing_heap.h"
+#include "memory.h"
+#include "test_session_fixture.h"
+
+/* Between the allocations that are tried: each case begins at its own. */
+static int stride = 97;
+/* The one that fails, or did last. */
+static int64_t allocation;
+
+/* ---- scenes and meshes ---------------------------------------------------------------------------------------- */
+
+#define IMAGE(name, size, layers, sampling)                                                                            \
+    "  - name: " name "\n    size: " size "\n    layers:\n" layers sampling "    outputs: [{path: " name ".exr}]\n"
+#define SURFACES                                                                                                       \
+    "      - isosurface: {field: f, values: [0.1, -0.4]}\n"                                                            \
+    "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
+#define VOLUME(field) "      - volume: {field: " field ", opacity: [[0, 0], [0.3, 0.4], [1, 0.9]]}\n"
+
+/* Surfaces alone and in front of a volume, by samples and by segments, values at vertices and in cells, several
+ * volumes, frames that are summed. */
+static const char full_scene[] =
+    "threads: 1\nimages:\n" IMAGE("a", "[24, 16]", SURFACES VOLUME("f"), "    sampling: {step_cells: 0.5, frames: 3}\n")
+        IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01}\n")
+            IMAGE("d", "[16, 16]", VOLUME("f") VOLUME("c"), "    sampling: {max_error: 0.01}\n");
+
+static const char edited_scene[] =
+    "threads: 1\nimages:\n" IMAGE("e", "[24, 16]", "      - isosurface: {field: f, values: [0.2]}\n", "");
+
+typedef struct memory_case {
+    const char *name;
+    test_mesh_kind kinds[2];
+    int mesh_count; /* two fill the same space */
+} memory_case;
+
+static const memory_case cases[] = {{"tets", {TEST_TETS}, 1},
+                                    {"hexes", {TEST_HEXES}, 1},
+                                    {"polyhedra", {TEST_POLYHEDRA}, 1},
+                                    {"mixed cells", {TEST_MIXED}, 1},
+                                    {"overlapping meshes", {TEST_HEXES, TEST_TETS}, 2},
+                                    {"overlapping polyhedra", {TEST_POLYHEDRA, TEST_HEXES}, 2}};
+
+typedef struct scenery {
+    const memory_case *of;
+    session_input inputs[2];
+    double *cell_values[2];
+} scenery;
+
+static void scenery_create(scenery *s, const memory_case *of)
+{
+    s->of = of;
+    for (int i = 0; i < of->mesh_count; i++) {
+        input_create(&s->inputs[i], of->kinds[i], 3, TEST_RANDOM, own_rank, rank_count);
+        const int64_t cells = s->inputs[i].part.cell_count;
+        s->cell_values[i] = calloc((size_t)cells + 1, sizeof(double));
+        assert_non_null(s->cell_values[i]);
+        for (int64_t k = 0; k < cells; k++) s->cell_values[i][k] = test_uniform_in((uint64_t)k, 3, -1, 1);
+    }
+}
+
+static void scenery_free(scenery *s)
+{
+    for (int i = 0; i < s->of->mesh_count; i++) {
+        input_free(&s->inputs[i]);
+        free(s->cell_values[i]);
+    }
+}
+
+/* The first status that is not OK; the rest is handed over all the same. */
+static insitu_status hand_over_scenery(insitu_session *session, const scenery *s)
+{
+    insitu_status first = INSITU_OK;
+    for (int i = 0; i < s->of->mesh_count; i++) {
+        const char *name = i ? "n" : "m";
+        const session_input *in = &s->inputs[i];
+        insitu_field cells = in->field;
+        cells.name = "c", cells.centring = INSITU_CELL, cells.count = in->part.cell_count;
+        cells.values.data = s->cell_values[i];
+        insitu_status status = insitu_set_mesh(session, name, &in->mesh);
+        if (!status) status = insitu_set_field(session, name, &in->field);
+        if (!status) status = insitu_set_field(session, name, &cells);
+        if (!first) first = status;
+    }
+    return first;
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------- */
+
+typedef struct picture_set {
+    int count;
+    caught_picture pictures[MAX_CAUGHT];
+} picture_set;
+
+static bool is_same_picture(const caught_picture *a, const caught_picture *b)
+{
+    const size_t pixels = (size_t)a->width * (size_t)a->height;
+    return a->width == b->width && a->height == b->height && !memcmp(a->rgba, b->rgba, pixels * 4 * sizeof(float)) &&
+           !memcmp(a->depth, b->depth, pixels * sizeof(float)) && !strcmp(a->path, b->path);
+}
+
+/* Rank 0's pictures, which are forgotten. */
+static picture_set take_pictures(void)
+{
+    picture_set set = {.count = caught_count};
+    memcpy(set.pictures, caught, (size_t)caught_count * sizeof *caught);
+    caught_count = 0;
+    return set;
+}
+
+static void free_pictures(picture_set *set)
+{
+    for (int i = 0; i < set->count; i++) {
+        free(set->pictures[i].rgba);
+        free(set->pictures[i].depth);
+    }
+}
+
+/* Every picture that was caught is one of the set; rank 0 has them. */
+static bool are_of(const picture_set *set)
+{
+    bool are_all = true;
+    for (int i = 0; i < caught_count; i++) {
+        bool is_one = false;
+        for (int k = 0; k < set->count; k++) is_one = is_one || is_same_picture(&caught[i], &set->pictures[k]);
+        are_all = are_all && is_one;
+    }
+    return are_all;
+}
+
+/* As everywhere(), with the allocation that failed. */
+#define at_allocation(condition) everywhere(name_allocation((condition)))
+static bool name_allocation(bool is_well)
+{
+    if (!is_well) fprintf(stderr, "allocation %lld:\n", (long long)allocation);
+    return is_well;
+}
+
+static void step_draws(insitu_session *session, const picture_set *expected)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, 1, 0);
+    told_everywhere(session, status, INSITU_OK, "");
+    at_allocation(own_rank != 0 || (are_of(expected) && caught_count == expected->count));
+}
+
+static insitu_session *open_and_draw(const char *scene, const scenery *s, picture_set *out)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    everywhere(hand_over_scenery(session, s) == INSITU_OK);
+    forget_pictures();
+    const insitu_status status = insitu_step(session, 1, 0);
+    told_everywhere(session, status, INSITU_OK, "");
+    *out = take_pictures();
+    return session;
+}
+
+/* ---- one allocation fails -------------------------------------------------------------------------------------- */
+
+typedef struct failure {
+    int64_t n;
+    bool is_armed; /* on this rank */
+} failure;
+
+static void arm(const failure *f)
+{
+    if (f->is_armed) heap_arm(f->n, false);
+}
+
+/* Whether it was beyond the last allocation on every rank. */
+static bool disarm(const failure *f)
+{
+    int is_over = !f->is_armed || heap_disarm() < f->n;
+    MPI_Allreduce(MPI_IN_PLACE, &is_over, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    return is_over;
+}
+
+/* An error is one of memory, or of the field that a refused mesh could not be given, and the same for all. */
+static void check_told(const insitu_session *session, insitu_status status)
+{
+    if (status == INSITU_OK || status == INSITU_ERROR_FIELD) {
+        told_everywhere(session, status, status, "");
+        return;
+    }
+    if (status != INSITU_ERROR_MEMORY) fprintf(stderr, "allocation %lld: ", (long long)allocation);
+    told_everywhere(session, status, INSITU_ERROR_MEMORY, "memory");
+}
+
+static void run_failures(bool (*fails_well)(const scenery *s, const failure *f, void *state), const scenery *s,
+                         int first, void *state)
+{
+    for (int with_all = 0; with_all < (rank_count > 1 ? 2 : 1); with_all++) {
+        failure f = {.n = first, .is_armed = with_all || own_rank == rank_count - 1};
+        for (allocation = f.n; !fails_well(s, &f, state); allocation = f.n) f.n += stride;
+        if (own_rank == 0) fprintf(stderr, "%s: to allocation %lld\n", s->of->name, (long long)f.n);
+    }
+}
+
+/* ---- steps ----------------------------------------------------------------------------------------------------- */
+
+typedef struct step_state {
+    insitu_session *session;
+    picture_set expected;
+} step_state;
+
+/* Returns whether there are no more to fail. */
+static bool set_and_step_fail_well(const scenery *s, const failure *f, void *state)
+{
+    step_state *t = state;
+    forget_pictures();
+    arm(f);
+    const insitu_status set = hand_over_scenery(t->session, s);
+    const insitu_status status = insitu_step(t->session, 1, 0);
+    const bool is_over = disarm(f);
+    check_told(t->session, status);
+    at_allocation(own_rank != 0 || are_of(&t->expected));
+    at_allocation(own_rank != 0 || status != INSITU_OK || caught_count == t->expected.count);
+    int is_set = set == INSITU_OK;
+    MPI_Allreduce(MPI_IN_PLACE, &is_set, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    if (is_set) step_draws(t->session, &t->expected); /* what was taken is not lost */
+    everywhere(hand_over_scenery(t->session, s) == INSITU_OK);
+    step_draws(t->session, &t->expected);
+    return is_over;
+}
+
+static void failing_step_is_the_same_picture_or_an_error(void **context)
+{
+    (void)context;
+    if (!heap_can_fail()) skip();
+    for (int i = 0; i < (int)(sizeof cases / sizeof *cases); i++) {
+        scenery s;
+        step_state t;
+        scenery_create(&s, &cases[i]);
+        t.session = open_and_draw(full_scene, &s, &t.expected);
+        run_failures(set_and_step_fail_well, &s, 1 + i % stride, &t);
+        insitu_destroy(&t.session);
+        free_pictures(&t.expected);
+        scenery_free(&s);
+    }
+}
+
+/* ---- first steps: a new session each --------------------------------------------------------------------------- */
+
+static bool first_step_fails_well(const scenery *s, const failure *f, void *state)
+{
+    step_state *t = state;
+    t->session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
+    const bool is_over = set_and_step_fail_well(s, f, t);
+    insitu_destroy(&t->session);
+    return is_over;
+}
+
+static void failing_first_step_is_the_same_picture_or_an_error(void **context)
+{
+    (void)context;
+    if (!heap_can_fail()) skip();
+    for (int i = 2; i < (int)(sizeof cases / sizeof *cases); i += 2) {
+        scenery s;
+        step_state t;
+        scenery_create(&s, &cases[i]);
+        t.session = open_and_draw(full_scene, &s, &t.expected);
+        insitu_destroy(&t.session);
+        run_failures(first_step_fails_well, &s, 1 + i % stride, &t);
+        free_pictures(&t.expected);
+        scenery_free(&s);
+    }
+}
+
+/* ---- sessions --------------------------------------------------------------------------------------------------- */
+
+static bool creation_fails_well(const scenery *s, const failure *f, void *state)
+{
+    step_state *t = state;
+    const int64_t held = base_memory_held();
+    const char *scene = write_scene(full_scene);
+    insitu_session *session = NULL;
+    arm(f);
+    const insitu_status status = insitu_create(MPI_COMM_WORLD, scene, &session);
+    const bool is_over = disarm(f);
+    everywhere((status == INSITU_OK) == (session != NULL));
+    check_told(NULL, status);
+    if (session) {
+        everywhere(hand_over_scenery(session, s) == INSITU_OK);
+        step_draws(session, &t->expected);
+    }
+    insitu_destroy(&session);
+    everywhere(base_memory_held() == held);
+    return is_over;
+}
+
+static void failing_creation_opens_the_session_or_none(void **context)
+{
+    (void)context;
+    if (!heap_can_fail()) skip();
+    scenery s;
+    step_state t;
+    scenery_create(&s, &cases[0]);
+    t.session = open_and_draw(full_scene, &s, &t.expected);
+    insitu_destroy(&t.session);
+    run_failures(creation_fails_well, &s, 1, &t);
+    free_pictures(&t.expected);
+    scenery_free(&s);
+}
+
+/* ---- edits ------------------------------------------------------------------------------------------------------ */
+
+typedef struct edit_state {
+    picture_set before, after;
+} edit_state;
+
+/* A step in which the edit is not taken says so, and the next one takes it. */
+static bool edit_fails_well(const scenery *s, const failure *f, void *state)
+{
+    edit_state *t = state;
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(full_scene));
+    everywhere(hand_over_scenery(session, s) == INSITU_OK);
+    write_scene(edited_scene);
+    forget_pictures();
+    arm(f);
+    const insitu_status status = insitu_step(session, 1, 0);
+    const bool is_over = disarm(f);
+    check_told(session, status);
+    const bool is_taken = are_of(&t->after);
+    at_allocation(own_rank != 0 || is_taken || are_of(&t->before));
+    at_allocation(own_rank != 0 || is_taken || status != INSITU_OK || *insitu_last_report(session)->warnings);
+    step_draws(session, &t->after);
+    insitu_destroy(&session);
+    return is_over;
+}
+
+static void failing_edit_is_told_and_taken_later(void **context)
+{
+    (void)context;
+    if (!heap_can_fail()) skip();
+    scenery s;
+    edit_state t;
+    scenery_create(&s, &cases[2]);
+    insitu_session *session = open_and_draw(full_scene, &s, &t.before);
+    insitu_destroy(&session);
+    session = open_and_draw(edited_scene, &s, &t.after);
+    insitu_destroy(&session);
+    run_failures(edit_fails_well, &s, 1, &t);
+    free_pictures(&t.before);
+    free_pictures(&t.after);
+    scenery_free(&s);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(failing_step_is_the_same_picture_or_an_error),
+        cmocka_unit_test(failing_first_step_is_the_same_picture_or_an_error),
+        cmocka_unit_test(failing_creation_opens_the_session_or_none),
+        cmocka_unit_test(failing_edit_is_told_and_taken_later),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 2) stride = atoi(argv[2]);
+    return run_session_tests(argc, argv, run);
+}
