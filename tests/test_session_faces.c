@@ -4,8 +4,10 @@
  * A rank's faces and vertices are numbered in the order in which its cells first use them: cell 0 has face 0 first, and
  * no cell before it. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
+#include "memory.h"
 #include "test_mesh_make.h"
 #include "test_session_fixture.h"
 
@@ -346,6 +348,23 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     test_free(before);
 }
 
+/* The first allocation of a step that checks polyhedra is for their edges. Without it nothing is known of the cells,
+ * and the next step must look at them again. */
+static void check_without_memory_is_told_and_repeated(void **context)
+{
+    (void)context;
+    char rank_words[32];
+    snprintf(rank_words, sizeof rank_words, "rank %d: ", rank_count - 1);
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    base_memory_fail_nth(own_rank == rank_count - 1);
+    const insitu_status status = insitu_step(session, 8, 0);
+    base_memory_fail_nth(0);
+    told_everywhere(session, status, INSITU_ERROR_MEMORY, rank_words, "mesh \"m\": no memory to check cell 0");
+    const int64_t cells = input.part.cell_count;
+    step_is_good(session, 9);
+    everywhere(insitu_last_report(session)->cells == cells && insitu_last_report(session)->bytes_trees > 0);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
@@ -353,6 +372,7 @@ static int run(void)
         cmocka_unit_test(spoilt_faces_are_told_at_the_step),
         cmocka_unit_test(ghosts_are_proved_but_for_coordinates),
         cmocka_unit_test(flat_polyhedra_are_counted_and_change_no_picture),
+        cmocka_unit_test(check_without_memory_is_told_and_repeated),
     };
     session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
     input_create(&input, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
