@@ -179,7 +179,7 @@ void wrong_files_are_named_with_the_reason(void **)
     expect(run_tool("scene.yaml missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
     expect(run_tool("scene.yaml notes.txt"), 1, "insitu-render: notes.txt: unknown ending");
     expect(run_tool("scene.yaml ."), 1, "is a directory");
-    expect(run_tool("--info cut.vtu"), 1, "insitu-render: cut.vtu: cannot be read");
+    expect(run_tool("--info cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
     expect(run_tool("--info missing.vtu"), 1, "insitu-render: missing.vtu: No such file");
 }
 
@@ -215,8 +215,8 @@ void one_rank_failing_to_read_ends_all(void **)
 {
     const std::string start =
         shell_word(mpiexec) + " -n 2 " + shell_word(tool) + " scene.yaml row.vtu : -n 1 " + shell_word(tool);
-    expect(run_in(folder, start + " scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: cannot be read");
-    expect(run_ranks(3, "scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: cannot be read");
+    expect(run_in(folder, start + " scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
+    expect(run_ranks(3, "scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
 }
 
 void nothing_to_draw_is_an_error(void **)

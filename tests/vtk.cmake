@@ -1,17 +1,24 @@
 # The VTK adaptor against a session that records, and insitu-render on files.
 find_package(VTK 9.1 REQUIRED
-  COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersExtraction IOLegacy IOXML)
+  COMPONENTS CommonCore CommonDataModel CommonExecutionModel IOLegacy IOParallel IOXML)
 
 add_executable(test_vtk_adaptor test_vtk_adaptor.cpp test_vtk_session_stub.cpp)
 target_link_libraries(test_vtk_adaptor PRIVATE insitu_vtk_objects PkgConfig::CMOCKA insitu_flags)
 add_test(NAME vtk_adaptor COMMAND test_vtk_adaptor)
 set_tests_properties(vtk_adaptor PROPERTIES TIMEOUT 30)
 
-add_executable(test_vtk_deal test_vtk_deal.cpp ${PROJECT_SOURCE_DIR}/tools/cell_deal.cpp)
-target_include_directories(test_vtk_deal PRIVATE ${PROJECT_SOURCE_DIR}/tools)
-target_link_libraries(test_vtk_deal PRIVATE insitu_flags PkgConfig::CMOCKA VTK::CommonDataModel VTK::FiltersExtraction)
+add_executable(test_vtk_deal test_vtk_deal.cpp)
+target_link_libraries(test_vtk_deal PRIVATE insitu_render_files insitu_flags PkgConfig::CMOCKA)
 add_test(NAME vtk_deal COMMAND test_vtk_deal)
 set_tests_properties(vtk_deal PROPERTIES TIMEOUT 60)
+
+# Files of every format, written by VTK's own writers where it has one.
+add_library(test_vtk_samples STATIC test_vtk_samples.cpp test_vtk_run.cpp)
+target_link_libraries(test_vtk_samples PUBLIC VTK::CommonDataModel PRIVATE insitu_flags VTK::IOParallel VTK::IOLegacy VTK::IOXML)
+
+add_executable(test_vtk_files test_vtk_files.cpp)
+target_link_libraries(test_vtk_files PRIVATE test_vtk_samples insitu_render_files insitu_flags PkgConfig::CMOCKA)
+add_test(NAME vtk_files COMMAND test_vtk_files)
 
 add_executable(test_vtk_tool test_vtk_tool.cpp test_vtk_run.cpp)
 target_link_libraries(test_vtk_tool PRIVATE insitu_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)

@@ -8,14 +8,12 @@
 #include <vector>
 
 #include <vtkBoundingBox.h>
-#include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
-#include <vtkExtractCells.h>
-#include <vtkIdList.h>
 #include <vtkMultiBlockDataSet.h>
-#include <vtkNew.h>
 #include <vtkUnstructuredGrid.h>
+
+#include "cell_extract.h"
 
 namespace render_tool
 {
@@ -106,20 +104,12 @@ int64_t number_cells(std::vector<leaf> &leaves, vtkBoundingBox &bounds)
 
 vtkSmartPointer<vtkDataObject> part_of(vtkUnstructuredGrid *grid, int64_t first_cell, const owner &owners, int rank)
 {
-    vtkNew<vtkIdList> mine;
+    std::vector<vtkIdType> mine;
     for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++)
-        if (owners.of(grid, i, first_cell + i) == rank) mine->InsertNextId(i);
-    if (mine->GetNumberOfIds() == 0) return nullptr;
-    if (mine->GetNumberOfIds() == grid->GetNumberOfCells()) return grid;
-    vtkNew<vtkExtractCells> extract;
-    extract->SetInputData(grid);
-    extract->AssumeSortedAndUniqueIdsOn();
-    extract->SetCellList(mine);
-    extract->Update();
-    /* The filter's own note of where cells came from is no field of the file's. */
-    const char *const note = "vtkOriginalCellIds";
-    if (!grid->GetCellData()->HasArray(note)) extract->GetOutput()->GetCellData()->RemoveArray(note);
-    return extract->GetOutput();
+        if (owners.of(grid, i, first_cell + i) == rank) mine.push_back(i);
+    if (mine.empty()) return nullptr;
+    if (static_cast<vtkIdType>(mine.size()) == grid->GetNumberOfCells()) return grid;
+    return extract_cells(grid, mine);
 }
 
 } // namespace

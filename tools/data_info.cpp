@@ -1,4 +1,5 @@
-/* Counts and ranges are taken over all leaves of a composite, so that a field which every block has is one line. */
+/* Counts and ranges are taken over all leaves of a composite, so that a field which every block has is one line. What
+ * stands in hidden cells is often junk, so nothing is taken from there. */
 #include "data_info.h"
 
 #include <algorithm>
@@ -15,9 +16,10 @@
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
-#include <vtkDataSet.h>
 #include <vtkPointData.h>
+#include <vtkPoints.h>
 #include <vtkSmartPointer.h>
+#include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
 namespace render_tool
@@ -35,7 +37,8 @@ struct field_info {
 };
 
 struct data_summary {
-    std::map<int, int64_t> cells;
+    std::map<int, int64_t> cells; // that are shown, by type
+    int64_t hidden_cells = 0;
     int64_t points = 0;
     int leaves = 0;
     std::string point_type;
@@ -53,7 +56,41 @@ void add_value(std::pair<double, double> &range, double value, bool &is_finite)
     range.second = std::max(range.second, value);
 }
 
-void add_array(vtkDataArray *array, field_info &info)
+/* Which cells of a grid are shown, and which points those have; both empty where all are. */
+struct selection {
+    std::vector<bool> cells, points;
+};
+
+bool has(const std::vector<bool> &selected, vtkIdType i)
+{
+    return selected.empty() || (i < static_cast<vtkIdType>(selected.size()) && selected[static_cast<size_t>(i)]);
+}
+
+selection select_shown(vtkUnstructuredGrid *grid)
+{
+    constexpr int hiding =
+        vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
+    selection shown;
+    vtkUnsignedCharArray *ghosts = grid->GetCellGhostArray();
+    if (!ghosts || ghosts->GetNumberOfValues() != grid->GetNumberOfCells()) return shown;
+    shown.cells.resize(static_cast<size_t>(grid->GetNumberOfCells()));
+    shown.points.resize(static_cast<size_t>(grid->GetNumberOfPoints()));
+    bool is_all = true;
+    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
+        if (ghosts->GetValue(i) & hiding) {
+            is_all = false;
+            continue;
+        }
+        shown.cells[static_cast<size_t>(i)] = true;
+        vtkIdType count = 0;
+        const vtkIdType *points = nullptr;
+        grid->GetCellPoints(i, count, points);
+        for (vtkIdType k = 0; k < count; k++) shown.points[static_cast<size_t>(points[k])] = true;
+    }
+    return is_all ? selection{} : shown;
+}
+
+void add_array(vtkDataArray *array, const std::vector<bool> &selected, field_info &info)
 {
     const int components = array->GetNumberOfComponents();
     const double infinity = std::numeric_limits<double>::infinity();
@@ -62,6 +99,7 @@ void add_array(vtkDataArray *array, field_info &info)
     info.leaves++;
     info.ranges.resize(static_cast<size_t>(components) + 1, {infinity, -infinity});
     for (vtkIdType i = 0; i < array->GetNumberOfTuples(); i++) {
+        if (!has(selected, i)) continue;
         double square = 0;
         for (int c = 0; c < components; c++) {
             const double value = array->GetComponent(i, c);
@@ -72,26 +110,37 @@ void add_array(vtkDataArray *array, field_info &info)
     }
 }
 
-void add_arrays(vtkDataSetAttributes *data, std::map<std::string, field_info> &fields)
+void add_arrays(vtkDataSetAttributes *data, const std::vector<bool> &selected,
+                std::map<std::string, field_info> &fields)
 {
     for (int i = 0; i < data->GetNumberOfArrays(); i++) {
         vtkDataArray *array = data->GetArray(i);
-        if (array && array->GetName()) add_array(array, fields[array->GetName()]);
+        if (array && array->GetName()) add_array(array, selected, fields[array->GetName()]);
     }
+}
+
+void add_bounds(vtkPoints *points, const std::vector<bool> &selected, vtkBoundingBox &bounds)
+{
+    for (vtkIdType i = 0; points && i < points->GetNumberOfPoints(); i++)
+        if (has(selected, i)) bounds.AddPoint(points->GetPoint(i));
 }
 
 void add_leaf(vtkDataObject *object, data_summary &all)
 {
-    auto *data = vtkDataSet::SafeDownCast(object);
-    if (!data) return;
+    auto *grid = vtkUnstructuredGrid::SafeDownCast(object);
+    if (!grid) return;
+    const selection shown = select_shown(grid);
     all.leaves++;
-    all.points += data->GetNumberOfPoints();
-    for (vtkIdType i = 0; i < data->GetNumberOfCells(); i++) all.cells[data->GetCellType(i)]++;
-    if (data->GetNumberOfPoints() > 0) all.bounds.AddBounds(data->GetBounds());
-    auto *points = vtkPointSet::SafeDownCast(data);
-    if (points && points->GetPoints()) all.point_type = points->GetPoints()->GetData()->GetDataTypeAsString();
-    add_arrays(data->GetPointData(), all.fields[0]);
-    add_arrays(data->GetCellData(), all.fields[1]);
+    all.points += grid->GetNumberOfPoints();
+    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++)
+        if (has(shown.cells, i))
+            all.cells[grid->GetCellType(i)]++;
+        else
+            all.hidden_cells++;
+    if (grid->GetPoints()) all.point_type = grid->GetPoints()->GetData()->GetDataTypeAsString();
+    add_bounds(grid->GetPoints(), shown.points, all.bounds);
+    add_arrays(grid->GetPointData(), shown.points, all.fields[0]);
+    add_arrays(grid->GetCellData(), shown.cells, all.fields[1]);
 }
 
 data_summary summarize(vtkDataObject *data)
@@ -144,17 +193,19 @@ void print_times(const std::vector<double> &times)
 
 } // namespace
 
-void print_info(const std::string &path, vtkDataObject *data, const std::vector<double> &times)
+void print_info(const std::string &title, vtkDataObject *data, const std::vector<double> &times)
 {
     const data_summary all = summarize(data);
     int64_t cells = 0;
     for (const auto &[type, count] : all.cells) cells += count;
-    std::printf("%s: %s", path.c_str(), data->GetClassName());
+    std::printf("%s", title.c_str());
     if (vtkCompositeDataSet::SafeDownCast(data)) std::printf(", %d blocks", all.leaves);
     std::printf(", %lld cells, %lld points (%s)\n", static_cast<long long>(cells), static_cast<long long>(all.points),
-                all.point_type.empty() ? "implicit" : all.point_type.c_str());
+                all.point_type.empty() ? "none" : all.point_type.c_str());
     for (const auto &[type, count] : all.cells)
         std::printf("  cells  %-24s type %d  %lld\n", cell_name(type).c_str(), type, static_cast<long long>(count));
+    if (all.hidden_cells > 0)
+        std::printf("  cells  %-24s %lld\n", "hidden or ghosts", static_cast<long long>(all.hidden_cells));
     if (all.bounds.IsValid()) {
         double b[6];
         all.bounds.GetBounds(b);

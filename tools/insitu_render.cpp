@@ -18,12 +18,15 @@
 
 #include <vtkDataObject.h>
 
+#include "data_file.h"
 #include "data_info.h"
+#include "grids_of.h"
 #include "insitu/insitu.h"
 #include "insitu/vtk.h"
 #include "render_options.h"
 #include "render_progress.h"
 #include "step_source.h"
+#include "vtk_messages.h"
 
 using namespace render_tool;
 
@@ -239,11 +242,12 @@ void draw(const world &w, const options &o)
 void show_info(const options &o)
 {
     for (const std::string &path : o.files) {
-        data_file file(path);
+        const auto file = open_data_file(path);
         const auto step = static_cast<size_t>(o.first_step);
-        if (step > 0 && step >= file.times().size())
+        if (step > 0 && step >= file->times().size())
             throw std::runtime_error(path + ": has no step " + std::to_string(step));
-        print_info(path, file.read(step, 0, 1), file.times());
+        const auto data = file->read(step, 0, 1);
+        print_info(path + ": " + data->GetClassName(), grids_of(data, path), file->times());
     }
 }
 

@@ -9,8 +9,21 @@
 #include <vtkDataObject.h>
 #include <vtkMultiBlockDataSet.h>
 
+#include "cell_deal.h"
+#include "grids_of.h"
+
 namespace render_tool
 {
+
+namespace
+{
+
+std::string file_name(const std::string &path)
+{
+    return path.substr(path.find_last_of('/') + 1);
+}
+
+} // namespace
 
 step_source::step_source(const options &o, int rank, int ranks) : options_(o), rank_(rank), ranks_(ranks)
 {
@@ -19,33 +32,30 @@ step_source::step_source(const options &o, int rank, int ranks) : options_(o), r
         if (!why_not.empty()) throw std::runtime_error(why_not);
     }
     int64_t cycle = 0;
-    auto add = [&](size_t file, size_t inside) {
-        if (cycle >= o.first_step && cycle <= o.last_step) steps_.push_back({file, inside, cycle});
-        cycle++;
-    };
     const size_t file_count = o.pieces ? 1 : o.files.size();
-    for (size_t f = 0; f < file_count; f++) {
-        const bool has_steps = !o.pieces && may_hold_steps(o.files[f]);
-        const size_t inside = has_steps ? std::max<size_t>(open(f).times().size(), 1) : 1;
-        for (size_t i = 0; i < inside; i++) add(f, i);
-    }
+    for (size_t f = 0; f < file_count; f++) add_steps_of(f, cycle);
     if (steps_.empty()) throw std::runtime_error("--steps: none chosen of " + std::to_string(cycle));
 }
 
-std::string step_source::name(size_t step) const
+void step_source::add_steps_of(size_t file, int64_t &cycle)
 {
-    const std::string &path = options_.files[steps_[step].file];
-    std::string name = path.substr(path.find_last_of('/') + 1);
-    if (options_.pieces && options_.files.size() > 1)
-        name += " and " + std::to_string(options_.files.size() - 1) + " more";
-    return name;
+    const std::string &path = options_.files[file];
+    const bool has_steps = !options_.pieces && may_hold_steps(path);
+    const size_t inside = has_steps ? std::max<size_t>(open(file).times().size(), 1) : 1;
+    for (size_t i = 0; i < inside; i++, cycle++) {
+        if (cycle < options_.first_step || cycle > options_.last_step) continue;
+        std::string name = file_name(has_steps ? open(file).step_path(i) : path);
+        if (options_.pieces && options_.files.size() > 1)
+            name += " and " + std::to_string(options_.files.size() - 1) + " more";
+        steps_.push_back({file, i, cycle, name});
+    }
 }
 
 data_file &step_source::open(size_t file)
 {
     if (!open_ || open_index_ != file) {
         open_.reset();
-        open_ = std::make_unique<data_file>(options_.files[file]);
+        open_ = open_data_file(options_.files[file]);
         open_index_ = file;
     }
     return *open_;
@@ -63,7 +73,8 @@ vtkSmartPointer<vtkDataObject> step_source::read_pieces()
     all->SetNumberOfBlocks(static_cast<unsigned>(files));
     for (int64_t f = 0; f < files; f++) {
         if (keeps_whole_files() && f * ranks_ / files != rank_) continue;
-        all->SetBlock(static_cast<unsigned>(f), open(static_cast<size_t>(f)).read(0, 0, 1));
+        const auto file = static_cast<size_t>(f);
+        all->SetBlock(static_cast<unsigned>(f), grids_of(open(file).read(0, 0, 1), options_.files[file]));
     }
     if (keeps_whole_files()) return all;
     return deal(all, options_.how, rank_, ranks_);
@@ -80,10 +91,11 @@ step_source::result step_source::read(size_t index)
         return r;
     }
     data_file &file = open(s.file);
-    const bool is_by_pieces = ranks_ > 1 && options_.how == partition::block && file.pieces() >= ranks_;
-    r.data = is_by_pieces ? file.read(s.inside, rank_, ranks_) : file.read(s.inside, 0, 1);
-    r.time = s.inside < file.times().size() ? file.times()[s.inside] : time_of(r.data, fallback);
-    if (!is_by_pieces) r.data = deal(r.data, options_.how, rank_, ranks_);
+    const bool is_by_pieces = ranks_ > 1 && options_.how == partition::block && file.pieces(s.inside) >= ranks_;
+    const auto data = is_by_pieces ? file.read(s.inside, rank_, ranks_) : file.read(s.inside, 0, 1);
+    r.time = s.inside < file.times().size() ? file.times()[s.inside] : time_of(data, fallback);
+    const auto grids = grids_of(data, file.step_path(s.inside));
+    r.data = is_by_pieces ? grids : deal(grids, options_.how, rank_, ranks_);
     return r;
 }
 

@@ -22,7 +22,7 @@ class step_source
 
     size_t count() const { return steps_.size(); }
     int64_t cycle(size_t step) const { return steps_[step].cycle; }
-    std::string name(size_t step) const; /* the file's, without its folder */
+    const std::string &name(size_t step) const { return steps_[step].name; } /* the file's, without its folder */
 
     struct result {
         vtkSmartPointer<vtkDataObject> data; // this rank's part; null where it has none
@@ -35,7 +35,9 @@ class step_source
         size_t file;
         size_t inside;
         int64_t cycle;
+        std::string name;
     };
+    void add_steps_of(size_t file, int64_t &cycle);
     data_file &open(size_t file);
     vtkSmartPointer<vtkDataObject> read_pieces();
     bool keeps_whole_files() const;

@@ -1,0 +1,40 @@
+/* Small files of every format that insitu-render reads, and the grids that they hold, built apart from them. */
+#ifndef TEST_VTK_SAMPLES_H
+#define TEST_VTK_SAMPLES_H
+
+#include <string>
+#include <vector>
+
+#include <vtkSmartPointer.h>
+
+class vtkDataSet;
+class vtkUnstructuredGrid;
+
+/* A lattice of 6 × 5 × 4 points as VTK has it: coordinates by axes, by one array an axis, by a list of points. */
+enum class lattice { image, rectilinear, curved };
+
+/* With the point field "x", and the cell field "c", which counts cells. */
+vtkSmartPointer<vtkDataSet> structured(lattice kind);
+
+/* The same as a list of hexahedra, made from the lattice's indices alone. */
+vtkSmartPointer<vtkUnstructuredGrid> hexes(lattice kind);
+
+/* A row of unit cubes along x from `first` on, every second a polyhedron if is_mixed, else all hexahedra. */
+vtkSmartPointer<vtkUnstructuredGrid> cubes(int count, int first, bool is_mixed);
+
+struct sample {
+    std::string name;               // of the file to open, within the folder
+    std::vector<std::string> files; // that may be cut: it and those it names
+    vtkSmartPointer<vtkUnstructuredGrid> expected;
+};
+
+/* Write the files of all formats that this VTK can write into folder. */
+std::vector<sample> write_samples(const std::string &folder);
+
+void write_vtu(const std::string &path, vtkUnstructuredGrid *grid);
+
+/* A box of one cube and, beside it, two wedges whose triangles together are the cube's face: so the cube has seven
+ * faces. As an OpenFOAM case in folder, with the fields p at the times 0 and 0.5: the cell's number, and twice that. */
+void write_foam(const std::string &folder);
+
+#endif

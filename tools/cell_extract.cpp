@@ -1,0 +1,158 @@
+/* VTK has a filter for this, vtkExtractCells. It reads beyond the lists of faces that VTK's own readers may leave
+ * shorter than the cells, so it is not used. */
+#include "cell_extract.h"
+
+#include <algorithm>
+
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkCellType.h>
+#include <vtkDataArray.h>
+#include <vtkFieldData.h>
+#include <vtkIdList.h>
+#include <vtkIdTypeArray.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+
+namespace render_tool
+{
+
+namespace
+{
+
+/* The new numbers of points, given in the order of their first use. */
+class renumbering
+{
+  public:
+    explicit renumbering(vtkIdType count) : numbers_(static_cast<size_t>(count), -1) {}
+
+    bool has(vtkIdType point) const { return point >= 0 && point < static_cast<vtkIdType>(numbers_.size()); }
+    vtkIdType of(vtkIdType point)
+    {
+        vtkIdType &number = numbers_[static_cast<size_t>(point)];
+        if (number < 0) number = used->InsertNextId(point);
+        return number;
+    }
+
+    vtkNew<vtkIdList> used; // the old numbers
+
+  private:
+    std::vector<vtkIdType> numbers_;
+};
+
+/* The faces of polyhedra: [faces, points of the first, its points, ...] of each, from its place on; -1 for none. */
+class face_streams
+{
+  public:
+    void add(vtkUnstructuredGrid *grid, vtkIdType cell, renumbering &points)
+    {
+        const vtkIdType length = length_of(grid, cell, points);
+        places->InsertNextValue(length > 0 ? stream->GetNumberOfValues() : -1);
+        if (length == 0) return;
+        const vtkIdType *from = grid->GetFaces()->GetPointer(grid->GetFaceLocations()->GetValue(cell));
+        const vtkIdType *const end = from + length;
+        stream->InsertNextValue(*from++);
+        while (from < end) {
+            const vtkIdType count = *from++;
+            stream->InsertNextValue(count);
+            for (vtkIdType k = 0; k < count; k++) stream->InsertNextValue(points.of(*from++));
+        }
+    }
+    void add_none() { places->InsertNextValue(-1); }
+    bool is_empty() const { return stream->GetNumberOfValues() == 0; }
+
+    vtkNew<vtkIdTypeArray> stream, places;
+
+  private:
+    /* 0 where it does not lie within the stream whole, or names a point that is not there. */
+    static vtkIdType length_of(vtkUnstructuredGrid *grid, vtkIdType cell, const renumbering &points)
+    {
+        vtkIdTypeArray *const all = grid->GetFaces(), *const starts = grid->GetFaceLocations();
+        if (!all || !starts || cell >= starts->GetNumberOfValues()) return 0;
+        const vtkIdType begin = starts->GetValue(cell), end = all->GetNumberOfValues();
+        if (begin < 0 || begin >= end) return 0;
+        vtkIdType at = begin;
+        const vtkIdType faces = all->GetValue(at++);
+        for (vtkIdType f = 0; f < faces; f++) {
+            const vtkIdType count = at < end ? all->GetValue(at++) : -1;
+            if (count < 0 || count > end - at) return 0;
+            for (vtkIdType k = 0; k < count; k++)
+                if (!points.has(all->GetValue(at++))) return 0;
+        }
+        return at - begin;
+    }
+};
+
+/* The arrays of one value an element; others cannot be dealt out. */
+void pick_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked, vtkDataSetAttributes *to)
+{
+    for (int i = 0; i < from->GetNumberOfArrays(); i++) {
+        vtkAbstractArray *array = from->GetAbstractArray(i);
+        if (array->GetNumberOfTuples() != count) continue;
+        const auto part = vtkSmartPointer<vtkAbstractArray>::Take(array->NewInstance());
+        part->SetName(array->GetName());
+        part->SetNumberOfComponents(array->GetNumberOfComponents());
+        part->SetNumberOfTuples(picked->GetNumberOfIds());
+        array->GetTuples(picked, part);
+        to->AddArray(part);
+    }
+}
+
+void pick_points(vtkUnstructuredGrid *grid, vtkIdList *picked, vtkUnstructuredGrid *part)
+{
+    vtkNew<vtkPoints> places;
+    if (grid->GetPoints()) {
+        places->SetDataType(grid->GetPoints()->GetDataType());
+        places->SetNumberOfPoints(picked->GetNumberOfIds());
+        grid->GetPoints()->GetPoints(picked, places);
+    }
+    part->SetPoints(places);
+}
+
+/* Returns the old numbers of the points in use. */
+vtkSmartPointer<vtkIdList> pick_cells(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &cells,
+                                      vtkUnstructuredGrid *part)
+{
+    renumbering points(grid->GetNumberOfPoints());
+    face_streams faces;
+    vtkNew<vtkUnsignedCharArray> types;
+    vtkNew<vtkCellArray> list;
+    for (const vtkIdType cell : cells) {
+        vtkIdType count = 0;
+        const vtkIdType *ids = nullptr;
+        grid->GetCellPoints(cell, count, ids);
+        list->InsertNextCell(static_cast<int>(count));
+        for (vtkIdType k = 0; k < count; k++) list->InsertCellPoint(points.of(ids[k]));
+        types->InsertNextValue(static_cast<unsigned char>(grid->GetCellType(cell)));
+        if (grid->GetCellType(cell) == VTK_POLYHEDRON)
+            faces.add(grid, cell, points);
+        else
+            faces.add_none();
+    }
+    if (faces.is_empty())
+        part->SetCells(types, list);
+    else
+        part->SetCells(types, list, faces.places, faces.stream);
+    return points.used.Get();
+}
+
+} // namespace
+
+vtkSmartPointer<vtkUnstructuredGrid> extract_cells(vtkUnstructuredGrid *grid, const std::vector<vtkIdType> &cells)
+{
+    auto part = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    const auto points = pick_cells(grid, cells, part);
+    pick_points(grid, points, part);
+    pick_arrays(grid->GetPointData(), grid->GetNumberOfPoints(), points, part->GetPointData());
+    vtkNew<vtkIdList> picked;
+    picked->SetNumberOfIds(static_cast<vtkIdType>(cells.size()));
+    std::copy(cells.begin(), cells.end(), picked->begin());
+    pick_arrays(grid->GetCellData(), grid->GetNumberOfCells(), picked, part->GetCellData());
+    part->GetFieldData()->ShallowCopy(grid->GetFieldData());
+    return part;
+}
+
+} // namespace render_tool

@@ -1,0 +1,282 @@
+/* A geometry file, by the format's description; [] where its header asks for it, n and m counts that stand before:
+ *
+ *     [format] 2 descriptions, node id, element id, [extents: 6 floats]
+ *     part     = "part" number description sections
+ *     section  = "coordinates" n [n ids] 3n floats
+ *              | "block" i j k 3ijk floats [ijk ints]     (rectilinear: i + j + k floats, uniform: 6)
+ *              | type n [n ids] n × nodes ints            (nsided, nfaced: counts, then nodes)
+ *
+ * A variable's file has a description, then for each of some parts: "part" number, and by nodes "coordinates" or
+ * "block", by elements each type or "block", followed by one value a node or element and component. */
+#include "ensight_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "ensight_stream.h"
+
+namespace render_tool
+{
+
+namespace
+{
+
+using encoding = ensight_stream::encoding;
+
+struct part_sizes {
+    int64_t points = 0;
+    int64_t block_cells = 0;
+    std::map<std::string, int64_t> elements; // by type
+};
+
+using geometry = std::map<int64_t, part_sizes>; // by the part's number
+
+bool starts_with(const std::string &text, const char *start)
+{
+    return text.compare(0, std::strlen(start), start) == 0;
+}
+
+/* -1 for a word that is no type of elements; 0 for those whose elements differ in size. */
+int nodes_of_type(const std::string &type)
+{
+    static const std::map<std::string, int> nodes = {
+        {"point", 1}, {"bar2", 2},       {"bar3", 3},     {"tria3", 3},  {"tria6", 6},    {"quad4", 4},
+        {"quad8", 8}, {"tetra4", 4},     {"tetra10", 10}, {"penta6", 6}, {"penta15", 15}, {"pyramid5", 5},
+        {"hexa8", 8}, {"pyramid13", 13}, {"hexa20", 20},  {"nsided", 0}, {"nfaced", 0}};
+    const auto found = nodes.find(starts_with(type, "g_") ? type.substr(2) : type);
+    return found == nodes.end() ? -1 : found->second;
+}
+
+bool has_ids(const std::string &line)
+{
+    return line.find("given") != std::string::npos || line.find("ignore") != std::string::npos;
+}
+
+class geometry_walk
+{
+  public:
+    geometry_walk(const std::string &path, encoding how) : in_(path, how), how_(how) {}
+
+    geometry parts()
+    {
+        std::string line = how_ == encoding::text ? "" : in_.line(); // "C Binary"
+        line = in_.line();
+        if (starts_with(line, "BEGIN TIME STEP")) line = in_.line();
+        in_.line();
+        has_node_ids_ = has_ids(in_.line());
+        has_element_ids_ = has_ids(in_.line());
+        geometry all;
+        while (in_.next_line(line)) {
+            if (starts_with(line, "END TIME STEP")) break;
+            if (starts_with(line, "extents"))
+                in_.skip_numbers(6);
+            else if (starts_with(line, "part"))
+                part_ = &begin_part(all);
+            else
+                add_section(line);
+        }
+        return all;
+    }
+
+  private:
+    part_sizes &begin_part(geometry &all)
+    {
+        part_sizes &part = all[in_.integer()];
+        in_.line();
+        return part;
+    }
+
+    void add_section(const std::string &line)
+    {
+        const int nodes = nodes_of_type(line);
+        if (!part_ || (nodes < 0 && line != "coordinates" && !starts_with(line, "block")))
+            in_.refuse("\"" + line + "\" is not understood");
+        if (line == "coordinates")
+            add_points();
+        else if (nodes < 0)
+            add_block(line);
+        else
+            add_elements(line, nodes);
+    }
+
+    void add_points()
+    {
+        part_->points = in_.integer();
+        if (has_node_ids_) in_.skip_numbers(part_->points);
+        for (int axis = 0; axis < 3; axis++) in_.skip_numbers(part_->points);
+    }
+
+    void add_block(const std::string &line)
+    {
+        if (line.find("range") != std::string::npos || line.find("ghost") != std::string::npos)
+            in_.refuse("\"" + line + "\" is not understood");
+        const auto [i, j, k] = dimensions();
+        part_->points = i * j * k;
+        part_->block_cells = std::max<int64_t>(i - 1, 1) * std::max<int64_t>(j - 1, 1) * std::max<int64_t>(k - 1, 1);
+        if (line.find("uniform") != std::string::npos)
+            in_.skip_numbers(6);
+        else if (line.find("rectilinear") != std::string::npos)
+            for (const int64_t count : {i, j, k}) in_.skip_numbers(count);
+        else
+            for (int axis = 0; axis < 3; axis++) in_.skip_numbers(part_->points);
+        if (line.find("iblanked") != std::string::npos) in_.skip_numbers(part_->points);
+    }
+
+    std::array<int64_t, 3> dimensions()
+    {
+        std::array<int64_t, 3> d{};
+        in_.integers(d.data(), 3);
+        return d;
+    }
+
+    void add_elements(const std::string &type, int nodes)
+    {
+        const int64_t count = in_.integer();
+        part_->elements[type] = count;
+        if (has_element_ids_) in_.skip_numbers(count);
+        if (nodes > 0) {
+            in_.skip_numbers(count * nodes);
+            return;
+        }
+        int64_t lists = in_.sum_of_integers(count);
+        if (type.find("nfaced") != std::string::npos) lists = in_.sum_of_integers(lists);
+        in_.skip_numbers(lists);
+    }
+
+    ensight_stream in_;
+    encoding how_;
+    bool has_node_ids_ = false, has_element_ids_ = false;
+    part_sizes *part_ = nullptr;
+};
+
+void walk_variable(const std::string &path, encoding how, const geometry &parts, int components, bool is_per_node)
+{
+    ensight_stream in(path, how);
+    std::string line = in.line();
+    if (starts_with(line, "BEGIN TIME STEP")) in.line();
+    const part_sizes *part = nullptr;
+    bool has_values = false;
+    while (in.next_line(line)) {
+        if (starts_with(line, "END TIME STEP")) break;
+        if (starts_with(line, "part")) {
+            if (part && !has_values) in.refuse("a part has no values");
+            has_values = false;
+            const int64_t number = in.integer();
+            const auto found = parts.find(number);
+            if (found == parts.end()) in.refuse("has a part " + std::to_string(number) + ", which the geometry lacks");
+            part = &found->second;
+            continue;
+        }
+        if (!part) in.refuse("\"" + line + "\" is not understood");
+        const auto element = part->elements.find(line);
+        const bool is_block = line == "block", is_points = is_per_node && (is_block || line == "coordinates");
+        if (!is_points && !(!is_per_node && (is_block || element != part->elements.end())))
+            in.refuse("\"" + line + "\" is not understood");
+        const int64_t count = is_points ? part->points : is_block ? part->block_cells : element->second;
+        for (int c = 0; c < components; c++) in.skip_numbers(count);
+        has_values = true;
+    }
+    if (!has_values) in.refuse("is cut short: a part has no values");
+}
+
+/* What a line of the case names. */
+struct named_file {
+    std::string pattern; // with '*' for the step's number
+    int components = 0;  // 0: geometry
+    bool is_per_node = false;
+};
+
+/* "1 1 name file" without the numbers of time and file sets. */
+std::vector<std::string> words_of(const std::string &text)
+{
+    std::vector<std::string> words;
+    std::istringstream in(text);
+    for (std::string word; in >> word;)
+        if (!words.empty() || word.find_first_not_of("0123456789") != std::string::npos) words.push_back(word);
+    return words;
+}
+
+int components_of(const std::string &key)
+{
+    if (starts_with(key, "scalar")) return 1;
+    if (starts_with(key, "vector")) return 3;
+    if (starts_with(key, "tensor symm")) return 6;
+    return starts_with(key, "tensor asym") ? 9 : 0;
+}
+
+std::vector<named_file> files_of(const std::string &case_path)
+{
+    std::vector<named_file> files;
+    std::ifstream in(case_path);
+    bool is_gold = false;
+    for (std::string line; std::getline(in, line);) {
+        const size_t colon = line.find(':'), start = line.find_first_not_of(" \t");
+        if (colon == std::string::npos || line[start] == '#') continue;
+        const std::string key = line.substr(start, colon - start);
+        const std::vector<std::string> words = words_of(line.substr(colon + 1));
+        if (key == "type") is_gold = words.size() == 2 && words[0] == "ensight" && words[1] == "gold";
+        if (key == "measured") throw std::runtime_error(case_path + ": measured particles are not read");
+        if (key == "model" && !words.empty()) files.push_back({words[0]});
+        const int components = components_of(key);
+        if (components == 0) continue;
+        if (words.size() < 2) throw std::runtime_error(case_path + ": \"" + line + "\" names no file");
+        files.push_back({words[1], components, key.find("per node") != std::string::npos});
+    }
+    if (!is_gold) throw std::runtime_error(case_path + ": is no case of EnSight Gold");
+    return files;
+}
+
+/* The files that a pattern stands for, by what stands for its stars. */
+std::map<std::string, std::string> matches(const std::string &folder, const std::string &pattern)
+{
+    const size_t first = pattern.find('*'), last = pattern.find_last_of('*');
+    if (first == std::string::npos) return {{"", folder + pattern}};
+    const std::string path = folder + pattern, start = pattern.substr(0, first), end = pattern.substr(last + 1);
+    const std::string inside = start.substr(0, start.find_last_of('/') + 1);
+    std::map<std::string, std::string> found;
+    std::error_code no_folder;
+    for (const auto &entry :
+         std::filesystem::directory_iterator(folder.empty() ? "./" + inside : folder + inside, no_folder)) {
+        const std::string name = inside + entry.path().filename().string();
+        if (name.size() != pattern.size() || name.compare(0, first, start) != 0) continue;
+        if (name.compare(last + 1, std::string::npos, end) == 0)
+            found[name.substr(first, last + 1 - first)] = folder + name;
+    }
+    if (found.empty()) throw std::runtime_error(path + ": no such files");
+    return found;
+}
+
+} // namespace
+
+void check_ensight(const std::string &case_path)
+{
+    const std::string folder = case_path.substr(0, case_path.find_last_of('/') + 1);
+    const std::vector<named_file> files = files_of(case_path);
+    std::map<std::string, geometry> geometries; // by the step's number
+    encoding how = encoding::text;
+    for (const named_file &file : files) {
+        if (file.components > 0) continue;
+        for (const auto &[number, path] : matches(folder, file.pattern)) {
+            how = ensight_stream::encoding_of(path);
+            geometries[number] = geometry_walk(path, how).parts();
+        }
+    }
+    if (geometries.empty()) throw std::runtime_error(case_path + ": names no geometry");
+    for (const named_file &file : files) {
+        if (file.components == 0) continue;
+        for (const auto &[number, path] : matches(folder, file.pattern)) {
+            const auto same = geometries.find(number);
+            walk_variable(path, how, same == geometries.end() ? geometries.begin()->second : same->second,
+                          file.components, file.is_per_node);
+        }
+    }
+}
+
+} // namespace render_tool

@@ -1,0 +1,176 @@
+/* Each ending has a function that makes its reader, with every array switched on: some of VTK's readers load nothing
+ * unless asked. Readers that Debian's VTK may lack are compiled in only where CMake found them. */
+#include "file_kinds.h"
+
+#include <vtkAlgorithm.h>
+#include <vtkGenericDataObjectReader.h>
+#include <vtkXMLImageDataReader.h>
+#include <vtkXMLMultiBlockDataReader.h>
+#include <vtkXMLPImageDataReader.h>
+#include <vtkXMLPRectilinearGridReader.h>
+#include <vtkXMLPStructuredGridReader.h>
+#include <vtkXMLPartitionedDataSetCollectionReader.h>
+#include <vtkXMLRectilinearGridReader.h>
+#include <vtkXMLStructuredGridReader.h>
+#include <vtkXMLUniformGridAMRReader.h>
+#include <vtkXMLUnstructuredGridReader.h>
+#ifdef INSITU_VTK_HDF
+#include <vtkHDFReader.h>
+#endif
+#ifdef INSITU_VTK_EXODUS
+#include <vtkExodusIIReader.h>
+#endif
+#ifdef INSITU_VTK_CGNS
+#include <vtkCGNSReader.h>
+#endif
+#ifdef INSITU_VTK_ENSIGHT
+#include <vtkGenericEnSightReader.h>
+#endif
+#ifdef INSITU_VTK_OPENFOAM
+#include <vtkOpenFOAMReader.h>
+#endif
+
+namespace render_tool
+{
+
+namespace
+{
+
+using reader = vtkSmartPointer<vtkAlgorithm>;
+
+template <typename Reader> reader make_plain(const std::string &path)
+{
+    auto r = vtkSmartPointer<Reader>::New();
+    r->SetFileName(path.c_str());
+    return r;
+}
+
+reader make_legacy(const std::string &path)
+{
+    auto r = vtkSmartPointer<vtkGenericDataObjectReader>::New();
+    r->SetFileName(path.c_str());
+    r->ReadAllScalarsOn();
+    r->ReadAllVectorsOn();
+    r->ReadAllTensorsOn();
+    r->ReadAllNormalsOn();
+    r->ReadAllTCoordsOn();
+    r->ReadAllFieldsOn();
+    return r;
+}
+
+reader make_amr(const std::string &path)
+{
+    auto r = vtkSmartPointer<vtkXMLUniformGridAMRReader>::New();
+    r->SetFileName(path.c_str());
+    r->SetMaximumLevelsToReadByDefault(0); // all
+    return r;
+}
+
+#ifdef INSITU_VTK_EXODUS
+reader make_exodus(const std::string &path)
+{
+    auto r = vtkSmartPointer<vtkExodusIIReader>::New();
+    r->SetFileName(path.c_str());
+    r->UpdateInformation();
+    r->SetAllArrayStatus(vtkExodusIIReader::NODAL, 1);
+    r->SetAllArrayStatus(vtkExodusIIReader::ELEM_BLOCK, 1);
+    return r;
+}
+#endif
+
+#ifdef INSITU_VTK_CGNS
+reader make_cgns(const std::string &path)
+{
+    auto r = vtkSmartPointer<vtkCGNSReader>::New();
+    r->SetFileName(path.c_str());
+    r->UpdateInformation();
+    r->EnableAllBases();
+    r->EnableAllPointArrays();
+    r->EnableAllCellArrays();
+    return r;
+}
+#endif
+
+#ifdef INSITU_VTK_ENSIGHT
+reader make_ensight(const std::string &path)
+{
+    auto r = vtkSmartPointer<vtkGenericEnSightReader>::New();
+    r->SetCaseFileName(path.c_str());
+    r->ReadAllVariablesOn();
+    return r;
+}
+#endif
+
+#ifdef INSITU_VTK_OPENFOAM
+/* The cells of the mesh alone, with the values that the solver computed, not VTK's means of them at the points. */
+reader make_openfoam(const std::string &path)
+{
+    auto r = vtkSmartPointer<vtkOpenFOAMReader>::New();
+    r->SetFileName(path.c_str());
+    r->DecomposePolyhedraOff();
+    r->CreateCellToPointOff();
+    r->UpdateInformation();
+    r->EnableAllCellArrays();
+    r->EnableAllPointArrays();
+    r->DisableAllLagrangianArrays();
+    r->DisableAllPatchArrays();
+    r->SetPatchArrayStatus("internalMesh", 1);
+    return r;
+}
+#endif
+
+} // namespace
+
+const std::vector<file_kind> &file_kinds()
+{
+    constexpr bool no = false, yes = true;
+    static const std::vector<file_kind> kinds = {
+        {".vtu", make_plain<vtkXMLUnstructuredGridReader>, no, no, nullptr},
+        {".pvtu", nullptr, no, no, nullptr},
+        {".vti", make_plain<vtkXMLImageDataReader>, no, no, nullptr},
+        {".pvti", make_plain<vtkXMLPImageDataReader>, no, yes, nullptr},
+        {".vtr", make_plain<vtkXMLRectilinearGridReader>, no, no, nullptr},
+        {".pvtr", make_plain<vtkXMLPRectilinearGridReader>, no, yes, nullptr},
+        {".vts", make_plain<vtkXMLStructuredGridReader>, no, no, nullptr},
+        {".pvts", make_plain<vtkXMLPStructuredGridReader>, no, yes, nullptr},
+        {".vtm", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet"},
+        {".vtmb", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet"},
+        {".vtpc", make_plain<vtkXMLPartitionedDataSetCollectionReader>, no, yes, nullptr},
+        {".vthb", make_amr, no, yes, nullptr},
+        {".vtk", make_legacy, no, no, nullptr},
+        {".pvd", nullptr, yes, no, nullptr},
+        {".series", nullptr, yes, no, nullptr},
+#ifdef INSITU_VTK_HDF
+        {".vtkhdf", make_plain<vtkHDFReader>, no, no, nullptr},
+#endif
+#ifdef INSITU_VTK_EXODUS
+        {".ex2", make_exodus, yes, no, nullptr},
+        {".exo", make_exodus, yes, no, nullptr},
+        {".exii", make_exodus, yes, no, nullptr},
+        {".e", make_exodus, yes, no, nullptr},
+        {".g", make_exodus, yes, no, nullptr},
+#endif
+#ifdef INSITU_VTK_CGNS
+        {".cgns", make_cgns, yes, no, nullptr},
+#endif
+#ifdef INSITU_VTK_ENSIGHT
+        {".case", make_ensight, yes, no, nullptr},
+#endif
+#ifdef INSITU_VTK_OPENFOAM
+        {".foam", make_openfoam, yes, no, nullptr},
+#endif
+    };
+    return kinds;
+}
+
+const file_kind *kind_of(const std::string &path)
+{
+    const std::string name = path.substr(path.find_last_of('/') + 1);
+    const size_t dot = name.find_last_of('.');
+    if (dot == std::string::npos) return nullptr;
+    for (const file_kind &kind : file_kinds())
+        if (name.substr(dot) == kind.ending) return &kind;
+    return nullptr;
+}
+
+} // namespace render_tool

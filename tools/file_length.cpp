@@ -1,0 +1,98 @@
+/* A number that lost its last digits is a number still, so plain text must end with the end of a line. Files of VTK's
+ * XML formats must end with their last tag; where VTK's readers open other files that such a file names, those must
+ * too. */
+#include "file_length.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <stdexcept>
+
+#include <sys/stat.h>
+
+#include "ensight_check.h"
+#include "legacy_check.h"
+#include "netcdf_size.h"
+
+namespace render_tool
+{
+
+namespace
+{
+
+bool has_ending(const std::string &path, const std::string &ending)
+{
+    return path.size() >= ending.size() && path.compare(path.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+void check_last_line(const std::string &path)
+{
+    std::ifstream in(path, std::ios::binary);
+    in.seekg(-1, std::ios::end);
+    if (!in || in.get() == '\n') return;
+    throw std::runtime_error(path + ": is cut short: its last line has no end");
+}
+
+std::string last_bytes(const std::string &path, int64_t count)
+{
+    std::ifstream in(path, std::ios::binary | std::ios::ate);
+    const int64_t size = in ? static_cast<int64_t>(in.tellg()) : 0, start = std::max<int64_t>(size - count, 0);
+    std::string bytes(static_cast<size_t>(size - start), '\0');
+    in.seekg(start);
+    in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return bytes;
+}
+
+/* Behind the last tag there may be blanks and a comment. */
+void check_last_tag(const std::string &path)
+{
+    const bool is_whole = last_bytes(path, 4096).find("</VTKFile>") != std::string::npos;
+    if (!is_whole) throw std::runtime_error(path + ": is cut short: it has no </VTKFile> at its end");
+}
+
+/* VTK's XML formats all begin so. */
+bool is_vtk_xml(const std::string &path)
+{
+    const std::string name = path.substr(path.find_last_of('/') + 1);
+    const size_t dot = name.find_last_of('.');
+    const std::string ending = dot == std::string::npos ? "" : name.substr(dot);
+    return ending.compare(0, 4, ".pvt") == 0 || ending == ".pvd" || ending == ".vthb" ||
+           (ending.compare(0, 3, ".vt") == 0 && ending != ".vtk" && ending != ".vtkhdf");
+}
+
+/* The value of name="0" in a tag is zero. */
+bool is_zero(const std::string &tag, const std::string &name)
+{
+    return tag.find(' ' + name + "=\"0\"") != std::string::npos;
+}
+
+} // namespace
+
+void check_length(const std::string &path)
+{
+    const int64_t expected = netcdf_bytes(path);
+    struct stat info;
+    if (expected > 0 && stat(path.c_str(), &info) == 0 && info.st_size < expected)
+        throw std::runtime_error(path + ": is cut short: " + std::to_string(info.st_size) + " bytes of " +
+                                 std::to_string(expected));
+    if (is_vtk_xml(path)) check_last_tag(path);
+    if (has_ending(path, ".vtk")) check_legacy(path);
+    if (has_ending(path, ".case")) {
+        check_last_line(path);
+        check_ensight(path);
+    }
+}
+
+bool is_empty_vtu(const std::string &path)
+{
+    std::ifstream in(path, std::ios::binary);
+    for (std::string tag; std::getline(in, tag, '>');) {
+        tag.erase(0, tag.find('<') == std::string::npos ? 0 : tag.find('<'));
+        if (tag.compare(0, 6, "<Piece") == 0 && !(is_zero(tag, "NumberOfPoints") && is_zero(tag, "NumberOfCells")))
+            return false;
+        if (tag == "</UnstructuredGrid") return true;
+    }
+    return false;
+}
+
+} // namespace render_tool

@@ -1,0 +1,18 @@
+/* What a file's own text says of how much there should be, for formats whose readers take a cut end for zeros. */
+#ifndef FILE_LENGTH_H
+#define FILE_LENGTH_H
+
+#include <string>
+
+namespace render_tool
+{
+
+/* Throw std::runtime_error where the file is shorter than it says or ends within a line of text. */
+void check_length(const std::string &path);
+
+/* Whether a .vtu is whole and says of all its pieces that they have neither points nor cells. */
+bool is_empty_vtu(const std::string &path);
+
+} // namespace render_tool
+
+#endif

@@ -1,0 +1,288 @@
+/* A .pvtu's pieces are read one by one and appended here. VTK 9.1's own reader of .pvtu files puts the faces of
+ * polyhedra under wrong cells where an earlier piece has none.
+ *
+ *     .pvtu     <VTKFile> <PUnstructuredGrid> <Piece Source="a.vtu"/>...
+ *     .pvd      <VTKFile> <Collection> <DataSet timestep="0.5" part="0" file="a.vtu"/>...
+ *     .series   {"file-series-version": "1.0", "files": [{"name": "a.vtu", "time": 0.5}, ...]}
+ *
+ * Names are relative to the file's folder. Entries of a .pvd with one time are parts of one step. */
+#include "piece_files.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <stdexcept>
+
+#include <vtkAppendFilter.h>
+#include <vtkCellData.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkXMLDataElement.h>
+#include <vtkXMLUtilities.h>
+#include <vtk_jsoncpp.h>
+
+#include "file_length.h"
+#include "grids_of.h"
+#include "vtk_messages.h"
+
+namespace render_tool
+{
+
+namespace
+{
+
+[[noreturn]] void refuse(const std::string &path, const std::string &why)
+{
+    throw std::runtime_error(path + ": " + why);
+}
+
+std::string beside(const std::string &path, const std::string &name)
+{
+    return name[0] == '/' ? name : path.substr(0, path.find_last_of('/') + 1) + name;
+}
+
+vtkSmartPointer<vtkXMLDataElement> read_xml(const std::string &path)
+{
+    check_length(path);
+    auto root = vtkSmartPointer<vtkXMLDataElement>::Take(vtkXMLUtilities::ReadElementFromFile(path.c_str()));
+    throw_caught(path);
+    if (!root) refuse(path, "cannot be read: is no XML");
+    return root;
+}
+
+/* The elements called `name` in the element called `list` of an XML file. */
+std::vector<vtkSmartPointer<vtkXMLDataElement>> read_elements(const std::string &path, const char *list,
+                                                              const char *name)
+{
+    const auto root = read_xml(path);
+    vtkXMLDataElement *parent = root->FindNestedElementWithName(list);
+    if (!parent) refuse(path, "cannot be read: has no element " + std::string(list));
+    std::vector<vtkSmartPointer<vtkXMLDataElement>> found;
+    for (int i = 0; i < parent->GetNumberOfNestedElements(); i++)
+        if (std::string(parent->GetNestedElement(i)->GetName()) == name)
+            found.emplace_back(parent->GetNestedElement(i));
+    return found;
+}
+
+/* The file an element names, which must be there. */
+std::string file_named_by(vtkXMLDataElement *element, const char *attribute, const std::string &path)
+{
+    const char *name = element->GetAttribute(attribute);
+    if (!name || !name[0]) refuse(path, "a " + std::string(element->GetName()) + " names no file");
+    const std::string file = beside(path, name), why_not = why_not_data(file);
+    if (!why_not.empty()) refuse(path, why_not);
+    return file;
+}
+
+void check_named(vtkXMLDataElement *element, const std::string &path)
+{
+    for (const char *attribute : {"file", "Source"})
+        if (element->GetAttribute(attribute)) check_length(file_named_by(element, attribute, path));
+    for (int i = 0; i < element->GetNumberOfNestedElements(); i++) check_named(element->GetNestedElement(i), path);
+}
+
+/* Whether file number `index` of `count` is for reader `piece` of `pieces`. */
+bool is_file_of_piece(size_t index, size_t count, int piece, int pieces)
+{
+    return static_cast<int>(index * static_cast<size_t>(pieces) / count) == piece;
+}
+
+using grid_list = std::vector<vtkSmartPointer<vtkUnstructuredGrid>>;
+
+/* Appending keeps only what all pieces have: a piece without ghost flags is given some. */
+void even_out_ghosts(const grid_list &grids)
+{
+    const bool has_ghosts = std::any_of(grids.begin(), grids.end(), [](auto &g) { return g->GetCellGhostArray(); });
+    for (const auto &grid : grids)
+        if (has_ghosts && !grid->GetCellGhostArray()) grid->AllocateCellGhostArray();
+}
+
+vtkSmartPointer<vtkUnstructuredGrid> append(const grid_list &grids)
+{
+    if (grids.empty()) return vtkSmartPointer<vtkUnstructuredGrid>::New();
+    if (grids.size() == 1) return grids[0];
+    even_out_ghosts(grids);
+    vtkNew<vtkAppendFilter> filter;
+    for (const auto &grid : grids) filter->AddInputData(grid);
+    filter->Update();
+    return filter->GetOutput();
+}
+
+class pvtu_file : public data_file
+{
+  public:
+    explicit pvtu_file(const std::string &path) : path_(path)
+    {
+        for (const auto &piece : read_elements(path, "PUnstructuredGrid", "Piece"))
+            pieces_.push_back(file_named_by(piece, "Source", path));
+    }
+
+    const std::vector<double> &times() const override { return times_; }
+    std::string step_path(size_t) const override { return path_; }
+    int pieces(size_t) override { return static_cast<int>(pieces_.size()); }
+    vtkSmartPointer<vtkDataObject> read(size_t, int piece, int pieces) override
+    {
+        grid_list grids;
+        for (size_t i = 0; i < pieces_.size(); i++) {
+            if (!is_file_of_piece(i, pieces_.size(), piece, pieces)) continue;
+            const auto data = grids_of(open_data_file(pieces_[i])->read(0, 0, 1), pieces_[i]);
+            auto *grid = vtkUnstructuredGrid::SafeDownCast(data);
+            if (!grid) refuse(path_, pieces_[i] + " is no unstructured grid");
+            if (grid->GetNumberOfCells() > 0) grids.emplace_back(grid);
+        }
+        vtkSmartPointer<vtkDataObject> all = append(grids);
+        throw_caught(path_);
+        return all;
+    }
+
+  private:
+    std::string path_;
+    std::vector<std::string> pieces_;
+    std::vector<double> times_; // none
+};
+
+struct series_step {
+    double time;
+    std::vector<std::string> parts; // files
+};
+
+class series_file : public data_file
+{
+  public:
+    series_file(const std::string &path, std::vector<series_step> steps, bool has_times)
+        : path_(path), steps_(std::move(steps))
+    {
+        if (steps_.empty()) refuse(path, "names no file");
+        for (const series_step &step : steps_) {
+            if (has_times) times_.push_back(step.time);
+            for (const std::string &part : step.parts)
+                if (is_series(part)) refuse(path, part + ": a series within a series");
+        }
+    }
+
+    const std::vector<double> &times() const override { return times_; }
+    std::string step_path(size_t step) const override { return steps_[step].parts[0]; }
+    int pieces(size_t step) override
+    {
+        const std::vector<std::string> &parts = steps_[step].parts;
+        return parts.size() > 1 ? static_cast<int>(parts.size()) : open(parts[0]).pieces(0);
+    }
+    vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) override
+    {
+        const std::vector<std::string> &parts = steps_[step].parts;
+        if (parts.size() == 1) return open(parts[0]).read(0, piece, pieces);
+        auto all = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+        all->SetNumberOfBlocks(static_cast<unsigned>(parts.size()));
+        for (size_t i = 0; i < parts.size(); i++)
+            if (is_file_of_piece(i, parts.size(), piece, pieces))
+                all->SetBlock(static_cast<unsigned>(i), open(parts[i]).read(0, 0, 1));
+        return all;
+    }
+
+  private:
+    static bool is_series(const std::string &path)
+    {
+        const std::string ending = path.substr(path.find_last_of('.'));
+        return ending == ".pvd" || ending == ".series";
+    }
+    data_file &open(const std::string &path)
+    {
+        if (open_ && open_path_ == path) return *open_;
+        open_ = open_data_file(path);
+        open_path_ = path;
+        if (open_->times().size() > 1)
+            refuse(path_, path + ": holds " + std::to_string(open_->times().size()) + " steps, expected one");
+        return *open_;
+    }
+
+    std::string path_;
+    std::vector<series_step> steps_;
+    std::vector<double> times_;
+    std::unique_ptr<data_file> open_; // the file read last
+    std::string open_path_;
+};
+
+double parse_time(const std::string &text, const std::string &path)
+{
+    char *end = nullptr;
+    const double time = std::strtod(text.c_str(), &end);
+    while (end && std::isspace(static_cast<unsigned char>(*end))) end++;
+    if (text.empty() || *end || !std::isfinite(time)) refuse(path, "timestep \"" + text + "\": expected a number");
+    return time;
+}
+
+void sort_by_time(std::vector<series_step> &steps)
+{
+    std::stable_sort(steps.begin(), steps.end(), [](auto &a, auto &b) { return a.time < b.time; });
+}
+
+Json::Value parse_json(const std::string &path)
+{
+    std::ifstream in(path);
+    Json::CharReaderBuilder builder;
+    builder["failIfExtra"] = true;
+    builder["rejectDupKeys"] = true;
+    Json::Value root;
+    std::string errors;
+    if (!Json::parseFromStream(builder, in, &root, &errors)) {
+        std::replace(errors.begin(), errors.end(), '\n', ' ');
+        refuse(path, "cannot be read: " + errors.substr(0, errors.find_last_not_of(' ') + 1));
+    }
+    return root;
+}
+
+} // namespace
+
+void check_named_files(const std::string &path)
+{
+    const auto root = read_xml(path);
+    check_named(root, path);
+}
+
+std::unique_ptr<data_file> open_pvtu(const std::string &path)
+{
+    return std::make_unique<pvtu_file>(path);
+}
+
+std::unique_ptr<data_file> open_pvd(const std::string &path)
+{
+    std::vector<series_step> steps;
+    bool has_times = true;
+    for (const auto &element : read_elements(path, "Collection", "DataSet")) {
+        const char *text = element->GetAttribute("timestep");
+        has_times = has_times && text;
+        const double time = text ? parse_time(text, path) : 0;
+        const std::string file = file_named_by(element, "file", path);
+        const auto same = std::find_if(steps.begin(), steps.end(), [=](auto &step) { return step.time == time; });
+        if (same != steps.end())
+            same->parts.push_back(file);
+        else
+            steps.push_back({time, {file}});
+    }
+    sort_by_time(steps);
+    return std::make_unique<series_file>(path, std::move(steps), has_times);
+}
+
+std::unique_ptr<data_file> open_series(const std::string &path)
+{
+    const Json::Value root = parse_json(path);
+    const Json::Value &files = root.isObject() ? root["files"] : Json::Value::nullSingleton();
+    if (!files.isArray()) refuse(path, "has no list \"files\"");
+    std::vector<series_step> steps;
+    for (const Json::Value &entry : files) {
+        if (!entry.isObject() || !entry["name"].isString() || entry["name"].asString().empty())
+            refuse(path, "an entry of \"files\" has no \"name\"");
+        if (!entry["time"].isNumeric()) refuse(path, entry["name"].asString() + ": \"time\" is no number");
+        const std::string file = beside(path, entry["name"].asString()), why_not = why_not_data(file);
+        if (!why_not.empty()) refuse(path, why_not);
+        steps.push_back({entry["time"].asDouble(), {file}});
+    }
+    sort_by_time(steps);
+    return std::make_unique<series_file>(path, std::move(steps), true);
+}
+
+} // namespace render_tool
