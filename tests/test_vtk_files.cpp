@@ -1,19 +1,30 @@
 /* What insitu-render's readers make of files of every format: the cells and values that are in them, and, of files that
- * are cut short, an error or the same cells and values, never others. */
+ * are cut short, an error or the same cells and values, never others.
+ *
+ *     test_vtk_files [random cuts of each file] */
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
-#include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include <vtkAMRBox.h>
+#include <vtkCell.h>
 #include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkIdList.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkOverlappingAMR.h>
 #include <vtkPointData.h>
+#include <vtkStructuredGrid.h>
+#include <vtkUniformGrid.h>
+#include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
+#include <vtkXMLUniformGridAMRWriter.h>
 
 #include "data_file.h"
 #include "grids_of.h"
@@ -38,6 +49,7 @@ namespace
 
 std::string folder;
 std::vector<sample> samples;
+int random_cuts = 40; // of each file, besides those that are chosen
 
 int write_all(void **)
 {
@@ -88,6 +100,11 @@ std::string differing_cells(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
         b->GetCellPoints(i, n, q);
         if (a->GetCellType(i) != b->GetCellType(i) || m != n || !std::equal(p, p + m, q))
             return "cell " + std::to_string(i);
+        vtkNew<vtkIdList> f, g;
+        if (a->GetCellType(i) != VTK_POLYHEDRON) continue;
+        a->GetFaceStream(i, f);
+        b->GetFaceStream(i, g);
+        if (!std::equal(f->begin(), f->end(), g->begin(), g->end())) return "faces of cell " + std::to_string(i);
     }
     return "";
 }
@@ -96,6 +113,7 @@ std::string differing_cells(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b)
 std::string differing_values(vtkDataSetAttributes *a, vtkDataSetAttributes *b, const std::string &name, bool must_exist)
 {
     vtkDataArray *x = a->GetArray(name.c_str()), *y = b->GetArray(name.c_str());
+    if (!y) return "";
     if (!x) return must_exist ? "no field " + name : "";
     if (x->GetNumberOfTuples() != y->GetNumberOfTuples()) return "length of " + name;
     for (vtkIdType i = 0; i < x->GetNumberOfTuples(); i++)
@@ -108,6 +126,7 @@ std::string difference(vtkUnstructuredGrid *a, vtkUnstructuredGrid *b, bool must
     std::string where = differing_cells(a, b);
     if (where.empty()) where = differing_values(a->GetPointData(), b->GetPointData(), "x", must_exist);
     if (where.empty()) where = differing_values(a->GetCellData(), b->GetCellData(), "c", must_exist);
+    if (where.empty()) where = differing_values(a->GetCellData(), b->GetCellData(), "p", must_exist);
     return where;
 }
 
@@ -147,32 +166,199 @@ std::vector<size_t> cuts_of(size_t size, int random_count)
     return cuts;
 }
 
+/* How many cuts of one file of the sample are taken for something else. */
+int count_wrong_cuts(const sample &s, const std::string &file)
+{
+    int wrong = 0;
+    const std::string whole = read_file(folder + "/" + file);
+    for (const size_t cut : cuts_of(whole.size(), random_cuts)) {
+        write_file(folder + "/" + file, whole.substr(0, cut));
+        const std::string where = taken_for(s);
+        if (where.empty()) continue;
+        print_error("%s with %s cut at %zu of %zu: %s\n", s.name.c_str(), file.c_str(), cut, whole.size(),
+                    where.c_str());
+        wrong++;
+    }
+    write_file(folder + "/" + file, whole);
+    return wrong;
+}
+
 void cut_files_are_errors_or_the_same(void **)
 {
     int wrong = 0;
     for (const sample &s : samples)
-        for (const std::string &file : s.files) {
-            const std::string whole = read_file(folder + "/" + file);
-            for (const size_t cut : cuts_of(whole.size(), 40)) {
-                write_file(folder + "/" + file, whole.substr(0, cut));
-                const std::string where = taken_for(s);
-                if (where.empty()) continue;
-                print_error("%s with %s cut at %zu of %zu: %s\n", s.name.c_str(), file.c_str(), cut, whole.size(),
-                            where.c_str());
-                wrong++;
-            }
-            write_file(folder + "/" + file, whole);
-        }
+        for (const std::string &file : s.files) wrong += count_wrong_cuts(s, file);
     assert_int_equal(wrong, 0);
+}
+
+vtkUnsignedCharArray *ghosts_of(vtkDataObject *grid)
+{
+    return vtkUnstructuredGrid::SafeDownCast(grid)->GetCellGhostArray();
+}
+
+void hidden_points_hide_their_cells(void **)
+{
+    const auto data = structured(lattice::curved);
+    vtkStructuredGrid::SafeDownCast(data)->BlankPoint(0);
+    vtkStructuredGrid::SafeDownCast(data)->BlankCell(59);
+    const auto grid = grids_of(data, "");
+    for (int i = 0; i < 60; i++) assert_int_equal(ghosts_of(grid)->GetValue(i) != 0, i == 0 || i == 59);
+}
+
+/* A coarse lattice of 4 × 4 × 4 cells, of which 2 × 2 × 2 have finer ones. */
+void finer_levels_hide_coarser_cells(void **)
+{
+    const double origin[3] = {0, 0, 0}, steps[2][3] = {{1, 1, 1}, {0.5, 0.5, 0.5}}, inner[3] = {1, 1, 1};
+    const int blocks[2] = {1, 1}, dimensions[3] = {5, 5, 5};
+    vtkNew<vtkOverlappingAMR> amr;
+    amr->Initialize(2, blocks);
+    amr->SetOrigin(origin);
+    amr->SetGridDescription(VTK_XYZ_GRID);
+    for (unsigned level = 0; level < 2; level++) {
+        vtkNew<vtkUniformGrid> grid;
+        grid->SetDimensions(dimensions);
+        grid->SetOrigin(level == 0 ? origin : inner);
+        grid->SetSpacing(steps[level]);
+        amr->SetSpacing(level, steps[level]);
+        amr->SetAMRBox(level, 0, vtkAMRBox(level == 0 ? origin : inner, dimensions, steps[level], origin));
+        amr->SetDataSet(level, 0, grid);
+        amr->SetRefinementRatio(level, 2);
+    }
+    const std::string path = folder + "/levels.vthb";
+    vtkNew<vtkXMLUniformGridAMRWriter> writer;
+    writer->SetFileName(path.c_str());
+    writer->SetInputData(amr);
+    assert_int_equal(writer->Write(), 1);
+
+    const auto data = grids_of(open_data_file(path)->read(0, 0, 1), path);
+    auto *levels = vtkMultiBlockDataSet::SafeDownCast(data);
+    assert_int_equal(levels->GetNumberOfBlocks(), 2);
+    for (int i = 0; i < 64; i++) {
+        auto is_inner = [](int index) { return index == 1 || index == 2; };
+        const bool is_hidden = is_inner(i % 4) && is_inner(i / 4 % 4) && is_inner(i / 16);
+        assert_int_equal(ghosts_of(levels->GetBlock(0))->GetValue(i) != 0, is_hidden);
+        assert_int_equal(ghosts_of(levels->GetBlock(1)) ? ghosts_of(levels->GetBlock(1))->GetValue(i) : 0, 0);
+    }
+}
+
+void expect_foam_step(data_file &file, size_t step, double factor)
+{
+    const auto grid = only_grid(grids_of(file.read(step, 0, 1), "case"));
+    assert_int_equal(grid->GetNumberOfCells(), 3);
+    assert_int_equal(grid->GetNumberOfPoints(), 12);
+    const int types[3] = {VTK_POLYHEDRON, VTK_WEDGE, VTK_WEDGE};
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(grid->GetCellType(i), types[i]);
+        assert_true(grid->GetCellData()->GetArray("p")->GetComponent(i, 0) == (i + 1) * factor);
+    }
+    assert_int_equal(grid->GetCell(0)->GetNumberOfFaces(), 7);
+}
+
+void foam_case_is_read_with_its_steps(void **)
+{
+    write_foam(folder + "/foam");
+    const auto file = open_data_file(folder + "/foam/case.foam");
+    assert_int_equal(file->times().size(), 2);
+    assert_true(file->times()[0] == 0 && file->times()[1] == 0.5);
+    expect_foam_step(*file, 0, 1);
+    expect_foam_step(*file, 1, 2);
+}
+
+void cut_foam_files_are_errors_or_the_same(void **)
+{
+    write_foam(folder + "/foam");
+    const auto whole = read_grid("foam/case.foam");
+    const std::string mesh = "foam/constant/polyMesh/";
+    int wrong = 0;
+    for (const std::string &file : {mesh + "points", mesh + "faces", mesh + "owner", mesh + "neighbour",
+                                    mesh + "boundary", std::string("foam/0/p"), std::string("foam/system/controlDict")})
+        wrong += count_wrong_cuts({"foam/case.foam", {}, whole}, file);
+    assert_int_equal(wrong, 0);
+}
+
+/* Entries of one time are parts of one step, and steps come in the order of their times. */
+void series_have_the_times_of_their_entries(void **)
+{
+    auto entry = [](const char *time, const char *file) {
+        return std::string("<DataSet timestep=\"") + time + "\" file=\"" + file + "\"/>";
+    };
+    write_file(folder + "/s.pvd", "<VTKFile type=\"Collection\"><Collection>" + entry("2", "raw.vtu") +
+                                      entry("0.25", "g.vts") + entry("2", "g.vti") + "</Collection></VTKFile>\n");
+    const auto file = open_data_file(folder + "/s.pvd");
+    assert_int_equal(file->times().size(), 2);
+    assert_true(file->times()[0] == 0.25 && file->times()[1] == 2);
+    assert_int_equal(file->pieces(0), 1);
+    assert_int_equal(file->pieces(1), 2);
+    assert_string_equal(file->step_path(0).c_str(), (folder + "/g.vts").c_str());
+    const auto both = grids_of(file->read(1, 0, 1), "");
+    assert_int_equal(vtkMultiBlockDataSet::SafeDownCast(both)->GetNumberOfBlocks(), 2);
+    const auto second = only_grid(grids_of(file->read(1, 1, 2), ""));
+    assert_string_equal(difference(second, hexes(lattice::image), true).c_str(), "");
+}
+
+void expect_refusal(const std::string &name, const std::string &text, const std::string &why)
+{
+    write_file(folder + "/" + name, text);
+    try {
+        (void)open_data_file(folder + "/" + name)->read(0, 0, 1);
+    } catch (const std::runtime_error &e) {
+        if (std::string(e.what()).find(why) != std::string::npos) return;
+        print_error("%s\n", e.what());
+    }
+    print_error("%s: expected an error with '%s'\n", name.c_str(), why.c_str());
+    assert_true(false);
+}
+
+void wrong_series_are_refused_by_what_is_wrong(void **)
+{
+    const std::string head = "<VTKFile type=\"Collection\"><Collection>", tail = "</Collection></VTKFile>\n";
+    expect_refusal("a.pvd", head + tail, "names no file");
+    expect_refusal("a.pvd", head + "<DataSet timestep=\"soon\" file=\"raw.vtu\"/>" + tail, "timestep \"soon\"");
+    expect_refusal("a.pvd", head + "<DataSet timestep=\"1\"/>" + tail, "a DataSet names no file");
+    expect_refusal("a.pvd", head + "<DataSet timestep=\"1\" file=\"none.vtu\"/>" + tail, "none.vtu: No such file");
+    expect_refusal("a.pvd", head + "<DataSet timestep=\"1\" file=\"g.pvd\"/>" + tail, "a series within a series");
+    expect_refusal("a.vtu.series", "{}", "no list \"files\"");
+    expect_refusal("a.vtu.series", "{\"files\": [{\"name\": \"raw.vtu\"}]}", "\"time\" is no number");
+    expect_refusal("a.vtu.series", "{\"files\": [3]}", "has no \"name\"");
+    expect_refusal("a.vtu.series", "{\"files\": [", "cannot be read");
+    expect_refusal("a.case", "FORMAT\ntype: ensight\nGEOMETRY\nmodel: t.geo\n", "no case of EnSight Gold");
+    expect_refusal("a.vtm",
+                   "<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\"><vtkMultiBlockDataSet><DataSet "
+                   "index=\"0\" file=\"none.vtu\"/></vtkMultiBlockDataSet></VTKFile>\n",
+                   "none.vtu: No such file");
+}
+
+/* As VTK's own writer and others leave grids without cells. */
+void grids_without_cells_are_no_errors(void **)
+{
+    const std::string head = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>",
+                      tail = "</UnstructuredGrid></VTKFile>\n";
+    write_vtu(folder + "/none.vtu", vtkNew<vtkUnstructuredGrid>());
+    write_file(folder + "/bare.vtu", head + "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"/>" + tail);
+    write_file(folder + "/no_piece.vtu", head + tail);
+    for (const char *name : {"none.vtu", "bare.vtu", "no_piece.vtu"})
+        assert_int_equal(read_grid(name)->GetNumberOfCells(), 0);
+    write_file(folder + "/with_none.pvtu",
+               "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece "
+               "Source=\"none.vtu\"/><Piece Source=\"raw.vtu\"/></PUnstructuredGrid></VTKFile>\n");
+    assert_string_equal(difference(read_grid("with_none.pvtu"), hexes(lattice::curved), true).c_str(), "");
 }
 
 } // namespace
 
-int main()
+int main(int argc, char **argv)
 {
+    if (argc > 1) random_cuts = std::atoi(argv[1]);
     const CMUnitTest tests[] = {
         cmocka_unit_test(every_format_gives_its_cells_and_values),
         cmocka_unit_test(cut_files_are_errors_or_the_same),
+        cmocka_unit_test(hidden_points_hide_their_cells),
+        cmocka_unit_test(finer_levels_hide_coarser_cells),
+        cmocka_unit_test(foam_case_is_read_with_its_steps),
+        cmocka_unit_test(cut_foam_files_are_errors_or_the_same),
+        cmocka_unit_test(series_have_the_times_of_their_entries),
+        cmocka_unit_test(wrong_series_are_refused_by_what_is_wrong),
+        cmocka_unit_test(grids_without_cells_are_no_errors),
     };
     return cmocka_run_group_tests(tests, write_all, nullptr);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 
 #include <vtkCellData.h>
 #include <vtkDoubleArray.h>
@@ -28,6 +29,11 @@
 #include <vtkXMLRectilinearGridWriter.h>
 #include <vtkXMLStructuredGridWriter.h>
 #include <vtkXMLUnstructuredGridWriter.h>
+
+#include <vtk_cgns.h>
+// clang-format off
+#include VTK_CGNS(cgnslib.h)
+// clang-format on
 
 #include "test_vtk_run.h"
 
@@ -280,13 +286,154 @@ void write_unstructured(const std::string &folder, vtkUnstructuredGrid *grid)
     write_ensight(folder, grid);
 }
 
+vtkSmartPointer<vtkUnstructuredGrid> joined(vtkUnstructuredGrid *first, vtkUnstructuredGrid *second)
+{
+    auto all = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkFloatArray> x, c;
+    x->SetName("x");
+    c->SetName("c");
+    all->SetPoints(points);
+    for (vtkUnstructuredGrid *grid : {first, second}) {
+        const vtkIdType base = points->GetNumberOfPoints();
+        for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); i++) {
+            points->InsertNextPoint(grid->GetPoint(i));
+            x->InsertNextTuple(i, grid->GetPointData()->GetArray("x"));
+        }
+        for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
+            c->InsertNextTuple(i, grid->GetCellData()->GetArray("c"));
+            vtkNew<vtkIdList> list;
+            if (grid->GetCellType(i) != VTK_POLYHEDRON) {
+                grid->GetCellPoints(i, list);
+                for (vtkIdType &point : *list) point += base;
+            } else {
+                grid->GetFaceStream(i, list);
+                vtkIdType at = 1;
+                while (at < list->GetNumberOfIds())
+                    for (vtkIdType left = list->GetId(at++); left > 0; left--, at++)
+                        list->SetId(at, list->GetId(at) + base);
+            }
+            all->InsertNextCell(grid->GetCellType(i), list);
+        }
+    }
+    all->GetPointData()->AddArray(x);
+    all->GetCellData()->AddArray(c);
+    return all;
+}
+
+/* The first piece has no polyhedra, the second has hexahedra and polyhedra. */
+vtkSmartPointer<vtkUnstructuredGrid> write_polyhedra(const std::string &folder)
+{
+    write_xml(folder + "/p0.vtu", cubes(2, 0, false), vtkXMLWriter::Appended, true);
+    write_xml(folder + "/p1.vtu", cubes(5, 2, true), vtkXMLWriter::Appended, true);
+    write_text_pieces(folder + "/p.pvtu", "PUnstructuredGrid", "",
+                      "<PPoints><PDataArray type=\"Float32\" NumberOfComponents=\"3\"/></PPoints>",
+                      "<Piece Source=\"p0.vtu\"/><Piece Source=\"p1.vtu\"/>");
+    return joined(cubes(2, 0, false), cubes(5, 2, true));
+}
+
+std::string lines_of(vtkDataArray *values, int component)
+{
+    std::ostringstream text;
+    for (vtkIdType i = 0; i < values->GetNumberOfTuples(); i++) text << values->GetComponent(i, component) << '\n';
+    return text.str();
+}
+
+/* As text; each number of a point or cell in a line of its own. */
+void write_ensight_text(const std::string &folder, vtkUnstructuredGrid *grid)
+{
+    std::ostringstream cells;
+    for (vtkIdType i = 0; i < grid->GetNumberOfCells(); i++) {
+        vtkIdType count = 0;
+        const vtkIdType *points = nullptr;
+        grid->GetCellPoints(i, count, points);
+        for (vtkIdType k = 0; k < count; k++) cells << ' ' << points[k] + 1;
+        cells << '\n';
+    }
+    vtkDataArray *points = grid->GetPoints()->GetData();
+    const std::string part = "part\n         1\n",
+                      coordinates = lines_of(points, 0) + lines_of(points, 1) + lines_of(points, 2);
+    write_file(folder + "/t.geo", "Hexahedra\nof a lattice\nnode id assign\nelement id assign\n" + part +
+                                      "all of them\ncoordinates\n" + std::to_string(point_count) + "\n" + coordinates +
+                                      "hexa8\n" + std::to_string(cell_count) + "\n" + cells.str());
+    write_file(folder + "/t.x", "x\n" + part + "coordinates\n" + lines_of(grid->GetPointData()->GetArray("x"), 0));
+    write_file(folder + "/t.c", "c\n" + part + "hexa8\n" + lines_of(grid->GetCellData()->GetArray("c"), 0));
+    write_file(folder + "/t.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: t.geo\nVARIABLE\n"
+                                   "scalar per node: x t.x\nscalar per element: c t.c\n");
+}
+
+/* A structured zone. */
+void write_cgns(const std::string &path, vtkUnstructuredGrid *grid)
+{
+    int file = 0, base = 0, zone = 0, solution = 0, number = 0;
+    const cgsize_t sizes[9] = {size[0], size[1], size[2], size[0] - 1, size[1] - 1, size[2] - 1, 0, 0, 0};
+    cg_open(path.c_str(), CG_MODE_WRITE, &file);
+    cg_base_write(file, "Base", 3, 3, &base);
+    cg_zone_write(file, base, "Zone", sizes, CGNS_ENUMV(Structured), &zone);
+    for (int axis = 0; axis < 3; axis++) {
+        std::vector<float> values;
+        for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); i++)
+            values.push_back(static_cast<float>(grid->GetPoint(i)[axis]));
+        const std::string name = std::string("Coordinate") + "XYZ"[axis];
+        cg_coord_write(file, base, zone, CGNS_ENUMV(RealSingle), name.c_str(), values.data(), &number);
+    }
+    cg_sol_write(file, base, zone, "AtVertices", CGNS_ENUMV(Vertex), &solution);
+    cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "x",
+                   grid->GetPointData()->GetArray("x")->GetVoidPointer(0), &number);
+    cg_sol_write(file, base, zone, "InCells", CGNS_ENUMV(CellCenter), &solution);
+    cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealSingle), "c",
+                   grid->GetCellData()->GetArray("c")->GetVoidPointer(0), &number);
+    cg_close(file);
+}
+
+std::string foam_file(const std::string &kind, const std::string &name, const std::string &body)
+{
+    return "FoamFile\n{\n    version 2.0;\n    format ascii;\n    class " + kind + ";\n    object " + name + ";\n}\n" +
+           body;
+}
+
 } // namespace
+
+void write_foam(const std::string &folder)
+{
+    namespace fs = std::filesystem;
+    const std::string mesh = folder + "/constant/polyMesh/";
+    for (const char *inside : {"/constant/polyMesh", "/system", "/0", "/0.5"}) fs::create_directories(folder + inside);
+    write_file(folder + "/case.foam", "");
+    write_file(folder + "/system/controlDict",
+               foam_file("dictionary", "controlDict",
+                         "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 0.5;\n"
+                         "deltaT 0.5;\nwriteControl timeStep;\nwriteInterval 1;\nwriteFormat ascii;\n"));
+    write_file(mesh + "points",
+               foam_file("vectorField", "points",
+                         "12\n(\n(0 0 0)\n(0 1 0)\n(0 1 1)\n(0 0 1)\n(1 0 0)\n(1 1 0)\n(1 1 1)\n(1 0 1)\n"
+                         "(2 0 0)\n(2 1 0)\n(2 1 1)\n(2 0 1)\n)\n"));
+    /* Inner faces first: the two triangles, then the quad between the wedges. */
+    write_file(mesh + "faces", foam_file("faceList", "faces",
+                                         "14\n(\n3(4 5 6)\n3(4 6 7)\n4(4 8 10 6)\n4(0 3 2 1)\n4(0 1 5 4)\n4(1 2 6 5)\n"
+                                         "4(2 3 7 6)\n4(3 0 4 7)\n4(4 5 9 8)\n4(5 6 10 9)\n3(8 9 10)\n4(6 7 11 10)\n"
+                                         "4(7 4 8 11)\n3(8 10 11)\n)\n"));
+    write_file(mesh + "owner", foam_file("labelList", "owner", "14\n(\n0\n0\n1\n0\n0\n0\n0\n0\n1\n1\n1\n2\n2\n2\n)\n"));
+    write_file(mesh + "neighbour", foam_file("labelList", "neighbour", "3\n(\n1\n2\n2\n)\n"));
+    write_file(mesh + "boundary", foam_file("polyBoundaryMesh", "boundary",
+                                            "1\n(\nwall\n{\n    type wall;\n    nFaces 11;\n    startFace 3;\n}\n)\n"));
+    for (const int step : {0, 1}) {
+        std::string values;
+        for (int i = 1; i <= 3; i++) values += std::to_string(i << step) + "\n";
+        write_file(folder + (step ? "/0.5/p" : "/0/p"),
+                   foam_file("volScalarField", "p",
+                             "dimensions [0 2 -2 0 0 0 0];\ninternalField nonuniform List<scalar>\n3\n(\n" + values +
+                                 ");\nboundaryField\n{\n    wall\n    {\n        type zeroGradient;\n    }\n}\n"));
+    }
+}
 
 std::vector<sample> write_samples(const std::string &folder)
 {
     const auto image = hexes(lattice::image), axes = hexes(lattice::rectilinear), curved = hexes(lattice::curved);
     write_lattices(folder);
     write_unstructured(folder, curved);
+    write_ensight_text(folder, curved);
+    write_cgns(folder + "/g.cgns", curved);
     std::vector<sample> all = {{"g.vti", {"g.vti"}, image},
                                {"g.vtr", {"g.vtr"}, axes},
                                {"g.vts", {"g.vts"}, curved},
@@ -297,7 +444,10 @@ std::vector<sample> write_samples(const std::string &folder)
                                {"g.pvd", {"g.pvd", "raw.vtu"}, curved},
                                {"g.vtu.series", {"g.vtu.series"}, curved},
                                {"m.vtm", {"m.vtm", "m/m_0.vtu"}, curved},
-                               {"e.case", files_like(folder, "e."), curved}};
+                               {"e.case", files_like(folder, "e."), curved},
+                               {"t.case", files_like(folder, "t."), curved},
+                               {"g.cgns", {"g.cgns"}, curved},
+                               {"p.pvtu", {"p.pvtu", "p0.vtu", "p1.vtu"}, write_polyhedra(folder)}};
     for (const std::string start : {"binary_", "text_"}) {
         all.push_back({start + "image.vtk", {start + "image.vtk"}, image});
         all.push_back({start + "axes.vtk", {start + "axes.vtk"}, axes});

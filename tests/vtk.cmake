@@ -1,6 +1,6 @@
 # The VTK adaptor against a session that records, and insitu-render on files.
 find_package(VTK 9.1 REQUIRED
-  COMPONENTS CommonCore CommonDataModel CommonExecutionModel IOLegacy IOParallel IOXML)
+  COMPONENTS CommonCore CommonDataModel CommonExecutionModel IOLegacy IOParallel IOXML cgns)
 
 add_executable(test_vtk_adaptor test_vtk_adaptor.cpp test_vtk_session_stub.cpp)
 target_link_libraries(test_vtk_adaptor PRIVATE insitu_vtk_objects PkgConfig::CMOCKA insitu_flags)
@@ -14,11 +14,12 @@ set_tests_properties(vtk_deal PROPERTIES TIMEOUT 60)
 
 # Files of every format, written by VTK's own writers where it has one.
 add_library(test_vtk_samples STATIC test_vtk_samples.cpp test_vtk_run.cpp)
-target_link_libraries(test_vtk_samples PUBLIC VTK::CommonDataModel PRIVATE insitu_flags VTK::IOParallel VTK::IOLegacy VTK::IOXML)
+target_link_libraries(test_vtk_samples PUBLIC VTK::CommonDataModel PRIVATE insitu_flags VTK::IOParallel VTK::IOLegacy VTK::IOXML VTK::cgns)
 
 add_executable(test_vtk_files test_vtk_files.cpp)
-target_link_libraries(test_vtk_files PRIVATE test_vtk_samples insitu_render_files insitu_flags PkgConfig::CMOCKA)
+target_link_libraries(test_vtk_files PRIVATE test_vtk_samples insitu_render_files insitu_flags PkgConfig::CMOCKA VTK::IOXML)
 add_test(NAME vtk_files COMMAND test_vtk_files)
+insitu_add_long_test(vtk_files_cut_often test_vtk_files 2000)
 
 add_executable(test_vtk_tool test_vtk_tool.cpp test_vtk_run.cpp)
 target_link_libraries(test_vtk_tool PRIVATE insitu_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)

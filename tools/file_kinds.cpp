@@ -2,6 +2,8 @@
  * unless asked. Readers that Debian's VTK may lack are compiled in only where CMake found them. */
 #include "file_kinds.h"
 
+#include <stdexcept>
+
 #include <vtkAlgorithm.h>
 #include <vtkGenericDataObjectReader.h>
 #include <vtkXMLImageDataReader.h>
@@ -22,6 +24,10 @@
 #endif
 #ifdef INSITU_VTK_CGNS
 #include <vtkCGNSReader.h>
+#include <vtk_cgns.h>
+// clang-format off
+#include VTK_CGNS(cgns_io.h)
+// clang-format on
 #endif
 #ifdef INSITU_VTK_ENSIGHT
 #include <vtkGenericEnSightReader.h>
@@ -79,8 +85,19 @@ reader make_exodus(const std::string &path)
 #endif
 
 #ifdef INSITU_VTK_CGNS
+/* VTK's reader ends the program where a file cannot be opened, so it is opened here first. */
+void check_cgns(const std::string &path)
+{
+    int type = CGIO_FILE_NONE, file = 0;
+    if (cgio_check_file(path.c_str(), &type) != CGIO_ERR_NONE ||
+        cgio_open_file(path.c_str(), CGIO_MODE_READ, type, &file) != CGIO_ERR_NONE)
+        throw std::runtime_error(path + ": cannot be read: is no CGNS file, or is cut short");
+    (void)cgio_close_file(file);
+}
+
 reader make_cgns(const std::string &path)
 {
+    check_cgns(path);
     auto r = vtkSmartPointer<vtkCGNSReader>::New();
     r->SetFileName(path.c_str());
     r->UpdateInformation();
