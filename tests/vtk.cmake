@@ -21,6 +21,14 @@ target_link_libraries(test_vtk_files PRIVATE test_vtk_samples insitu_render_file
 add_test(NAME vtk_files COMMAND test_vtk_files)
 insitu_add_long_test(vtk_files_cut_often test_vtk_files 2000)
 
+add_executable(test_vtk_formats test_vtk_formats.cpp)
+target_link_libraries(test_vtk_formats PRIVATE test_vtk_samples insitu_flags PkgConfig::CMOCKA VTK::IOXML)
+add_test(NAME vtk_formats COMMAND test_vtk_formats $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
+insitu_add_long_test(vtk_formats_cut_often
+  test_vtk_formats $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE} 50 90 95 99)
+set_tests_properties(vtk_formats vtk_formats_cut_often PROPERTIES
+  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300)
+
 add_executable(test_vtk_tool test_vtk_tool.cpp test_vtk_run.cpp)
 target_link_libraries(test_vtk_tool PRIVATE insitu_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)
 add_test(NAME vtk_tool COMMAND test_vtk_tool $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})

@@ -115,7 +115,9 @@ void add_arrays(vtkDataSetAttributes *data, const std::vector<bool> &selected,
 {
     for (int i = 0; i < data->GetNumberOfArrays(); i++) {
         vtkDataArray *array = data->GetArray(i);
-        if (array && array->GetName()) add_array(array, selected, fields[array->GetName()]);
+        if (!array || !array->GetName() || array->GetName() == std::string(vtkDataSetAttributes::GhostArrayName()))
+            continue;
+        add_array(array, selected, fields[array->GetName()]);
     }
 }
 

@@ -1,0 +1,229 @@
+/* insitu-render on files of every format: the pictures are those of the same cells in a .vtu, bit for bit, on one rank
+ * and on two; a file that is cut short ends the program with an error or changes nothing.
+ *
+ *     test_vtk_formats <insitu-render> <mpiexec> [percent...], where to cut (95 unless told) */
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <vtkCellData.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkStructuredGrid.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkXMLStructuredGridWriter.h>
+
+#include "test_vtk_run.h"
+#include "test_vtk_samples.h"
+
+// cmocka defines fail as a macro, so it comes after all C++ headers.
+extern "C" {
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+}
+
+namespace
+{
+
+std::string tool, mpiexec, folder;
+std::vector<size_t> percents = {95};
+std::vector<sample> samples;
+
+std::string scene(const std::string &field, const std::string &value)
+{
+    return "images:\n"
+           "  - name: a\n"
+           "    size: [64, 48]\n"
+           "    layers:\n"
+           "      - isosurface:\n"
+           "          field: " +
+           field +
+           "\n"
+           "          values: [" +
+           value +
+           "]\n"
+           "    outputs:\n"
+           "      - path: a_{cycle:02}.png\n";
+}
+
+int write_all(void **)
+{
+    folder = fresh_folder("vtk_formats");
+    write_file(folder + "/scene.yaml", scene("x", "0.3"));
+    write_file(folder + "/cells.yaml", scene("p", "1.5"));
+    samples = write_samples(folder);
+    write_foam(folder + "/foam");
+    return 0;
+}
+
+run_result run_tool(int ranks, const std::string &arguments)
+{
+    const std::string start = ranks > 1 ? shell_word(mpiexec) + " -n " + std::to_string(ranks) + " " : "";
+    return run_in(folder, start + shell_word(tool) + " " + arguments);
+}
+
+void expect(const run_result &r, int status, const std::string &text)
+{
+    if (r.status == status && r.says(text)) return;
+    print_error("status %d, expected %d with '%s'\n%s%s", r.status, status, text.c_str(), r.out.c_str(), r.err.c_str());
+    assert_true(false);
+}
+
+std::string picture(size_t step)
+{
+    const std::string number = std::to_string(step);
+    return read_file(folder + "/a_" + (step < 10 ? "0" : "") + number + ".png");
+}
+
+/* Files are steps of one run: the first is the .vtu, the others must look the same. */
+void expect_same_pictures(int ranks, const std::vector<std::string> &files)
+{
+    std::string names;
+    for (const std::string &file : files) names += " " + file;
+    const std::string count = std::to_string(files.size());
+    expect(run_tool(ranks, "scene.yaml" + names), 0, count + " steps, " + count + " pictures");
+    const std::string first = picture(0);
+    assert_true(first.size() > 300); // an empty picture has some 200 bytes
+    for (size_t i = 1; i < files.size(); i++) {
+        if (picture(i) == first) continue;
+        print_error("%s on %d ranks: another picture than %s\n", files[i].c_str(), ranks, files[0].c_str());
+        assert_true(false);
+    }
+}
+
+void every_format_gives_the_picture_of_its_vtu(void **)
+{
+    const lattice kinds[] = {lattice::image, lattice::rectilinear, lattice::curved};
+    for (const lattice kind : kinds) {
+        const auto same = hexes(kind);
+        write_vtu(folder + "/same.vtu", same);
+        std::vector<std::string> files = {"same.vtu"};
+        for (const sample &s : samples) {
+            double a[6], b[6];
+            s.expected->GetBounds(a);
+            same->GetBounds(b);
+            if (std::equal(a, a + 6, b)) files.push_back(s.name);
+        }
+        assert_true(files.size() > 4);
+        for (const int ranks : {1, 2}) expect_same_pictures(ranks, files);
+    }
+}
+
+void polyhedra_beside_other_cells_are_drawn_on_any_ranks(void **)
+{
+    const auto pieces = std::find_if(samples.begin(), samples.end(), [](auto &s) { return s.name == "p.pvtu"; });
+    write_vtu(folder + "/same.vtu", pieces->expected);
+    for (const int ranks : {1, 2, 3}) expect_same_pictures(ranks, {"same.vtu", "p.pvtu"});
+    expect(run_tool(3, "--partition random scene.yaml p.pvtu"), 0, "  7 cells");
+    const std::string random = picture(0);
+    expect(run_tool(1, "scene.yaml same.vtu"), 0, "  7 cells");
+    assert_true(picture(0) == random);
+}
+
+/* The file that VTK writes for a grid without cells. */
+void pieces_without_cells_change_nothing(void **)
+{
+    write_vtu(folder + "/none.vtu", vtkNew<vtkUnstructuredGrid>());
+    expect(run_tool(1, "scene.yaml raw.vtu"), 0, "  60 cells");
+    const std::string alone = picture(0);
+    for (const int ranks : {1, 2}) {
+        expect(run_tool(ranks, "--pieces scene.yaml none.vtu raw.vtu none.vtu"), 0, "  60 cells");
+        assert_true(picture(0) == alone);
+    }
+    expect(run_tool(1, "scene.yaml none.vtu"), 1, "none.vtu: no cells to draw");
+}
+
+void foam_cases_are_drawn_step_by_step(void **)
+{
+    const run_result all = run_tool(2, "cells.yaml foam/case.foam");
+    expect(all, 0, "2 steps, 2 pictures");
+    expect(all, 0, "case.foam  cycle 1  time 0.5  3 cells");
+    assert_true(picture(0) != picture(1));
+}
+
+void steps_of_series_are_chosen_by_number(void **)
+{
+    write_file(folder + "/run.pvd",
+               "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"3\" file=\"g.vts\"/><DataSet "
+               "timestep=\"7.5\" file=\"raw.vtu\"/><DataSet timestep=\"9\" file=\"g.vti\"/></Collection></VTKFile>\n");
+    const run_result r = run_tool(1, "--steps 1 scene.yaml run.pvd");
+    expect(r, 0, "raw.vtu  cycle 1  time 7.5  60 cells");
+    expect(r, 0, "1 step, 1 picture");
+    expect(run_tool(1, "--steps 3 scene.yaml run.pvd"), 1, "none chosen of 3");
+    expect(run_tool(1, "--steps 2: scene.yaml g.pvd run.pvd"), 0, "raw.vtu  cycle 2  time 7.5");
+    expect(run_tool(1, "--info run.pvd"), 0, "times  3: 3 .. 9");
+}
+
+/* What lies in hidden cells, and at points that no other cell has, is no part of what --info says. */
+void info_leaves_hidden_cells_out(void **)
+{
+    const auto data = structured(lattice::curved);
+    auto *grid = vtkStructuredGrid::SafeDownCast(data);
+    grid->BlankCell(0);
+    grid->GetCellData()->GetArray("c")->SetComponent(0, 0, -1e9);
+    grid->GetPointData()->GetArray("x")->SetComponent(0, 0, 1e9);
+    vtkNew<vtkXMLStructuredGridWriter> writer;
+    writer->SetFileName((folder + "/blanked.vts").c_str());
+    writer->SetInputData(grid);
+    assert_int_equal(writer->Write(), 1);
+    const run_result r = run_tool(1, "--info blanked.vts");
+    expect(r, 0, "blanked.vts: vtkStructuredGrid, 59 cells");
+    expect(r, 0, "1 .. 59\n");
+    expect(r, 0, "hidden or ghosts         1\n");
+    assert_false(r.says("e+09"));
+    assert_false(r.says("vtkGhostType"));
+    assert_false(r.says("Empty"));
+    expect(run_tool(2, "scene.yaml blanked.vts"), 0, "  60 cells");
+}
+
+void expect_error_or_same(const sample &s, const std::string &file, const std::string &right, size_t percent, int ranks)
+{
+    const std::string whole = read_file(folder + "/" + file);
+    write_file(folder + "/" + file, whole.substr(0, whole.size() * percent / 100));
+    const run_result r = run_tool(ranks, "scene.yaml " + s.name);
+    write_file(folder + "/" + file, whole);
+    const bool is_error = r.status == 1 && r.err.compare(0, 15, "insitu-render: ") == 0;
+    if (is_error || (r.status == 0 && picture(0) == right)) return;
+    print_error("%s with %s cut at %zu %% on %d ranks: status %d\n%s%s", s.name.c_str(), file.c_str(), percent, ranks,
+                r.status, r.out.c_str(), r.err.c_str());
+    assert_true(false);
+}
+
+void cut_files_end_all_ranks(void **)
+{
+    for (const sample &s : samples) {
+        write_vtu(folder + "/same.vtu", s.expected);
+        expect(run_tool(1, "scene.yaml same.vtu"), 0, "1 picture");
+        const std::string right = picture(0);
+        for (const std::string &file : s.files)
+            for (const size_t percent : percents)
+                for (const int ranks : {1, 2}) expect_error_or_same(s, file, right, percent, ranks);
+    }
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    if (argc < 3) return 2;
+    tool = argv[1];
+    mpiexec = argv[2];
+    if (argc > 3) percents.clear();
+    for (int i = 3; i < argc; i++) percents.push_back(static_cast<size_t>(std::atoi(argv[i])));
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(every_format_gives_the_picture_of_its_vtu),
+        cmocka_unit_test(polyhedra_beside_other_cells_are_drawn_on_any_ranks),
+        cmocka_unit_test(pieces_without_cells_change_nothing),
+        cmocka_unit_test(foam_cases_are_drawn_step_by_step),
+        cmocka_unit_test(steps_of_series_are_chosen_by_number),
+        cmocka_unit_test(info_leaves_hidden_cells_out),
+        cmocka_unit_test(cut_files_end_all_ranks),
+    };
+    return cmocka_run_group_tests(tests, write_all, nullptr);
+}
