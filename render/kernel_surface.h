@@ -108,6 +108,7 @@ SIMD_INLINE void kernel_base_colour(const kernel_surface *s, int value, vf w, vf
 {
     if (s->layer->colour_map) {
         kernel_table_colour(&s->colour, w, out);
+        for (int a = 0; a < 3; a++) out[a] = vf_select(vf_eq(w, w), out[a], vf_set(RENDER_NO_COLOUR));
         return;
     }
     for (int a = 0; a < 3; a++) out[a] = vf_set(s->layer->colours[3 * value + a]);

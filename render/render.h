@@ -96,7 +96,8 @@ typedef struct render_surface_layer {
     int value_count;
     const double *values;      /* isovalues */
     const float *colours;      /* value_count × 3, linear; where colour_map is NULL */
-    render_field colour_field; /* where colour_map is given: vertex- or cell-centred; ranges not looked at */
+    render_field colour_field; /* where colour_map is given: vertex- or cell-centred, with values on every part that has
+                                  the surface; ranges not looked at */
     const render_transfer *colour_map;
     float opacity; /* 0 .. 1; 1 ends the ray */
     render_material material;
@@ -110,6 +111,9 @@ typedef struct render_volume_layer {
     render_field field;
     const render_transfer *transfer;
 } render_volume_layer;
+
+/* Linear grey of surfaces where their colour field is not a number: what a scene's colour of 0.6 is in float. */
+#define RENDER_NO_COLOUR 0.318546802f
 
 /* A mesh of this rank. */
 typedef struct render_part {

@@ -71,12 +71,13 @@ static const char every_key[] = "threads: 3\n"
                                 "      - volume:\n"
                                 "          field: temperature\n"
                                 "          component: y\n"
+                                "          mesh: [air, sea]\n"
                                 "          map: cool_to_warm\n"
                                 "          range: [-2, 3]\n"
                                 "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
                                 "          unit_distance: 0.1\n"
                                 "      - isosurface: {field: q, values: [7], colour_by: {field: speed, component: 2, "
-                                "map: inferno, range: [0, 1]}}\n"
+                                "map: inferno, range: [0, 1]}, mesh: air}\n"
                                 "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4,\n"
                                 "               method: segments}\n"
                                 "    outputs:\n"
@@ -197,7 +198,10 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");
     assert_int_equal(second->colour_by.component, 2);
-    assert_int_equal(second->colour_by.line, 31);
+    assert_int_equal(second->colour_by.line, 32);
+    assert_true(second->field.mesh_count == 1 && second->colour_by.mesh_count == 1 && first->field.mesh_count == 0);
+    assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
+    assert_true(scene_field_is_on(&first->field, "anything"));
     assert_int_equal(second->colour_map, SCENE_INFERNO);
     assert_true(second->colour_range.is_fixed && second->colour_range.low == 0 && second->colour_range.high == 1);
     scene_free(&s);
@@ -217,6 +221,9 @@ static void scene_volume_keys_are_read(void **state)
     assert_int_equal(volume->colour_map, SCENE_COOL_TO_WARM);
     assert_true(volume->range.is_fixed && volume->range.low == -2 && volume->range.high == 3);
     assert_true(volume->unit_distance == 0.1);
+    assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 27);
+    assert_true(scene_field_is_on(&volume->field, "air") && scene_field_is_on(&volume->field, "sea/12/3"));
+    assert_false(scene_field_is_on(&volume->field, "se") || scene_field_is_on(&volume->field, "sea2"));
     assert_int_equal(volume->opacity_count, 4);
     for (int i = 0; i < 4; i++) assert_true(volume->opacity[i].at == at[i] && volume->opacity[i].opacity == opacity[i]);
     scene_free(&s);
@@ -432,6 +439,10 @@ static const struct bad_file {
     {10, "      - isosurface: {field: f, values: [1], difference: 0}", 10, {"difference: \"0\"", "above 0"}},
     {10, "      - isosurface: {field: f, values: [1], material: {shine: 1}}", 10, {"material: the key \"shine\""}},
     {10, "      - isosurface: {field: f, values: [1], material: {shininess: 0}}", 10, {"material.shininess: \"0\""}},
+    {10, "      - isosurface: {field: f, values: [1], mesh: }", 10, {"isosurface.mesh: nothing", "a text of 1 to 255"}},
+    {10, "      - isosurface: {field: f, values: [1], mesh: []}", 10, {"mesh: a list", "a list of 1 to 64 of them"}},
+    {11, "      - volume: {field: f, mesh: [a, [b]]}", 11, {"volume.mesh: a list", "a list of 1 to 64 of them"}},
+    {11, "      - volume: {field: f, mesh: {a: b}}", 11, {"volume.mesh: a mapping", "a list of 1 to 64 of them"}},
     {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface and volume"}},
     {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds both"}},
     {11, "      - slice: {field: f}", 11, {"layers[1]: the key \"slice\" is unknown", "isosurface, volume"}},

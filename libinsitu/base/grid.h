@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 enum {
+    GRID_NO_TYPE = 0,
     GRID_TET = 10,
     GRID_HEX = 12,
     GRID_WEDGE = 13,
@@ -84,7 +85,9 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     if (!g->cell_types) return g->cell_type;
     const char *p = g->cell_types + cell * g->cell_types_stride;
     if (g->cell_types_bytes == 1) return *(const unsigned char *)p;
-    return g->cell_types_bytes == 4 ? (int)*(const int32_t *)(const void *)p : (int)*(const int64_t *)(const void *)p;
+    if (g->cell_types_bytes == 4) return (int)*(const int32_t *)(const void *)p;
+    const int64_t type = *(const int64_t *)(const void *)p;
+    return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
 /* The cell's vertex indices, in VTK's order; returns how many. None of a polyhedron: see grid_walk. */

@@ -157,6 +157,21 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
 
+/* ---- meshes ---- */
+
+bool scene_name_stands_for(const char *name, const char *mesh)
+{
+    const size_t length = strlen(name);
+    return strncmp(name, mesh, length) == 0 && (mesh[length] == '\0' || mesh[length] == '/');
+}
+
+bool scene_field_is_on(const scene_field *field, const char *mesh)
+{
+    for (int i = 0; i < field->mesh_count; i++)
+        if (scene_name_stands_for(field->meshes[i], mesh)) return true;
+    return field->mesh_count == 0;
+}
+
 /* ---- the whole ---- */
 
 static insitu_status parse_in_c_locale(const char *text, size_t size, const char *file_name, scene *out,
@@ -188,17 +203,24 @@ insitu_status scene_parse(const char *text, size_t size, const char *file_name, 
     return status;
 }
 
+static void free_field(scene_field *field)
+{
+    for (int i = 0; i < field->mesh_count; i++) base_free(field->meshes[i]);
+    base_free(field->meshes);
+    base_free(field->name);
+}
+
 static void free_image(scene_image *image)
 {
     for (int i = 0; i < image->isosurface_count; i++) {
         scene_isosurface *surface = &image->isosurfaces[i];
-        base_free(surface->field.name);
-        base_free(surface->colour_by.name);
+        free_field(&surface->field);
+        free_field(&surface->colour_by);
         base_free(surface->values);
         base_free(surface->colours);
     }
     for (int i = 0; i < image->volume_count; i++) {
-        base_free(image->volumes[i].field.name);
+        free_field(&image->volumes[i].field);
         base_free(image->volumes[i].opacity);
     }
     for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);

@@ -14,11 +14,20 @@ typedef enum scene_colour_map { SCENE_VIRIDIS, SCENE_INFERNO, SCENE_COOL_TO_WARM
 /* Which scalar of a field: the magnitude, or component n. Default: component 0 of a field of one, else magnitude. */
 enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 
+/* A field as a layer shows it: on some of the meshes. */
 typedef struct scene_field {
     char *name;
-    int component; /* 0 .., or one of the above */
-    int line;      /* of the scene file, for messages about the field */
+    int component;   /* 0 .., or one of the above */
+    int line;        /* of the scene file, for messages about the field */
+    int mesh_count;  /* 0: on the meshes that have the field */
+    char **meshes;   /* a name stands for the meshes below it too: "a" for "a/0" */
+    int meshes_line; /* for messages about them */
 } scene_field;
+
+/* Is the layer drawn on a mesh of this name, if that has the field? */
+bool scene_field_is_on(const scene_field *field, const char *mesh);
+/* Does name stand for the mesh? */
+bool scene_name_stands_for(const char *name, const char *mesh);
 
 typedef struct scene_range {
     bool is_fixed; /* else from the data, over all ranks, at each drawn step */

@@ -168,30 +168,52 @@ static const yaml_node_pair_t *find_pair(const scene_document *d, const yaml_nod
     return NULL;
 }
 
-int scene_document_line(const scene_document *d, const char *path)
+/* The node at a path, NULL where there is none; *line: of it, or of as much of the path as there is. */
+static const yaml_node_t *find_node(const scene_document *d, const char *path, int *line)
 {
     const yaml_node_t *node = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
-    int line = line_of(node);
+    *line = line_of(node);
     while (*path) {
         if (*path == '[') {
             char *end;
             const long index = strtol(path + 1, &end, 10);
-            if (node->type != YAML_SEQUENCE_NODE || index >= item_count(node)) return line;
+            if (node->type != YAML_SEQUENCE_NODE || index >= item_count(node)) return NULL;
             node = node_of(d, node->data.sequence.items.start[index]);
-            line = line_of(node);
+            *line = line_of(node);
             path = end + 1;
         } else {
             path += *path == '.';
             const size_t length = strcspn(path, ".[");
-            if (node->type != YAML_MAPPING_NODE) return line;
+            if (node->type != YAML_MAPPING_NODE) return NULL;
             const yaml_node_pair_t *pair = find_pair(d, node, path, length);
-            if (!pair) return line;
-            line = line_of(node_of(d, pair->key));
+            if (!pair) return NULL;
+            *line = line_of(node_of(d, pair->key));
             node = node_of(d, pair->value);
             path += length;
         }
     }
+    return node;
+}
+
+int scene_document_line(const scene_document *d, const char *path)
+{
+    int line;
+    find_node(d, path, &line);
     return line;
+}
+
+int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most)
+{
+    int line;
+    const yaml_node_t *node = find_node(d, path, &line);
+    if (!node) return 0;
+    if (node->type == YAML_SCALAR_NODE) {
+        if (most > 0) texts[0] = text_of(node);
+        return 1;
+    }
+    const int count = item_count(node);
+    for (int i = 0; i < count && i < most; i++) texts[i] = text_of(node_of(d, node->data.sequence.items.start[i]));
+    return count;
 }
 
 insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
@@ -262,6 +284,7 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     case CYAML_FLOAT: return read_number(text, &number) && is_in_range(number, key);
     case CYAML_BOOL: return strcmp(text, "true") == 0 || strcmp(text, "false") == 0;
     case CYAML_ENUM: return is_choice(text, value);
+    case CYAML_IGNORE: return length >= 1 && length <= SCENE_NAME_BYTES;
     default: return length >= value->string.min && length <= value->string.max;
     }
 }
@@ -286,6 +309,18 @@ static insitu_status check_list(const scene_document *d, const char *path, const
         status = check_value(d, item_path, node_of(d, node->data.sequence.items.start[i]), value->sequence.entry, key);
     }
     return status;
+}
+
+/* A name, or a list of names. */
+static insitu_status check_names(const scene_document *d, const char *path, const yaml_node_t *node,
+                                 const cyaml_schema_value_t *value, const scene_key *key)
+{
+    const bool is_list = node->type == YAML_SEQUENCE_NODE;
+    const int count = is_list ? item_count(node) : 1;
+    bool is_right = count >= 1 && count <= SCENE_MAX_NAMES;
+    for (int i = 0; i < count && is_right; i++)
+        is_right = is_scalar_right(is_list ? node_of(d, node->data.sequence.items.start[i]) : node, value, key);
+    return is_right ? INSITU_OK : bad_value(d, path, node, value, key);
 }
 
 static insitu_status bad_key(const scene_document *d, const char *path, const yaml_node_t *name,
@@ -344,6 +379,7 @@ static insitu_status check_value(const scene_document *d, const char *path, cons
         return check_mapping(d, path, node, key->child);
     case CYAML_SEQUENCE:
     case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key);
+    case CYAML_IGNORE: return check_names(d, path, node, value, key);
     default: return is_scalar_right(node, value, key) ? INSITU_OK : bad_value(d, path, node, value, key);
     }
 }

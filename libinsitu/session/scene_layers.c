@@ -41,14 +41,34 @@ static insitu_status convert_component(const scene_document *d, const char *path
     return INSITU_OK;
 }
 
-static insitu_status convert_field(const scene_document *d, const char *path, const char *name, const char *component,
-                                   scene_field *out)
+/* layer: the path of the layer, which says on what meshes. */
+static insitu_status convert_meshes(const scene_document *d, const char *layer, scene_field *out)
+{
+    char path[SCENE_PATH_SIZE + 8];
+    const char *names[SCENE_MAX_NAMES];
+    snprintf(path, sizeof path, "%s.mesh", layer);
+    const int count = scene_document_texts(d, path, names, SCENE_MAX_NAMES);
+    out->meshes_line = scene_document_line(d, path);
+    out->meshes = base_calloc((size_t)count, sizeof *out->meshes);
+    if (!out->meshes) return scene_no_memory(d);
+    while (out->mesh_count < count) {
+        char *name = base_strdup(names[out->mesh_count]);
+        if (!name) return scene_no_memory(d);
+        out->meshes[out->mesh_count++] = name;
+    }
+    return INSITU_OK;
+}
+
+static insitu_status convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
+                                   const char *component, scene_field *out)
 {
     char field_path[SCENE_PATH_SIZE + 8];
     snprintf(field_path, sizeof field_path, "%s.field", path);
     out->line = scene_document_line(d, field_path);
     out->name = base_strdup(name);
-    return out->name ? convert_component(d, path, component, &out->component) : scene_no_memory(d);
+    if (!out->name) return scene_no_memory(d);
+    const insitu_status status = convert_meshes(d, layer, out);
+    return status ? status : convert_component(d, path, component, &out->component);
 }
 
 static insitu_status convert_range(const scene_document *d, const char *path, const double *in, scene_range *out)
@@ -109,7 +129,7 @@ static insitu_status convert_colour_by(const scene_document *d, const char *path
     out->has_colour_by = true;
     out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
     insitu_status status = convert_range(d, colour_by_path, in->range, &out->colour_range);
-    if (status == INSITU_OK) status = convert_field(d, colour_by_path, in->field, in->component, &out->colour_by);
+    if (status == INSITU_OK) status = convert_field(d, path, colour_by_path, in->field, in->component, &out->colour_by);
     return status;
 }
 
@@ -135,7 +155,7 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
     out->root_steps = in->root_steps ? *in->root_steps : 2;
     out->normals = in->normals ? (scene_normal)*in->normals : SCENE_GRADIENT;
     out->difference = in->difference ? *in->difference : 1;
-    insitu_status status = convert_field(d, path, in->field, in->component, &out->field);
+    insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_values(d, path, in, out);
     if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);
     if (status == INSITU_OK) status = convert_colour_by(d, path, in->colour_by, out);
@@ -172,7 +192,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 {
     out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
     out->unit_distance = in->unit_distance ? *in->unit_distance : 0;
-    insitu_status status = convert_field(d, path, in->field, in->component, &out->field);
+    insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_range(d, path, in->range, &out->range);
     if (status == INSITU_OK) status = convert_opacity(d, path, in, out);
     return status;

@@ -19,6 +19,8 @@
 #define TEXT(key, flags, type, member, longest) CYAML_FIELD_STRING_PTR(key, flags, type, member, 1, longest)
 /* An optional list of exactly `count` numbers. */
 #define NUMBERS(key, type, member, count) CYAML_FIELD_SEQUENCE_FIXED(key, POINTER, type, member, &number, count)
+/* An optional name or list of names. */
+#define NAMES(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
 #define CHOICE(key, type, member, words)                                                                               \
     CYAML_FIELD_ENUM_PTR(key, CHOICE_FLAGS, type, member, words, CYAML_ARRAY_LEN(words))
 #define CHOICE_FLAGS (POINTER | CYAML_FLAG_STRICT)
@@ -40,9 +42,13 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
 #define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
 #define COMPONENT_DEFAULT "`0` of a field of one component, else `magnitude`"
 #define FIELD_HELP "Name of the field, as the simulation or the file gives it; at most 255 bytes."
+#define MESH_HELP                                                                                                      \
+    "The mesh that the layer is drawn on, or a list of meshes, by the names that the simulation gives them. A name "   \
+    "stands for the meshes below it too: `data` for `data/0`, `data/1`, ..., as the blocks of a file are called."
+#define MESH_DEFAULT "the meshes that have the field"
 #define MAP_HELP "Colour map."
 #define RANGE_HELP "The values `[low, high]`, low < high, that the ends of the colour map stand for; clamped outside."
-#define RANGE_DEFAULT "from the data, over all ranks, at each drawn step"
+#define RANGE_DEFAULT "from the data on the meshes of the layer, over all ranks, at each drawn step"
 
 #define AUTOMATIC_KEYS(X)                                                                                              \
     X(NUMBERS("direction", scene_file_automatic, direction, 3),                                                        \
@@ -106,6 +112,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
     X(TEXT("field", REQUIRED, scene_file_isosurface, field, 255), .help = FIELD_HELP)                                  \
     X(TEXT("component", OPTIONAL, scene_file_isosurface, component, 16), .help = COMPONENT_HELP,                       \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
     X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1, 16),               \
       .help = "The values at which surfaces are drawn, none twice. At most 16 in all isosurfaces of an image "         \
               "together.")                                                                                             \
@@ -113,7 +120,9 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .help = "Colours of the values in turn, sRGB; the last serves all values that are left. Not with `colour_by`.",  \
       .by_default = "colours that differ, from a fixed cycle", .low = 0, .high = 1)                                    \
     X(CYAML_FIELD_MAPPING_PTR("colour_by", OPTIONAL, scene_file_isosurface, colour_by, colour_by_fields),              \
-      .help = "Colour the surfaces by a field.", .by_default = "by `colours`", .child = &colour_by_mapping)            \
+      .help = "Colour the surfaces by a field. They are grey, with a warning, on meshes of the layer that do not "     \
+              "have it, and where it is not a number.",                                                                \
+      .by_default = "by `colours`", .child = &colour_by_mapping)                                                       \
     X(CYAML_FIELD_FLOAT_PTR("opacity", OPTIONAL, scene_file_isosurface, opacity),                                      \
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_isosurface, material, material_fields),                 \
@@ -138,6 +147,7 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
     X(TEXT("field", REQUIRED, scene_file_volume, field, 255), .help = FIELD_HELP)                                      \
     X(TEXT("component", OPTIONAL, scene_file_volume, component, 16), .help = COMPONENT_HELP,                           \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
     X(CHOICE("map", scene_file_volume, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                   \
     X(NUMBERS("range", scene_file_volume, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)                  \
     X(CYAML_FIELD_SEQUENCE("opacity", POINTER, scene_file_volume, opacity, &opacity_point, 1, 32),                     \

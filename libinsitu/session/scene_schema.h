@@ -124,6 +124,10 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
+/* libcyaml has no word for "a name or a list of names": CYAML_IGNORE stands for that here, and the names are read from
+ * the document (scene_document_texts()). */
+enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64 };
+
 /* The mapping at the top of a file, of a scene_file, and libcyaml's view of the same. */
 extern const scene_mapping scene_top;
 extern const cyaml_schema_value_t scene_top_value;

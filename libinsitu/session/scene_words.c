@@ -72,6 +72,9 @@ void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, 
     case CYAML_BOOL: append(words, "true or false"); break;
     case CYAML_STRING: append(words, "a text of %u to %u bytes", value->string.min, value->string.max); break;
     case CYAML_ENUM: append_choices(words, value); break;
+    case CYAML_IGNORE:
+        append(words, "a text of 1 to %d bytes or a list of 1 to %d of them", SCENE_NAME_BYTES, SCENE_MAX_NAMES);
+        break;
     case CYAML_MAPPING: append_mapping(words, key->child); break;
     default: append_list(words, value, key); break;
     }

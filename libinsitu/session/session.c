@@ -63,6 +63,7 @@ static void free_session(insitu_session *session)
     session_text_free(&session->copied_why);
     session_text_free(&session->left_out);
     session_text_free(&session->warnings);
+    base_free(session->told);
     base_free(session);
 }
 

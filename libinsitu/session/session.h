@@ -9,6 +9,7 @@
  *     session_team.c       how many threads there are, where more are wanted than before
  *     session_space.c      global bounds, origin and scale
  *     session_catalogue.c  which meshes and fields there are, over all ranks
+ *     session_warnings.c   what is drawn as asked but hardly as meant
  *     session_plan.c       due images to the scalars they need; nothing else is computed from here on
  *     session_recentre.c   cell values to vertices, where an isosurface wants them (session_exchange.c: over ranks)
  *     session_values.c     whether values that were set anew have changed
@@ -177,6 +178,8 @@ struct insitu_session {
     base_error error;
     insitu_report report;
     session_text copied_why, left_out, warnings;
+    int told_count;
+    uint64_t *told; /* warnings that hold and were told (session_warnings.c) */
 };
 
 static inline int64_t session_type_size(insitu_type type)

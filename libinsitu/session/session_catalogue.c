@@ -15,14 +15,11 @@
 
 /* ---- a rank's table as text ---------------------------------------------------------------------------------- */
 
-/* Writes at most capacity bytes; returns how many there are. Names may hold anything but are shown without newlines. */
+/* Writes at most capacity bytes; returns how many there are. */
 static size_t append_line(char *text, size_t capacity, size_t at, char kind, int a, int b, const char *name)
 {
     const size_t room = at < capacity ? capacity - at : 0;
     const int size = snprintf(room ? text + at : NULL, room, "%c %d %d %s", kind, a, b, name);
-    if (room)
-        for (char *c = text + at; c < text + capacity && *c; c++)
-            if (*c == '\n') *c = ' ';
     return at + (size_t)size + 1;
 }
 

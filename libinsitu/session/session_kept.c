@@ -14,9 +14,16 @@ static bool can_be_kept(const scene_isosurface *layer)
     return layer->opacity >= 1 && !layer->has_colour_by && layer->normals == SCENE_GRADIENT;
 }
 
+static bool are_same_meshes(const scene_field *a, const scene_field *b)
+{
+    bool is_same = a->mesh_count == b->mesh_count;
+    for (int i = 0; i < a->mesh_count && is_same; i++) is_same = strcmp(a->meshes[i], b->meshes[i]) == 0;
+    return is_same;
+}
+
 static bool is_same(const scene_isosurface *a, const scene_isosurface *b)
 {
-    return strcmp(a->field.name, b->field.name) == 0 && a->field.component == b->field.component &&
+    return are_same_meshes(&a->field, &b->field) && strcmp(a->field.name, b->field.name) == 0 && a->field.component == b->field.component &&
            a->roots == b->roots && a->value_count == b->value_count &&
            memcmp(a->values, b->values, (size_t)a->value_count * sizeof *a->values) == 0;
 }

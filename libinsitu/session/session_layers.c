@@ -1,5 +1,6 @@
 /* A part is a mesh of this rank that has a tree with cells in it. A layer's field stands once for each part; where a
- * part does not have it, its ranges are none, and the renderer passes by. */
+ * part does not have it, its ranges are none, and the renderer passes by; a surface whose colour's field a part does not
+ * have is drawn there by values that are not numbers. */
 #include "session_layers.h"
 
 #include "memory.h"
@@ -45,6 +46,14 @@ static void fill_parts(const insitu_session *session, session_layers *layers)
     }
 }
 
+static const double no_number = NAN;
+
+/* One value for all vertices. */
+static grid_field absent_field(void)
+{
+    return (grid_field){.values = {(const char *)&no_number, 0, true, false}, .component_count = 1};
+}
+
 /* slot: which run of part_count fields. */
 static render_field place_field(const insitu_session *session, session_layers *layers, int slot,
                                 const scene_field *field, bool at_vertices, bool wants_ranges)
@@ -56,7 +65,7 @@ static render_field place_field(const insitu_session *session, session_layers *l
         const session_mesh *mesh = session->meshes[i];
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field, at_vertices);
-        if (scalar) layers->fields[at] = session_scalar_field(mesh, scalar);
+        layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
         if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
         at++;
     }

@@ -7,6 +7,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_shown.h"
+#include "session_warnings.h"
 
 static int resolve_component(const scene_field *field, int component_count)
 {
@@ -16,18 +17,59 @@ static int resolve_component(const scene_field *field, int component_count)
 
 /* ---- can the image be drawn? --------------------------------------------------------------------------------- */
 
-static insitu_status refuse_missing(const insitu_session *session, const scene_field *field, base_error *error)
+enum { NAMES_SIZE = 700 };
+
+/* What there is, for a message. */
+static void list_fields(const insitu_session *session, char names[NAMES_SIZE])
 {
-    char names[700] = "";
     size_t size = 0;
     for (int m = 0; m < session->catalogue.mesh_count; m++) {
         const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
-        for (int f = 0; f < mesh->field_count && size < sizeof names; f++)
-            size += (size_t)snprintf(names + size, sizeof names - size, "%s\"%s\" (mesh \"%s\")", size ? ", " : "",
+        for (int f = 0; f < mesh->field_count && size < NAMES_SIZE; f++)
+            size += (size_t)snprintf(names + size, NAMES_SIZE - size, "%s\"%s\" (mesh \"%s\")", size ? ", " : "",
                                      mesh->fields[f].name, mesh->name);
     }
+    if (size == 0) snprintf(names, NAMES_SIZE, "none");
+}
+
+static void list_meshes(const insitu_session *session, char names[NAMES_SIZE])
+{
+    size_t size = 0;
+    for (int m = 0; m < session->catalogue.mesh_count && size < NAMES_SIZE; m++)
+        size += (size_t)snprintf(names + size, NAMES_SIZE - size, "%s\"%s\"", size ? ", " : "",
+                                 session->catalogue.meshes[m].name);
+    if (size == 0) snprintf(names, NAMES_SIZE, "none");
+}
+
+static insitu_status refuse_missing(const insitu_session *session, const scene_field *field, base_error *error)
+{
+    char names[NAMES_SIZE];
+    list_fields(session, names);
     return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: no mesh has the field \"%s\"; there are: %s",
-                     session->scene_path, field->line, field->name, size ? names : "none");
+                     session->scene_path, field->line, field->name, names);
+}
+
+/* A mesh that the layer names is there, and has the field, unless it has no cells anywhere. */
+static insitu_status check_named_mesh(const insitu_session *session, const scene_field *field, const char *name,
+                                      base_error *error)
+{
+    char names[NAMES_SIZE];
+    bool is_there = false, is_well = false;
+    for (int m = 0; m < session->catalogue.mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
+        if (!scene_name_stands_for(name, mesh->name)) continue;
+        is_there = true;
+        is_well = is_well || mesh->first_rank < 0 || session_catalogue_find(mesh, field->name);
+    }
+    if (is_well) return INSITU_OK;
+    if (is_there) {
+        list_fields(session, names);
+        return base_fail(error, INSITU_ERROR_FIELD, "%s:%d: mesh \"%s\" does not have the field \"%s\"; there are: %s",
+                         session->scene_path, field->meshes_line, name, field->name, names);
+    }
+    list_meshes(session, names);
+    return base_fail(error, INSITU_ERROR_MESH, "%s:%d: there is no mesh \"%s\"; there are: %s", session->scene_path,
+                     field->meshes_line, name, names);
 }
 
 static insitu_status check_on_mesh(const insitu_session *session, const scene_field *field,
@@ -51,33 +93,46 @@ static insitu_status check_on_mesh(const insitu_session *session, const scene_fi
     return INSITU_OK;
 }
 
-static insitu_status check_layer_field(const insitu_session *session, const scene_field *field, base_error *error)
+/* The mesh's field where the layer shows it there, else NULL. */
+static const session_catalogue_field *find_shown(const session_catalogue_mesh *mesh, const scene_field *field)
 {
-    int found_count = 0;
-    for (int m = 0; m < session->catalogue.mesh_count; m++) {
-        const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
-        const session_catalogue_field *found = session_catalogue_find(mesh, field->name);
-        if (!found) continue;
-        found_count++;
-        const insitu_status status = check_on_mesh(session, field, mesh, found, error);
-        if (status) return status;
-    }
-    return found_count ? INSITU_OK : refuse_missing(session, field, error);
+    return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Where the surface is, its colour's field must be too. */
-static insitu_status check_colour_by(const insitu_session *session, const scene_isosurface *layer, base_error *error)
+/* Some mesh has the field; and on those that the layer shows it on it is sound. */
+static insitu_status check_field(const insitu_session *session, const scene_field *field, base_error *error)
 {
-    const insitu_status status = check_layer_field(session, &layer->colour_by, error);
+    bool is_there = false;
+    insitu_status status = INSITU_OK;
     for (int m = 0; m < session->catalogue.mesh_count && !status; m++) {
         const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
-        if (session_catalogue_find(mesh, layer->field.name) && !session_catalogue_find(mesh, layer->colour_by.name))
-            return base_fail(error, INSITU_ERROR_FIELD,
-                             "%s:%d: mesh \"%s\" has the isosurface's field \"%s\" but not \"%s\", which colours it",
-                             session->scene_path, layer->colour_by.line, mesh->name, layer->field.name,
-                             layer->colour_by.name);
+        const session_catalogue_field *shown = find_shown(mesh, field);
+        is_there = is_there || session_catalogue_find(mesh, field->name);
+        if (shown) status = check_on_mesh(session, field, mesh, shown, error);
     }
+    return is_there || status ? status : refuse_missing(session, field, error);
+}
+
+static insitu_status check_layer_field(const insitu_session *session, const scene_field *field, base_error *error)
+{
+    insitu_status status = check_field(session, field, error);
+    for (int i = 0; i < field->mesh_count && !status; i++)
+        status = check_named_mesh(session, field, field->meshes[i], error);
     return status;
+}
+
+/* Meshes that have the surface but not what colours it. */
+static void warn_of_grey(insitu_session *session, const scene_image *image, const scene_isosurface *layer)
+{
+    for (int m = 0; m < session->catalogue.mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
+        const bool is_grey = mesh->first_rank >= 0 && find_shown(mesh, &layer->field) &&
+                             !session_catalogue_find(mesh, layer->colour_by.name);
+        const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
+        session_warn(session, &warning, is_grey,
+                     "image \"%s\": mesh \"%s\" does not have the field \"%s\": its isosurface of \"%s\" is grey",
+                     image->name, mesh->name, layer->colour_by.name, layer->field.name);
+    }
 }
 
 static insitu_status check_image(const insitu_session *session, const scene_image *image, base_error *error)
@@ -88,7 +143,7 @@ static insitu_status check_image(const insitu_session *session, const scene_imag
         const scene_isosurface *layer = &image->isosurfaces[i];
         values += layer->value_count;
         status = check_layer_field(session, &layer->field, error);
-        if (!status && layer->has_colour_by) status = check_colour_by(session, layer, error);
+        if (!status && layer->has_colour_by) status = check_field(session, &layer->colour_by, error);
     }
     for (int i = 0; i < image->volume_count && !status; i++)
         status = check_layer_field(session, &image->volumes[i].field, error);
@@ -112,9 +167,15 @@ static session_scalar *find_scalar(const session_mesh *mesh, int field, int comp
     return NULL;
 }
 
+/* -1 where the layer does not show the field on the mesh. */
+static int find_field(const session_mesh *mesh, const scene_field *field)
+{
+    return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
+}
+
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field, bool at_vertices)
 {
-    const int index = session_find_field(mesh, field->name);
+    const int index = find_field(mesh, field);
     if (index < 0) return NULL;
     const insitu_field *given = &mesh->fields[index].given;
     return find_scalar(mesh, index, resolve_component(field, given->component_count),
@@ -153,7 +214,7 @@ static bool add_scalar(session_mesh *mesh, int field, int component, bool is_rec
 static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_vertices, bool wants_ranges,
                         session_scalar **marked)
 {
-    const int index = session_find_field(mesh, field->name);
+    const int index = find_field(mesh, field);
     *marked = NULL;
     if (index < 0) return true;
     const insitu_field *given = &mesh->fields[index].given;
@@ -175,7 +236,8 @@ static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)
 {
     session_scalar *scalar;
     if (!mark_scalar(mesh, &layer->field, true, true, &scalar)) return false;
-    if (scalar && !session_shown_surface(scalar, layer)) return false;
+    if (!scalar) return true;
+    if (!session_shown_surface(scalar, layer)) return false;
     return !layer->has_colour_by || mark_scalar(mesh, &layer->colour_by, false, false, &scalar);
 }
 
@@ -231,9 +293,9 @@ static bool add_recentrings(const insitu_session *session, session_plan *plan, c
 {
     for (int m = 0; m < session->catalogue.mesh_count; m++) {
         const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
-        const session_catalogue_field *found = session_catalogue_find(mesh, field->name);
-        if (!found || !found->is_cell_centred) continue;
-        const session_recentring item = {mesh, found->name, resolve_component(field, found->component_count)};
+        const session_catalogue_field *shown = find_shown(mesh, field);
+        if (!shown || !shown->is_cell_centred) continue;
+        const session_recentring item = {mesh, shown->name, resolve_component(field, shown->component_count)};
         if (!add_recentring(plan, item)) return false;
     }
     return true;
@@ -249,6 +311,16 @@ static bool plan_recentrings(const insitu_session *session, session_plan *plan)
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
 
+/* Without cells anywhere no field can be asked of anyone: the picture is its background. */
+static bool can_be_drawn(insitu_session *session, const scene_image *image, base_error *refusal)
+{
+    if (session->extent.cell_count == 0) return true;
+    if (check_image(session, image, refusal) != INSITU_OK) return false;
+    for (int i = 0; i < image->isosurface_count; i++)
+        if (image->isosurfaces[i].has_colour_by) warn_of_grey(session, image, &image->isosurfaces[i]);
+    return true;
+}
+
 void session_plan_free(session_plan *plan)
 {
     base_free(plan->images);
@@ -262,9 +334,7 @@ insitu_status session_make_plan(insitu_session *session, const scene_image *cons
     session_plan plan = {.images = base_calloc((size_t)count, sizeof *plan.images)};
     bool is_whole = plan.images != NULL;
     for (int i = 0; i < count && is_whole; i++)
-        /* Without cells anywhere no field can be asked of anyone: the picture is its background. */
-        if (session->extent.cell_count == 0 || check_image(session, due[i], refusal) == INSITU_OK)
-            plan.images[plan.image_count++] = due[i];
+        if (can_be_drawn(session, due[i], refusal)) plan.images[plan.image_count++] = due[i];
     is_whole = is_whole && plan_recentrings(session, &plan) && mark_meshes(session, &plan);
     if (!is_whole) session_no_memory(error, count * (int64_t)sizeof *plan.images, "the plan of the images");
     const insitu_status status = session_agree(session->comm, error);

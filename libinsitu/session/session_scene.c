@@ -9,6 +9,7 @@
 #include "memory.h"
 #include "session.h"
 #include "session_agree.h"
+#include "session_warnings.h"
 
 enum { MAX_SCENE_BYTES = 1 << 22 };
 
@@ -148,5 +149,6 @@ void session_reload_scene(insitu_session *session)
     scene_free(&session->scene);
     session->scene = edited;
     session_drop_picture(session);
+    session_forget_warnings(session);
     for (int i = 0; i < session->mesh_count; i++) session_drop_scalars(session->meshes[i]);
 }

@@ -1,0 +1,267 @@
+/* Regions: several meshes in one picture, of which each has fields of its own. What a layer is drawn on, by its field or
+ * by name; what is grey; what is refused. On any number of ranks, some of which have no part of a region. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+enum { WIDTH = 40, HEIGHT = 30, SIDE = 4 };
+
+#define GREY "0.6, 0.6, 0.6"
+#define IMAGE(layers)                                                                                                  \
+    "images:\n  - name: a\n    size: [40, 30]\n    background: [0, 0, 0, 0]\n    layers:\n" layers                     \
+    "    outputs: [{path: a.exr}]\n"
+
+/* Two cubes of hexes beside each other, "air" and "sea/0", dealt to all ranks but for the last, which has none of the
+ * sea; both have the field f, the air has t too, and the sea has s. */
+static session_input air, sea;
+
+static void regions_create(void)
+{
+    input_create(&air, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    input_create(&sea, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count > 1 ? rank_count - 1 : 1);
+    for (int64_t v = 0; v < sea.part.vertex_count; v++) sea.part.coordinates[3 * v] += 2.5;
+}
+
+static void regions_free(void)
+{
+    input_free(&air);
+    input_free(&sea);
+}
+
+static bool has_sea(void)
+{
+    return rank_count == 1 || own_rank < rank_count - 1;
+}
+
+static insitu_status set_named(insitu_session *session, const char *mesh, const session_input *in, const char *name)
+{
+    insitu_field field = in->field;
+    field.name = name;
+    return insitu_set_field(session, mesh, &field);
+}
+
+static insitu_session *open_regions(const char *scene)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    insitu_status status = insitu_set_mesh(session, "air", &air.mesh);
+    if (!status) status = set_named(session, "air", &air, "f");
+    if (!status) status = set_named(session, "air", &air, "t");
+    if (!status && has_sea()) status = insitu_set_mesh(session, "sea/0", &sea.mesh);
+    if (!status && has_sea()) status = set_named(session, "sea/0", &sea, "f");
+    if (!status && has_sea()) status = set_named(session, "sea/0", &sea, "s");
+    everywhere(status == INSITU_OK);
+    return session;
+}
+
+/* The picture of a scene, on rank 0. */
+static caught_picture draw(const char *scene, const char *warning)
+{
+    caught_picture picture = {0};
+    insitu_session *session = open_regions(scene);
+    step_is_good(session, 0);
+    const char *warnings = insitu_last_report(session)->warnings;
+    if (warning ? !strstr(warnings, warning) : *warnings) fprintf(stderr, "warnings: %s\n", warnings);
+    everywhere(warning ? strstr(warnings, warning) != NULL : !*warnings);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+static bool has_colour(const caught_picture *picture, int p)
+{
+    return picture->rgba[4 * p + 3] > 0;
+}
+
+/* Rank 0: covered pixels of the left half, where the air alone is, and of the right half. */
+static void count_covered(const caught_picture *picture, int counts[2])
+{
+    counts[0] = counts[1] = 0;
+    for (int p = 0; own_rank == 0 && p < WIDTH * HEIGHT; p++) counts[p % WIDTH >= WIDTH / 2] += has_colour(picture, p);
+}
+
+static void assert_same(const char *scene, const char *warning, const char *other)
+{
+    caught_picture a = draw(scene, warning), b = draw(other, NULL);
+    bool is_same = true;
+    for (int i = 0; own_rank == 0 && i < WIDTH * HEIGHT * 4; i++) is_same = is_same && a.rgba[i] == b.rgba[i];
+    for (int i = 0; own_rank == 0 && i < WIDTH * HEIGHT; i++) is_same = is_same && a.depth[i] == b.depth[i];
+    int counts[2];
+    count_covered(&a, counts);
+    everywhere(own_rank != 0 || counts[0] + counts[1] > 100);
+    everywhere(is_same);
+    free_picture(&a);
+    free_picture(&b);
+}
+
+#define FRONT "    camera: {automatic: {direction: [0, 0, 1]}}\n"
+#define FRONT_IMAGE(layers)                                                                                            \
+    "images:\n  - name: a\n    size: [40, 30]\n    background: [0, 0, 0, 0]\n" FRONT "    layers:\n" layers            \
+    "    outputs: [{path: a.exr}]\n"
+
+/* A layer without a mesh is on those that have its field, and a named one on what its name stands for. */
+static void layers_are_on_the_meshes_that_have_the_field(void **context)
+{
+    (void)context;
+    static const struct {
+        const char *scene;
+        bool is_on[2]; /* air, sea */
+    } cases[] = {
+        {FRONT_IMAGE("      - isosurface: {field: f, values: [0.1]}\n"), {true, true}},
+        {FRONT_IMAGE("      - isosurface: {field: t, values: [0.1]}\n"), {true, false}},
+        {FRONT_IMAGE("      - isosurface: {field: s, values: [0.1]}\n"), {false, true}},
+        {FRONT_IMAGE("      - isosurface: {field: f, values: [0.1], mesh: air}\n"), {true, false}},
+        {FRONT_IMAGE("      - isosurface: {field: f, values: [0.1], mesh: sea}\n"), {false, true}},
+        {FRONT_IMAGE("      - isosurface: {field: f, values: [0.1], mesh: [sea/0, air]}\n"), {true, true}},
+        {FRONT_IMAGE("      - volume: {field: f}\n"), {true, true}},
+        {FRONT_IMAGE("      - volume: {field: t}\n"), {true, false}},
+        {FRONT_IMAGE("      - volume: {field: s}\n"), {false, true}},
+        {FRONT_IMAGE("      - volume: {field: f, mesh: air}\n"), {true, false}},
+        {FRONT_IMAGE("      - volume: {field: f, mesh: [sea]}\n"), {false, true}},
+        {FRONT_IMAGE("      - volume: {field: f, mesh: [air, sea/0]}\n"), {true, true}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        caught_picture picture = draw(cases[i].scene, NULL);
+        int counts[2];
+        count_covered(&picture, counts);
+        if (own_rank == 0) fprintf(stderr, "case %zu: %d and %d pixels\n", i, counts[0], counts[1]);
+        everywhere(own_rank != 0 || ((counts[0] > 50) == cases[i].is_on[0] && (counts[1] > 50) == cases[i].is_on[1]));
+        free_picture(&picture);
+    }
+}
+
+/* Two layers, one a region, are one layer on both. */
+static void regions_apart_are_regions_together(void **context)
+{
+    (void)context;
+    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]]}\n"), NULL,
+                IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: air}\n"
+                      "      - isosurface: {field: f, values: [0.1], colours: [[1, 0, 0]], mesh: sea}\n"));
+}
+
+/* The range of the colours is of the meshes that are drawn; the others are grey, as by colours: [grey]. */
+static void surfaces_without_the_colour_field_are_grey(void **context)
+{
+    (void)context;
+    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}}\n"),
+                "image \"a\": mesh \"sea/0\" does not have the field \"t\": its isosurface of \"f\" is grey",
+                IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: air}\n"
+                      "      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
+    assert_same(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}, mesh: sea}\n"),
+                "mesh \"sea/0\" does not have the field \"t\"",
+                IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: sea}\n"));
+}
+
+/* Colours that are not numbers are grey, one by one: here all of them, of one region. */
+static void colours_that_are_not_numbers_are_grey(void **context)
+{
+    (void)context;
+    static const char by_t[] =
+        IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t, range: [0, 1]}, mesh: air}\n");
+    static const char plain[] =
+        IMAGE("      - isosurface: {field: f, values: [0.1], colours: [[" GREY "]], mesh: air}\n");
+    for (int kind = TEST_TETS; kind < TEST_KIND_COUNT; kind++) {
+        input_free(&air);
+        input_create(&air, (test_mesh_kind)kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+        double *nothing = test_calloc((size_t)air.part.vertex_count + 1, sizeof *nothing);
+        for (int64_t v = 0; v < air.part.vertex_count; v++) nothing[v] = NAN;
+        caught_picture pictures[2] = {{0}};
+        for (int i = 0; i < 2; i++) {
+            insitu_session *session = open_regions(i ? plain : by_t);
+            insitu_field field = air.field;
+            field.name = "t";
+            field.values.data = nothing;
+            everywhere(insitu_set_field(session, "air", &field) == INSITU_OK);
+            step_is_good(session, 0);
+            if (own_rank == 0) pictures[i] = caught[0];
+            caught_count = 0;
+            insitu_destroy(&session);
+        }
+        everywhere(own_rank != 0 || memcmp(pictures[0].rgba, pictures[1].rgba, sizeof(float) * WIDTH * HEIGHT * 4) == 0);
+        free_picture(&pictures[0]);
+        free_picture(&pictures[1]);
+        test_free(nothing);
+    }
+    regions_free();
+    regions_create();
+}
+
+static void warning_of_grey_is_told_once(void **context)
+{
+    (void)context;
+    insitu_session *session =
+        open_regions(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}}\n"));
+    static const bool has_t[] = {false, false, true, false, false}, is_told[] = {true, false, false, true, false};
+    for (int cycle = 0; cycle < 5; cycle++) {
+        if (has_sea()) everywhere(insitu_set_mesh(session, "sea/0", &sea.mesh) == INSITU_OK);
+        else everywhere(true);
+        everywhere(!has_sea() || set_named(session, "sea/0", &sea, "f") == INSITU_OK);
+        everywhere(!has_sea() || !has_t[cycle] || set_named(session, "sea/0", &sea, "t") == INSITU_OK);
+        step_is_good(session, cycle);
+        everywhere((strstr(insitu_last_report(session)->warnings, "is grey") != NULL) == is_told[cycle]);
+    }
+    insitu_destroy(&session);
+}
+
+static void what_no_rank_has_is_refused(void **context)
+{
+    (void)context;
+    static const struct {
+        const char *scene;
+        insitu_status status;
+        const char *words[2];
+    } cases[] = {
+        {IMAGE("      - isosurface: {field: q, values: [0.1]}\n"),
+         INSITU_ERROR_FIELD,
+         {".yaml:6: no mesh has the field \"q\"", "\"f\" (mesh \"air\"), \"t\" (mesh \"air\"), \"f\" (mesh \"sea/0\")"}},
+        {IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: q}}\n"),
+         INSITU_ERROR_FIELD,
+         {".yaml:6: no mesh has the field \"q\"", "\"s\" (mesh \"sea/0\")"}},
+        {IMAGE("      - volume: {field: f, mesh: land}\n"),
+         INSITU_ERROR_MESH,
+         {".yaml:6: there is no mesh \"land\"; there are: \"air\", \"sea/0\""}},
+        {IMAGE("      - volume:\n          field: f\n          mesh: [air, se]\n"),
+         INSITU_ERROR_MESH,
+         {".yaml:8: there is no mesh \"se\""}},
+        {IMAGE("      - volume: {field: t, mesh: [air, sea]}\n"),
+         INSITU_ERROR_FIELD,
+         {".yaml:6: mesh \"sea\" does not have the field \"t\"", "\"s\" (mesh \"sea/0\")"}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        insitu_session *session = open_regions(cases[i].scene);
+        const insitu_status status = insitu_step(session, 0, 0);
+        told_everywhere(session, status, cases[i].status, cases[i].words[0],
+                        cases[i].words[1] ? cases[i].words[1] : "");
+        insitu_destroy(&session);
+    }
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(layers_are_on_the_meshes_that_have_the_field),
+        cmocka_unit_test(regions_apart_are_regions_together),
+        cmocka_unit_test(surfaces_without_the_colour_field_are_grey),
+        cmocka_unit_test(colours_that_are_not_numbers_are_grey),
+        cmocka_unit_test(warning_of_grey_is_told_once),
+        cmocka_unit_test(what_no_rank_has_is_refused),
+    };
+    regions_create();
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    regions_free();
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
