@@ -1,8 +1,9 @@
 #include "render.h"
 
+/* Of vectors so long or short, too, that their squares are not to be had. */
 static double length3(const double v[3])
 {
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    return hypot(hypot(v[0], v[1]), v[2]);
 }
 
 static void cross3(const double a[3], const double b[3], double out[3])

@@ -45,54 +45,55 @@ static void parse_good(const char *text, scene *s)
     if (parse(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
 }
 
-static const char every_key[] = "threads: 3\n"
-                                "tree: partial\n"
-                                "images:\n"
-                                "  - name: wave\n"
-                                "    size: [640, 480]\n"
-                                "    every: 10\n"
-                                "    camera: {position: [4, 3, 5], focal: [1, 0, 0], up: [0, 0, 2], angle: 35.5}\n"
-                                "    background: [0.5, 0.25, 1, 0.5]\n"
-                                "    lights:\n"
-                                "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
-                                "      - {direction: [3, 0, 4], in: camera}\n"
-                                "    layers:\n"
-                                "      - isosurface:\n"
-                                "          field: pressure\n"
-                                "          component: magnitude\n"
-                                "          values: [0.2, 0.5, -1e-3]\n"
-                                "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
-                                "          opacity: 0.5\n"
-                                "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
-                                "          root_steps: 5\n"
-                                "          roots: neubauer\n"
-                                "          normals: differences\n"
-                                "          difference: 0.25\n"
-                                "      - volume:\n"
-                                "          field: temperature\n"
-                                "          component: y\n"
-                                "          mesh: [air, sea]\n"
-                                "          map: cool_to_warm\n"
-                                "          range: [-2, 3]\n"
-                                "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
-                                "          unit_distance: 0.1\n"
-                                "      - isosurface: {field: q, values: [7], colour_by: {field: speed, component: 2, "
-                                "map: inferno, range: [0, 1]}, mesh: air}\n"
-                                "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4,\n"
-                                "               method: segments}\n"
-                                "    outputs:\n"
-                                "      - path: \"out/{name}_{cycle:06}.png\"\n"
-                                "        bits: 16\n"
-                                "      - path: out/wave_{cycle}.EXR\n"
-                                "  - name: second\n"
-                                "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5}}\n"
-                                "    layers: [{volume: {field: p}}]\n"
-                                "    sampling: {step: 0.125}\n"
-                                "    outputs: [{path: b.png, bits: 8}]\n"
-                                "  - name: third\n"
-                                "    layers: [{volume: {field: p}}, {volume: {field: q}}]\n"
-                                "    sampling: {max_error: 1e-3}\n"
-                                "    outputs: [{path: c.png}]\n";
+static const char every_key[] =
+    "threads: 3\n"
+    "tree: partial\n"
+    "images:\n"
+    "  - name: wave\n"
+    "    size: [640, 480]\n"
+    "    every: 10\n"
+    "    camera: {position: [4, 3, 5], focal: [1, 0, 0], up: [0, 0, 2], angle: 35.5}\n"
+    "    background: [0.5, 0.25, 1, 0.5]\n"
+    "    lights:\n"
+    "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
+    "      - {direction: [3, 0, 4], in: camera}\n"
+    "    layers:\n"
+    "      - isosurface:\n"
+    "          field: pressure\n"
+    "          component: magnitude\n"
+    "          values: [0.2, 0.5, -1e-3]\n"
+    "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
+    "          opacity: 0.5\n"
+    "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
+    "          root_steps: 5\n"
+    "          roots: neubauer\n"
+    "          normals: differences\n"
+    "          difference: 0.25\n"
+    "      - volume:\n"
+    "          field: temperature\n"
+    "          component: y\n"
+    "          mesh: [air, sea]\n"
+    "          map: cool_to_warm\n"
+    "          range: [-2, 3]\n"
+    "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
+    "          unit_distance: 0.1\n"
+    "      - isosurface: {field: q, values: [7], colour_by: {field: speed, component: 2, "
+    "map: inferno, range: [0, 1]}, mesh: air}\n"
+    "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4, max_seconds: 10,\n"
+    "               method: segments}\n"
+    "    outputs:\n"
+    "      - path: \"out/{name}_{cycle:06}.png\"\n"
+    "        bits: 16\n"
+    "      - path: out/wave_{cycle}.EXR\n"
+    "  - name: second\n"
+    "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5}}\n"
+    "    layers: [{volume: {field: p}}]\n"
+    "    sampling: {step: 0.125}\n"
+    "    outputs: [{path: b.png, bits: 8}]\n"
+    "  - name: third\n"
+    "    layers: [{volume: {field: p}}, {volume: {field: q}}]\n"
+    "    sampling: {max_error: 1e-3}\n"
+    "    outputs: [{path: c.png}]\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -136,6 +137,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(image->sample_group, 8);
     assert_false(image->jitter);
     assert_int_equal(image->frames, 4);
+    assert_true(image->max_seconds == 10 && s.images[1].max_seconds == 3600);
     assert_true(image->method == SCENE_SEGMENTS && image->max_error == 0);
     assert_true(s.images[2].method == SCENE_SEGMENTS && s.images[2].max_error == 1e-3 && s.images[2].volume_count == 2);
     assert_int_equal(image->output_count, 2);
@@ -378,6 +380,8 @@ static const struct bad_file {
     {3, "  - name: b", 15, {"images[1].name: \"b\" is the name of the image in line 3"}},
     {3, "  - name: a/b", 3, {"images[0].name: \"a/b\"", "without"}},
     {3, "  - name: [a]", 3, {"images[0].name: a list", "a text of 1 to 64 bytes"}},
+    {3, "  - name: \"\\e[1m/\"", 3, {"images[0].name: \"\\x1b[1m/\"", "without"}},
+    {4, "    size: \"\\a\"", 4, {"images[0].size: \"\\x07\""}},
     {3, "  - name: \"a\\0b\"", 3, {"images[0].name: ", "a text"}},
     {4, "    size: 64", 4, {"images[0].size: \"64\"", "a list of 2 whole numbers from 1 to 32768"}},
     {4, "    size: [64]", 4, {"images[0].size: a list of 1", "a list of 2"}},
@@ -394,9 +398,11 @@ static const struct bad_file {
     {6, "    camera: {position: [0, 5, 0], focal: [0, 0, 0], automatic: {}}", 6, {"camera.automatic: given beside"}},
     {6, "    camera: {position: [1e308, 0, 0], focal: [-1e308, 0, 0]}", 6, {"camera.position: too far from focal"}},
     {6, "    camera: {automatic: {direction: [0, 0, 0]}}", 6, {"camera.automatic.direction: has length 0"}},
-    {6, "    camera: {automatic: {zoom: 0}}", 6, {"camera.automatic.zoom: \"0\"", "above 0 and at most 1000"}},
-    {6, "    camera: {angle: 0}", 6, {"camera.angle: \"0\"", "above 0 and below 180"}},
-    {6, "    camera: {angle: 180}", 6, {"camera.angle: \"180\"", "above 0 and below 180"}},
+    {6, "    camera: {automatic: {zoom: 0}}", 6, {"camera.automatic.zoom: \"0\"", "from 0.0001 to 1000"}},
+    {6, "    camera: {automatic: {zoom: 1e-300}}", 6, {"camera.automatic.zoom: \"1e-300\"", "from 0.0001 to 1000"}},
+    {6, "    camera: {angle: 0}", 6, {"camera.angle: \"0\"", "from 1e-06 and below 180"}},
+    {6, "    camera: {angle: 1e-300}", 6, {"camera.angle: \"1e-300\"", "from 1e-06 and below 180"}},
+    {6, "    camera: {angle: 180}", 6, {"camera.angle: \"180\"", "from 1e-06 and below 180"}},
     {6, "    camera: {angle: nan}", 6, {"camera.angle: \"nan\"", "a number"}},
     {6, "    camera: {position: [0, 0, inf], focal: [0, 0, 0]}", 6, {"camera.position[2]: \"inf\"", "a number"}},
     {6, "    camera: {position: [0, 0, 1e999], focal: [0, 0, 0]}", 6, {"camera.position[2]: \"1e999\""}},
@@ -453,14 +459,16 @@ static const struct bad_file {
     {11, "      - volume: {field: f, opacity: [[0, 0], [1.5, 1]]}", 11, {"opacity[1][0]: \"1.5\"", "from 0 to 1"}},
     {11, "      - volume: {field: f, opacity: [[0, 0, 0]]}", 11, {"opacity[0]: a list of 3", "a list of 2"}},
     {11, "      - volume: {field: f, opacity: 0.5}", 11, {"opacity: \"0.5\"", "lists of 2 numbers"}},
-    {11, "      - volume: {field: f, unit_distance: 0}", 11, {"unit_distance: \"0\"", "above 0"}},
+    {11, "      - volume: {field: f, unit_distance: 0}", 11, {"unit_distance: \"0\"", "above 0 and at most 1e+30"}},
     {12, "    sampling: {step: 1, step_cells: 1}", 12, {"sampling.step: given beside step_cells"}},
     {12, "    sampling: {max_error: 1e-3, step: 1}", 12, {"sampling.max_error: given beside a step"}},
     {12, "    sampling: {max_error: 1e-3, method: samples}", 12, {"sampling.max_error: given with method: samples"}},
     {12, "    sampling: {max_error: 0}", 12, {"sampling.max_error: \"0\"", "from 0.0001 to 1"}},
     {12, "    sampling: {max_error: 9e-5}", 12, {"sampling.max_error: \"9e-5\"", "from 0.0001 to 1"}},
     {12, "    sampling: {method: rays}", 12, {"sampling.method: \"rays\"", "samples, segments"}},
-    {12, "    sampling: {step: 0}", 12, {"sampling.step: \"0\"", "above 0"}},
+    {12, "    sampling: {step: 0}", 12, {"sampling.step: \"0\"", "above 0 and at most 1e+30"}},
+    {12, "    sampling: {step: 1e300}", 12, {"sampling.step: \"1e300\"", "above 0 and at most 1e+30"}},
+    {12, "    sampling: {max_seconds: 0}", 12, {"sampling.max_seconds: \"0\"", "from 1 to 1000000000"}},
     {12, "    sampling: {group: 65}", 12, {"sampling.group: \"65\"", "from 1 to 64"}},
     {12, "    sampling: {jitter: maybe}", 12, {"sampling.jitter: \"maybe\"", "true or false"}},
     {12, "    sampling: {frames: 4097}", 12, {"sampling.frames: \"4097\"", "from 1 to 4096"}},

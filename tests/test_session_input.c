@@ -60,6 +60,24 @@ static void type_unknown(session_input *in)
 {
     in->part.types[1] = 9;
 }
+static void type_too_wide(session_input *in)
+{
+    static int64_t types[64];
+    for (int64_t cell = 0; cell < in->part.cell_count; cell++) types[cell] = INSITU_HEX;
+    types[2] = (1LL << 32) + INSITU_HEX;
+    in->mesh.cell_types = (insitu_array){types, INSITU_INT64, 0};
+}
+static void type_negative(session_input *in)
+{
+    static int64_t types[64];
+    for (int64_t cell = 0; cell < in->part.cell_count; cell++) types[cell] = INSITU_HEX;
+    types[0] = -(1LL << 40);
+    in->mesh.cell_types = (insitu_array){types, INSITU_INT64, 0};
+}
+static void coordinate_far(session_input *in)
+{
+    for (int64_t i = 0; i < 3 * in->part.vertex_count; i++) in->part.coordinates[i] *= 1e300;
+}
 static void types_without_offsets(session_input *in)
 {
     in->mesh.offsets.data = NULL;
@@ -165,6 +183,13 @@ static const spoilt_case cases[] = {
      {"cell 0 (hex): offsets 0 and 7 do not lie 8 apart"}},
     {"last offset", offsets_end_early, INSITU_ERROR_MESH, false, {"the last offset is ", "not connectivity_count"}},
     {"unknown type", type_unknown, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 9"}},
+    {"type of 33 bits", type_too_wide, INSITU_ERROR_MESH, false, {"cell 2: unknown cell type 4294967308"}},
+    {"type below 32 bits", type_negative, INSITU_ERROR_MESH, false, {"cell 0: unknown cell type -1099511627776"}},
+    {"far coordinate",
+     coordinate_far,
+     INSITU_ERROR_MESH,
+     false,
+     {"cell 0 (hex): vertex ", "coordinates of at most 1e+100 are supported"}},
     {"types alone", types_without_offsets, INSITU_ERROR_MESH, true, {"offsets are not given"}},
     {"one unknown type", one_type_unknown, INSITU_ERROR_MESH, true, {"unknown cell_type 41"}},
     {"one type's count", one_type_wrong_count, INSITU_ERROR_MESH, true, {"connectivity_count is ", "of 6 vertices"}},

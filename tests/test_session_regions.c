@@ -1,5 +1,5 @@
-/* Regions: several meshes in one picture, of which each has fields of its own. What a layer is drawn on, by its field or
- * by name; what is grey; what is refused. On any number of ranks, some of which have no part of a region. */
+/* Regions: several meshes in one picture, of which each has fields of its own. What a layer is drawn on, by its field
+ * or by name; what is grey; what is refused. On any number of ranks, some of which have no part of a region. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -186,7 +186,8 @@ static void colours_that_are_not_numbers_are_grey(void **context)
             caught_count = 0;
             insitu_destroy(&session);
         }
-        everywhere(own_rank != 0 || memcmp(pictures[0].rgba, pictures[1].rgba, sizeof(float) * WIDTH * HEIGHT * 4) == 0);
+        everywhere(own_rank != 0 ||
+                   memcmp(pictures[0].rgba, pictures[1].rgba, sizeof(float) * WIDTH * HEIGHT * 4) == 0);
         free_picture(&pictures[0]);
         free_picture(&pictures[1]);
         test_free(nothing);
@@ -202,8 +203,10 @@ static void warning_of_grey_is_told_once(void **context)
         open_regions(IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: t}}\n"));
     static const bool has_t[] = {false, false, true, false, false}, is_told[] = {true, false, false, true, false};
     for (int cycle = 0; cycle < 5; cycle++) {
-        if (has_sea()) everywhere(insitu_set_mesh(session, "sea/0", &sea.mesh) == INSITU_OK);
-        else everywhere(true);
+        if (has_sea())
+            everywhere(insitu_set_mesh(session, "sea/0", &sea.mesh) == INSITU_OK);
+        else
+            everywhere(true);
         everywhere(!has_sea() || set_named(session, "sea/0", &sea, "f") == INSITU_OK);
         everywhere(!has_sea() || !has_t[cycle] || set_named(session, "sea/0", &sea, "t") == INSITU_OK);
         step_is_good(session, cycle);
@@ -222,7 +225,8 @@ static void what_no_rank_has_is_refused(void **context)
     } cases[] = {
         {IMAGE("      - isosurface: {field: q, values: [0.1]}\n"),
          INSITU_ERROR_FIELD,
-         {".yaml:6: no mesh has the field \"q\"", "\"f\" (mesh \"air\"), \"t\" (mesh \"air\"), \"f\" (mesh \"sea/0\")"}},
+         {".yaml:6: no mesh has the field \"q\"",
+          "\"f\" (mesh \"air\"), \"t\" (mesh \"air\"), \"f\" (mesh \"sea/0\")"}},
         {IMAGE("      - isosurface: {field: f, values: [0.1], colour_by: {field: q}}\n"),
          INSITU_ERROR_FIELD,
          {".yaml:6: no mesh has the field \"q\"", "\"s\" (mesh \"sea/0\")"}},

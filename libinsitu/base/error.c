@@ -1,7 +1,44 @@
 #include "error.h"
 
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
+#include <string.h>
+
+/* How many bytes of a control character stand at text, 0 for what is none: of ASCII, or of the second such block of
+ * Latin 1, in UTF-8. */
+static size_t control_bytes(const unsigned char *text)
+{
+    if (text[0] < ' ' || text[0] == 0x7f) return 1;
+    return text[0] == 0xc2 && text[1] >= 0x80 && text[1] < 0xa0 ? 2 : 0;
+}
+
+static bool has_control(const char *text)
+{
+    for (; *text; text++)
+        if (control_bytes((const unsigned char *)text)) return true;
+    return false;
+}
+
+void base_escape(char *text, size_t capacity)
+{
+    if (!has_control(text)) return;
+    char escaped[2048];
+    const size_t room = capacity < sizeof escaped ? capacity : sizeof escaped;
+    size_t size = 0;
+    const unsigned char *c = (const unsigned char *)text;
+    while (*c && size + 1 < room) {
+        const size_t bytes = control_bytes(c);
+        if (bytes == 0)
+            escaped[size++] = (char)*c++;
+        else
+            size += (size_t)snprintf(escaped + size, room - size, "\\x%02x", bytes == 1 ? c[0] : c[1]);
+        c += bytes;
+    }
+    size = size < room ? size : room - 1;
+    memcpy(text, escaped, size);
+    text[size] = '\0';
+}
 
 insitu_status base_fail(base_error *error, insitu_status status, const char *format, ...)
 {
@@ -10,6 +47,7 @@ insitu_status base_fail(base_error *error, insitu_status status, const char *for
         va_start(arguments, format);
         vsnprintf(error->message, sizeof error->message, format, arguments);
         va_end(arguments);
+        base_escape(error->message, sizeof error->message);
         error->status = status;
     }
     return status;

@@ -113,6 +113,7 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     out->sample_group = in->group ? *in->group : 64;
     out->jitter = in->jitter ? *in->jitter : true;
     out->frames = in->frames ? *in->frames : 1;
+    out->max_seconds = in->max_seconds ? *in->max_seconds : 3600;
     if (in->step && in->step_cells)
         return scene_bad(d, path, "sampling.step", "given beside step_cells, expected one of the two");
     if (in->max_error && (in->step || in->step_cells))

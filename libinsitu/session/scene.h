@@ -113,6 +113,7 @@ typedef struct scene_image {
     int sample_group;             /* 1 .. 64; 64 by default */
     bool jitter;                  /* true by default */
     int frames;                   /* accumulated; 1 by default, 1 .. 4096 */
+    double max_seconds;           /* that samples may take by estimate; 3600 by default */
     int output_count;             /* >= 1 */
     scene_output *outputs;
     int every; /* drawn at cycles that are multiples of it; 1 by default */

@@ -138,7 +138,7 @@ static const char *text_of(const yaml_node_t *scalar)
     return (const char *)scalar->data.scalar.value;
 }
 
-/* What stands in the file, short enough for a message and free of control characters. */
+/* What stands in the file, short enough for a message. */
 static void quote(const yaml_node_t *node, char quoted[quote_size])
 {
     if (node->type == YAML_SEQUENCE_NODE) {
@@ -150,9 +150,6 @@ static void quote(const yaml_node_t *node, char quoted[quote_size])
     } else {
         const bool is_long = node->data.scalar.length > 36;
         snprintf(quoted, quote_size, "\"%.36s%s\"", text_of(node), is_long ? "..." : "");
-        for (char *c = quoted; *c; c++) {
-            if ((unsigned char)*c < ' ' || *c == 127) *c = '?';
-        }
     }
 }
 

@@ -28,8 +28,8 @@ insitu_status scene_document_check(const scene_document *d);
 /* The line (from 1) of a path such as "images[0].size[1]"; of as much of it as there is. */
 int scene_document_line(const scene_document *d, const char *path);
 
-/* The texts at a path: of a text alone, or of a list of them; borrowed from the document. Returns how many there are; at
- * most `most` are filled in. 0: nothing stands there. */
+/* The texts at a path: of a text alone, or of a list of them; borrowed from the document. Returns how many there are;
+ * at most `most` are filled in. 0: nothing stands there. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
 /* Record "file:line: parent.key: ..." and return INSITU_ERROR_SCENE. key may be "", meaning the parent itself. */

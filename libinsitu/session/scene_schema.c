@@ -55,7 +55,7 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
       .help = "From the middle of the data towards the eye. Any length but 0.", .by_default = "`[1, 0.8, 1.2]`")       \
     X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom),                                             \
       .help = "1 fits the sphere around the data's bounds into the image; larger is nearer.", .by_default = "`1`",     \
-      .low = 0, .is_low_excluded = true, .high = 1000)
+      .low = 1e-4, .high = 1000)
 DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
 
 #define CAMERA_KEYS(X)                                                                                                 \
@@ -70,8 +70,8 @@ DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
     X(NUMBERS("up", scene_file_camera, up, 3), .help = "What is up in the image. Not parallel to the view.",           \
       .by_default = "`[0, 1, 0]`; `[0, 0, 1]` where the view is along y")                                              \
     X(CYAML_FIELD_FLOAT_PTR("angle", OPTIONAL, scene_file_camera, angle),                                              \
-      .help = "Whole vertical angle of view, in degrees.", .by_default = "`40`", .low = 0, .is_low_excluded = true,    \
-      .high = 180, .is_high_excluded = true)
+      .help = "Whole vertical angle of view, in degrees.", .by_default = "`40`", .low = 1e-6, .high = 180,             \
+      .is_high_excluded = true)
 DEFINE_MAPPING(camera, "camera", CAMERA_KEYS);
 
 #define LIGHT_KEYS(X)                                                                                                  \
@@ -199,7 +199,11 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
       .by_default = "`true`")                                                                                          \
     X(CYAML_FIELD_INT_PTR("frames", OPTIONAL, scene_file_sampling, frames),                                            \
       .help = "Frames of different jitter that are averaged into the image.", .by_default = "`1`", .low = 1,           \
-      .high = 4096)
+      .high = 4096)                                                                                                    \
+    X(CYAML_FIELD_FLOAT_PTR("max_seconds", OPTIONAL, scene_file_sampling, max_seconds),                                \
+      .help = "An image whose samples would take longer, as estimated before it is drawn, is refused with the "        \
+              "estimate: a step that is a thousand times too small keeps no run waiting for days.",                    \
+      .by_default = "`3600`", .low = 1, .high = 1e9)
 DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
 #define OUTPUT_KEYS(X)                                                                                                 \

@@ -74,6 +74,7 @@ typedef struct scene_file_sampling {
     int *group;
     bool *jitter;
     int *frames;
+    double *max_seconds;
 } scene_file_sampling;
 
 typedef struct scene_file_output {

@@ -16,15 +16,10 @@ __attribute__((format(printf, 2, 3))) static void append(char words[SCENE_WORDS_
 
 static void append_range(char words[SCENE_WORDS_SIZE], const scene_key *key)
 {
-    const double no_limit = 1e30; /* the schema's word for "any, but finite in float" */
     if (!key || (key->low == 0 && key->high == 0)) return;
-    if (!key->is_low_excluded) {
-        append(words, " from %.10g to %.10g", key->low, key->high);
-        return;
-    }
-    append(words, " above %.10g", key->low);
-    if (key->high < no_limit)
-        append(words, key->is_high_excluded ? " and below %.10g" : " and at most %.10g", key->high);
+    append(words, key->is_low_excluded ? " above %.10g" : " from %.10g", key->low);
+    const char *const high = key->is_high_excluded ? " and below" : key->is_low_excluded ? " and at most" : " to";
+    append(words, "%s %.10g", high, key->high);
 }
 
 static void append_choices(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t *value)

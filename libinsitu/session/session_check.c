@@ -70,6 +70,14 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     return grid_is_ghost(g, cell) ? CELL_GOOD : check_coordinates(g, vertices, count, place);
 }
 
+/* As it stands in the array, which may be of int64. */
+static long long given_type(const grid *g, int64_t cell)
+{
+    if (!g->cell_types || g->cell_types_bytes < 8) return grid_cell_type(g, cell);
+    const grid_array types = {g->cell_types, g->cell_types_stride, true, true};
+    return grid_array_index(&types, cell);
+}
+
 static const char *type_name(int type)
 {
     switch (type) {
@@ -124,8 +132,8 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
                              "mesh \"%s\": cell %lld is a polyhedron, and face_offsets are not given", mesh->name, at);
         return base_fail(
             error, INSITU_ERROR_MESH,
-            "mesh \"%s\": cell %lld: unknown cell type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron)",
-            mesh->name, at, place.type);
+            "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron)",
+            mesh->name, at, given_type(&mesh->cells, cell));
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
@@ -185,12 +193,46 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
                      mesh->name, (long long)last, (long long)mesh->given.connectivity_count);
 }
 
+/* The squares and volumes of larger ones, and what follows from them, would leave double. */
+static const double largest_coordinate = 1e100;
+
+/* The first drawn cell with too large a coordinate. */
+static insitu_status describe_far_cell(const session_mesh *mesh, base_error *error)
+{
+    const grid *g = &mesh->cells;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (grid_is_ghost(g, cell)) continue;
+        grid_walk walk = grid_walk_cell(g, cell);
+        int64_t vertex;
+        while (grid_walk_next(&walk, &vertex)) {
+            double p[3];
+            grid_vertex(g, vertex, p);
+            if (fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))) > largest_coordinate)
+                return base_fail(
+                    error, INSITU_ERROR_MESH,
+                    "mesh \"%s\": cell %lld (%s): vertex %lld is at (%g, %g, %g), coordinates of at most %g "
+                    "are supported",
+                    mesh->name, (long long)cell, type_name(grid_cell_type(g, cell)), (long long)vertex, p[0], p[1],
+                    p[2], largest_coordinate);
+        }
+    }
+    return INSITU_OK;
+}
+
+static bool is_far(const mesh_tally *tally)
+{
+    bool far = false;
+    for (int axis = 0; axis < 3 && tally->drawn; axis++)
+        far = far || fmax(fabs(tally->lower[axis]), fabs(tally->upper[axis])) > largest_coordinate;
+    return far;
+}
+
 insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     mesh_tally tally = tally_empty();
     const int64_t bad = check_cells(mesh, threads, &tally);
     if (bad < mesh->cells.cell_count) return describe_fault(mesh, bad, error);
-    const insitu_status status = check_last_offset(mesh, error);
+    const insitu_status status = is_far(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
         mesh->lower[axis] = tally.lower[axis];

@@ -16,6 +16,7 @@
 #include "session_recentre.h"
 #include "session_tree.h"
 #include "session_view.h"
+#include "session_warnings.h"
 
 /* Of pixels where cells overlap, on all ranks together, at once: 128 MiB. */
 enum { overlap_fragments = 1 << 22 };
@@ -137,11 +138,11 @@ static void report_frame(insitu_report *report, const session_frame *frame)
 
 static void warn_of_overlaps(insitu_session *session, const scene_image *image, int64_t pixels)
 {
-    if (pixels)
-        session_text_add(&session->warnings,
-                         "image \"%s\": %lld pixels where cells overlap: each cell adds its own volume (are ghost "
-                         "cells flagged?)",
-                         image->name, (long long)pixels);
+    const session_warning warning = {WARNING_OVERLAP, image->name, NULL, 0};
+    session_warn(
+        session, &warning, pixels > 0,
+        "image \"%s\": %lld pixels where cells overlap: each cell adds its own volume (are ghost cells flagged?)",
+        image->name, (long long)pixels);
 }
 
 static insitu_status draw_frames(insitu_session *session, const scene_image *image, const session_view *view,
@@ -215,6 +216,10 @@ static insitu_status draw_image(insitu_session *session, const scene_image *imag
     canvas target = {0};
     insitu_status status = session_make_view(session, image, &view, error);
     if (status) return status;
+    session_check_time(session, image, &view, error);
+    status = session_agree_as_is(session->comm, error);
+    if (status) return status;
+    session_warn_of_view(session, image, &view);
     status = session_make_layers(session, image, &layers, error);
     if (status) return status;
     layers.kept = kept;
@@ -237,7 +242,8 @@ static insitu_status prepare(insitu_session *session, const session_plan *plan, 
     session->report.prepare_ms += 1e3 * (MPI_Wtime() - start);
     if (status) return status;
     session_update_trees(session, error);
-    return session_agree(session->comm, error);
+    const insitu_status built = session_agree(session->comm, error);
+    return built ? built : session_warn_of_isovalues(session, plan, error);
 }
 
 /* The step's kept cells, made for the first image that shares some; without memory nothing is kept. */

@@ -23,8 +23,8 @@ static bool are_same_meshes(const scene_field *a, const scene_field *b)
 
 static bool is_same(const scene_isosurface *a, const scene_isosurface *b)
 {
-    return are_same_meshes(&a->field, &b->field) && strcmp(a->field.name, b->field.name) == 0 && a->field.component == b->field.component &&
-           a->roots == b->roots && a->value_count == b->value_count &&
+    return are_same_meshes(&a->field, &b->field) && strcmp(a->field.name, b->field.name) == 0 &&
+           a->field.component == b->field.component && a->roots == b->roots && a->value_count == b->value_count &&
            memcmp(a->values, b->values, (size_t)a->value_count * sizeof *a->values) == 0;
 }
 

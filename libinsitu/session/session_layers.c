@@ -1,6 +1,6 @@
 /* A part is a mesh of this rank that has a tree with cells in it. A layer's field stands once for each part; where a
- * part does not have it, its ranges are none, and the renderer passes by; a surface whose colour's field a part does not
- * have is drawn there by values that are not numbers. */
+ * part does not have it, its ranges are none, and the renderer passes by; a surface whose colour's field a part does
+ * not have is drawn there by values that are not numbers. */
 #include "session_layers.h"
 
 #include "memory.h"

@@ -3,8 +3,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "error.h"
 #include "memory.h"
 #include "session.h"
+#include "session_warnings.h"
 
 void session_text_clear(session_text *text)
 {
@@ -37,6 +39,7 @@ void session_text_add(session_text *text, const char *format, ...)
     const int wanted = vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
     if (wanted < 0) return;
+    base_escape(line, sizeof line);
     const size_t size = strlen(line);
     if (!reserve_text(text, size + 2)) return;
     if (text->size) text->data[text->size++] = '\n';
@@ -141,7 +144,8 @@ void session_end_report(insitu_session *session)
     insitu_report *report = &session->report;
     if (session->scene_warning)
         session_text_add(&session->warnings, "the scene file's last edit was not taken: %s", session->scene_warning);
-    if (render_isa_warning() && *render_isa_warning()) session_text_add(&session->warnings, "%s", render_isa_warning());
+    const char *isa = render_isa_warning();
+    session_warn(session, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "%s", isa);
     for (int i = 0; i < session->mesh_count; i++) report_mesh(session, session->meshes[i]);
     report->bytes_trees += mmbvh_bytes(&session->parent);
     report->bytes_pictures = (int64_t)session->picture_bytes;

@@ -3,8 +3,6 @@
  * Every number here comes out of reductions, so that it is the same on every rank and for every partition. The space
  * is kept while the cells stay about where they were, since a new one means new trees: a moving mesh does not move it
  * at every step. */
-#include <float.h>
-
 #include "session.h"
 #include "session_agree.h"
 
@@ -113,9 +111,6 @@ insitu_status session_update_extent(insitu_session *session, base_error *error)
     status = reduce_extent(session, &extent, error);
     if (status) return status;
     extent.half_diagonal = half_diagonal(extent.lower, extent.upper);
-    if (!(extent.half_diagonal <= DBL_MAX / 16))
-        return base_fail(error, INSITU_ERROR_MESH, "the meshes span more than double numbers can: %g across",
-                         2 * extent.half_diagonal);
     session->extent = extent;
     session->has_extent = true;
     if (!space_still_fits(session)) make_space(session);

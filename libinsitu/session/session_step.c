@@ -13,6 +13,7 @@
 #include "session_draw.h"
 #include "session_guard.h"
 #include "session_team.h"
+#include "session_warnings.h"
 
 enum step_word {
     CYCLE_HIGH,
@@ -98,6 +99,8 @@ static insitu_status draw_due(insitu_session *session, const step_message *messa
     insitu_status status = INSITU_OK;
     if (message->words[CELLS_CHANGED]) status = session_update_extent(session, error);
     if (!status && message->words[NAMES_CHANGED]) status = session_update_catalogue(session, are_names_alike, error);
+    if (!status && (message->words[CELLS_CHANGED] || message->words[NAMES_CHANGED]))
+        status = session_warn_of_cells(session, error);
     session->report.prepare_ms = 1e3 * (MPI_Wtime() - start);
     if (status) return status;
     const scene_image *due[due_count(&session->scene, cycle)];

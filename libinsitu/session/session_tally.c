@@ -164,6 +164,34 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
     tally->flat += is_flat_cell;
 }
 
+/* ---- quads that cross themselves ----------------------------------------------------------------------------- */
+
+enum { CROSSED_SAMPLES = 256 };
+
+static bool is_crossed(const grid *g, int64_t cell, int type)
+{
+    static const signed char exchanged[8] = {0, 1, 3, 2, 4, 5, 7, 6};
+    double points[GRID_MAX_CELL_VERTICES][3], turned[GRID_MAX_CELL_VERTICES][3];
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    const int count = grid_cell_vertices(g, cell, vertices);
+    for (int i = 0; i < count; i++) grid_vertex(g, vertices[i], points[i]);
+    for (int i = 0; i < count; i++) memcpy(turned[i], points[exchanged[i]], sizeof turned[i]);
+    return fabs(signed_volume(type, turned)) > 2 * fabs(signed_volume(type, points));
+}
+
+void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed)
+{
+    const grid *g = &mesh->cells;
+    const int64_t step = g->cell_count / CROSSED_SAMPLES + 1;
+    *looked_at = *crossed = 0;
+    for (int64_t cell = 0; cell < g->cell_count; cell += step) {
+        const int type = grid_cell_type(g, cell);
+        if (grid_is_ghost(g, cell) || (type != GRID_HEX && type != GRID_PYRAMID)) continue;
+        ++*looked_at;
+        *crossed += is_crossed(g, cell, type);
+    }
+}
+
 /* ---- runs ---------------------------------------------------------------------------------------------------- */
 
 MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int count)

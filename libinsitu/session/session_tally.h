@@ -16,6 +16,11 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part);
 /* One good cell of any type. */
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
 
+/* Of some hexes and pyramids, spread over the mesh: how many were looked at, and how many of them would have more than
+ * twice the volume if two neighbours in each quad changed places. Those with quads numbered row by row do: their quads
+ * cross themselves, which takes their volume. */
+void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed);
+
 /* Check and tally cells begin .. end; returns the first that is not good, or end. */
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 

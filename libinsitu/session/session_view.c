@@ -96,6 +96,56 @@ insitu_status session_make_view(const insitu_session *session, const scene_image
     return INSITU_OK;
 }
 
+/* ---- time ---------------------------------------------------------------------------------------------------- */
+
+/* What a sample takes on one thread: 27 to 240 ns as measured, on all types of cells, where there are many rays and
+ * few. */
+static const double sample_seconds = 1e-7;
+
+/* The length of the pixel's ray within the bounds. */
+static double chord_of_bounds(const session_extent *e, const render_camera *camera, int x, int y)
+{
+    double base[3], direction[3], begin = 0, end = INFINITY;
+    render_camera_ray(camera, x, y, base, direction);
+    for (int axis = 0; axis < 3; axis++) {
+        const double a = (e->lower[axis] - base[axis]) / direction[axis];
+        const double b = (e->upper[axis] - base[axis]) / direction[axis];
+        begin = fmax(begin, fmin(a, b)); /* parallel to the faces: infinities of the right signs, or NaN, passed over */
+        end = fmin(end, fmax(a, b));
+    }
+    return end > begin ? (end - begin) * length(direction) : 0;
+}
+
+/* Of all rays, on all ranks, as if the bounds were full of cells and nothing hid a sample. */
+static double estimate_samples(const session_extent *e, const scene_image *image, const session_view *view)
+{
+    enum { PROBES = 16 };
+    const render_camera *camera = &view->camera;
+    double sum = 0;
+    for (int i = 0; i < PROBES * PROBES; i++) {
+        const int x = (int)((i % PROBES + 0.5) * camera->width / PROBES);
+        const int y = (int)((i / PROBES + 0.5) * camera->height / PROBES);
+        sum += chord_of_bounds(e, camera, x, y);
+    }
+    const double rays = (double)image->width * image->height * image->frames;
+    return sum / (PROBES * PROBES) / view->step * rays * image->volume_count;
+}
+
+insitu_status session_check_time(const insitu_session *session, const scene_image *image, const session_view *view,
+                                 base_error *error)
+{
+    const session_extent *e = &session->extent;
+    if (image->volume_count == 0 || image->method != SCENE_SAMPLES || e->rank_count == 0) return INSITU_OK;
+    const double samples = estimate_samples(e, image, view);
+    const double seconds = samples * sample_seconds / ((double)session->threads * e->rank_count);
+    if (!(seconds > image->max_seconds)) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_SCENE,
+                     "%s:%d: image \"%s\" would take some %.1e samples at a step of %g, about %.2g s on %d ranks of %d "
+                     "threads; its max_seconds is %g: expected a larger step, or more of that",
+                     session->scene_path, image->line, image->name, samples, view->step, seconds, e->rank_count,
+                     session->threads, image->max_seconds);
+}
+
 /* ---- transfer functions -------------------------------------------------------------------------------------- */
 
 static const char *map_name(scene_colour_map map)

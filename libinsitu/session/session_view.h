@@ -21,6 +21,10 @@ typedef struct session_transfer {
 insitu_status session_make_view(const insitu_session *session, const scene_image *image, session_view *out,
                                 base_error *error);
 
+/* Fails where the samples of the image's volumes would take longer than its max_seconds, by estimate. Local. */
+insitu_status session_check_time(const insitu_session *session, const scene_image *image, const session_view *view,
+                                 base_error *error);
+
 /* low > high: there are no values. Local. */
 insitu_status session_make_transfer(const insitu_session *session, scene_colour_map map, double low, double high,
                                     const scene_volume *volume, session_transfer *out, base_error *error);

@@ -151,7 +151,10 @@ typedef struct insitu_report {
     int64_t bytes_peak;     /* most bytes the library held at once in this step */
     const char *copied_why; /* "" or a list of what was copied and why; valid until the next step */
     const char *left_out;   /* "" or a list of what the scene does not need and was not computed; as above */
-    const char *warnings;   /* "" or one warning a line; as above */
+    const char *warnings; /* "" or one warning a line; as above. Told where it begins to be true, and again when it has
+                             ceased to be in between; but the scene file's broken edit, and counts of this rank's
+                             cells with values that are not finite, at every step. Others than these are the same on
+                             every rank. */
 } insitu_report;
 
 typedef struct insitu_session insitu_session;
