@@ -139,9 +139,120 @@ static void scenes_a_million_times_larger_look_the_same(void **context)
     pictures_are_the_same(1e6, (const double[]){0, 0, 0});
 }
 
+/* ---- depth --------------------------------------------------------------------------------------------------- */
+
+/* The field is z, which cells of all types have exactly: isosurfaces are planes across the cube. */
+static double height(const double position[3])
+{
+    return position[2];
+}
+
+static const struct {
+    const char *layers;
+    int count;
+    double planes[2];
+} depths[] = {
+    {"      - isosurface: {field: f, values: [0.25]}\n", 1, {0.25}},
+    {"      - isosurface: {field: f, values: [0.5], opacity: 0.3}\n      - isosurface: {field: f, values: [-0.5]}\n",
+     2,
+     {0.5, -0.5}},
+    {"      - isosurface: {field: f, values: [0.5], opacity: 0}\n", 1, {0.5}},
+    {"      - volume: {field: f, opacity: [[0, 0.9]]}\n", 0, {0}},
+    {"      - volume: {field: f, opacity: [[0, 1]], unit_distance: 1e-3}\n"
+     "      - isosurface: {field: f, values: [-0.9]}\n"
+     "    sampling: {frames: 3}\n",
+     1,
+     {-0.9}},
+};
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+static void to_length_1(double v[3])
+{
+    const double length = sqrt(dot(v, v));
+    for (int i = 0; i < 3; i++) v[i] /= length;
+}
+
+static const double eye[3] = {0.9, 1.2, 4}, focal[3] = {0.1, -0.2, 0.1}, camera_angle = 35;
+
+/* A step of 1 along the camera's axis for pixel p. */
+static void pixel_direction(int p, double out[3])
+{
+    const double up[3] = {0, 1, 0}, pixel = 2 * tan(camera_angle * 3.14159265358979323846 / 360) / HEIGHT;
+    double forward[3], right[3], above[3];
+    for (int i = 0; i < 3; i++) forward[i] = focal[i] - eye[i];
+    to_length_1(forward);
+    cross(forward, up, right);
+    to_length_1(right);
+    cross(right, forward, above);
+    const double x = (p % WIDTH + 0.5 - 0.5 * WIDTH) * pixel, y = (0.5 * HEIGHT - p / WIDTH - 0.5) * pixel;
+    for (int i = 0; i < 3; i++) out[i] = forward[i] + x * right[i] + y * above[i];
+}
+
+/* The depth of the plane, infinite where it is met outside of the cube; 0 within 1e-4 of the border, where it may be
+ * either. */
+static double plane_depth(const double direction[3], double plane)
+{
+    const double depth = (plane - eye[2]) / direction[2];
+    double farthest = 0;
+    for (int i = 0; i < 2; i++) farthest = fmax(farthest, fabs(eye[i] + depth * direction[i]));
+    if (fabs(farthest - 1) < 1e-4) return 0;
+    return farthest < 1 ? depth : (double)INFINITY;
+}
+
+/* A hit is off by 1e-5 of the cell's size, 0.5, at most, and a depth of 5 in float32 by 3e-7. */
+static bool is_depth(const caught_picture *picture, int p, int count, const double planes[2])
+{
+    double direction[3], expected = INFINITY;
+    pixel_direction(p, direction);
+    for (int i = 0; i < count; i++) expected = fmin(expected, plane_depth(direction, planes[i]));
+    const double found = (double)picture->depth[p];
+    if (expected == 0) return true;
+    return isinf(expected) ? found == (double)INFINITY : fabs(found - expected) <= 1e-5 * 0.5 + 3e-7;
+}
+
+/* The depth of an EXR: along the camera's axis, of the nearest isosurface, however transparent and whatever volume is
+ * in front; infinite elsewhere. */
+static void depth_is_of_the_nearest_surface(void **context)
+{
+    (void)context;
+    for (size_t n = 0; n < sizeof depths / sizeof depths[0]; n++) {
+        char scene[1024];
+        session_input in;
+        snprintf(scene, sizeof scene,
+                 "images:\n  - name: a\n    size: [%d, %d]\n    camera: {position: [%g, %g, %g], focal: [%g, %g, %g], "
+                 "angle: %g}\n    outputs: [{path: a.exr}]\n    layers:\n%s",
+                 WIDTH, HEIGHT, eye[0], eye[1], eye[2], focal[0], focal[1], focal[2], camera_angle, depths[n].layers);
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+        input_create(&in, TEST_MIXED, 4, TEST_RANDOM, own_rank, rank_count);
+        test_mesh_set_values(&in.part, height);
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        step_is_good(session, 0);
+        int wrong = 0, finite = 0;
+        for (int p = 0; own_rank == 0 && p < WIDTH * HEIGHT; p++) {
+            wrong += !is_depth(&caught[0], p, depths[n].count, depths[n].planes);
+            finite += isfinite(caught[0].depth[p]);
+        }
+        everywhere(wrong == 0);
+        everywhere(own_rank != 0 || depths[n].count == 0 || (finite > 300 && finite < WIDTH * HEIGHT - 300));
+        insitu_destroy(&session);
+        input_free(&in);
+    }
+    forget_pictures();
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(depth_is_of_the_nearest_surface),
         cmocka_unit_test(exact_offsets_change_no_pixel),
         cmocka_unit_test(scenes_a_million_times_smaller_look_the_same),
         cmocka_unit_test(scenes_a_million_times_larger_look_the_same),

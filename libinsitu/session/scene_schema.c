@@ -208,11 +208,17 @@ DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
 #define OUTPUT_KEYS(X)                                                                                                 \
     X(TEXT("path", REQUIRED, scene_file_output, path, 1023),                                                           \
-      .help = "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "       \
-              "folders are made. `{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, "         \
-              "`{name}` the image's name. At most 1023 bytes.")                                                        \
+      .help =                                                                                                          \
+          "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "           \
+          "folders are made. `{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, "             \
+          "`{name}` the image's name. At most 1023 bytes. The channel Z of an EXR is the depth of the nearest "        \
+          "isosurface in the pixel: how far from the eye it is along the camera's axis, in scene units (not along "    \
+          "the pixel's ray). Surfaces of any opacity count, 0 as well, and no volume hides them; it is infinite "      \
+          "where there is none: volumes and the background have no depth.")                                            \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
-      .help = "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats, colour and depth.",                   \
+      .help =                                                                                                          \
+          "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats: R, G, B (linear, times A), A, and the "   \
+          "depth, Z.",                                                                                                 \
       .by_default = "`8`", .low = 8, .high = 16)
 DEFINE_MAPPING(output, "outputs", OUTPUT_KEYS);
 

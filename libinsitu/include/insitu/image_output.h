@@ -1,6 +1,6 @@
-/* The face between the library and whatever writes its pictures. libinsitu itself knows no image format: on rank 0, when
- * the first picture is due, it loads libinsitu_image (adaptors/image, on OpenImageIO) and calls insitu_image_write().
- * So other ranks never load an image library. */
+/* The face between the library and whatever writes its pictures. libinsitu itself knows no image format: on rank 0,
+ * when the first picture is due, it loads libinsitu_image (adaptors/image, on OpenImageIO) and calls
+ * insitu_image_write(). So other ranks never load an image library. */
 #ifndef INSITU_IMAGE_OUTPUT_H
 #define INSITU_IMAGE_OUTPUT_H
 
@@ -21,8 +21,9 @@ typedef enum insitu_image_format {
 typedef struct insitu_image {
     int width, height;
     const float *rgba;  /* row-major, height × width × 4, top row first, linear, premultiplied */
-    const float *depth; /* NULL, or row-major, height × width: distance along the camera's axis in scene units;
-                           +infinity where there is nothing */
+    const float *depth; /* NULL, or row-major, height × width: of the nearest isosurface, of any opacity and whatever
+                           volume is in front, the distance from the eye along the camera's axis (not along the pixel's
+                           ray) in scene units; +infinity where there is none */
 } insitu_image;
 
 /* Write to a temporary file beside path and rename, so that path is never half a picture; missing folders are made. The
