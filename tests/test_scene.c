@@ -45,55 +45,57 @@ static void parse_good(const char *text, scene *s)
     if (parse(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
 }
 
-static const char every_key[] =
-    "threads: 3\n"
-    "tree: partial\n"
-    "images:\n"
-    "  - name: wave\n"
-    "    size: [640, 480]\n"
-    "    every: 10\n"
-    "    camera: {position: [4, 3, 5], focal: [1, 0, 0], up: [0, 0, 2], angle: 35.5}\n"
-    "    background: [0.5, 0.25, 1, 0.5]\n"
-    "    lights:\n"
-    "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
-    "      - {direction: [3, 0, 4], in: camera}\n"
-    "    layers:\n"
-    "      - isosurface:\n"
-    "          field: pressure\n"
-    "          component: magnitude\n"
-    "          values: [0.2, 0.5, -1e-3]\n"
-    "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
-    "          opacity: 0.5\n"
-    "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
-    "          root_steps: 5\n"
-    "          roots: neubauer\n"
-    "          normals: differences\n"
-    "          difference: 0.25\n"
-    "      - volume:\n"
-    "          field: temperature\n"
-    "          component: y\n"
-    "          mesh: [air, sea]\n"
-    "          map: cool_to_warm\n"
-    "          range: [-2, 3]\n"
-    "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
-    "          unit_distance: 0.1\n"
-    "      - isosurface: {field: q, values: [7], colour_by: {field: speed, component: 2, "
-    "map: inferno, range: [0, 1]}, mesh: air}\n"
-    "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4, max_seconds: 10,\n"
-    "               method: segments}\n"
-    "    outputs:\n"
-    "      - path: \"out/{name}_{cycle:06}.png\"\n"
-    "        bits: 16\n"
-    "      - path: out/wave_{cycle}.EXR\n"
-    "  - name: second\n"
-    "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5}}\n"
-    "    layers: [{volume: {field: p}}]\n"
-    "    sampling: {step: 0.125}\n"
-    "    outputs: [{path: b.png, bits: 8}]\n"
-    "  - name: third\n"
-    "    layers: [{volume: {field: p}}, {volume: {field: q}}]\n"
-    "    sampling: {max_error: 1e-3}\n"
-    "    outputs: [{path: c.png}]\n";
+static const char every_key[] = "threads: 3\n"
+                                "tree: partial\n"
+                                "images:\n"
+                                "  - name: wave\n"
+                                "    size: [640, 480]\n"
+                                "    every: 10\n"
+                                "    camera: {position: [4, 3, 5], focal: [1, 0, 0], up: [0, 0, 2], angle: 35.5}\n"
+                                "    background: [0.5, 0.25, 1, 0.5]\n"
+                                "    lights:\n"
+                                "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
+                                "      - {direction: [3, 0, 4], in: camera}\n"
+                                "    layers:\n"
+                                "      - isosurface:\n"
+                                "          field: pressure\n"
+                                "          component: magnitude\n"
+                                "          values: [0.2, 0.5, -1e-3]\n"
+                                "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
+                                "          opacity: 0.5\n"
+                                "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
+                                "          root_steps: 5\n"
+                                "          roots: neubauer\n"
+                                "          normals: differences\n"
+                                "          difference: 0.25\n"
+                                "      - volume:\n"
+                                "          field: temperature\n"
+                                "          component: y\n"
+                                "          mesh: [air, sea]\n"
+                                "          interpolate: vertex\n"
+                                "          map: cool_to_warm\n"
+                                "          range: [-2, 3]\n"
+                                "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
+                                "          unit_distance: 0.1\n"
+                                "      - isosurface:\n"
+                                "          {field: q, values: [7], mesh: air, interpolate: vertex, colour_by:\n"
+                                "           {field: speed, component: 2, map: inferno, range: [0, 1],\n"
+                                "            interpolate: vertex}}\n"
+                                "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4,\n"
+                                "               max_seconds: 10, method: segments}\n"
+                                "    outputs:\n"
+                                "      - path: \"out/{name}_{cycle:06}.png\"\n"
+                                "        bits: 16\n"
+                                "      - path: out/wave_{cycle}.EXR\n"
+                                "  - name: second\n"
+                                "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5}}\n"
+                                "    layers: [{volume: {field: p}}]\n"
+                                "    sampling: {step: 0.125}\n"
+                                "    outputs: [{path: b.png, bits: 8}]\n"
+                                "  - name: third\n"
+                                "    layers: [{volume: {field: p}}, {volume: {field: q}}]\n"
+                                "    sampling: {max_error: 1e-3}\n"
+                                "    outputs: [{path: c.png}]\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -200,10 +202,11 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");
     assert_int_equal(second->colour_by.component, 2);
-    assert_int_equal(second->colour_by.line, 32);
+    assert_int_equal(second->colour_by.line, 35);
     assert_true(second->field.mesh_count == 1 && second->colour_by.mesh_count == 1 && first->field.mesh_count == 0);
     assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
     assert_true(scene_field_is_on(&first->field, "anything"));
+    assert_true(first->field.at_vertices && second->field.at_vertices && second->colour_by.at_vertices);
     assert_int_equal(second->colour_map, SCENE_INFERNO);
     assert_true(second->colour_range.is_fixed && second->colour_range.low == 0 && second->colour_range.high == 1);
     scene_free(&s);
@@ -223,6 +226,7 @@ static void scene_volume_keys_are_read(void **state)
     assert_int_equal(volume->colour_map, SCENE_COOL_TO_WARM);
     assert_true(volume->range.is_fixed && volume->range.low == -2 && volume->range.high == 3);
     assert_true(volume->unit_distance == 0.1);
+    assert_true(volume->field.at_vertices && !s.images[1].volumes[0].field.at_vertices);
     assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 27);
     assert_true(scene_field_is_on(&volume->field, "air") && scene_field_is_on(&volume->field, "sea/12/3"));
     assert_false(scene_field_is_on(&volume->field, "se") || scene_field_is_on(&volume->field, "sea2"));
@@ -449,6 +453,8 @@ static const struct bad_file {
     {10, "      - isosurface: {field: f, values: [1], mesh: []}", 10, {"mesh: a list", "a list of 1 to 64 of them"}},
     {11, "      - volume: {field: f, mesh: [a, [b]]}", 11, {"volume.mesh: a list", "a list of 1 to 64 of them"}},
     {11, "      - volume: {field: f, mesh: {a: b}}", 11, {"volume.mesh: a mapping", "a list of 1 to 64 of them"}},
+    {10, "      - isosurface: {field: f, values: [1], interpolate: cell}", 10, {"interpolate: cell is not", "vertex"}},
+    {11, "      - volume: {field: f, interpolate: face}", 11, {"interpolate: \"face\"", "one of cell, vertex"}},
     {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface and volume"}},
     {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds both"}},
     {11, "      - slice: {field: f}", 11, {"layers[1]: the key \"slice\" is unknown", "isosurface, volume"}},

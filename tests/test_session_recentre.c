@@ -33,6 +33,14 @@ static const char mixed_scene[] = "images:\n"
                                   "    outputs:\n"
                                   "      - path: a.exr\n";
 
+/* What mixed_scene draws, but for the isosurface's own field, by c and by v. */
+#define SMOOTH(field, how, method)                                                                                     \
+    "images:\n  - name: a\n    size: [40, 30]\n    layers:\n"                                                          \
+    "      - isosurface: {field: c, values: [8], colour_by: {field: " field how "}, opacity: 0.5}\n"                   \
+    "      - volume: {field: " field how ", opacity: [[0, 0.4], [1, 0.1]]}\n"                                          \
+    "    sampling: {method: " method "}\n    outputs: [{path: a.exr}]\n"
+#define AT_VERTICES ", interpolate: vertex"
+
 static test_mesh whole;
 static int *owners;
 
@@ -285,6 +293,65 @@ static void volumes_of_dealt_cells_are_those_of_one_rank(void **context)
     compare_with_alone(mixed_scene, 1e-6);
 }
 
+static void smooth_volumes_of_dealt_cells_are_those_of_one_rank(void **context)
+{
+    (void)context;
+    compare_with_alone(SMOOTH("c", AT_VERTICES, "samples"), 1e-6);
+    compare_with_alone(SMOOTH("c", AT_VERTICES, "segments"), 1e-6);
+}
+
+/* On rank 0 the picture of a scene, of the cells' values as c and the means of a search over all cells as v. */
+static caught_picture draw_smooth(const char *scene, const part_input *in, const double *means)
+{
+    caught_picture picture = {0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    insitu_field v;
+    insitu_field_defaults(&v);
+    v.name = "v";
+    v.count = in->part.vertex_count;
+    v.values = (insitu_array){means, INSITU_FLOAT64, 0};
+    everywhere(insitu_set_mesh(session, "m", &in->mesh) == INSITU_OK);
+    everywhere(insitu_set_field(session, "m", &in->field) == INSITU_OK);
+    everywhere(insitu_set_field(session, "m", &v) == INSITU_OK);
+    everywhere(draw(session, NULL, 0) == INSITU_OK);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static bool is_same_picture(const caught_picture *a, const caught_picture *b)
+{
+    return own_rank != 0 || memcmp(a->rgba, b->rgba, 40 * 30 * 4 * sizeof(float)) == 0;
+}
+
+/* By interpolate: vertex a cell's field is that of the means at the vertices; by default it is as it is. */
+static void smooth_layers_are_those_of_the_means(void **context)
+{
+    (void)context;
+    static const char *const scenes[2][4] = {
+        {SMOOTH("c", AT_VERTICES, "samples"), SMOOTH("v", "", "samples"), SMOOTH("c", "", "samples"),
+         SMOOTH("c", ", interpolate: cell", "samples")},
+        {SMOOTH("c", AT_VERTICES, "segments"), SMOOTH("v", AT_VERTICES, "segments"), SMOOTH("c", "", "segments"),
+         SMOOTH("c", ", interpolate: cell", "segments")},
+    };
+    part_input in;
+    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    part_create(&in, own_rank, false);
+    double *means = test_calloc((size_t)in.part.vertex_count + 1, sizeof *means);
+    for (int64_t v = 0; v < in.part.vertex_count; v++) means[v] = expected_at(in.part.coordinates + 3 * v);
+    for (int method = 0; method < 2; method++) {
+        caught_picture pictures[4];
+        for (int i = 0; i < 4; i++) pictures[i] = draw_smooth(scenes[method][i], &in, means);
+        everywhere(is_same_picture(&pictures[0], &pictures[1]));
+        everywhere(is_same_picture(&pictures[2], &pictures[3]));
+        everywhere(own_rank != 0 || !is_same_picture(&pictures[0], &pictures[2]));
+        for (int i = 0; i < 4; i++) free(pictures[i].rgba), free(pictures[i].depth);
+    }
+    part_free(&in);
+    test_free(means);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
@@ -293,6 +360,8 @@ static int run(void)
         cmocka_unit_test(means_follow_values_that_changed_on_one_rank),
         cmocka_unit_test(surfaces_of_dealt_cells_are_those_of_one_rank),
         cmocka_unit_test(volumes_of_dealt_cells_are_those_of_one_rank),
+        cmocka_unit_test(smooth_volumes_of_dealt_cells_are_those_of_one_rank),
+        cmocka_unit_test(smooth_layers_are_those_of_the_means),
     };
     test_mesh_lattice(TEST_MIXED, SIDE, 0.2, test_wave, &whole);
     owners = calloc((size_t)whole.cell_count, sizeof *owners);

@@ -9,6 +9,7 @@
 #include "error.h"
 
 typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
+typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
 typedef enum scene_colour_map { SCENE_VIRIDIS, SCENE_INFERNO, SCENE_COOL_TO_WARM, SCENE_GREY } scene_colour_map;
 
 /* Which scalar of a field: the magnitude, or component n. Default: component 0 of a field of one, else magnitude. */
@@ -18,6 +19,7 @@ enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 typedef struct scene_field {
     char *name;
     int component;   /* 0 .., or one of the above */
+    bool at_vertices; /* cell values are recentred to the vertices; else they are drawn as they are */
     int line;        /* of the scene file, for messages about the field */
     int mesh_count;  /* 0: on the meshes that have the field */
     char **meshes;   /* a name stands for the meshes below it too: "a" for "a/0" */

@@ -128,6 +128,7 @@ static insitu_status convert_colour_by(const scene_document *d, const char *path
     snprintf(colour_by_path, sizeof colour_by_path, "%s.colour_by", path);
     out->has_colour_by = true;
     out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
+    out->colour_by.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = convert_range(d, colour_by_path, in->range, &out->colour_range);
     if (status == INSITU_OK) status = convert_field(d, path, colour_by_path, in->field, in->component, &out->colour_by);
     return status;
@@ -155,6 +156,11 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
     out->root_steps = in->root_steps ? *in->root_steps : 2;
     out->normals = in->normals ? (scene_normal)*in->normals : SCENE_GRADIENT;
     out->difference = in->difference ? *in->difference : 1;
+    out->field.at_vertices = true;
+    if (in->interpolate && *in->interpolate == SCENE_BY_CELL)
+        return scene_bad(d, path, "interpolate",
+                         "cell is not allowed, expected vertex: values that are the same throughout a cell have no "
+                         "surface in it");
     insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_values(d, path, in, out);
     if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);
@@ -192,6 +198,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 {
     out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
     out->unit_distance = in->unit_distance ? *in->unit_distance : 0;
+    out->field.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_range(d, path, in->range, &out->range);
     if (status == INSITU_OK) status = convert_opacity(d, path, in, out);

@@ -35,6 +35,7 @@ static const cyaml_strval_t map_words[] = {
 static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
 static const cyaml_strval_t root_words[] = {{"neubauer", SCENE_NEUBAUER}, {"robust", SCENE_ROBUST}};
 static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}};
+static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"vertex", SCENE_BY_VERTEX}};
 static const cyaml_strval_t tree_words[] = {
     {"auto", SCENE_TREE_AUTO}, {"full", SCENE_TREE_FULL}, {"partial", SCENE_TREE_PARTIAL}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
@@ -46,6 +47,14 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
     "The mesh that the layer is drawn on, or a list of meshes, by the names that the simulation gives them. A name "   \
     "stands for the meshes below it too: `data` for `data/0`, `data/1`, ..., as the blocks of a file are called."
 #define MESH_DEFAULT "the meshes that have the field"
+#define INTERPOLATE_HELP                                                                                               \
+    "How a field that has one value a cell is drawn: `cell`, as it is, the same throughout each cell; or `vertex`, by "\
+    "the means of the cells at each vertex, on all ranks, interpolated between the vertices (8 bytes a vertex are "    \
+    "held). Of no effect on a field that has one value a vertex."
+#define ISO_INTERPOLATE_HELP                                                                                           \
+    "How a field that has one value a cell is drawn: by the means of the cells at each vertex, on all ranks (8 bytes " \
+    "a vertex are held). `cell` is refused: between cells of two values there is a face, not a surface of the value "  \
+    "asked for."
 #define MAP_HELP "Colour map."
 #define RANGE_HELP "The values `[low, high]`, low < high, that the ends of the colour map stand for; clamped outside."
 #define RANGE_DEFAULT "from the data on the meshes of the layer, over all ranks, at each drawn step"
@@ -104,6 +113,8 @@ DEFINE_MAPPING(material, "material", MATERIAL_KEYS);
     X(TEXT("field", REQUIRED, scene_file_colour_by, field, 255), .help = FIELD_HELP)                                   \
     X(TEXT("component", OPTIONAL, scene_file_colour_by, component, 16), .help = COMPONENT_HELP,                        \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CHOICE("interpolate", scene_file_colour_by, interpolate, interpolation_words), .help = INTERPOLATE_HELP,  \
+      .by_default = "`cell`")                                                                                            \
     X(CHOICE("map", scene_file_colour_by, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                \
     X(NUMBERS("range", scene_file_colour_by, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)
 DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
@@ -112,6 +123,8 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
     X(TEXT("field", REQUIRED, scene_file_isosurface, field, 255), .help = FIELD_HELP)                                  \
     X(TEXT("component", OPTIONAL, scene_file_isosurface, component, 16), .help = COMPONENT_HELP,                       \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CHOICE("interpolate", scene_file_isosurface, interpolate, interpolation_words), .help = ISO_INTERPOLATE_HELP,  \
+      .by_default = "`vertex`")                                                                                            \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
     X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1, 16),               \
       .help = "The values at which surfaces are drawn, none twice. At most 16 in all isosurfaces of an image "         \
@@ -147,6 +160,8 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
     X(TEXT("field", REQUIRED, scene_file_volume, field, 255), .help = FIELD_HELP)                                      \
     X(TEXT("component", OPTIONAL, scene_file_volume, component, 16), .help = COMPONENT_HELP,                           \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CHOICE("interpolate", scene_file_volume, interpolate, interpolation_words), .help = INTERPOLATE_HELP,  \
+      .by_default = "`cell`")                                                                                            \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
     X(CHOICE("map", scene_file_volume, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                   \
     X(NUMBERS("range", scene_file_volume, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)                  \

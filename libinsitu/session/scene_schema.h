@@ -34,12 +34,14 @@ typedef struct scene_file_material {
 
 typedef struct scene_file_colour_by {
     char *field, *component;
-    int *map;      /* scene_colour_map */
+    int *interpolate; /* scene_interpolation */
+    int *map;         /* scene_colour_map */
     double *range; /* 2 */
 } scene_file_colour_by;
 
 typedef struct scene_file_isosurface {
     char *field, *component;
+    int *interpolate; /* scene_interpolation */
     double *values;
     int values_count;
     double (*colours)[3];
@@ -55,7 +57,8 @@ typedef struct scene_file_isosurface {
 
 typedef struct scene_file_volume {
     char *field, *component;
-    int *map;      /* scene_colour_map */
+    int *interpolate; /* scene_interpolation */
+    int *map;         /* scene_colour_map */
     double *range; /* 2 */
     double (*opacity)[2];
     int opacity_count;

@@ -11,7 +11,7 @@
  *     session_catalogue.c  which meshes and fields there are, over all ranks
  *     session_warnings.c   what is drawn as asked but hardly as meant
  *     session_plan.c       due images to the scalars they need; nothing else is computed from here on
- *     session_recentre.c   cell values to vertices, where an isosurface wants them (session_exchange.c: over ranks)
+ *     session_recentre.c   cell values to vertices, where a layer wants them (session_exchange.c: over ranks)
  *     session_values.c     whether values that were set anew have changed
  *     session_shown.c      which values of them the images show
  *     session_tree.c       trees and ranges

@@ -56,7 +56,7 @@ static grid_field absent_field(void)
 
 /* slot: which run of part_count fields. */
 static render_field place_field(const insitu_session *session, session_layers *layers, int slot,
-                                const scene_field *field, bool at_vertices, bool wants_ranges)
+                                const scene_field *field, bool wants_ranges)
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
@@ -64,7 +64,7 @@ static render_field place_field(const insitu_session *session, session_layers *l
     for (int i = 0; i < session->mesh_count; i++) {
         const session_mesh *mesh = session->meshes[i];
         if (!is_part(mesh)) continue;
-        const session_scalar *scalar = session_find_scalar(mesh, field, at_vertices);
+        const session_scalar *scalar = session_find_scalar(mesh, field);
         layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
         if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
         at++;
@@ -79,7 +79,7 @@ static insitu_status data_range(insitu_session *session, const scene_field *fiel
     double mine[2] = {INFINITY, INFINITY}, all[2];
     for (int i = 0; i < session->mesh_count; i++) {
         const session_mesh *mesh = session->meshes[i];
-        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field, false) : NULL;
+        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
         if (!scalar) continue;
         double least, most;
         session_scalar_extent(mesh, scalar, session->threads, &least, &most);
@@ -110,7 +110,7 @@ static insitu_status fill_surface(insitu_session *session, const scene_isosurfac
 {
     render_surface_layer *out = &layers->surfaces[index];
     const scene_material *m = &layer->material;
-    *out = (render_surface_layer){.field = place_field(session, layers, 2 * index, &layer->field, true, true),
+    *out = (render_surface_layer){.field = place_field(session, layers, 2 * index, &layer->field, true),
                                   .value_count = layer->value_count,
                                   .values = layer->values,
                                   .colours = layer->colours,
@@ -121,7 +121,7 @@ static insitu_status fill_surface(insitu_session *session, const scene_isosurfac
                                   .normal = layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES : RENDER_GRADIENT,
                                   .difference = layer->difference};
     if (!layer->has_colour_by) return INSITU_OK;
-    out->colour_field = place_field(session, layers, 2 * index + 1, &layer->colour_by, false, false);
+    out->colour_field = place_field(session, layers, 2 * index + 1, &layer->colour_by, false);
     out->colour_map = &layers->transfers[index].transfer;
     return make_transfer(session, &layer->colour_by, layer->colour_map, &layer->colour_range, NULL,
                          &layers->transfers[index], error);
@@ -133,7 +133,7 @@ static insitu_status fill_volume(insitu_session *session, const scene_image *ima
     const scene_volume *layer = &image->volumes[index];
     session_transfer *transfer = &layers->transfers[image->isosurface_count + index];
     layers->volumes[index] = (render_volume_layer){
-        .field = place_field(session, layers, 2 * image->isosurface_count + index, &layer->field, false, true),
+        .field = place_field(session, layers, 2 * image->isosurface_count + index, &layer->field, true),
         .transfer = &transfer->transfer};
     return make_transfer(session, &layer->field, layer->colour_map, &layer->range, layer, transfer, error);
 }

@@ -173,13 +173,13 @@ static int find_field(const session_mesh *mesh, const scene_field *field)
     return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
 }
 
-session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field, bool at_vertices)
+session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field)
 {
     const int index = find_field(mesh, field);
     if (index < 0) return NULL;
     const insitu_field *given = &mesh->fields[index].given;
     return find_scalar(mesh, index, resolve_component(field, given->component_count),
-                       at_vertices && given->centring == INSITU_CELL);
+                       field->at_vertices && given->centring == INSITU_CELL);
 }
 
 grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
@@ -211,17 +211,16 @@ static bool add_scalar(session_mesh *mesh, int field, int component, bool is_rec
 }
 
 /* *marked: NULL where the mesh does not have the field. */
-static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_vertices, bool wants_ranges,
-                        session_scalar **marked)
+static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool wants_ranges, session_scalar **marked)
 {
     const int index = find_field(mesh, field);
     *marked = NULL;
     if (index < 0) return true;
     const insitu_field *given = &mesh->fields[index].given;
-    session_scalar *scalar = session_find_scalar(mesh, field, at_vertices);
+    session_scalar *scalar = session_find_scalar(mesh, field);
     if (!scalar) {
         if (!add_scalar(mesh, index, resolve_component(field, given->component_count),
-                        at_vertices && given->centring == INSITU_CELL))
+                        field->at_vertices && given->centring == INSITU_CELL))
             return false;
         scalar = &mesh->scalars[mesh->scalar_count - 1];
     }
@@ -235,16 +234,16 @@ static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool at_ve
 static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)
 {
     session_scalar *scalar;
-    if (!mark_scalar(mesh, &layer->field, true, true, &scalar)) return false;
+    if (!mark_scalar(mesh, &layer->field, true, &scalar)) return false;
     if (!scalar) return true;
     if (!session_shown_surface(scalar, layer)) return false;
-    return !layer->has_colour_by || mark_scalar(mesh, &layer->colour_by, false, false, &scalar);
+    return !layer->has_colour_by || mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
 static bool mark_volume(const insitu_session *session, session_mesh *mesh, const scene_volume *layer)
 {
     session_scalar *scalar;
-    if (!mark_scalar(mesh, &layer->field, false, true, &scalar)) return false;
+    if (!mark_scalar(mesh, &layer->field, true, &scalar)) return false;
     return !scalar || session_shown_volume(session, scalar, layer);
 }
 
@@ -291,6 +290,7 @@ static bool add_recentring(session_plan *plan, session_recentring item)
 
 static bool add_recentrings(const insitu_session *session, session_plan *plan, const scene_field *field)
 {
+    if (!field->at_vertices) return true;
     for (int m = 0; m < session->catalogue.mesh_count; m++) {
         const session_catalogue_mesh *mesh = &session->catalogue.meshes[m];
         const session_catalogue_field *shown = find_shown(mesh, field);
@@ -303,10 +303,17 @@ static bool add_recentrings(const insitu_session *session, session_plan *plan, c
 
 static bool plan_recentrings(const insitu_session *session, session_plan *plan)
 {
-    for (int i = 0; i < plan->image_count; i++)
-        for (int s = 0; s < plan->images[i]->isosurface_count; s++)
-            if (!add_recentrings(session, plan, &plan->images[i]->isosurfaces[s].field)) return false;
-    return true;
+    bool is_planned = true;
+    for (int i = 0; i < plan->image_count; i++) {
+        const scene_image *image = plan->images[i];
+        for (int s = 0; s < image->isosurface_count && is_planned; s++)
+            is_planned = add_recentrings(session, plan, &image->isosurfaces[s].field) &&
+                         (!image->isosurfaces[s].has_colour_by ||
+                          add_recentrings(session, plan, &image->isosurfaces[s].colour_by));
+        for (int v = 0; v < image->volume_count && is_planned; v++)
+            is_planned = add_recentrings(session, plan, &image->volumes[v].field);
+    }
+    return is_planned;
 }
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */

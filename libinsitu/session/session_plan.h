@@ -4,7 +4,7 @@
 
 #include "session.h"
 
-/* Cell values that an isosurface wants at vertices; one item a mesh, field and component. */
+/* Cell values that a layer wants at vertices; one item a mesh, field and component. */
 typedef struct session_recentring {
     const session_catalogue_mesh *mesh;
     const char *field;
@@ -27,7 +27,7 @@ insitu_status session_make_plan(insitu_session *session, const scene_image *cons
 void session_plan_free(session_plan *plan);
 
 /* This rank's scalar for a layer's field: NULL where the mesh does not have it. */
-session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field, bool at_vertices);
+session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
 /* The values of a scalar. */
 grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar);

@@ -157,7 +157,7 @@ static field_range own_range(const insitu_session *session, const scene_field *f
     field_range range = no_range;
     for (int i = 0; i < session->mesh_count; i++) {
         const session_mesh *mesh = session->meshes[i];
-        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field, true) : NULL;
+        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
         if (scalar && of_all_cells) take_extent(session, mesh, scalar, &range);
         if (scalar && !of_all_cells) take_root(mesh, scalar, &range);
     }

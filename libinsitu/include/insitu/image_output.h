@@ -1,6 +1,6 @@
-/* The face between the library and whatever writes its pictures. libinsitu itself knows no image format: on rank 0,
- * when the first picture is due, it loads libinsitu_image (adaptors/image, on OpenImageIO) and calls
- * insitu_image_write(). So other ranks never load an image library. */
+/* The face between the library and whatever writes its pictures. libinsitu itself knows no image format: on rank 0, when
+ * the first picture is due, it loads libinsitu_image (adaptors/image, on OpenImageIO) and calls insitu_image_write().
+ * So other ranks never load an image library. */
 #ifndef INSITU_IMAGE_OUTPUT_H
 #define INSITU_IMAGE_OUTPUT_H
 

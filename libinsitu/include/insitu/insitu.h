@@ -106,7 +106,9 @@ typedef struct insitu_mesh {
     unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
 } insitu_mesh;
 
-/* Whether a field has one value a vertex or one a cell. */
+/* Whether a field has one value a vertex or one a cell. Of cells, volumes and colours show each cell's value as it is
+ * unless the scene says `interpolate: vertex`; isosurfaces, and those, are drawn by the means of the cells at each vertex,
+ * over all ranks, ghosts left out: a vertex on the boundary has the mean of the cells within. */
 typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1 } insitu_centring;
 
 /* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
@@ -173,8 +175,9 @@ INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insi
 INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
 
 /* Hand over this rank's part of the mesh called name: borrowed arrays. Local. Ranks that have no part of it need not
- * call it; meshes of different names are drawn together. A mesh with INSITU_CHANGED_TOPOLOGY, or of other counts, drops
- * the fields set on it before. NULL for mesh takes it away. A mesh that is not set again is taken as unchanged.
+ * call it; meshes of different names are drawn together, a layer of the scene on those that have its field, or that it
+ * names. A mesh with INSITU_CHANGED_TOPOLOGY, or of other counts, drops the fields set on it before. NULL for mesh takes
+ * it away. A mesh that is not set again is taken as unchanged.
  *
  * What can be seen at once (counts, types, strides) is checked here; the arrays' contents when a step first needs
  * them: every cell's vertex indices and type, and the coordinates that cells without a ghost flag use. Either way the
