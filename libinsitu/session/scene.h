@@ -18,12 +18,12 @@ enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 /* A field as a layer shows it: on some of the meshes. */
 typedef struct scene_field {
     char *name;
-    int component;   /* 0 .., or one of the above */
+    int component;    /* 0 .., or one of the above */
     bool at_vertices; /* cell values are recentred to the vertices; else they are drawn as they are */
-    int line;        /* of the scene file, for messages about the field */
-    int mesh_count;  /* 0: on the meshes that have the field */
-    char **meshes;   /* a name stands for the meshes below it too: "a" for "a/0" */
-    int meshes_line; /* for messages about them */
+    int line;         /* of the scene file, for messages about the field */
+    int mesh_count;   /* 0: on the meshes that have the field */
+    char **meshes;    /* a name stands for the meshes below it too: "a" for "a/0" */
+    int meshes_line;  /* for messages about them */
 } scene_field;
 
 /* Is the layer drawn on a mesh of this name, if that has the field? */

@@ -48,7 +48,8 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
     "stands for the meshes below it too: `data` for `data/0`, `data/1`, ..., as the blocks of a file are called."
 #define MESH_DEFAULT "the meshes that have the field"
 #define INTERPOLATE_HELP                                                                                               \
-    "How a field that has one value a cell is drawn: `cell`, as it is, the same throughout each cell; or `vertex`, by "\
+    "How a field that has one value a cell is drawn: `cell`, as it is, the same throughout each cell; or `vertex`, "   \
+    "by "                                                                                                              \
     "the means of the cells at each vertex, on all ranks, interpolated between the vertices (8 bytes a vertex are "    \
     "held). Of no effect on a field that has one value a vertex."
 #define ISO_INTERPOLATE_HELP                                                                                           \
@@ -113,8 +114,8 @@ DEFINE_MAPPING(material, "material", MATERIAL_KEYS);
     X(TEXT("field", REQUIRED, scene_file_colour_by, field, 255), .help = FIELD_HELP)                                   \
     X(TEXT("component", OPTIONAL, scene_file_colour_by, component, 16), .help = COMPONENT_HELP,                        \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
-    X(CHOICE("interpolate", scene_file_colour_by, interpolate, interpolation_words), .help = INTERPOLATE_HELP,  \
-      .by_default = "`cell`")                                                                                            \
+    X(CHOICE("interpolate", scene_file_colour_by, interpolate, interpolation_words), .help = INTERPOLATE_HELP,         \
+      .by_default = "`cell`")                                                                                          \
     X(CHOICE("map", scene_file_colour_by, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                \
     X(NUMBERS("range", scene_file_colour_by, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)
 DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
@@ -123,8 +124,8 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
     X(TEXT("field", REQUIRED, scene_file_isosurface, field, 255), .help = FIELD_HELP)                                  \
     X(TEXT("component", OPTIONAL, scene_file_isosurface, component, 16), .help = COMPONENT_HELP,                       \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
-    X(CHOICE("interpolate", scene_file_isosurface, interpolate, interpolation_words), .help = ISO_INTERPOLATE_HELP,  \
-      .by_default = "`vertex`")                                                                                            \
+    X(CHOICE("interpolate", scene_file_isosurface, interpolate, interpolation_words), .help = ISO_INTERPOLATE_HELP,    \
+      .by_default = "`vertex`")                                                                                        \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
     X(CYAML_FIELD_SEQUENCE("values", CYAML_FLAG_POINTER, scene_file_isosurface, values, &number, 1, 16),               \
       .help = "The values at which surfaces are drawn, none twice. At most 16 in all isosurfaces of an image "         \
@@ -160,8 +161,8 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
     X(TEXT("field", REQUIRED, scene_file_volume, field, 255), .help = FIELD_HELP)                                      \
     X(TEXT("component", OPTIONAL, scene_file_volume, component, 16), .help = COMPONENT_HELP,                           \
       .by_default = COMPONENT_DEFAULT)                                                                                 \
-    X(CHOICE("interpolate", scene_file_volume, interpolate, interpolation_words), .help = INTERPOLATE_HELP,  \
-      .by_default = "`cell`")                                                                                            \
+    X(CHOICE("interpolate", scene_file_volume, interpolate, interpolation_words), .help = INTERPOLATE_HELP,            \
+      .by_default = "`cell`")                                                                                          \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
     X(CHOICE("map", scene_file_volume, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                   \
     X(NUMBERS("range", scene_file_volume, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)                  \

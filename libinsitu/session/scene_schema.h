@@ -36,7 +36,7 @@ typedef struct scene_file_colour_by {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
     int *map;         /* scene_colour_map */
-    double *range; /* 2 */
+    double *range;    /* 2 */
 } scene_file_colour_by;
 
 typedef struct scene_file_isosurface {
@@ -59,7 +59,7 @@ typedef struct scene_file_volume {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
     int *map;         /* scene_colour_map */
-    double *range; /* 2 */
+    double *range;    /* 2 */
     double (*opacity)[2];
     int opacity_count;
     double *unit_distance;

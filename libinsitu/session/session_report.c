@@ -102,8 +102,7 @@ static void report_scalar(insitu_session *session, const session_mesh *mesh, con
     if (scalar->vertex_values) {
         const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof(double);
         session->report.bytes_copied += bytes;
-        session_text_add(&session->copied_why,
-                         "mesh \"%s\": field \"%s\" recentred from cells to vertices: %lld bytes",
+        session_text_add(&session->copied_why, "mesh \"%s\": field \"%s\" recentred from cells to vertices: %lld bytes",
                          mesh->name, name, (long long)bytes);
     }
     if (scalar->is_used && scalar->wants_ranges && scalar->unusable)

@@ -106,9 +106,9 @@ typedef struct insitu_mesh {
     unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
 } insitu_mesh;
 
-/* Whether a field has one value a vertex or one a cell. Of cells, volumes and colours show each cell's value as it is
- * unless the scene says `interpolate: vertex`; isosurfaces, and those, are drawn by the means of the cells at each vertex,
- * over all ranks, ghosts left out: a vertex on the boundary has the mean of the cells within. */
+/* Whether a field has one value a vertex or one a cell. Of cells, volumes and colours show each value as it is, unless
+ * the scene says `interpolate: vertex`; then, and for isosurfaces, a vertex gets the mean of its cells on all ranks,
+ * ghosts left out: on the boundary that of the cells within. */
 typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1 } insitu_centring;
 
 /* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
