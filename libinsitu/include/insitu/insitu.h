@@ -79,8 +79,9 @@ enum {
  * reads the values they hold then. Fill with insitu_mesh_defaults() first. */
 typedef struct insitu_mesh {
     int64_t vertex_count;        /* >= 0 */
-    insitu_array coordinates[3]; /* x, y, z: float32 or float64, vertex_count each. Interleaved xyz is three arrays
-                                    of stride 3 elements: see insitu_mesh_interleaved(). */
+    insitu_array coordinates[3]; /* x, y, z: float32 or float64, vertex_count each; of drawn cells at most 1e100 in
+                                    size. Interleaved xyz is three arrays of stride 3 elements: see
+                                    insitu_mesh_interleaved(). */
     insitu_array vertex_ids;     /* optional, int32 or int64: ids unique over all ranks, to match the vertices that
                                     ranks share; not given: vertices match by bitwise equal coordinates */
     int64_t cell_count;          /* >= 0; at most 4294967294 */
