@@ -32,7 +32,8 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
 
 /* Of a pixel's fragments as comp_merge_pixel() left them: does one begin, in front of what is opaque, where a volume
  * fragment has not ended? Two volume fragments that hold the same t overlap; so do a volume's that holds a surface's t,
- * unless it begins there, and that surface. Local. */
+ * unless it begins there, and that surface. What ends before it begins, being shorter than rounding, does not, nor do
+ * samples on their own (fragment.h) of two volumes, or of two cells at their common face. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {

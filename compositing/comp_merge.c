@@ -102,17 +102,6 @@ static float nearest_surface(const fragment *sorted, int64_t count)
     return INFINITY;
 }
 
-bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
-{
-    float reach = -INFINITY;
-    for (int64_t i = 0; i < count; i++) {
-        if (sorted[i].t_in <= reach) return true;
-        if (sorted[i].transmittance == 0) return false;
-        if (sorted[i].kind < FRAGMENT_SURFACE && sorted[i].t_out > reach) reach = sorted[i].t_out;
-    }
-    return false;
-}
-
 static bool is_sample(const fragment *f)
 {
     return f->kind < FRAGMENT_SURFACE && f->t_in == f->t_out;
@@ -126,11 +115,57 @@ static int64_t samples_at(const fragment *sorted, int64_t count)
     return n;
 }
 
+/* Of samples at one place, sorted: those that count. Of two of one volume, one at its cell's end and the other at its
+ * cell's begin, the cells are neighbours whose common face rounding has in two places: the first is left out. */
+typedef struct sample_pass {
+    uint32_t layer;
+    int64_t begun; /* at their cells' begin, and no other left out for them yet */
+    int64_t counted;
+} sample_pass;
+
+static bool does_count(sample_pass *pass, const fragment *sample)
+{
+    const uint32_t layer = sample->kind / FRAGMENT_LAYER, ends = sample->kind % FRAGMENT_LAYER;
+    if (layer != pass->layer) *pass = (sample_pass){.layer = layer};
+    if (ends == FRAGMENT_LATE && pass->begun > 0) {
+        pass->begun--;
+        return false;
+    }
+    pass->begun += ends == FRAGMENT_EARLY;
+    pass->counted++;
+    return true;
+}
+
+/* Are two of one volume? */
+static bool are_of_overlaps(const fragment *samples, int64_t count)
+{
+    sample_pass pass = {0};
+    for (int64_t i = 0; i < count; i++)
+        if (does_count(&pass, &samples[i]) && pass.counted > 1) return true;
+    return false;
+}
+
+bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
+{
+    float reach = -INFINITY;
+    for (int64_t i = 0, n; i < count; i += n) {
+        const fragment *f = &sorted[i];
+        n = samples_at(f, count - i);
+        if (f->t_in <= reach && f->t_out >= f->t_in) return true;
+        if (f->transmittance == 0) return false;
+        if (n > 1 && are_of_overlaps(f, n)) return true;
+        if (f->kind < FRAGMENT_SURFACE && f->t_out > reach) reach = f->t_out;
+    }
+    return false;
+}
+
 static fragment mix_samples(const fragment *samples, int64_t count)
 {
     fragment mixed = samples[0];
     double colour[3] = {0, 0, 0}, weight = 0, absorbed = 0;
+    sample_pass pass = {0};
     for (int64_t i = 0; i < count; i++) {
+        if (!does_count(&pass, &samples[i])) continue;
         const double own = 1 - (double)samples[i].transmittance;
         for (int c = 0; c < 3; c++) colour[c] += (double)samples[i].colour[c];
         weight += own;

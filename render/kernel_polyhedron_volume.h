@@ -36,7 +36,7 @@ static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
         const vf value = piece->v0 + slope * (t - piece->t0), kept = s->value[state->volume][n];
         const vm apart = vm_and(own, vf_eq(kept, kept));
         if (__builtin_expect(vm_any(apart), 0)) {
-            kernel_emit_sample(p, state, apart, t, value);
+            kernel_emit_sample(p, state, &stay->interval, apart, t, value);
             own = vm_andnot(own, apart);
         }
         s->value[state->volume][n] = vf_select(own, value, kept);

@@ -228,21 +228,29 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
 
 /* ---- the ray ---- */
 
-/* Rays whose fragment must end before the segment at t_in: a surface is in between, or there is a gap, or cells
- * overlap, which the overlapping fragments tell compositing (render.h). */
-SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_cuts *cuts, vf t_in)
+/* So far before an end that what begins there is not known to begin in front of it. */
+SIMD_INLINE vf kernel_segment_end(vf t_out)
 {
-    vm broken = p->frame->job->is_alone ? vf_lt(t_in, b->t_last) : vm_not(vf_eq(t_in, b->t_last));
+    return t_out - vf_max(vf_abs(t_out), vf_set(1)) * KERNEL_FACE_ERROR;
+}
+
+/* Rays whose fragment must end before the segment from t_in to t_out: a surface is in between, or there is a gap, or
+ * cells overlap, by more than rounding, which the overlapping fragments tell compositing (render.h). */
+SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_cuts *cuts, vf t_in,
+                                     vf t_out)
+{
+    vm broken = vm_not(vf_eq(t_in, b->t_last));
+    if (p->frame->job->is_alone) broken = vf_lt(t_in, kernel_segment_end(vf_min(t_out, b->t_last)));
     if (cuts->row_count) broken = vm_or(broken, vf_le(kernel_next_cut(p, cuts, b->t_last, false), t_in));
     return broken;
 }
 
-/* End the fragments of the rays in mask, just before their end: what begins at the end does not overlap
- * them (comp.h). */
+/* End the fragments of the rays in mask, where compositing is to take them for ended. Those that are shorter than
+ * rounding end before they begin, and overlap nothing (comp.h). */
 SIMD_INLINE void kernel_segments_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
-    const vf end = b->t_last, size = vf_max(vf_abs(end), vf_set(1e-30f));
-    b->t_last = vf_max(b->t_first, end - size * 1e-7f);
+    const vf end = b->t_last;
+    b->t_last = kernel_segment_end(end);
     kernel_blend_close(p, b, mask);
     b->t_last = end;
 }
@@ -263,7 +271,7 @@ SIMD_INLINE void kernel_blend_light(kernel_blend *b, vm has, vf t_in, vf t_out, 
     b->depth = vf_select(fresh, light->depth, vf_select(has, b->depth + light->depth, b->depth));
     b->transmittance = vf_select(has, kernel_exp(-b->depth), b->transmittance);
     b->light = vf_select(has, b->light * light->transmittance, b->light);
-    b->t_last = vf_select(has, t_out, b->t_last);
+    b->t_last = vf_select(has, vf_select(fresh, t_out, vf_max(b->t_last, t_out)), b->t_last);
     b->open = vm_or(b->open, has);
 }
 
@@ -292,7 +300,7 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
             light = kernel_preintegrated(pieces, has, &run, &end);
         else
             kernel_integrate(pieces, has, &run, &light);
-        kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in)));
+        kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in, t_out)));
         kernel_blend_light(b, has, t_in, t_out, &light);
     }
     const vm heaped = vf_lt(list->heap.transmittance, vf_set(1));

@@ -13,6 +13,15 @@
 /* What is behind so little light does not show: far below the 1e-6 that ranks may differ by. */
 #define KERNEL_DARK 1e-7f
 
+/* Two faces that are one in truth, but not the same to the bit, may be so far apart along a ray, in t: of a hanging
+ * node the coarse cell's face and the small ones on it, and faces whose crossings come in the wrong order beside a
+ * vertex. Near 1, where t of the scene is, each face's crossing is off by a rounding of its vertices' depths and one of
+ * t, 6e-8 each, and by its weights' or Newton's, 2.4e-7 (kernel_line.h) to 1e-6 times the cell's size (kernel_quad.h):
+ * twice that is 3e-6 for a cell as large as the scene. Across the ray vertices are off by 6e-8 of their distance from
+ * the tile's centre, a cell's size: of cells of 0.1 that is no more than this where a face's cosine to the ray is above
+ * 1.5e-3. */
+#define KERNEL_FACE_ERROR 4e-6f
+
 /* The samples of a window: NaN where this rank has none. */
 typedef struct kernel_samples {
     int first, count;
@@ -96,9 +105,9 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
 
 /* A sample as a fragment of its own, in front of what is opaque. Of those that another cell owns too, which mark their
  * ray (render.h), the nearest counts, for others may be behind what is opaque on another rank; a clear one beside it
- * makes sure that it overlaps something. */
-static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state, vm mask,
-                                                               vf t, vf value)
+ * makes sure that it overlaps something. cell: from where to where the sample's cell has the ray. */
+static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state,
+                                                               const kernel_interval *cell, vm mask, vf t, vf value)
 {
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
     const vf zero = vf_set(0), clear[3] = {zero, zero, zero};
@@ -111,8 +120,14 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
         mask = vm_and(mask, vf_lt(t, state->samples->marked));
         state->samples->marked = vf_select(mask, t, state->samples->marked);
         kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, clear, vf_set(1));
+        kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, colour, left);
+        return;
     }
-    kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, colour, left);
+    const vf error = vf_max(vf_abs(t), vf_set(1)) * KERNEL_FACE_ERROR;
+    const vf early = vf_select(vf_lt(t - cell->t_in, error), vf_set(FRAGMENT_EARLY), zero);
+    const vf late = vf_select(vf_lt(cell->t_out - t, error), vf_set(FRAGMENT_LATE), zero);
+    const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)state->volume;
+    kernel_emit(p, mask, kind, early + late, t, t, colour, left);
 }
 
 /* A sample that another cell owns too stays the other's. */
@@ -139,7 +154,7 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
         const vf kept = values[n];
         const vm apart = vm_and(own, vf_eq(kept, kept));
         if (__builtin_expect(vm_any(apart), 0)) {
-            kernel_emit_sample(p, state, apart, t, value);
+            kernel_emit_sample(p, state, i, apart, t, value);
             own = vm_andnot(own, apart);
         }
         values[n] = vf_select(own, value, kept);

@@ -14,7 +14,12 @@
  * depth; compositing finds the pixels in which fragments overlap (comp.h), whoever made them; and these are traced
  * again with separate_samples, which leaves the sharing to compositing. What a frame makes of such pixels otherwise is
  * not the picture. Volumes by segments are made the same way: of overlaps each cell's segments become fragments of
- * their own, and so do the segments of several volumes, on all pixels. */
+ * their own, and so do the segments of several volumes, on all pixels.
+ *
+ * Faces that are one in truth but not to the bit, as at hanging nodes, leave overlaps and gaps of rounding's size.
+ * Segments that overlap by no more are not told compositing: each has its own length, which on any ranks adds up to the
+ * same. A sample in such an overlap marks its ray; separate samples say that they are near their cell's begin or end,
+ * so that compositing can tell the two owners from cells that overlap. */
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 

@@ -44,6 +44,8 @@ insitu_add_mpi_test(partition test_partition_mpi 1 2 3 4 7)
 
 insitu_render_program(test_overlap_mpi)
 insitu_add_mpi_test(overlap test_overlap_mpi 1 2 3 4 7)
+insitu_render_program(test_hanging_mpi)
+insitu_add_mpi_test(hanging test_hanging_mpi 1 2 3 7)
 
 insitu_render_program(test_segments)
 foreach(isa plain sse4.2 avx2 avx512)

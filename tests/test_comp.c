@@ -465,6 +465,20 @@ static void stretches_that_overlap_are_mixed(void **context)
     }
 }
 
+/* Of a sample that rounding gives to two neighbours the one behind counts, in whatever order they come. */
+static void samples_of_neighbours_count_once(void **context)
+{
+    (void)context;
+    const fragment ahead = {0, 1, 1, {0.5f, 0, 0}, 0.5f, FRAGMENT_VOLUME + FRAGMENT_LATE};
+    const fragment behind = {0, 1, 1, {0, 0.25f, 0}, 0.75f, FRAGMENT_VOLUME + FRAGMENT_EARLY};
+    for (int turn = 0; turn < 2; turn++) {
+        fragment items[2] = {turn ? ahead : behind, turn ? behind : ahead};
+        float rgba[4], depth;
+        comp_merge_pixel(items, 2, black, rgba, &depth);
+        assert_true(rgba[0] == 0 && rgba[1] == 0.25f && rgba[3] == 0.25f);
+    }
+}
+
 static bool do_overlap(const fragment *given, int count)
 {
     fragment items[4];
@@ -477,7 +491,7 @@ static bool do_overlap(const fragment *given, int count)
 static void overlaps_are_where_a_volume_has_not_ended(void **context)
 {
     (void)context;
-    enum { V = FRAGMENT_VOLUME, S = FRAGMENT_SURFACE };
+    enum { V = FRAGMENT_VOLUME, S = FRAGMENT_SURFACE, EARLY = FRAGMENT_EARLY, LATE = FRAGMENT_LATE };
     const struct {
         int count;
         fragment items[3];
@@ -506,6 +520,17 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
           {.t_in = 2, .t_out = 4, .transmittance = 0.5f},
           {.t_in = 3, .t_out = 5, .transmittance = 0.5f}},
          false},
+        /* shorter than rounding */
+        {2,
+         {{.t_in = 0, .t_out = 2, .transmittance = 0.5f}, {.t_in = 1, .t_out = 0.99f, .transmittance = 0.5f}},
+         false},
+        /* samples of cells whose common face is in two places; of cells in one place; beside those of another volume */
+        {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + EARLY}}, false},
+        {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V}}, true},
+        {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + LATE}}, true},
+        {3, {{0, 1, 1, {0}, 0.5f, V + EARLY}, {0, 1, 1, {0}, 0.5f, V + EARLY}, {0, 1, 1, {0}, 0.5f, V + LATE}}, true},
+        {2, {{0, 1, 1, {0}, 0.5f, V}, {0, 1, 1, {0}, 0.5f, V + FRAGMENT_LAYER}}, false},
+        {2, {{0, 1, 1, {0}, 0.5f, V + LATE}, {0, 1, 1, {0}, 0.5f, V + FRAGMENT_LAYER + EARLY}}, false},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         if (do_overlap(cases[i].items, cases[i].count) != cases[i].overlap) fail_msg("case %d", (int)i);
@@ -676,6 +701,7 @@ int main(void)
         cmocka_unit_test(permutations_give_the_same_bits),
         cmocka_unit_test(samples_of_one_place_share_what_they_absorb),
         cmocka_unit_test(stretches_that_overlap_are_mixed),
+        cmocka_unit_test(samples_of_neighbours_count_once),
         cmocka_unit_test(overlaps_are_where_a_volume_has_not_ended),
         cmocka_unit_test(owners_share_all_pixels_evenly),
         cmocka_unit_test(owners_of_the_largest_image_add_up),

@@ -47,6 +47,16 @@ static void add_tets(test_mesh *mesh, const int64_t *corners)
     for (int i = 0; i < 6; i++) test_mesh_add_cell(mesh, GRID_TET, corners, tets[i]);
 }
 
+void test_mesh_add_cube(test_mesh *mesh, test_mesh_kind kind, const int64_t *corners)
+{
+    if (kind == TEST_HEXES)
+        add_hex(mesh, corners);
+    else if (kind == TEST_WEDGES)
+        add_wedges(mesh, corners);
+    else
+        add_tets(mesh, corners);
+}
+
 /* What closes the cube's face (as cube_faces) against its centre: two tets where is_split, else a pyramid. */
 static void close_face(test_mesh *mesh, const int64_t *corners, int64_t centre, const int face[4], bool is_split)
 {
@@ -99,9 +109,9 @@ static void add_cube(test_mesh *mesh, test_mesh_kind kind, int n, const int plac
     }
     switch (kind) {
     case TEST_TETS:
-    case TEST_POLYHEDRA: add_tets(mesh, corners); break;
-    case TEST_HEXES: add_hex(mesh, corners); break;
-    case TEST_WEDGES: add_wedges(mesh, corners); break;
+    case TEST_HEXES:
+    case TEST_WEDGES:
+    case TEST_POLYHEDRA: test_mesh_add_cube(mesh, kind, corners); break;
     case TEST_PYRAMIDS: {
         const int64_t centre = add_centre(mesh, corners);
         for (int face = 0; face < 6; face++) close_face(mesh, corners, centre, cube_faces[face], false);

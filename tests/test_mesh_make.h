@@ -25,6 +25,9 @@ void test_mesh_add_polyhedron(test_mesh *mesh, const int64_t *faces, int64_t cou
 /* A cell of some of the given vertices, picked by local indices. */
 void test_mesh_add_cell(test_mesh *mesh, int type, const int64_t *vertices, const int *picks);
 
+/* A cube as a hex, two wedges, or six tets for any other kind. Corners by bits: bit 0: +x, bit 1: +y, bit 2: +z. */
+void test_mesh_add_cube(test_mesh *mesh, test_mesh_kind kind, const int64_t *corners);
+
 /* The faces of a cell: how many, and their vertices, -1 behind a triangle's. */
 typedef struct test_faces {
     int count;

@@ -3,6 +3,7 @@
 set(here ${CMAKE_CURRENT_LIST_DIR})
 add_library(test_meshes STATIC
   ${here}/test_meshes.c ${here}/test_mesh_changes.c ${here}/test_mesh_dual.c ${here}/test_mesh_lattice.c
+  ${here}/test_meshes.c ${here}/test_mesh_changes.c ${here}/test_mesh_hanging.c ${here}/test_mesh_lattice.c
   ${here}/test_mesh_parts.c
   ${here}/test_mesh_polyhedra.c ${here}/test_mesh_shapes.c ${here}/test_mesh_views.c)
 target_include_directories(test_meshes PUBLIC ${here} ${PROJECT_SOURCE_DIR}/libinsitu/base)

@@ -14,13 +14,16 @@
 typedef struct fragment {
     uint32_t pixel; /* y * width + x, y = 0 at the top */
     float t_in;     /* the ray's parameter, (depth - depth_origin) * scale (render.h), of the first sample or the hit */
-    float t_out;    /* of the last sample; == t_in and kind bit set for a hit */
+    float t_out; /* of the last sample, or what ends a little before its last cell (kernel_segments.h); a hit's t_in */
     float colour[3];     /* premultiplied linear RGB */
     float transmittance; /* 0 opaque .. 1 clear */
-    uint32_t kind;       /* FRAGMENT_VOLUME, or FRAGMENT_SURFACE + surface id (0, 1, ...) */
+    uint32_t kind;       /* as below */
 } fragment;
 
-enum { FRAGMENT_VOLUME = 0, FRAGMENT_SURFACE = 1 };
+/* Samples on their own are FRAGMENT_VOLUME + FRAGMENT_LAYER times the volume (0 .. 3), and say so where they are within
+ * rounding of their cell's begin or end, where the cell before or behind it may have the same sample. Other stretches
+ * of volumes are FRAGMENT_VOLUME; hits are FRAGMENT_SURFACE + surface id (0, 1, ...). */
+enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
 /* A growing list, memory from memory.h. */
 typedef struct fragment_list {

@@ -124,12 +124,16 @@ static insitu_status redraw(const frame_target *t, const render_job *job, int64_
                             base_error *error)
 {
     const int64_t most = turn_pixels(job, fragment_limit);
+    const bool is_sampled = job->integration == RENDER_SAMPLES;
     render_job again = *job;
     again.pixels = turn;
     again.separate_samples = true;
     for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
+        comp_overlaps found = {0};
         at = take_pixels(out, overlaps->pixels, at, most, turn);
-        const insitu_status status = draw(t, &again, beside, NULL, error);
+        const insitu_status status = draw(t, &again, beside, is_sampled ? &found : NULL, error);
+        t->frame->overlaps += found.count;
+        base_free(found.pixels);
         if (status) return status;
         if (beside->rgba) copy_pixels(turn, beside, out);
     }
@@ -187,7 +191,8 @@ insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render
         status = take_all(&t, out, &overlaps, error);
     } else {
         status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
-        frame->overlaps = overlaps.count;
+        /* Of samples those are told apart later that two cells have because rounding has their face in two places. */
+        frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
     if (!status && overlaps.count) status = draw_overlaps(&t, job, fragment_limit, &overlaps, out, error);
     base_free(overlaps.pixels);

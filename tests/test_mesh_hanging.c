@@ -1,0 +1,135 @@
+/* Hanging nodes (test_mesh_hanging.h): vertices live on the lattice of the smallest cells, where they are made when a
+ * cell first asks for them. One on a cube's boundary has the mean of the cube's corners, which all cubes around it have
+ * alike, for the map of a cube is bilinear on its faces. */
+#include "test_mesh_hanging.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_mesh_make.h"
+
+typedef struct hanging {
+    int n, side;
+    test_hanging_shape shape;
+    test_function *f;
+    int64_t line;      /* vertices of the finest lattice along an axis */
+    int64_t *vertices; /* of the mesh, by place in that lattice; -1: not made */
+    test_mesh *mesh;
+} hanging;
+
+const char *test_hanging_shape_name(test_hanging_shape shape)
+{
+    static const char *const names[TEST_HANGING_SHAPE_COUNT] = {"dyadic", "turned", "curved", "round"};
+    return names[shape];
+}
+
+/* The cube onto a ball of radius 1. */
+static void to_ball(const double p[3], double out[3])
+{
+    for (int a = 0; a < 3; a++) {
+        const double u = p[(a + 1) % 3] * p[(a + 1) % 3], v = p[(a + 2) % 3] * p[(a + 2) % 3];
+        out[a] = p[a] * sqrt(1 - u / 2 - v / 2 + u * v / 3);
+    }
+}
+
+/* About (1, 2, 3), by an angle of cosine 0.8, to 0.55 of the size. */
+static void turn(const double p[3], double out[3])
+{
+    const double length = sqrt(14), axis[3] = {1 / length, 2 / length, 3 / length};
+    const double along = axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2];
+    for (int a = 0; a < 3; a++) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        const double across = axis[b] * p[c] - axis[c] * p[b];
+        out[a] = 0.55 * (0.8 * p[a] + 0.6 * across + 0.2 * along * axis[a]);
+    }
+}
+
+static void map(const hanging *h, const double p[3], double out[3])
+{
+    if (h->shape >= TEST_HANGING_CURVED)
+        to_ball(p, out);
+    else if (h->shape == TEST_HANGING_TURNED)
+        turn(p, out);
+    else
+        memcpy(out, p, 3 * sizeof *out);
+}
+
+/* A place of the finest lattice in the cube [-1, 1]^3. */
+static void lattice_place(const hanging *h, const int64_t at[3], double out[3])
+{
+    for (int a = 0; a < 3; a++) out[a] = 2.0 * (double)at[a] / (double)(h->n * h->side) - 1;
+}
+
+/* The mean of the cube's corners at the place: position and value. */
+static void cube_mean(const hanging *h, const int64_t at[3], double position[3], double *value)
+{
+    int64_t cube[3];
+    double share[3];
+    for (int a = 0; a < 3; a++) {
+        cube[a] = at[a] / h->side < h->n ? at[a] / h->side : h->n - 1;
+        share[a] = (double)(at[a] - cube[a] * h->side) / h->side;
+    }
+    position[0] = position[1] = position[2] = *value = 0;
+    for (int corner = 0; corner < 8; corner++) {
+        int64_t place[3];
+        double weight = 1, flat[3], p[3];
+        for (int a = 0; a < 3; a++) {
+            place[a] = (cube[a] + (corner >> a & 1)) * h->side;
+            weight *= corner >> a & 1 ? share[a] : 1 - share[a];
+        }
+        if (!(weight > 0)) continue;
+        lattice_place(h, place, flat);
+        map(h, flat, p);
+        for (int a = 0; a < 3; a++) position[a] += weight * p[a];
+        *value += weight * h->f(p);
+    }
+}
+
+static int64_t vertex_at(hanging *h, const int64_t at[3])
+{
+    int64_t *vertex = &h->vertices[at[0] + h->line * (at[1] + h->line * at[2])];
+    double flat[3], own[3], mean[3], value;
+    if (*vertex >= 0) return *vertex;
+    const bool is_inside = at[0] % h->side && at[1] % h->side && at[2] % h->side;
+    lattice_place(h, at, flat);
+    map(h, flat, own);
+    cube_mean(h, at, mean, &value);
+    *vertex = test_mesh_add_vertex(h->mesh, h->shape == TEST_HANGING_CURVED ? mean : own);
+    h->mesh->values[*vertex] = is_inside ? h->f(h->mesh->coordinates + 3 * *vertex) : value;
+    return *vertex;
+}
+
+/* The cells of a cube of the finest lattice from `at` on, so many of its cubes wide. */
+static void add_cells(hanging *h, test_mesh_kind kind, const int64_t at[3], int width)
+{
+    int64_t corners[8];
+    for (int b = 0; b < 8; b++) {
+        const int64_t place[3] = {at[0] + (b & 1) * width, at[1] + (b >> 1 & 1) * width, at[2] + (b >> 2) * width};
+        corners[b] = vertex_at(h, place);
+    }
+    test_mesh_add_cube(h->mesh, kind, corners);
+}
+
+static void add_refined(hanging *h, test_mesh_kind kind, const int64_t cube[3], bool is_fine)
+{
+    const int cuts = is_fine ? h->side : 1, width = h->side / cuts;
+    for (int i = 0; i < cuts * cuts * cuts; i++) {
+        const int place[3] = {i % cuts, i / cuts % cuts, i / (cuts * cuts)};
+        int64_t at[3];
+        for (int a = 0; a < 3; a++) at[a] = cube[a] * h->side + (int64_t)place[a] * width;
+        add_cells(h, kind, at, width);
+    }
+}
+
+void test_mesh_hanging(test_mesh_kind kind, int n, int side, test_hanging_shape shape, test_function *f, test_mesh *out)
+{
+    hanging h = {n, side, shape, f, (int64_t)n * side + 1, NULL, out};
+    const int64_t places = h.line * h.line * h.line, cells = 6 * places;
+    h.vertices = test_allocate(places, sizeof *h.vertices);
+    for (int64_t i = 0; i < places; i++) h.vertices[i] = -1;
+    test_mesh_allocate(out, places, cells, 8 * cells);
+    for (int64_t i = 0; i < (int64_t)n * n * n; i++)
+        add_refined(&h, kind, (const int64_t[]){i % n, i / n % n, i / ((int64_t)n * n)},
+                    test_uniform((uint64_t)i, 77) < 1.0 / 3);
+    free(h.vertices);
+}
