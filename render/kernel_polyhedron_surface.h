@@ -225,10 +225,17 @@ SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, 
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
 }
 
+/* A little more than t, by one or two roundings. */
+SIMD_INLINE vf kernel_just_behind(vf t)
+{
+    return t + (vf_abs(t) * 2.4e-7f + 1e-30f);
+}
+
 /* The next crossing of every open ray; returns who has one. */
 static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, kernel_walk *walk)
 {
-    vm found = walk->jump_in, left = vm_andnot(walk->open, found);
+    const vm jump = walk->jump_in;
+    vm found = jump, left = vm_andnot(walk->open, jump);
     walk->jump_in = vm_none();
     while (vm_any(left)) {
         const vm on = kernel_walk_on(r, stay, left, walk);
@@ -242,7 +249,7 @@ static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, ker
     const vf length = piece->t1 - piece->t0;
     const vf t = kernel_secant(piece->t0, piece->v0, piece->t1, piece->v1);
     const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece->t0) / length, vf_set(0));
-    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, piece->t0);
+    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, vf_select(jump, kernel_just_behind(piece->t0), piece->t0));
     walk->w = piece->w0 + along * (piece->w1 - piece->w0);
     return found;
 }
