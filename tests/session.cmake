@@ -16,6 +16,16 @@ insitu_add_mpi_test(session_recentre test_session_recentre 1 2 3 4 7 TIMEOUT 120
 insitu_session_program(test_session_space)
 insitu_add_mpi_test(session_space test_session_space 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_partition)
+target_sources(test_session_partition PRIVATE test_mesh_honeycomb.c)
+insitu_add_mpi_test(session_partition test_session_partition 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+foreach(ranks 16 64)
+  insitu_add_long_test(session_partition_np${ranks}
+    ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:test_session_partition>
+    ${CMAKE_CURRENT_BINARY_DIR})
+  set_tests_properties(session_partition_np${ranks} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+endforeach()
+
 insitu_session_program(test_session)
 insitu_add_mpi_test(session test_session 1 2 3 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

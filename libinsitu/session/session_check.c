@@ -151,12 +151,13 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
 /* Cells of any layout, one by one. */
 static int64_t check_each(const session_mesh *mesh, int64_t begin, int64_t end, face_room *room, mesh_tally *tally)
 {
-    for (int64_t cell = begin; cell < end; cell++) {
-        fault_place place;
-        if (check_cell(mesh, cell, room, &place) != CELL_GOOD) return cell;
-        tally_cell(&mesh->cells, cell, tally);
-    }
-    return end;
+    mesh_tally own = tally_empty();
+    fault_place place;
+    int64_t cell = begin;
+    for (; cell < end && check_cell(mesh, cell, room, &place) == CELL_GOOD; cell++)
+        tally_cell(&mesh->cells, cell, &own);
+    tally_merge(tally, &own);
+    return cell;
 }
 
 /* The lowest bad cell, or cell_count. */

@@ -36,8 +36,8 @@ void session_faces_free(face_room *room);
 /* offsets of the cell have been proved. */
 face_fault session_check_faces(const session_mesh *mesh, int64_t cell, face_room *room, face_place *place);
 
-/* The volume: exact for cells that are star-shaped from their vertices' mean, else somewhat more. Flat, of
- * volume 0: in one plane, but for rounding. */
+/* The volume: exact for cells that are star-shaped from their vertices' mean, else somewhat more; however faces are
+ * listed the same but for rounding. Flat, of volume 0: in one plane, but for rounding. */
 double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat);
 
 /* The error in words. */

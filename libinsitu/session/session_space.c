@@ -27,6 +27,18 @@ static insitu_status check_meshes(insitu_session *session, base_error *error)
     return INSITU_OK;
 }
 
+/* To 13 bits, which is within 1.6e-4: steps are derived from it, and a sum over cells rounds by the order of the cells,
+ * of a cell's vertices and of the ranks, by 1e-12 or so. Where to round up is a matter of choice. The golden ratio is
+ * far from every fraction of small numbers, which the means of regular and refined lattices are; halves are among them,
+ * and rounding would decide. */
+static double rounded_size(double size)
+{
+    enum { BITS = 13 };
+    int exponent;
+    const double mantissa = frexp(size, &exponent);
+    return ldexp(floor(ldexp(mantissa, BITS) + 0.61803398874989485), exponent - BITS);
+}
+
 static insitu_status reduce_extent(insitu_session *session, session_extent *out, base_error *error)
 {
     double mine[6], all[6];
@@ -55,10 +67,8 @@ static insitu_status reduce_extent(insitu_session *session, session_extent *out,
                              "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .rank_count = (int)totals[1]};
-    /* Of the cells that have one: flat ones change no sample. To float, so that the sum's rounding, which depends on
-     * the partition, does not reach the samples. */
-    const int64_t sized = totals[2] > 0 ? totals[2] : totals[0];
-    if (sized > 0) out->cell_size = (double)(float)(all_sizes / (double)sized);
+    /* Of the cells that have one: flat ones change no sample. */
+    if (totals[2] > 0) out->cell_size = rounded_size(all_sizes / (double)totals[2]);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
         out->lower[axis] = all[axis];
         out->upper[axis] = -all[3 + axis];

@@ -122,6 +122,7 @@ MMBVH_INLINE double cube_root(double x)
     return cube_root_step(x, cube_root_step(x, cube_root_begin(x)));
 }
 
+/* 0 of a flat cell, whatever sign and size rounding left it. */
 MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
 {
     tally->drawn++;
@@ -160,7 +161,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
         volume = signed_volume(type, points);
         is_flat_cell = is_flat(volume, box_volume(points, grid_type_vertices(type)));
     }
-    tally_volume(tally, volume);
+    tally_volume(tally, is_flat_cell ? 0 : volume);
     tally->flat += is_flat_cell;
 }
 
@@ -254,14 +255,14 @@ typedef struct lane_bounds {
     lanes least; /* volume without its sign */
 } lane_bounds;
 
-MMBVH_INLINE lane_bounds lane_bounds_of(const mesh_tally *t)
+MMBVH_INLINE lane_bounds lane_bounds_empty(void)
 {
     lane_bounds b;
     for (int lane = 0; lane < LANES; lane++) b.least[lane] = (double)INFINITY;
     for (int axis = 0; axis < 3; axis++)
         for (int lane = 0; lane < LANES; lane++) {
-            b.lower[axis][lane] = t->lower[axis];
-            b.upper[axis][lane] = t->upper[axis];
+            b.lower[axis][lane] = (double)INFINITY;
+            b.upper[axis][lane] = -(double)INFINITY;
         }
     return b;
 }
@@ -375,13 +376,13 @@ MMBVH_INLINE bool run_lanes(const grid *g, int64_t cell, mesh_tally *t, lane_bou
     return true;
 }
 
-/* Only where the least of the volumes may be flat beside all that was seen are cells looked at again, each with its own
- * box: to know all boxes takes a thirtieth of the time of a mesh of tets. */
-static int64_t count_flat(const grid *g, int64_t begin, int64_t end)
+/* Only where the least of the volumes may be flat beside all cells of the run are they looked at again, each with its
+ * own box: to know all boxes takes a thirtieth of the time of a mesh of tets. */
+static mesh_tally tally_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();
     for (int64_t cell = begin; cell < end; cell++) tally_cell(g, cell, &again);
-    return again.flat;
+    return again;
 }
 
 MMBVH_INLINE bool may_be_flat(const mesh_tally *t, const lane_bounds *b, double least)
@@ -395,8 +396,8 @@ MMBVH_INLINE bool may_be_flat(const mesh_tally *t, const lane_bounds *b, double 
 MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally,
                          const fetch_shape shape, const bool wide_index, const bool wide_number)
 {
-    mesh_tally t = *tally;
-    lane_bounds bounds = lane_bounds_of(tally);
+    mesh_tally t = tally_empty();
+    lane_bounds bounds = lane_bounds_empty();
     double least = (double)INFINITY;
     bool is_good = true;
     int64_t cell = begin;
@@ -410,8 +411,8 @@ MMBVH_INLINE int64_t run(const session_mesh *mesh, int64_t begin, int64_t end, m
         while (cell < next && (is_good = run_cell(mesh, cell, &t, &least, shape, wide_index, wide_number))) cell++;
     }
     tally_bounds(&t, &bounds);
-    if (may_be_flat(&t, &bounds, least)) t.flat += count_flat(&mesh->cells, begin, cell);
-    *tally = t;
+    if (may_be_flat(&t, &bounds, least)) t = tally_again(&mesh->cells, begin, cell);
+    tally_merge(tally, &t);
     return cell;
 }
 

@@ -7,7 +7,7 @@
 typedef struct mesh_tally {
     double lower[3], upper[3];
     int64_t drawn, ghosts, inverted, flat;
-    double sizes; /* sum of cube roots of volumes */
+    double sizes; /* sum of cube roots of volumes; added up block by block, so that it rounds as a sum of few */
 } mesh_tally;
 
 mesh_tally tally_empty(void);

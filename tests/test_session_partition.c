@@ -1,0 +1,200 @@
+/* A volume as the library draws it where nothing is said of its sampling, its range, its unit distance or the camera:
+ * what these are derived from is that of all ranks together, so the picture is the one that rank 0 draws of the whole
+ * mesh alone. Each rank lists its cells its own way: other vertices and cells first, faces from another vertex on and
+ * in the other direction, a polyhedron's faces in another order. Warped faces make a cell's volume depend on how a face
+ * is cut into triangles, which must not depend on the listing.
+ *
+ * The bound is what compositing promises: fragments blend in other groups, 1e-6. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session.h"
+#include "test_mesh_honeycomb.h"
+#include "test_mesh_make.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, WIDTH = 48, HEIGHT = 36 };
+
+#define IMAGE(layers, sampling)                                                                                        \
+    "images:\n  - name: a\n    size: [48, 36]\n    layers:\n" layers sampling "    outputs:\n      - path: a.exr\n"
+#define VOLUME "      - volume: {field: f}\n"
+#define DENSE "      - volume: {field: f, opacity: [[0, 0.2], [0.5, 0.2], [0.5, 1], [1, 0.4]]}\n"
+#define SURFACE "      - isosurface: {field: f, values: [0.1]}\n"
+
+typedef struct scene_case {
+    const char *name, *text;
+} scene_case;
+
+static const scene_case scenes[] = {
+    {"default", IMAGE(VOLUME, "")},
+    {"default, dense", IMAGE(DENSE, "")},
+    {"default, surface", IMAGE(VOLUME SURFACE, "")},
+    {"samples", IMAGE(VOLUME, "    sampling: {method: samples}\n")},
+    {"samples, dense", IMAGE(DENSE, "    sampling: {method: samples}\n")},
+    {"two volumes", IMAGE(VOLUME DENSE, "")},
+};
+enum { SCENES = sizeof scenes / sizeof *scenes };
+
+/* ---- meshes -------------------------------------------------------------------------------------------------- */
+
+typedef enum mesh_kind { HONEYCOMB, WARPED_POLYHEDRA, WARPED_MIXED, HEXES, FLAT_AMONG_HEXES, MESHES } mesh_kind;
+
+static const char *const mesh_names[MESHES] = {"honeycomb", "warped polyhedra", "polyhedra among others", "hexes",
+                                               "flat cells among hexes"};
+
+/* As many hexes again, each of eight places in one oblique plane: what rounding makes of their volumes goes by which
+ * vertex is listed first. */
+static void add_flat_hexes(test_mesh *mesh)
+{
+    test_mesh old = *mesh;
+    test_mesh_allocate(mesh, old.vertex_count + 8 * old.cell_count, 2 * old.cell_count, 16 * old.cell_count);
+    for (int64_t v = 0; v < old.vertex_count; v++)
+        mesh->values[test_mesh_add_vertex(mesh, old.coordinates + 3 * v)] = old.values[v];
+    for (int64_t cell = 0; cell < old.cell_count; cell++) {
+        int64_t vertices[8];
+        for (int i = 0; i < 8; i++) {
+            const uint64_t index = (uint64_t)(16 * cell + 2 * i);
+            const double x = test_uniform_in(index, 3, -1, 1) / 2, y = test_uniform_in(index + 1, 3, -1, 1) / 2;
+            vertices[i] = test_mesh_add_vertex(mesh, (const double[]){x, y, 0.1 * x - 0.7 * y});
+            mesh->values[vertices[i]] = 0.25;
+        }
+        test_mesh_add_cell(mesh, GRID_HEX, old.connectivity + old.offsets[cell], (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
+        test_mesh_add_cell(mesh, GRID_HEX, vertices, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
+    }
+    test_mesh_free(&old);
+}
+
+static void make_mesh(mesh_kind kind, test_mesh *out)
+{
+    if (kind == HONEYCOMB) {
+        test_mesh_honeycomb(SIDE, 0.2, test_wave, out);
+        return;
+    }
+    test_mesh_lattice(kind == WARPED_MIXED ? TEST_MIXED : TEST_HEXES, SIDE, 0.2, test_wave, out);
+    if (kind == WARPED_POLYHEDRA || kind == WARPED_MIXED) test_mesh_to_polyhedra(out, kind == WARPED_MIXED ? 0.5 : 1);
+    if (kind == FLAT_AMONG_HEXES) add_flat_hexes(out);
+}
+
+/* Dealt at random, and listed in the rank's own way. */
+static void take_part(const test_mesh *whole, session_input *out)
+{
+    int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
+    test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_part(whole, owners, own_rank, &out->part);
+    test_free(owners);
+    test_mesh_turn(&out->part, 11 + (uint64_t)own_rank);
+    test_mesh_shuffle(&out->part, 77 + (uint64_t)own_rank);
+    input_describe(out);
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------ */
+
+/* On rank 0 *out is the picture, to be freed. */
+static double draw(MPI_Comm comm, const char *scene, const session_input *in, caught_picture *out)
+{
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
+    const double size = session->extent.cell_size;
+    if (own_rank == 0) {
+        *out = caught[0];
+        caught_count = 0;
+    }
+    insitu_destroy(&session);
+    return size;
+}
+
+static double difference(const caught_picture *a, const caught_picture *b)
+{
+    double worst = 0;
+    for (int i = 0; i < 4 * WIDTH * HEIGHT; i++)
+        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    return worst;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind kind, const session_input *whole,
+                           const session_input *part)
+{
+    caught_picture ours = {0}, alone = {0};
+    const double size = draw(MPI_COMM_WORLD, file, part, &ours);
+    if (own_rank != 0) return true;
+    const double alone_size = draw(MPI_COMM_SELF, file, whole, &alone);
+    const double off = difference(&ours, &alone);
+    const bool is_one = off <= 1e-6 && size == alone_size;
+    if (!is_one)
+        fprintf(stderr, "%s, %s, %d ranks: off by %.3g; cells of size %.17g and %.17g\n", mesh_names[kind], scene->name,
+                rank_count, off, size, alone_size);
+    free_picture(&ours);
+    free_picture(&alone);
+    return is_one;
+}
+
+static void judge(mesh_kind kind)
+{
+    session_input whole = {0}, part = {0};
+    bool is_one = true;
+    make_mesh(kind, &whole.part);
+    input_describe(&whole);
+    take_part(&whole.part, &part);
+    for (int i = 0; i < SCENES; i++)
+        is_one = is_one_picture(&scenes[i], write_scene(scenes[i].text), kind, &whole, &part) && is_one;
+    everywhere(is_one);
+    input_free(&part);
+    input_free(&whole);
+}
+
+static void default_volumes_of_honeycombs_are_one_picture(void **context)
+{
+    (void)context;
+    judge(HONEYCOMB);
+}
+
+static void default_volumes_of_warped_polyhedra_are_one_picture(void **context)
+{
+    (void)context;
+    judge(WARPED_POLYHEDRA);
+}
+
+static void default_volumes_of_polyhedra_among_others_are_one_picture(void **context)
+{
+    (void)context;
+    judge(WARPED_MIXED);
+}
+
+static void default_volumes_of_hexes_are_one_picture(void **context)
+{
+    (void)context;
+    judge(HEXES);
+}
+
+static void flat_cells_do_not_change_the_default_step(void **context)
+{
+    (void)context;
+    judge(FLAT_AMONG_HEXES);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(default_volumes_of_honeycombs_are_one_picture),
+        cmocka_unit_test(default_volumes_of_warped_polyhedra_are_one_picture),
+        cmocka_unit_test(default_volumes_of_polyhedra_among_others_are_one_picture),
+        cmocka_unit_test(default_volumes_of_hexes_are_one_picture),
+        cmocka_unit_test(flat_cells_do_not_change_the_default_step),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
