@@ -249,7 +249,7 @@ static void scene_image_defaults_hold(void **state)
     assert_true(image->background[3] == 1);
     assert_true(image->step == 0 && image->step_cells == 0.5 && image->sample_group == 64);
     assert_true(image->jitter && image->frames == 1);
-    assert_true(image->method == SCENE_SAMPLES && image->max_error == 0);
+    assert_true(image->method == SCENE_SEGMENTS && image->max_error == 0.01);
     assert_true(image->camera.is_automatic && image->camera.angle == 40 && image->camera.zoom == 1);
     check_vector(image->camera.direction, 1 / length, 0.8 / length, 1.2 / length);
     check_vector(image->camera.up, 0, 1, 0);
@@ -262,6 +262,50 @@ static void scene_image_defaults_hold(void **state)
     }
     assert_int_equal(image->outputs[0].format, SCENE_PNG8);
     scene_free(&s);
+}
+
+/* What is said of sampling, of how many volumes, and how they are integrated. */
+static void sampling_is_by_what_is_said(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *sampling;
+        int volumes;
+        scene_sampling_method method;
+        double max_error;
+    } cases[] = {
+        {"{}", 1, SCENE_SEGMENTS, 0.01},
+        {"{}", 0, SCENE_SAMPLES, 0},
+        {"{}", 2, SCENE_SAMPLES, 0},
+        {"{}", 4, SCENE_SAMPLES, 0},
+        {"{method: samples}", 1, SCENE_SAMPLES, 0},
+        {"{method: segments}", 1, SCENE_SEGMENTS, 0},
+        {"{method: segments}", 2, SCENE_SEGMENTS, 0},
+        {"{method: segments, max_error: 1e-3}", 1, SCENE_SEGMENTS, 1e-3},
+        {"{max_error: 1e-3}", 1, SCENE_SEGMENTS, 1e-3},
+        {"{max_error: 1e-3}", 2, SCENE_SEGMENTS, 1e-3},
+        {"{max_error: 1e-3, frames: 4, jitter: false, group: 8}", 1, SCENE_SEGMENTS, 1e-3},
+        {"{method: segments, step_cells: 0.25}", 1, SCENE_SEGMENTS, 0},
+        {"{step: 0.1}", 1, SCENE_SAMPLES, 0},
+        {"{step_cells: 0.25}", 1, SCENE_SAMPLES, 0},
+        {"{jitter: true}", 1, SCENE_SAMPLES, 0},
+        {"{frames: 1}", 1, SCENE_SAMPLES, 0},
+        {"{group: 64}", 1, SCENE_SAMPLES, 0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[512] = "images:\n- name: a\n  layers:\n  - isosurface: {field: p, values: [1]}\n";
+        scene s;
+        for (int k = 0; k < cases[i].volumes; k++) strcat(text, "  - volume: {field: p}\n");
+        snprintf(text + strlen(text), sizeof text - strlen(text), "  sampling: %s\n  outputs: [{path: a.png}]\n",
+                 cases[i].sampling);
+        parse_good(text, &s);
+        const scene_image *image = &s.images[0];
+        if (image->method != cases[i].method || image->max_error != cases[i].max_error)
+            fprintf(stderr, "%s, %d volumes: method %d, max_error %g\n", cases[i].sampling, cases[i].volumes,
+                    (int)image->method, image->max_error);
+        assert_true(image->method == cases[i].method && image->max_error == cases[i].max_error);
+        scene_free(&s);
+    }
 }
 
 static void scene_layer_defaults_hold(void **state)
@@ -689,6 +733,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_isosurface_keys_are_read),
         cmocka_unit_test(scene_volume_keys_are_read),
         cmocka_unit_test(scene_image_defaults_hold),
+        cmocka_unit_test(sampling_is_by_what_is_said),
         cmocka_unit_test(scene_layer_defaults_hold),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),

@@ -101,13 +101,29 @@ static void convert_background(const scene_file_image *in, float background[4])
     background[3] = alpha;
 }
 
+/* Nothing was said of how the volume is to be sampled. Any key but method and max_error, be it of samples alone, says
+ * how samples are to be taken. */
+static bool is_unsaid(const scene_file_sampling *in)
+{
+    return !in->method && !in->max_error && !in->step && !in->step_cells && !in->group && !in->jitter && !in->frames;
+}
+
+/* One volume is drawn to an error: samples are cheaper, but noise of what error they leave nobody knows. Several are
+ * sampled, as their segments are mixed pixel by pixel. */
+static void choose_method(const scene_file_sampling *in, scene_image *out)
+{
+    static const double default_error = 0.01;
+    const bool by_default = is_unsaid(in) && out->volume_count == 1;
+    out->max_error = in->max_error ? *in->max_error : by_default ? default_error : 0;
+    out->method = in->method ? (scene_sampling_method)*in->method : out->max_error > 0 ? SCENE_SEGMENTS : SCENE_SAMPLES;
+}
+
 static insitu_status convert_sampling(const scene_document *d, const char *path, const scene_file_sampling *in,
                                       scene_image *out)
 {
     static const scene_file_sampling none;
     if (!in) in = &none;
-    out->max_error = in->max_error ? *in->max_error : 0;
-    out->method = in->method ? (scene_sampling_method)*in->method : in->max_error ? SCENE_SEGMENTS : SCENE_SAMPLES;
+    choose_method(in, out);
     out->step = in->step ? *in->step : 0;
     out->step_cells = in->step_cells ? *in->step_cells : 0.5;
     out->sample_group = in->group ? *in->group : 64;

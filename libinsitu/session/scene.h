@@ -108,8 +108,8 @@ typedef struct scene_image {
     scene_volume *volumes;
     int light_count; /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
-    scene_sampling_method method; /* of volumes; segments only where there is one volume */
-    double max_error;             /* of segments: of a channel, linear; 0: by step */
+    scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */
+    double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */
     double step;                  /* sample distance in scene units; 0: by step_cells */
     double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
     int sample_group;             /* 1 .. 64; 64 by default */

@@ -187,7 +187,8 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
       .help = "How a volume is integrated: by samples, or by segments, exact on tetrahedra and of second order in "    \
               "the step elsewhere (of first on rays that graze a step of the opacity). Segments of several volumes "   \
               "are mixed pixel by pixel, slower than samples.",                                                        \
-      .by_default = "`samples`, with `max_error` `segments`")                                                          \
+      .by_default = "`segments` of one volume, or with `max_error`; `samples` of several, or with any other key of "   \
+                    "`sampling`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("max_error", OPTIONAL, scene_file_sampling, max_error),                                    \
       .help = "No channel of a pixel is off by more, in linear light: cells are cut, and integrals taken, as "         \
               "finely as that takes, where the medium is of less than 1000 optical depths across the scene: of "       \
@@ -199,13 +200,15 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
               "tetrahedra, and with tables of many colours, `1e-2` takes a fraction of the time of "                   \
               "`method: segments`. Not with `step`, "                                                                  \
               "`step_cells`, nor `method: samples`.",                                                                  \
-      .by_default = "by the step", .low = 1e-4, .high = 1)                                                             \
+      .by_default = "`0.01` of one volume where no other key of `sampling` is given; else by the step", .low = 1e-4,   \
+      .high = 1)                                                                                                       \
     X(CYAML_FIELD_FLOAT_PTR("step", OPTIONAL, scene_file_sampling, step),                                              \
       .help = "Distance between samples, in scene units. Not with `step_cells`.", .by_default = "by `step_cells`",     \
       .low = 0, .is_low_excluded = true, .high = 1e30)                                                                 \
     X(CYAML_FIELD_FLOAT_PTR("step_cells", OPTIONAL, scene_file_sampling, step_cells),                                  \
-      .help = "Distance between samples in mean cell sizes (a cell's size is the cube root of its volume). Smaller "   \
-              "is finer and slower.",                                                                                  \
+      .help =                                                                                                          \
+          "Distance between samples in mean cell sizes (a cell's size is the cube root of its volume; the mean is "    \
+          "rounded by up to 1.6e-4, so that no partition shows in it). Smaller is finer and slower.",                  \
       .by_default = "`0.5`", .low = 0, .is_low_excluded = true, .high = 1000)                                          \
     X(CYAML_FIELD_INT_PTR("group", OPTIONAL, scene_file_sampling, group),                                              \
       .help = "Samples of a ray that are looked up together. Changes the speed, not the image.", .by_default = "`64`", \
@@ -261,7 +264,9 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
     X(CYAML_FIELD_SEQUENCE("layers", CYAML_FLAG_POINTER, scene_file_image, layers, &layer, 1, 20),                     \
       .help = "What is drawn. Each entry holds one of the keys of a layer.", .child = &layer_mapping)                  \
     X(CYAML_FIELD_MAPPING_PTR("sampling", OPTIONAL, scene_file_image, sampling, sampling_fields),                      \
-      .help = "How finely volumes are sampled.", .by_default = "half a cell, jittered", .child = &sampling_mapping)    \
+      .help = "How volumes are integrated, and how finely.",                                                           \
+      .by_default = "one volume to a `max_error` of 0.01; several by samples, half a cell apart, jittered",            \
+      .child = &sampling_mapping)                                                                                      \
     X(CYAML_FIELD_SEQUENCE("outputs", CYAML_FLAG_POINTER, scene_file_image, outputs, &output, 1, 16),                  \
       .help = "Files that the image is written to. No two files of a scene may have the same name.",                   \
       .child = &output_mapping)
