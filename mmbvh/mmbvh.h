@@ -98,14 +98,14 @@ typedef struct mmbvh_selection {
 
 typedef struct mmbvh_options {
     int threads;                      /* >= 1; 0: as many as OpenMP would take */
-    const mmbvh_selection *selection; /* of a build: these cells alone; NULL: all. None may be a ghost. */
+    const mmbvh_selection *selection; /* of a build: these cells alone; NULL: all. None may be a ghost, or flat. */
     mmbvh_layout layout;
     mmbvh_builder builder;
 } mmbvh_options;
 
-/* Build over the grid's cells (ghosts left out) with the ranges of field (NULL: all ranges (-inf, +inf)).
- * Parallel; the same tree for any number of threads. On success *out owns the memory: free it with mmbvh_free(). On
- * an error *out is zeroed. */
+/* Build over the grid's cells (ghosts and flat cells left out) with the ranges of field (NULL: all ranges (-inf,
+ * +inf)). Parallel; the same tree for any number of threads. On success *out owns the memory: free it with
+ * mmbvh_free(). On an error *out is zeroed. */
 insitu_status mmbvh_build(const grid *g, const grid_field *field, const double origin[3], double scale,
                           const mmbvh_options *options, mmbvh *out, base_error *error);
 
@@ -121,10 +121,10 @@ typedef struct mmbvh_wish {
     const mmbvh_interval *intervals;
 } mmbvh_wish;
 
-/* The cells that one of the wishes can show: no ghosts, and none for a field of which it has a value that is not
- * finite; unusable gets the number of these for each wish. Parallel; reads each cell's values once a wish, at about
- * the speed of a refit of ranges. A tree over the selection (mmbvh_options) draws what the full tree does, for as long
- * as cells, values and wishes stay. */
+/* The cells that one of the wishes can show: no ghosts or flat cells, and none for a field of which it has a value that
+ * is not finite; unusable gets the number of these for each wish. Parallel; reads each cell's values once a wish, at
+ * about the speed of a refit of ranges. A tree over the selection (mmbvh_options) draws what the full tree does, for as
+ * long as cells, values and wishes stay. */
 insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_count, const mmbvh_options *options,
                            mmbvh_selection *out, int64_t *unusable, base_error *error);
 void mmbvh_selection_free(mmbvh_selection *selection);
@@ -176,8 +176,8 @@ typedef struct mmbvh_statistics {
     int64_t bytes;          /* nodes and cell indices */
 } mmbvh_statistics;
 
-/* Prove the tree: every non-ghost cell in exactly one leaf, counts within 1..7, every node's bounds and range contain
- * those of its children and its cells, siblings adjacent, every node reached once. The first violation is the
+/* Prove the tree: every cell that is drawn in exactly one leaf, counts within 1..7, every node's bounds and range
+ * contain those of its children and its cells, siblings adjacent, every node reached once. The first violation is the
  * error. g, field may be NULL (a parent tree): then only the structure is proved. out may be NULL. */
 insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_statistics *out,
                           base_error *error);

@@ -41,12 +41,12 @@ static int64_t chunk_start(const build *b, int chunk)
 
 static bool may_leave_out(const build *b)
 {
-    return !b->selected && b->source.g && b->source.g->ghosts;
+    return !b->selected && b->source.g && (b->source.g->ghosts || b->source.g->flat);
 }
 
 static bool is_left_out(const build *b, int64_t cell)
 {
-    return may_leave_out(b) && grid_is_ghost(b->source.g, cell);
+    return may_leave_out(b) && !grid_is_drawn(b->source.g, cell);
 }
 
 static uint32_t listed_cell(const build *b, int64_t i)

@@ -63,6 +63,7 @@ static bool cell_range(const walk *w, int64_t cell, double *low, double *high)
 {
     grid_walk vertices = grid_walk_cell(w->g, cell);
     int64_t vertex;
+    if (!grid_has_own_value(w->field, cell)) return false;
     *low = INFINITY;
     *high = -INFINITY;
     while (grid_walk_next(&vertices, &vertex)) {
@@ -106,6 +107,7 @@ static insitu_status check_cell(walk *w, int64_t index, int64_t cell)
     *byte = (unsigned char)(*byte | bit);
     if (!w->g) return INSITU_OK;
     if (grid_is_ghost(w->g, cell)) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is a ghost", index, cell);
+    if (grid_is_flat(w->g, cell)) return BROKEN(w, "leaf %" PRId64 ": cell %" PRId64 " is flat", index, cell);
     const insitu_status status = check_cell_bounds(w, index, cell);
     if (status || !w->field) return status;
     return check_cell_range(w, index, cell);
@@ -211,7 +213,7 @@ static insitu_status check_complete(const walk *w)
     }
     for (int64_t cell = 0; cell < w->seen_count; cell++) {
         const bool seen = w->seen[cell / 8] >> (cell % 8) & 1;
-        if (!seen && !(w->g && grid_is_ghost(w->g, cell))) return BROKEN(w, "cell %" PRId64 " is in no leaf", cell);
+        if (!seen && !(w->g && !grid_is_drawn(w->g, cell))) return BROKEN(w, "cell %" PRId64 " is in no leaf", cell);
     }
     if (w->field && w->unusable != w->tree->unusable_cells) {
         return BROKEN(w, "%" PRId64 " cells are unusable, the tree says %" PRId64, w->unusable,

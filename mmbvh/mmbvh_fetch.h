@@ -127,7 +127,7 @@ MMBVH_INLINE fetch_range fetch_doubles_range(const fetch_doubles *v, bool is_fin
 /* Of any cell and any field. */
 static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *field, int64_t cell)
 {
-    fetch_range range = {INFINITY, -INFINITY, true};
+    fetch_range range = {INFINITY, -INFINITY, grid_has_own_value(field, cell)};
     if (field->is_cell_centred) {
         const double v = grid_field_value(field, cell);
         return (fetch_range){v, v, isfinite(v)};

@@ -186,7 +186,8 @@ static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
 /* Can the instances read it? */
 static bool is_plain(const grid *g, const grid_field *field)
 {
-    return !field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !grid_has_faces(g);
+    const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
+    return is_float && !field->own && !grid_has_faces(g);
 }
 
 bool sweep_reads_floats(const sweep *ranges)

@@ -65,7 +65,7 @@ MMBVH_INLINE finding find_doubles(const selector *s, int64_t cell, const fetch_s
 
 typedef finding (*const finder)(const selector *s, int64_t cell, const bool is_packed);
 
-/* Ghosts are passed over. */
+/* Cells that are not drawn are passed over. */
 MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder find, const bool is_packed)
 {
     int64_t unusable = 0;
@@ -73,7 +73,7 @@ MMBVH_INLINE int64_t mark(const selector *s, int64_t begin, int64_t end, finder 
         const int64_t count = end - first < WORD_CELLS ? end - first : WORD_CELLS;
         uint64_t word = s->bits[first / WORD_CELLS];
         for (int64_t i = 0; i < count; i++) {
-            if (grid_is_ghost(s->g, first + i)) continue;
+            if (!grid_is_drawn(s->g, first + i)) continue;
             const finding cell = find(s, first + i, is_packed);
             unusable += !cell.is_finite;
             word |= (uint64_t)(cell.is_finite & cell.meets) << i;
@@ -113,7 +113,8 @@ static selector make_selector(const grid *g, const mmbvh_wish *wish, uint64_t *b
     static const selector_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(mark_vertices);
     const grid_field *field = wish->field;
     selector s = {.run = mark_any, .g = g, .wish = wish, .values = field->values, .bits = bits};
-    if (!field->is_cell_centred && field->component >= 0 && !field->values.is_integer && !grid_has_faces(g))
+    const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;
+    if (is_float && !field->own && !grid_has_faces(g))
         s.run = table[fetch_grid_shape(g)][g->connectivity.is_wide][field->values.is_wide];
     if (field->component > 0) s.values.data += field->component * field->component_stride;
     return s;

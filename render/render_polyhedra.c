@@ -472,10 +472,11 @@ static size_t lay_out_polyhedron(polyhedron *c, char *buffer, int quads)
 }
 
 /* The mean of the vertices, summed in their order. */
-static void keep_vertices(const work *w, polyhedron *c)
+static void keep_vertices(const work *w, int64_t cell, polyhedron *c)
 {
     double sum[4] = {0, 0, 0, 0};
-    c->is_finite = c->is_constant = true;
+    c->is_finite = grid_has_own_value(w->field, cell);
+    c->is_constant = true;
     for (int i = 0; i < c->vertex_count; i++) {
         const work_vertex *v = &w->vertices[i];
         memcpy(c->world[i], v->position, sizeof v->position);
@@ -545,7 +546,7 @@ static void keep_twins(polyhedron *c)
             if (c->facets[j].quad == c->facets[i].quad) c->facets[i].twin = j, c->facets[j].twin = i;
 }
 
-static polyhedron *keep(polyhedron_store *store, work *w)
+static polyhedron *keep(polyhedron_store *store, work *w, int64_t cell)
 {
     polyhedron shape = {.vertex_count = w->vertex_count, .facet_count = w->facet_count};
     const size_t head = rounded(sizeof shape);
@@ -554,7 +555,7 @@ static polyhedron *keep(polyhedron_store *store, work *w)
     polyhedron *c = (polyhedron *)(void *)block;
     *c = shape;
     lay_out_polyhedron(c, block + head, w->face_count);
-    keep_vertices(w, c);
+    keep_vertices(w, cell, c);
     turn_outward(w, (const double(*)[3])c->world);
     keep_facets(w, c);
     keep_twins(c);
@@ -572,7 +573,7 @@ static polyhedron *take_apart(polyhedron_store *store, const grid *g, const grid
     turn_faces(&w);
     for (int face = 0; face < w.face_count; face++) add_fan(&w, face);
     sort_facets(w.facets, w.facet_count);
-    return keep(store, &w);
+    return keep(store, &w, index);
 }
 
 polyhedron *polyhedra_find(polyhedron_store *store, const grid *g, const grid_field *field, int part, int layer,

@@ -26,6 +26,9 @@ foreach(ranks 16 64)
   set_tests_properties(session_partition_np${ranks} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
 endforeach()
 
+insitu_session_program(test_session_left_out)
+insitu_add_mpi_test(session_left_out test_session_left_out 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session)
 insitu_add_mpi_test(session test_session 1 2 3 4 7 TIMEOUT 180 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

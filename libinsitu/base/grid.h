@@ -40,6 +40,7 @@ typedef struct grid {
     int cell_type;
     const char *ghosts; /* NULL: none */
     int64_t ghosts_stride;
+    const uint64_t *flat; /* NULL: none known; a bit for each cell, set where it has no volume and is not drawn */
     /* Faces of polyhedra, shared between them; no data: there are no polyhedra. */
     int64_t face_count;
     grid_array face_offsets;      /* face_count + 1 */
@@ -53,6 +54,8 @@ typedef struct grid_field {
     int component_count;
     int component; /* 0 .. component_count - 1, or -1 for the magnitude */
     bool is_cell_centred;
+    const struct grid_field *own; /* NULL, or the cells' own values, of which these at vertices were made: a cell whose
+                                     own is not finite has none */
 } grid_field;
 
 static inline double grid_array_number(const grid_array *a, int64_t i)
@@ -168,6 +171,17 @@ static inline bool grid_is_ghost(const grid *g, int64_t cell)
     return g->ghosts && g->ghosts[cell * g->ghosts_stride] != 0;
 }
 
+static inline bool grid_is_flat(const grid *g, int64_t cell)
+{
+    return g->flat && (g->flat[cell / 64] >> (cell % 64) & 1);
+}
+
+/* Neither a ghost nor flat: what trees hold. */
+static inline bool grid_is_drawn(const grid *g, int64_t cell)
+{
+    return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);
+}
+
 static inline double grid_field_value(const grid_field *f, int64_t i)
 {
     if (f->component >= 0) {
@@ -185,12 +199,18 @@ static inline double grid_field_value(const grid_field *f, int64_t i)
     return sqrt(sum);
 }
 
+/* Is the cell's own value finite, where the values at vertices were made of such? */
+static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
+{
+    return !f->own || isfinite(grid_field_value(f->own, cell));
+}
+
 /* The values at the cell's vertices (or the cell's own, count times). False where one is NaN or infinite: such a
  * cell is not drawn. */
 static inline bool grid_cell_values(const grid_field *f, int64_t cell, const int64_t *vertices, int count,
                                     double *values)
 {
-    bool finite = true;
+    bool finite = grid_has_own_value(f, cell);
     for (int i = 0; i < count; i++) {
         values[i] = grid_field_value(f, f->is_cell_centred ? cell : vertices[i]);
         finite = finite && isfinite(values[i]);

@@ -51,6 +51,7 @@ typedef struct session_scalar {
     int interval_count; /* else the values that its images show */
     mmbvh_interval *intervals;
     double *vertex_values; /* recentred values, a declared copy; NULL until computed */
+    grid_field own;        /* of a recentred one in use: the cells' */
     bool are_values_stale; /* recentred ones are to be computed again */
     bool is_suspect;       /* the values were set anew: they may have changed */
     bool has_checksum;
@@ -79,6 +80,7 @@ typedef struct session_mesh {
     double lower[3], upper[3]; /* of the drawn cells; lower > upper: there are none */
     int64_t drawn_count, ghost_count, inverted_count, flat_count;
     double size_sum; /* of drawn cells: cube roots of volumes */
+    uint64_t *flat;  /* NULL: no cell is flat; else as in cells */
 
     bool is_needed; /* by an image of this step */
     bool has_tree;
@@ -215,7 +217,9 @@ void session_drop_tree(session_mesh *mesh);
 /* The first error that a set call left behind, or NULL. */
 const base_error *session_pending_error(const insitu_session *session);
 
-/* session_check.c: prove a mesh before anything reads it; fills bounds and counts. Parallel. Local. */
+/* session_check.c: prove a mesh before anything reads it; fills bounds and counts, and finds flat cells. Parallel.
+ * Local.
+ */
 insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error);
 
 /* session_space.c */

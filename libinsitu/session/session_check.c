@@ -6,7 +6,9 @@
  * may hold anything. Indices are proved for ghosts too. */
 #include <omp.h>
 #include <stdio.h>
+#include <string.h>
 
+#include "memory.h"
 #include "session.h"
 #include "session_faces.h"
 #include "session_tally.h"
@@ -228,12 +230,40 @@ static bool is_far(const mesh_tally *tally)
     return far;
 }
 
+static void find_flat(const grid *g, int threads, uint64_t *flat)
+{
+    const int64_t words = (g->cell_count + 63) / 64;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t word = 0; word < words; word++) {
+        const int64_t first = 64 * word, end = first + 64 < g->cell_count ? first + 64 : g->cell_count;
+        for (int64_t cell = first; cell < end; cell++) flat[word] |= (uint64_t)tally_is_flat(g, cell) << (cell - first);
+    }
+}
+
+/* Cells of no volume are kept out of the trees: a tree without them does not do where they are others than before. */
+static insitu_status update_flat(session_mesh *mesh, int64_t count, int threads, base_error *error)
+{
+    const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat;
+    uint64_t *flat = NULL;
+    if (count) {
+        flat = base_calloc(bytes, 1);
+        if (!flat) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %zu bytes of flat cells", bytes);
+        find_flat(&mesh->cells, threads, flat);
+    }
+    const bool is_same = !flat == !mesh->flat && (!flat || memcmp(flat, mesh->flat, bytes) == 0);
+    if (!is_same) session_drop_tree(mesh);
+    base_free(mesh->flat);
+    mesh->cells.flat = mesh->flat = flat;
+    return INSITU_OK;
+}
+
 insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     mesh_tally tally = tally_empty();
     const int64_t bad = check_cells(mesh, threads, &tally);
     if (bad < mesh->cells.cell_count) return describe_fault(mesh, bad, error);
-    const insitu_status status = is_far(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
+    insitu_status status = is_far(&tally) ? describe_far_cell(mesh, error) : check_last_offset(mesh, error);
+    if (!status) status = update_flat(mesh, tally.flat, threads, error);
     if (status) return status;
     for (int axis = 0; axis < 3; axis++) {
         mesh->lower[axis] = tally.lower[axis];

@@ -271,6 +271,8 @@ static void drop_contents(session_mesh *mesh)
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     drop_fields(mesh);
+    base_free(mesh->flat);
+    mesh->flat = NULL;
 }
 
 void session_mesh_free(session_mesh *mesh)
@@ -351,6 +353,7 @@ static void take_mesh(insitu_session *session, session_mesh *mesh, const insitu_
     }
     mesh->given = *given;
     mesh->cells = as_grid(given);
+    mesh->cells.flat = mesh->flat;
     mesh->is_given = true;
     mesh->problem = (base_error){0};
 }

@@ -182,18 +182,24 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
                        field->at_vertices && given->centring == INSITU_CELL);
 }
 
-grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
+/* As the caller gave it. */
+static grid_field given_field(const session_mesh *mesh, const session_scalar *scalar)
 {
     const session_field *field = &mesh->fields[scalar->field];
-    if (scalar->is_recentred)
-        return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
-                            .component_stride = (int64_t)sizeof(double),
-                            .component_count = 1};
     return (grid_field){.values = field->values,
                         .component_stride = field->component_stride,
                         .component_count = field->given.component_count,
                         .component = scalar->component,
                         .is_cell_centred = field->given.centring == INSITU_CELL};
+}
+
+grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
+{
+    if (!scalar->is_recentred) return given_field(mesh, scalar);
+    return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
+                        .component_stride = (int64_t)sizeof(double),
+                        .component_count = 1,
+                        .own = &scalar->own};
 }
 
 static bool add_scalar(session_mesh *mesh, int field, int component, bool is_recentred)
@@ -225,6 +231,7 @@ static bool mark_scalar(session_mesh *mesh, const scene_field *field, bool wants
         scalar = &mesh->scalars[mesh->scalar_count - 1];
     }
     scalar->is_used = true;
+    scalar->own = given_field(mesh, scalar);
     scalar->wants_ranges = scalar->wants_ranges || wants_ranges;
     mesh->is_needed = mesh->is_needed || wants_ranges;
     *marked = scalar;

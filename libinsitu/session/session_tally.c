@@ -51,17 +51,19 @@ MMBVH_INLINE double determinant(const double u[3], const double v[3], const doub
     return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
 }
 
+MMBVH_INLINE double corner_volume(double points[][3], const signed char corner[4])
+{
+    double edge[3][3];
+    for (int k = 0; k < 3; k++)
+        for (int axis = 0; axis < 3; axis++) edge[k][axis] = points[corner[k + 1]][axis] - points[corner[0]][axis];
+    return determinant(edge[0], edge[1], edge[2]);
+}
+
 MMBVH_INLINE double signed_volume(int type, double points[][3])
 {
     const cell_corners of = corners_of(type);
     double sum = 0;
-    for (int i = 0; i < of.count; i++) {
-        double edge[3][3];
-        for (int k = 0; k < 3; k++)
-            for (int axis = 0; axis < 3; axis++)
-                edge[k][axis] = points[of.corners[i][k + 1]][axis] - points[of.corners[i][0]][axis];
-        sum += determinant(edge[0], edge[1], edge[2]);
-    }
+    for (int i = 0; i < of.count; i++) sum += corner_volume(points, of.corners[i]);
     return sum / of.shares;
 }
 
@@ -89,6 +91,15 @@ MMBVH_INLINE double box_volume(double points[][3], int count)
         box *= high - low;
     }
     return box;
+}
+
+/* Has the cell no volume at any of its corners? One turned through itself may have none in sum, and yet be there. */
+static bool is_flat_everywhere(int type, double points[][3])
+{
+    const cell_corners of = corners_of(type);
+    double sum = 0;
+    for (int i = 0; i < of.count; i++) sum += fabs(corner_volume(points, of.corners[i]));
+    return is_flat(sum / of.shares, box_volume(points, grid_type_vertices(type)));
 }
 
 MMBVH_INLINE bool has_usual_root(double x)
@@ -159,7 +170,7 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
         volume = session_polyhedron_volume(g, cell, &is_flat_cell);
     } else {
         volume = signed_volume(type, points);
-        is_flat_cell = is_flat(volume, box_volume(points, grid_type_vertices(type)));
+        is_flat_cell = is_flat_everywhere(type, points);
     }
     tally_volume(tally, is_flat_cell ? 0 : volume);
     tally->flat += is_flat_cell;
@@ -191,6 +202,13 @@ void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crosse
         ++*looked_at;
         *crossed += is_crossed(g, cell, type);
     }
+}
+
+bool tally_is_flat(const grid *g, int64_t cell)
+{
+    mesh_tally one = tally_empty();
+    tally_cell(g, cell, &one);
+    return one.flat > 0;
 }
 
 /* ---- runs ---------------------------------------------------------------------------------------------------- */

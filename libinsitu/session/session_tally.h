@@ -21,6 +21,9 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
  * cross themselves, which takes their volume. */
 void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed);
 
+/* Of a good cell: has it no volume but what rounding leaves? Never of a ghost. */
+bool tally_is_flat(const grid *g, int64_t cell);
+
 /* Check and tally cells begin .. end; returns the first that is not good, or end. */
 typedef int64_t (*tally_run)(const session_mesh *mesh, int64_t begin, int64_t end, mesh_tally *tally);
 

@@ -280,7 +280,7 @@ static void find_extent(const grid *g, const grid_field *field, int threads, dou
     double least = INFINITY, most = -INFINITY;
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (grid_is_ghost(g, cell)) continue;
+        if (!grid_is_drawn(g, cell)) continue;
         const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
         if (!of_cell.is_finite) continue;
         least = fmin(least, of_cell.low);

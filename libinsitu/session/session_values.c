@@ -53,19 +53,25 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
     return sum;
 }
 
-static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scalar, int threads)
+static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_field *field, int threads)
 {
-    const grid_field field = session_scalar_field(mesh, scalar);
-    const int64_t count = field.is_cell_centred ? mesh->given.cell_count : mesh->given.vertex_count;
-    const int first = field.component < 0 ? 0 : field.component;
-    const int end = field.component < 0 ? field.component_count : first + 1;
-    uint64_t sum = 0;
-    for (int component = first; component < end && field.values.data; component++) {
-        grid_array a = field.values;
-        a.data += component * field.component_stride;
+    const int64_t count = field->is_cell_centred ? mesh->given.cell_count : mesh->given.vertex_count;
+    const int first = field->component < 0 ? 0 : field->component;
+    const int end = field->component < 0 ? field->component_count : first + 1;
+    for (int component = first; component < end && field->values.data; component++) {
+        grid_array a = field->values;
+        a.data += component * field->component_stride;
         sum = mix(sum, sum_array(&a, count, threads));
     }
     return sum;
+}
+
+/* A cell that has lost its own value may leave the means at its vertices as they are. */
+static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scalar, int threads)
+{
+    const grid_field field = session_scalar_field(mesh, scalar);
+    const uint64_t sum = sum_field(0, mesh, &field, threads);
+    return field.own ? sum_field(sum, mesh, field.own, threads) : sum;
 }
 
 static void settle(insitu_session *session, const session_mesh *mesh, session_scalar *scalar)

@@ -140,10 +140,10 @@ typedef struct insitu_report {
     double write_ms;        /* images written, on rank 0 */
     int64_t cells;          /* handed over, ghosts included */
     int64_t cells_ghost;    /* not drawn: flagged as ghosts */
-    int64_t cells_unusable; /* not drawn: a field value that is not finite */
+    int64_t cells_unusable; /* not drawn: a field value, its own or a vertex's, that is not finite */
     int64_t cells_inverted; /* drawn right all the same: left-handed, by the sign of the corner volumes' sum */
-    int64_t cells_flat;   /* of no volume, and so not seen: the corner volumes' sum is nothing beside the cell's box (at
-                             most 1.4e-14 of it, which is rounding); polyhedra where all of one is in a plane. */
+    int64_t cells_flat;   /* of no volume, not drawn: the corner volumes, each without its sign, sum to nothing beside the
+                             cell's box (at most 1.4e-14, rounding); polyhedra where all of one is in a plane. */
     int64_t rays;         /* primary rays traced */
     int64_t fragments;    /* sent to pixel owners, own ones included */
     int64_t map_failures; /* inverse maps that did not converge and fell back to linear interpolation */
