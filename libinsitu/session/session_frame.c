@@ -125,6 +125,7 @@ static insitu_status redraw(const frame_target *t, const render_job *job, int64_
 {
     const int64_t most = turn_pixels(job, fragment_limit);
     const bool is_sampled = job->integration == RENDER_SAMPLES;
+    int64_t doubled = 0;
     render_job again = *job;
     again.pixels = turn;
     again.separate_samples = true;
@@ -132,11 +133,12 @@ static insitu_status redraw(const frame_target *t, const render_job *job, int64_
         comp_overlaps found = {0};
         at = take_pixels(out, overlaps->pixels, at, most, turn);
         const insitu_status status = draw(t, &again, beside, is_sampled ? &found : NULL, error);
-        t->frame->overlaps += found.count;
+        doubled += found.count;
         base_free(found.pixels);
         if (status) return status;
         if (beside->rgba) copy_pixels(turn, beside, out);
     }
+    if (doubled) t->frame->overlaps = overlaps->count;
     return INSITU_OK;
 }
 
@@ -191,7 +193,7 @@ insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render
         status = take_all(&t, out, &overlaps, error);
     } else {
         status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
-        /* Of samples those are told apart later that two cells have because rounding has their face in two places. */
+        /* Separate samples tell whether any has two owners but by rounding of their common face: see redraw(). */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
     if (!status && overlaps.count) status = draw_overlaps(&t, job, fragment_limit, &overlaps, out, error);
