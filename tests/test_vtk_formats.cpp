@@ -1,7 +1,10 @@
 /* insitu-render on files of every format: the pictures are those of the same cells in a .vtu, bit for bit, on one rank
  * and on two; a file that is cut short ends the program with an error or changes nothing.
  *
- *     test_vtk_formats <insitu-render> <mpiexec> [percent...], where to cut (95 unless told) */
+ *     test_vtk_formats <insitu-render> <mpiexec> [percent...]
+ *
+ * Percents are where to cut, each file on one rank and on two. Unless told, at 95, each on one rank or on two in turn:
+ * programs start slowly. */
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -33,6 +36,7 @@ namespace
 
 std::string tool, mpiexec, folder;
 std::vector<size_t> percents = {95};
+bool is_quick = true;
 std::vector<sample> samples;
 
 std::string scene(const std::string &field, const std::string &value)
@@ -197,13 +201,15 @@ void expect_error_or_same(const sample &s, const std::string &file, const std::s
 
 void cut_files_end_all_ranks(void **)
 {
+    int turn = 0;
     for (const sample &s : samples) {
         write_vtu(folder + "/same.vtu", s.expected);
         expect(run_tool(1, "scene.yaml same.vtu"), 0, "1 picture");
         const std::string right = picture(0);
         for (const std::string &file : s.files)
             for (const size_t percent : percents)
-                for (const int ranks : {1, 2}) expect_error_or_same(s, file, right, percent, ranks);
+                for (const int ranks : {1, 2})
+                    if (!is_quick || ranks == 1 + turn++ / 2 % 2) expect_error_or_same(s, file, right, percent, ranks);
     }
 }
 
@@ -214,7 +220,8 @@ int main(int argc, char **argv)
     if (argc < 3) return 2;
     tool = argv[1];
     mpiexec = argv[2];
-    if (argc > 3) percents.clear();
+    is_quick = argc == 3;
+    if (!is_quick) percents.clear();
     for (int i = 3; i < argc; i++) percents.push_back(static_cast<size_t>(std::atoi(argv[i])));
     const CMUnitTest tests[] = {
         cmocka_unit_test(every_format_gives_the_picture_of_its_vtu),
