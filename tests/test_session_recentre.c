@@ -325,7 +325,15 @@ static bool is_same_picture(const caught_picture *a, const caught_picture *b)
     return own_rank != 0 || memcmp(a->rgba, b->rgba, 40 * 30 * 4 * sizeof(float)) == 0;
 }
 
-/* By interpolate: vertex a cell's field is that of the means at the vertices; by default it is as it is. */
+/* Flag the cells that have no finite value of their own, or none. */
+static void flag_missing(part_input *in, bool are_ghosts)
+{
+    for (int64_t cell = 0; cell < in->part.cell_count; cell++)
+        in->part.ghosts[cell] = are_ghosts && !isfinite(in->values[cell]);
+}
+
+/* By interpolate: vertex a cell's field is that of the means at the vertices, but where its own value is not finite; by
+ * default it is as it is. */
 static void smooth_layers_are_those_of_the_means(void **context)
 {
     (void)context;
@@ -342,7 +350,10 @@ static void smooth_layers_are_those_of_the_means(void **context)
     for (int64_t v = 0; v < in.part.vertex_count; v++) means[v] = expected_at(in.part.coordinates + 3 * v);
     for (int method = 0; method < 2; method++) {
         caught_picture pictures[4];
-        for (int i = 0; i < 4; i++) pictures[i] = draw_smooth(scenes[method][i], &in, means);
+        for (int i = 0; i < 4; i++) {
+            flag_missing(&in, i == 1);
+            pictures[i] = draw_smooth(scenes[method][i], &in, means);
+        }
         everywhere(is_same_picture(&pictures[0], &pictures[1]));
         everywhere(is_same_picture(&pictures[2], &pictures[3]));
         everywhere(own_rank != 0 || !is_same_picture(&pictures[0], &pictures[2]));

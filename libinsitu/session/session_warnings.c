@@ -87,9 +87,9 @@ static void warn_of_order(insitu_session *session, const char *mesh, const int64
     session_warn(
         session, &(session_warning){WARNING_ORDER, NULL, mesh, 0}, are_crossed,
         "mesh \"%s\": the vertices of its hexes or pyramids seem to be in lexicographic order: their quads cross "
-        "themselves, and %lld of %lld cells have no volume and are not seen; VTK's order goes around each quad "
-        "(counted from 0, exchange vertices 2 and 3, of hexes 6 and 7 as well)",
-        mesh, flat, drawn);
+        "themselves, so that little of the cells is seen; VTK's order goes around each quad (counted from 0, exchange "
+        "vertices 2 and 3, of hexes 6 and 7 as well)",
+        mesh);
     session_warn(
         session, &(session_warning){WARNING_ORDER, NULL, mesh, 1}, are_flat,
         "mesh \"%s\": %lld of %lld cells have no volume and are not seen: look at the order of their vertices, "
