@@ -325,15 +325,8 @@ static bool is_same_picture(const caught_picture *a, const caught_picture *b)
     return own_rank != 0 || memcmp(a->rgba, b->rgba, 40 * 30 * 4 * sizeof(float)) == 0;
 }
 
-/* Flag the cells that have no finite value of their own, or none. */
-static void flag_missing(part_input *in, bool are_ghosts)
-{
-    for (int64_t cell = 0; cell < in->part.cell_count; cell++)
-        in->part.ghosts[cell] = are_ghosts && !isfinite(in->values[cell]);
-}
-
-/* By interpolate: vertex a cell's field is that of the means at the vertices, but where its own value is not finite; by
- * default it is as it is. */
+/* By interpolate: vertex a cell's field is that of the means at the vertices; by default it is as it is. Cells without
+ * a finite value of their own, which a field at vertices does not know of, are ghosts. */
 static void smooth_layers_are_those_of_the_means(void **context)
 {
     (void)context;
@@ -346,14 +339,13 @@ static void smooth_layers_are_those_of_the_means(void **context)
     part_input in;
     test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
     part_create(&in, own_rank, false);
+    for (int64_t cell = 0; cell < in.part.cell_count; cell++)
+        if (!isfinite(in.values[cell])) in.part.ghosts[cell] = 1;
     double *means = test_calloc((size_t)in.part.vertex_count + 1, sizeof *means);
     for (int64_t v = 0; v < in.part.vertex_count; v++) means[v] = expected_at(in.part.coordinates + 3 * v);
     for (int method = 0; method < 2; method++) {
         caught_picture pictures[4];
-        for (int i = 0; i < 4; i++) {
-            flag_missing(&in, i == 1);
-            pictures[i] = draw_smooth(scenes[method][i], &in, means);
-        }
+        for (int i = 0; i < 4; i++) pictures[i] = draw_smooth(scenes[method][i], &in, means);
         everywhere(is_same_picture(&pictures[0], &pictures[1]));
         everywhere(is_same_picture(&pictures[2], &pictures[3]));
         everywhere(own_rank != 0 || !is_same_picture(&pictures[0], &pictures[2]));
