@@ -3,8 +3,8 @@
  *
  *     test_vtk_formats <insitu-render> <mpiexec> [percent...]
  *
- * Percents are where to cut, each file on one rank and on two. Unless told, at 95, each on one rank or on two in turn:
- * programs start slowly. */
+ * Percents are where to cut, each file on one rank and on two. Unless told, at 95, and a fifth of the runs alone: programs
+ * start slowly, and test_vtk_files cuts each file within one. */
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -209,7 +209,7 @@ void cut_files_end_all_ranks(void **)
         for (const std::string &file : s.files)
             for (const size_t percent : percents)
                 for (const int ranks : {1, 2})
-                    if (!is_quick || ranks == 1 + turn++ / 2 % 2) expect_error_or_same(s, file, right, percent, ranks);
+                    if (!is_quick || turn++ % 5 == 0) expect_error_or_same(s, file, right, percent, ranks);
     }
 }
 
