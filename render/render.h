@@ -23,9 +23,11 @@
 #ifndef RENDER_RENDER_H
 #define RENDER_RENDER_H
 
+#include "error.h"
 #include "fragment.h"
+#include "grid.h"
+#include "insitu/status.h"
 #include "mmbvh.h"
-#include "pixel_set.h"
 
 typedef struct render_camera {
     double eye[3];

@@ -1,3 +1,5 @@
+#include <math.h>
+
 #include "render.h"
 
 /* Of vectors so long or short, too, that their squares are not to be had. */

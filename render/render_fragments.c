@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "fragment.h"
 #include "memory.h"
 
 static bool grow(fragment_list *list, int64_t capacity)

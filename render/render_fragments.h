@@ -6,8 +6,6 @@
 #ifndef RENDER_RENDER_FRAGMENTS_H
 #define RENDER_RENDER_FRAGMENTS_H
 
-#include <stdbool.h>
-
 #include "fragment.h"
 
 enum { FRAGMENT_PIECE = 4096 };

@@ -1,10 +1,17 @@
 /* One frame: tiles dealt to threads. They are small (16 × 16 pixels) and handed out a few at a time, because a
  * picture's middle costs far more than its border. */
+#include <math.h>
 #include <omp.h>
-#include <string.h>
 #include <time.h>
 
+#include "error.h"
+#include "fragment.h"
+#include "grid.h"
+#include "insitu/status.h"
+#include "kernel_types.h"
 #include "memory.h"
+#include "pixel_set.h"
+#include "render.h"
 #include "render_fragments.h"
 #include "render_isa.h"
 #include "render_kept.h"
@@ -68,15 +75,15 @@ static bool begin_threads(const kernel_frame *frame, const frame_end *end, kerne
          * its first touch. */
 #pragma omp parallel for num_threads(threads) schedule(static, 1) reduction(&& : has_memory)
     for (int i = 0; i < threads; i++) {
-        states[i] = (kernel_thread){.cache = base_alloc(kernels->cache_bytes),
+        states[i] = (kernel_thread){.memory = base_alloc(kernels->memory_bytes),
                                     .out = &end->writers[i].list,
                                     .reserve = fragment_reserve,
                                     .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                     .find_polyhedron = polyhedra_find,
                                     .polyhedron_scratch = polyhedra_scratch,
                                     .now = now};
-        if (states[i].cache) kernels->begin(states[i].cache);
-        has_memory = has_memory && states[i].cache && (!has_polyhedra || states[i].polyhedra);
+        if (states[i].memory) kernels->begin(&states[i]);
+        has_memory = has_memory && states[i].memory && (!has_polyhedra || states[i].polyhedra);
     }
     return has_memory;
 }
@@ -87,7 +94,7 @@ static bool end_threads(kernel_thread *states, int threads, render_statistics *s
     double surface = 0, volume = 0;
     for (int i = 0; i < threads; i++) {
         polyhedra_free(states[i].polyhedra);
-        base_free(states[i].cache);
+        base_free(states[i].memory);
         has_memory = has_memory && !states[i].out_of_memory;
         surface = fmax(surface, states[i].surface_seconds);
         volume = fmax(volume, states[i].volume_seconds);

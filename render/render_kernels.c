@@ -1,80 +1,41 @@
 /* The kernels: this one file is compiled once per instruction set and exports one table (kernel_types.h). A tile finds
  * its surfaces first, so that volumes know where opaque ones end them. A tile is traced in one traversal, or packet by
  * packet. */
-#include <math.h>
-
+#include "kernel_bins.h"
+#include "kernel_cell.h"
+#include "kernel_cell_cache.h"
+#include "kernel_finder.h"
+#include "kernel_hits.h"
+#include "kernel_packet.h"
+#include "kernel_packet_surface.h"
 #include "kernel_segments.h"
-#include "kernel_polyhedron_surface.h"
-#include "kernel_polyhedron_volume.h"
 #include "kernel_shown.h"
-#include "kernel_spmd.h"
+#include "kernel_surface.h"
+#include "kernel_tile.h"
+#include "kernel_tile_cells.h"
 #include "kernel_tile_segments.h"
 #include "kernel_tile_shown.h"
 #include "kernel_tile_surface.h"
+#include "kernel_tile_trace.h"
 #include "kernel_tile_volume.h"
-
-/* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
-typedef struct kernel_parent_state {
-    const render_field *field;
-    const kernel_interest *interest;
-    vf t_low;
-    const vf *t_high;
-    kernel_leaf *leaf;
-    void *state;
-} kernel_parent_state;
-
-static void kernel_parent_leaf(kernel_packet *p, void *opaque_state, int unused, const uint32_t *parts, int count,
-                               vm rays)
-{
-    const kernel_parent_state *s = opaque_state;
-    (void)unused;
-    for (int n = 0; n < count; n++) {
-        const int part = (int)parts[n];
-        if (!s->field->ranges[part].low) continue;
-        kernel_traverse(p, p->frame->job->parts[part].tree, &s->field->ranges[part], s->interest, rays, s->t_low,
-                        s->t_high, part, s->leaf, s->state);
-    }
-}
-
-SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                    vf t_low, const vf *t_high, kernel_leaf *leaf, void *state)
-{
-    const render_job *job = p->frame->job;
-    if (job->parent) {
-        kernel_parent_state parent = {field, interest, t_low, t_high, leaf, state};
-        kernel_traverse(p, job->parent, NULL, NULL, p->active, t_low, t_high, 0, kernel_parent_leaf, &parent);
-        return;
-    }
-    for (int part = 0; part < job->part_count; part++)
-        if (field->ranges[part].low)
-            kernel_traverse(p, job->parts[part].tree, &field->ranges[part], interest, p->active, t_low, t_high, part,
-                            leaf, state);
-}
+#include "kernel_types.h"
+#include "kernel_volume.h"
+#include "pixel_set.h"
+#include "render.h"
+#include "simd.h"
 
 /* What a thread holds from tile to tile. */
 typedef struct kernel_memory {
-    kernel_surface_cache cache; /* first: kernel_thread's cache is this */
+    kernel_cell_cache packet_cells;
+    kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
+    kernel_cell tile_cell;
+    kernel_poly tile_poly;
     kernel_tile_trace tile;
     kernel_tile_volume volume;
     kernel_tile_segments segments;
     kernel_tile_cells cells;
     kernel_finder finder;
 } kernel_memory;
-
-SIMD_INLINE kernel_tile_volume *kernel_tile_volume_of(kernel_tile_trace *t)
-{
-    return &((kernel_memory *)t->thread->cache)->volume;
-}
-
-SIMD_INLINE kernel_tile_segments *kernel_tile_segments_of(kernel_tile_trace *t)
-{
-    return &((kernel_memory *)t->thread->cache)->segments;
-}
-
-SIMD_INLINE kernel_tile_cells *kernel_tile_cells_of(kernel_tile_trace *t)
-{
-    return &((kernel_memory *)t->thread->cache)->cells;
-}
 
 static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
 {
@@ -191,7 +152,7 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
         trace_packets(f, thread, x0, y0);
         return;
     }
-    kernel_tile_trace *t = &((kernel_memory *)thread->cache)->tile;
+    kernel_tile_trace *t = thread->tile;
     kernel_tile_shown *items;
     if (f->shown && !f->volume_count && !kernel_shown_in_tile(f, x0, y0, &items)) return;
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
@@ -210,7 +171,7 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
 static void find_shown(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
                        kernel_shown_list *list, bool (*grow)(kernel_shown_list *list))
 {
-    kernel_finder *finder = &((kernel_memory *)thread->cache)->finder;
+    kernel_finder *finder = thread->finder;
     kernel_finder_begin(finder, f, subtree);
     finder->list = list;
     finder->grow = grow;
@@ -223,7 +184,7 @@ static void find_shown(const kernel_frame *f, kernel_thread *thread, const kerne
 static void keep_crossed(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
                          kernel_keeper *keeper, bool (*grow)(kernel_keeper *keeper))
 {
-    kernel_finder *finder = &((kernel_memory *)thread->cache)->finder;
+    kernel_finder *finder = thread->finder;
     kernel_finder_begin(finder, f, subtree);
     finder->keeper = keeper;
     finder->keep = grow;
@@ -231,10 +192,19 @@ static void keep_crossed(const kernel_frame *f, kernel_thread *thread, const ker
 }
 
 /* Megabytes, most of which no tile of the frame may touch: only what is read before it is written is set. */
-static void begin(void *cache)
+static void begin(kernel_thread *thread)
 {
-    kernel_memory *m = cache;
-    for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->cache.cells.cells[i].serial = 0;
+    kernel_memory *m = thread->memory;
+    thread->cells = &m->packet_cells;
+    thread->polys = m->polys;
+    thread->tile = &m->tile;
+    thread->tile_cells = &m->cells;
+    thread->tile_volume = &m->volume;
+    thread->tile_segments = &m->segments;
+    thread->finder = &m->finder;
+    m->tile.cell = &m->tile_cell;
+    m->tile.poly = &m->tile_poly;
+    for (int i = 0; i < KERNEL_CACHE_CELLS; i++) m->packet_cells.cells[i].serial = 0;
     m->segments.depth = 0;
 }
 

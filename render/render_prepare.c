@@ -1,8 +1,15 @@
 #include "render_prepare.h"
 
+#include <math.h>
 #include <string.h>
 
+#include "error.h"
+#include "fragment.h"
+#include "insitu/status.h"
+#include "kernel_types.h"
 #include "memory.h"
+#include "mmbvh.h"
+#include "render.h"
 #include "render_pieces.h"
 
 static float below(double v)

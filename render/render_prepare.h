@@ -2,7 +2,10 @@
 #ifndef RENDER_RENDER_PREPARE_H
 #define RENDER_RENDER_PREPARE_H
 
+#include "error.h"
+#include "insitu/status.h"
 #include "kernel_types.h"
+#include "render.h"
 
 /* Check the job and fill frame, which is to be freed with render_unprepare() where that succeeded. */
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error);

@@ -18,6 +18,8 @@ function room_of(path, parts) {
     if (path ~ /^libinsitu\/include\//) return "public"
     if (path ~ /^adaptors\/[^\/]*\/include\//) return "adaptor_headers"
     if (parts[1] == "libinsitu") return parts[2]
+    if (path == "render/render.h") return "render_face"
+    if (path ~ /^render\/[a-z]+\//) return parts[2]
     return parts[1]
 }
 function complain(text) {
@@ -30,7 +32,7 @@ function check_include(path, line, number, room, name, last, quoted, target) {
     name = substr(line, RSTART + 1, RLENGTH - 2)
     last = name
     sub(/.*\//, "", last)
-    if (room ~ /^(base|mmbvh|render)$/ && (name == "mpi.h" || name == "insitu/insitu.h"))
+    if (room ~ /^(base|mmbvh|render|render_face|rays|cells|find|surface|volume)$/ && (name == "mpi.h" || name == "insitu/insitu.h"))
         complain(path ":" number ": " room " knows no MPI, yet includes " name)
     if (room in allowed && room !~ /^(adaptors|adaptor_headers|tools)$/ && name ~ /^(vtk[A-Z]|OpenImageIO\/)/)
         complain(path ":" number ": " room " includes " name ", which belongs behind an adaptor")
@@ -48,9 +50,15 @@ BEGIN {
     allowed["public"] = " "
     allowed["base"] = " public "
     allowed["mmbvh"] = " base public "
-    allowed["render"] = " mmbvh base public "
+    allowed["render_face"] = " mmbvh base public "
+    allowed["rays"] = " render_face mmbvh base public "
+    allowed["cells"] = " rays" allowed["rays"]
+    allowed["find"] = " cells" allowed["cells"]
+    allowed["surface"] = " find" allowed["find"]
+    allowed["volume"] = " find" allowed["find"]
+    allowed["render"] = " surface volume find" allowed["find"]
     allowed["compositing"] = " base public "
-    allowed["session"] = " render compositing mmbvh base public "
+    allowed["session"] = " render render_face compositing mmbvh base public "
     allowed["adaptor_headers"] = " public "
     allowed["adaptors"] = " adaptor_headers public "
     allowed["tools"] = " adaptor_headers public "

@@ -50,13 +50,20 @@ fresh_tree
 accepts sh "$here/house_includes.sh" "$place/tree"
 planted libinsitu/base/seeded.c '#include "comp.h"' 'base must not include comp.h of compositing'
 planted libinsitu/base/seeded.c '#include <mpi.h>' 'base knows no MPI'
-planted mmbvh/seeded.c '#include "render.h"' 'mmbvh must not include render.h of render'
+planted mmbvh/seeded.c '#include "render.h"' 'mmbvh must not include render.h of render_face'
 planted mmbvh/seeded.c '  #  include <mpi.h>' 'mmbvh knows no MPI'
 planted render/seeded.c '#include "comp.h"' 'render must not include comp.h of compositing'
 planted render/seeded.c '#include <comp.h>' 'comp.h is ours'
 planted render/seeded.h '#include "insitu/insitu.h"' 'render knows no MPI'
 planted render/seeded.c '#include "../libinsitu/session/scene.h"' 'render must not include .*scene.h of session'
-planted compositing/seeded.c '#include "render.h"' 'compositing must not include render.h of render'
+planted compositing/seeded.c '#include "render.h"' 'compositing must not include render.h of render_face'
+planted render/rays/seeded.h '#include "kernel_cell.h"' 'rays must not include kernel_cell.h of cells'
+planted render/cells/seeded.h '#include "kernel_finder.h"' 'cells must not include kernel_finder.h of find'
+planted render/find/seeded.c '#include "kernel_surface.h"' 'find must not include kernel_surface.h of surface'
+planted render/surface/seeded.h '#include "kernel_samples.h"' 'surface must not include kernel_samples.h of volume'
+planted render/volume/seeded.h '#include "kernel_roots.h"' 'volume must not include kernel_roots.h of surface'
+planted render/volume/seeded.h '#include "render_frame.h"' 'no file of the tree is called render_frame.h'
+planted libinsitu/session/seeded.c '#include "kernel_types.h"' 'session must not include kernel_types.h of rays'
 planted libinsitu/session/seeded.c '#include <vtkPoints.h>' 'session includes vtkPoints.h'
 planted libinsitu/include/insitu/seeded.h '#include "error.h"' 'public must not include error.h of base'
 planted adaptors/vtk/seeded.cpp '#include "memory.h"' 'adaptors must not include memory.h of base'
@@ -68,6 +75,17 @@ planted tests/comp.c 'int seeded;' 'same name as compositing/comp.c'
 rm -rf "$place/tree"
 mkdir -p "$place/tree/mmbvh"
 refuses 'wrong place' sh "$here/house_includes.sh" "$place/tree"
+
+headers_tree() {
+    rm -rf "$place/headers"
+    mkdir -p "$place/headers/libinsitu/base" "$place/headers/libinsitu/include" "$place/headers/mmbvh" "$place/headers/render"
+}
+headers_tree
+refuses 'no header was found' sh "$here/house_headers.sh" "$place/headers" "$cc"
+echo 'typedef int seeded;' >"$place/headers/render/seeded.h"
+accepts sh "$here/house_headers.sh" "$place/headers" "$cc"
+echo 'static inline bool is_seeded(void) { return true; }' >"$place/headers/render/seeded.h"
+refuses 'render/seeded.h does not compile alone' sh "$here/house_headers.sh" "$place/headers" "$cc"
 
 # library NAME SOURCE [FLAG...]
 library() {

@@ -7,6 +7,10 @@
 #ifndef RENDER_KERNEL_BOUNDS_H
 #define RENDER_KERNEL_BOUNDS_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
 #include "kernel_map.h"
 
 #define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */

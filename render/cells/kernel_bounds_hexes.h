@@ -4,7 +4,13 @@
 #ifndef RENDER_KERNEL_BOUNDS_HEXES_H
 #define RENDER_KERNEL_BOUNDS_HEXES_H
 
+#include <math.h>
+#include <string.h>
+
 #include "kernel_bounds.h"
+#include "kernel_map.h"
+#include "kernel_wide.h"
+#include "simd.h"
 
 /* Lane by lane what kernel_bounds has of a hex. */
 typedef struct kernel_hexes_bounds {

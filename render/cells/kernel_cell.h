@@ -15,7 +15,13 @@
 #ifndef RENDER_KERNEL_CELL_H
 #define RENDER_KERNEL_CELL_H
 
-#include "kernel_quad.h"
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2, KERNEL_MAX_LINES = 18 };
 
@@ -63,14 +69,6 @@ SIMD_INLINE bool kernel_position_before(const double *a, const double *b)
     return a[2] < b[2];
 }
 
-/* Cells that rays of the tile have met, by hash: a cell is fetched, ordered and moved into tile space once for all the
- * tile's packets, and for all of a volume's windows, as long as it is not pushed out. */
-enum { KERNEL_CACHE_BITS = 8, KERNEL_CACHE_CELLS = 1 << KERNEL_CACHE_BITS };
-
-typedef struct kernel_cache {
-    kernel_cell cells[KERNEL_CACHE_CELLS];
-} kernel_cache;
-
 /* Which of the vertices, bit by bit, the face has; those not yet known are added. 0: it needs more than four. */
 static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)
 {
@@ -116,20 +114,6 @@ SIMD_INLINE void kernel_cell_fetch(kernel_cell *c, const grid *g, const grid_fie
     else
         c->count = grid_cell_vertices(g, index, c->vertices);
     c->is_finite = grid_cell_values(field, index, c->vertices, c->count, c->values);
-}
-
-/* The same from the cache, where it may have been placed. layer tells apart the fields that cells are asked for. */
-SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
-                                          uint32_t index)
-{
-    const uint32_t key = index + 0x85ebca6bu * (uint32_t)part + 0xc2b2ae35u * (uint32_t)layer;
-    kernel_cell *c = &((kernel_cache *)p->thread->cache)->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];
-    if (c->serial == p->thread->serial && c->index == index && c->part == part && c->layer == layer) return c;
-    c->serial = p->thread->serial;
-    c->part = part;
-    c->layer = layer;
-    kernel_cell_fetch(c, p->frame->job->parts[part].cells, field, index);
-    return c;
 }
 
 SIMD_INLINE bool kernel_rank_before(const kernel_cell *c, int i, int j)
@@ -281,15 +265,6 @@ SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, con
 {
     kernel_cell_move(c, f, tile, g);
     kernel_cell_order(c);
-}
-
-/* Of a placed cell, before rays of the tile are to meet it. */
-static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile);
-
-SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
-{
-    kernel_cell_place_in(c, p->frame, p->tile, g);
-    if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 
 SIMD_INLINE kernel_spot kernel_cell_spot(const kernel_cell *c, int i)

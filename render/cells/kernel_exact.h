@@ -3,8 +3,14 @@
 #ifndef RENDER_KERNEL_EXACT_H
 #define RENDER_KERNEL_EXACT_H
 
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
 #include "kernel_fine.h"
 #include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_types.h"
 
 enum { KERNEL_EXACT_STEPS = 24 };
 

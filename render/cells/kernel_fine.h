@@ -17,8 +17,15 @@
 #ifndef RENDER_KERNEL_FINE_H
 #define RENDER_KERNEL_FINE_H
 
+#include <math.h>
+#include <string.h>
+
+#include "kernel_cell.h"
+#include "kernel_packet.h"
 #include "kernel_tet.h"
+#include "kernel_types.h"
 #include "kernel_wide.h"
+#include "simd.h"
 
 /* The plane is left by no more than 1e-7 / KERNEL_FINE_EDGE of the face's extent. */
 #define KERNEL_FINE_EDGE 1e-3

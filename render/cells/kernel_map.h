@@ -10,8 +10,14 @@
 #ifndef RENDER_KERNEL_MAP_H
 #define RENDER_KERNEL_MAP_H
 
-#include "kernel_poly.h"
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_packet.h"
 #include "kernel_wide.h"
+#include "simd.h"
 
 enum { KERNEL_MAP_STEPS = 10 };
 

@@ -8,8 +8,14 @@
 #ifndef RENDER_KERNEL_OUTLINE_H
 #define RENDER_KERNEL_OUTLINE_H
 
-#include "kernel_tet.h"
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_line.h"
 #include "kernel_tile.h"
+#include "simd.h"
 
 SIMD_INLINE kernel_four kernel_four_pick(kernel_four v, const int32_t *index)
 {

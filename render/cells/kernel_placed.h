@@ -5,8 +5,18 @@
 #ifndef RENDER_KERNEL_PLACED_H
 #define RENDER_KERNEL_PLACED_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
 #include "kernel_plain.h"
+#include "kernel_tet.h"
+#include "kernel_types.h"
 #include "kernel_wide.h"
+#include "simd.h"
 
 /* Lane by lane what kernel_cell has; f is for the caller to set. */
 typedef struct kernel_placed {

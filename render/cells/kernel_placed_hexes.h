@@ -5,9 +5,18 @@
 #ifndef RENDER_KERNEL_PLACED_HEXES_H
 #define RENDER_KERNEL_PLACED_HEXES_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
 #include "kernel_plain.h"
-#include "kernel_surface.h"
+#include "kernel_poly.h"
+#include "kernel_types.h"
 #include "kernel_wide.h"
+#include "simd.h"
 
 enum {
     KERNEL_HEX_EDGES = 12,

@@ -3,7 +3,14 @@
 #ifndef RENDER_KERNEL_PLAIN_H
 #define RENDER_KERNEL_PLAIN_H
 
-#include "kernel_tet.h"
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_packet.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 /* A mesh of tets alone, or of hexes, whose indices are int32 one after the other, and whose coordinates and values
  * float32, within reach of a gather: strides in elements. */

@@ -2,7 +2,18 @@
 #ifndef RENDER_KERNEL_POLY_H
 #define RENDER_KERNEL_POLY_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
+#include "kernel_quad.h"
 #include "kernel_tet.h"
+#include "kernel_types.h"
+#include "render_polyhedra.h"
+#include "simd.h"
 
 typedef struct kernel_shape {
     int edge_count;
@@ -99,6 +110,12 @@ static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kerne
         kernel_tet_lines(c, f, tile);
     else
         kernel_poly_lines(c, f, tile);
+}
+
+SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
+{
+    kernel_cell_place_in(c, p->frame, p->tile, g);
+    if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
 }
 
 SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4])

@@ -27,7 +27,16 @@
 #ifndef RENDER_KERNEL_POLYHEDRON_H
 #define RENDER_KERNEL_POLYHEDRON_H
 
-#include "kernel_map.h"
+#include <math.h>
+#include <string.h>
+
+#include "kernel_cell.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
+#include "kernel_poly.h"
+#include "kernel_quad.h"
+#include "render_polyhedra.h"
+#include "simd.h"
 
 /* Rays that cross a triangle at t: v its value there, linear, and w the colour's. Of a facet also where its face is
  * met and the face's values, which are others for quads. Of a sheet v_face and w_face are the field's values there. */

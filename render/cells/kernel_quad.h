@@ -32,8 +32,11 @@
 #ifndef RENDER_KERNEL_QUAD_H
 #define RENDER_KERNEL_QUAD_H
 
-#include "kernel_line.h"
+#include <math.h>
+#include <stdbool.h>
+
 #include "kernel_wide.h"
+#include "simd.h"
 
 /* In a packet's planes. e01 is the edge function from corner 0 to corner 1, its sign bit the exact one. */
 typedef struct kernel_quad {

@@ -2,7 +2,13 @@
 #ifndef RENDER_KERNEL_TET_H
 #define RENDER_KERNEL_TET_H
 
+#include <string.h>
+
 #include "kernel_cell.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 /* Edges 01, 02, 03, 12, 13, 23, and the faces without vertex 3, 2, 1, 0: their edges ij, jk and ik. */
 enum { KERNEL_TET_EDGES = 6 };

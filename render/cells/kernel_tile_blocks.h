@@ -8,8 +8,15 @@
 #ifndef RENDER_KERNEL_TILE_BLOCKS_H
 #define RENDER_KERNEL_TILE_BLOCKS_H
 
+#include <math.h>
+
+#include "kernel_cell.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
 #include "kernel_tet.h"
 #include "kernel_tile.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 enum { KERNEL_BLOCK_VECTORS = KERNEL_BLOCKS / SIMD_WIDTH };
 

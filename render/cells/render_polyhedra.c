@@ -16,8 +16,10 @@
  * volumes says which way is out, and a piece inside an odd number of others is turned over. */
 #include "render_polyhedra.h"
 
+#include <math.h>
 #include <string.h>
 
+#include "grid.h"
 #include "memory.h"
 
 enum { TABLE_BITS = 10, BLOCK_BYTES = 1 << 18, STORE_LIMIT = 16 << 20 };

@@ -4,9 +4,19 @@
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_values.h"
+#include "kernel_outline.h"
+#include "kernel_packet.h"
 #include "kernel_plain.h"
-#include "kernel_tile_surface.h"
-#include "kernel_volume.h"
+#include "kernel_tile.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 /* Tets, one a lane. */
 typedef struct kernel_tets {

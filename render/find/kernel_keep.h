@@ -4,7 +4,14 @@
 #ifndef RENDER_KERNEL_KEEP_H
 #define RENDER_KERNEL_KEEP_H
 
+#include <math.h>
+#include <string.h>
+
 #include "kernel_finder.h"
+#include "kernel_plain.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 /* Lanes that some isovalue crosses; unusual: one of these has a difference that float32 has not, or hardly. */
 SIMD_INLINE unsigned kernel_keep_crossed(const kernel_finder *s, const vf *v, int vertices, bool *unusual)

@@ -15,8 +15,19 @@
 #ifndef RENDER_KERNEL_SHOWN_H
 #define RENDER_KERNEL_SHOWN_H
 
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_finder.h"
+#include "kernel_interest.h"
 #include "kernel_keep.h"
+#include "kernel_plain.h"
+#include "kernel_prefetch.h"
 #include "kernel_shown_hexes.h"
+#include "kernel_shown_tets.h"
+#include "kernel_tile.h"
+#include "kernel_types.h"
+#include "mmbvh.h"
+#include "simd.h"
 
 /* Those that wait for their vertices. */
 static void kernel_find_waiting(kernel_finder *s)
@@ -59,7 +70,7 @@ static void kernel_find_coming(kernel_finder *s)
     const grid *g = s->frame->job->parts[s->part].cells;
     const grid_field *field = &s->field->fields[s->part];
     if (!s->surface || g->cell_type != GRID_TET)
-        for (int n = 0; n < s->coming_count; n++) kernel_tile_prefetch_vertices(g, field, s->coming[n]);
+        for (int n = 0; n < s->coming_count; n++) kernel_prefetch_vertices(g, field, s->coming[n]);
     for (int n = 0; n < s->coming_count; n++) {
         const uint32_t cell = s->coming[n];
         if (s->surface && grid_cell_type(g, cell) == GRID_TET) {

@@ -12,7 +12,17 @@
 #ifndef RENDER_KERNEL_SHOWN_HEXES_H
 #define RENDER_KERNEL_SHOWN_HEXES_H
 
+#include <math.h>
+#include <string.h>
+
+#include "kernel_cell.h"
+#include "kernel_finder.h"
+#include "kernel_outline.h"
+#include "kernel_plain.h"
 #include "kernel_shown_tets.h"
+#include "kernel_tile.h"
+#include "render.h"
+#include "simd.h"
 
 typedef struct kernel_hex_lanes {
     vf at[8][3], f[8]; /* along the camera's axes; values less the isovalue, scaled as kernel_cell_relative() does */

@@ -5,7 +5,20 @@
 #ifndef RENDER_KERNEL_SHOWN_TETS_H
 #define RENDER_KERNEL_SHOWN_TETS_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_values.h"
 #include "kernel_finder.h"
+#include "kernel_interest.h"
+#include "kernel_plain.h"
+#include "kernel_tet.h"
+#include "kernel_tile.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 /* Where the surface of one isovalue is in each: ends over the edges that it crosses. */
 typedef struct kernel_tet_ends {

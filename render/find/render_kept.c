@@ -3,11 +3,16 @@
  * many as may be kept: memory that is not written to is none. */
 #include "render_kept.h"
 
+#include <math.h>
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "grid.h"
+#include "kernel_types.h"
 #include "memory.h"
+#include "mmbvh.h"
+#include "render.h"
 #include "render_isa.h"
 #include "render_subtrees.h"
 

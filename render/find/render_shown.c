@@ -6,7 +6,9 @@
 
 #include <omp.h>
 
+#include "kernel_types.h"
 #include "memory.h"
+#include "render.h"
 #include "render_isa.h"
 #include "render_subtrees.h"
 

@@ -2,7 +2,9 @@
 
 #include <string.h>
 
+#include "kernel_types.h"
 #include "memory.h"
+#include "mmbvh.h"
 
 enum { SUBTREES = 128, LEAST_PIECE = 1024 /* records */ };
 

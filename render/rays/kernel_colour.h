@@ -2,7 +2,13 @@
 #ifndef RENDER_KERNEL_COLOUR_H
 #define RENDER_KERNEL_COLOUR_H
 
+#include <math.h>
+
+#include "fragment.h"
 #include "kernel_packet.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 /* 2^x for x <= 0, to 2e-7 relative; 0 below -126. Taylor of 2^f for f in [-1/2, 1/2]: the first term left out is
  * (f ln 2)^7 / 7! < 1.2e-7. */

@@ -37,7 +37,12 @@
 #ifndef RENDER_KERNEL_LINE_H
 #define RENDER_KERNEL_LINE_H
 
+#include <math.h>
+#include <string.h>
+
 #include "kernel_packet.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 /* c + cu u + cv v; its sign is sure where it is beyond +-bound. */
 typedef struct kernel_line {

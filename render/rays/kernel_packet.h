@@ -12,7 +12,12 @@
 #ifndef RENDER_KERNEL_PACKET_H
 #define RENDER_KERNEL_PACKET_H
 
+#include <math.h>
+
 #include "kernel_types.h"
+#include "mmbvh.h"
+#include "pixel_set.h"
+#include "render.h"
 #include "simd.h"
 
 typedef struct kernel_tile {

@@ -4,7 +4,13 @@
 #ifndef RENDER_KERNEL_SPMD_H
 #define RENDER_KERNEL_SPMD_H
 
-#include "kernel_surface.h"
+#include "kernel_interest.h"
+#include "kernel_packet.h"
+#include "kernel_traverse.h"
+#include "kernel_types.h"
+#include "mmbvh.h"
+#include "render.h"
+#include "simd.h"
 
 /* The rays' boxes and what they are at. */
 typedef struct kernel_spmd {
@@ -54,7 +60,7 @@ SIMD_INLINE void kernel_spmd_push(kernel_spmd *s, const kernel_packet *p, const 
 }
 
 static void kernel_traverse_spmd(kernel_packet *p, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                 const kernel_interest *interest, vm rays, int part, kernel_surface_state *state)
+                                 const kernel_interest *interest, vm rays, int part, kernel_leaf *leaf, void *state)
 {
     kernel_spmd s;
     if (!tree->node_count || !kernel_node_shows(interest, ranges, 0)) return;
@@ -72,8 +78,7 @@ static void kernel_traverse_spmd(kernel_packet *p, const mmbvh *tree, const mmbv
             for (int i = first + 1; count && i < SIMD_WIDTH; i++) same |= (unsigned)(s.node[i] == node) << i & bits;
             bits &= ~same;
             if (count)
-                kernel_surface_leaf(p, state, part, tree->cells + mmbvh_node_ref(tree, node), count,
-                                    vm_from_bits(same));
+                leaf(p, state, part, tree->cells + mmbvh_node_ref(tree, node), count, vm_from_bits(same));
             else
                 kernel_spmd_push(&s, p, tree, ranges, interest, first);
         }
@@ -82,12 +87,13 @@ static void kernel_traverse_spmd(kernel_packet *p, const mmbvh *tree, const mmbv
 
 /* Parts are tried in turn: a tree over them is for packets. */
 SIMD_INLINE void kernel_trace_parts_spmd(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                         kernel_surface_state *state)
+                                         kernel_leaf *leaf, void *state)
 {
     const render_job *job = p->frame->job;
     for (int part = 0; part < job->part_count; part++)
         if (field->ranges[part].low)
-            kernel_traverse_spmd(p, job->parts[part].tree, &field->ranges[part], interest, p->active, part, state);
+            kernel_traverse_spmd(p, job->parts[part].tree, &field->ranges[part], interest, p->active, part, leaf,
+                                 state);
 }
 
 #endif

@@ -16,7 +16,14 @@
 #ifndef RENDER_KERNEL_TILE_H
 #define RENDER_KERNEL_TILE_H
 
+#include <math.h>
+#include <string.h>
+
 #include "kernel_packet.h"
+#include "kernel_types.h"
+#include "mmbvh.h"
+#include "render.h"
+#include "simd.h"
 
 enum {
     KERNEL_BLOCKS_ACROSS = KERNEL_TILE / KERNEL_BLOCK,

@@ -4,39 +4,15 @@
 #ifndef RENDER_KERNEL_TRAVERSE_H
 #define RENDER_KERNEL_TRAVERSE_H
 
+#include "kernel_interest.h"
 #include "kernel_packet.h"
-
-/* mmbvh_build() keeps trees less deep than this. */
-enum { KERNEL_STACK = 256 };
+#include "kernel_types.h"
+#include "mmbvh.h"
+#include "render.h"
+#include "simd.h"
 
 /* Called with the rays that meet a leaf's box. */
 typedef void kernel_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays);
-
-SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float low, float high)
-{
-    for (int i = 0; i < interest->count; i++)
-        if (low <= interest->high[i] && high >= interest->low[i]) return true;
-    return false;
-}
-
-/* The same of cells, a lane each, of four values. */
-SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf v[4])
-{
-    const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3]));
-    const vf high = vf_max(vf_max(v[0], v[1]), vf_max(v[2], v[3]));
-    vm meets = vm_none();
-    for (int i = 0; i < interest->count; i++)
-        meets = vm_or(meets, vm_and(vf_le(low, vf_set(interest->high[i])), vf_le(vf_set(interest->low[i]), high)));
-    return meets;
-}
-
-SIMD_INLINE bool kernel_node_shows(const kernel_interest *interest, const mmbvh_ranges *ranges, int64_t node)
-{
-    float low, high;
-    memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
-    memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
-    return kernel_interest_meets(interest, low, high);
-}
 
 /* Is the right child nearer than the left, seen along the packet? */
 SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
@@ -54,7 +30,7 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
                                  const kernel_interest *interest, vm rays, vf t_low, const vf *t_high, int part,
                                  kernel_leaf *leaf, void *state)
 {
-    int64_t stack[KERNEL_STACK];
+    int64_t stack[MMBVH_MAX_DEPTH];
     int top = 0;
     if (tree->node_count && (!interest || kernel_node_shows(interest, ranges, 0))) stack[top++] = 0;
     while (top) {
@@ -73,6 +49,44 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
         if (!interest || kernel_node_shows(interest, ranges, far)) stack[top++] = far;
         if (!interest || kernel_node_shows(interest, ranges, near)) stack[top++] = near;
     }
+}
+
+/* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
+typedef struct kernel_parent_state {
+    const render_field *field;
+    const kernel_interest *interest;
+    vf t_low;
+    const vf *t_high;
+    kernel_leaf *leaf;
+    void *state;
+} kernel_parent_state;
+
+static void kernel_parent_leaf(kernel_packet *p, void *opaque_state, int unused, const uint32_t *parts, int count,
+                               vm rays)
+{
+    const kernel_parent_state *s = opaque_state;
+    (void)unused;
+    for (int n = 0; n < count; n++) {
+        const int part = (int)parts[n];
+        if (!s->field->ranges[part].low) continue;
+        kernel_traverse(p, p->frame->job->parts[part].tree, &s->field->ranges[part], s->interest, rays, s->t_low,
+                        s->t_high, part, s->leaf, s->state);
+    }
+}
+
+SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field, const kernel_interest *interest,
+                                    vf t_low, const vf *t_high, kernel_leaf *leaf, void *state)
+{
+    const render_job *job = p->frame->job;
+    if (job->parent) {
+        kernel_parent_state parent = {field, interest, t_low, t_high, leaf, state};
+        kernel_traverse(p, job->parent, NULL, NULL, p->active, t_low, t_high, 0, kernel_parent_leaf, &parent);
+        return;
+    }
+    for (int part = 0; part < job->part_count; part++)
+        if (field->ranges[part].low)
+            kernel_traverse(p, job->parts[part].tree, &field->ranges[part], interest, p->active, t_low, t_high, part,
+                            leaf, state);
 }
 
 #endif

@@ -5,9 +5,10 @@
 
 #include <stddef.h>
 
+#include "fragment.h"
+#include "grid.h"
 #include "kernel_pieces.h"
 #include "render.h"
-#include "render_polyhedra.h"
 
 enum {
     KERNEL_TILE = 16,
@@ -139,24 +140,33 @@ typedef struct kernel_frame {
     bool has_segments;  /* volumes are integrated by segments, else sampled; */
     bool is_fine;       /* their ends are taken in double (kernel_fine.h) */
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
-    float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_segments.h */
+    float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_course.h */
     bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there
                          */
 } kernel_frame;
 
 /* One thread's state. */
 typedef struct kernel_thread {
-    void *cache;     /* cache_bytes of the kernel table, which its begin() has readied for the frame */
-    uint32_t serial; /* of the tile, from 1: what the cache holds of other tiles is stale */
+    /* memory_bytes of the kernel table, and where the kernels' rooms have theirs in it: set by the table's begin(). */
+    void *memory;
+    struct kernel_cell_cache *cells; /* that packets on their own have met, */
+    struct kernel_poly *polys;       /* and what surfaces know of the cells in the same places */
+    struct kernel_tile_trace *tile;
+    struct kernel_tile_cells *tile_cells;
+    struct kernel_tile_volume *tile_volume;
+    struct kernel_tile_segments *tile_segments;
+    struct kernel_finder *finder;
+    uint32_t serial; /* of the tile, from 1: cells of other tiles in the cache are stale */
     fragment_list *out;
     /* Make room for more items in out; false where memory ran out. */
     bool (*reserve)(fragment_list *list, int64_t more);
     bool out_of_memory;
     int64_t map_failures;
-    polyhedron_store *polyhedra; /* of the tile; NULL where no mesh has any */
-    polyhedron *(*find_polyhedron)(polyhedron_store *store, const grid *g, const grid_field *field, int part, int layer,
-                                   uint32_t index);
-    void *(*polyhedron_scratch)(polyhedron_store *store, size_t bytes);
+    /* Of the tile: render_polyhedra.h; NULL where no mesh has any. */
+    struct polyhedron_store *polyhedra;
+    struct polyhedron *(*find_polyhedron)(struct polyhedron_store *store, const grid *g, const grid_field *field,
+                                          int part, int layer, uint32_t index);
+    void *(*polyhedron_scratch)(struct polyhedron_store *store, size_t bytes);
     double surface_seconds, volume_seconds;
     double (*now)(void);
 } kernel_thread;
@@ -164,8 +174,8 @@ typedef struct kernel_thread {
 /* What one instruction set's object exports. */
 typedef struct kernel_table {
     int width;
-    size_t cache_bytes;
-    void (*begin)(void *cache);
+    size_t memory_bytes;
+    void (*begin)(kernel_thread *thread); /* ready the thread's memory for a frame */
     /* Trace the tile of pixels whose upper left one is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
     /* What may show of the subtree is added to the list; grow() makes room for more, or the list full. */

@@ -11,8 +11,24 @@
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
 
+#include <math.h>
+#include <string.h>
+
+#include "kernel_cell.h"
+#include "kernel_field.h"
+#include "kernel_hits.h"
+#include "kernel_line.h"
+#include "kernel_packet.h"
 #include "kernel_placed.h"
+#include "kernel_plain.h"
+#include "kernel_surface.h"
+#include "kernel_tet.h"
 #include "kernel_tile_surface.h"
+#include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "render.h"
+#include "simd.h"
 
 enum {
     KERNEL_BATCH_PIXELS = 32, /* of a cell's box: with more of them, the cell is traced block by block */
@@ -353,8 +369,8 @@ static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, ker
         }
         if (!blocks) continue;
         if (!b->has_normals) kernel_batch_normals(b, t->frame);
-        kernel_batch_cell(b, n, &t->cell);
-        kernel_blocks_meet(t, blocks, b->part, t->cell.index, &t->cell, b->value[n]);
+        kernel_batch_cell(b, n, t->cell);
+        kernel_blocks_meet(t, blocks, b->part, t->cell->index, t->cell, b->value[n]);
     }
     kernel_batch_trace(t, b);
     b->count = 0;

@@ -3,8 +3,18 @@
 #ifndef RENDER_KERNEL_HEX_RAYS_H
 #define RENDER_KERNEL_HEX_RAYS_H
 
+#include <math.h>
+#include <string.h>
+
 #include "kernel_batch.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
 #include "kernel_placed_hexes.h"
+#include "kernel_poly.h"
+#include "kernel_quad.h"
+#include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 enum { KERNEL_HEX_RAYS = 512, KERNEL_HEX_ROOM = KERNEL_HEX_RAYS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
 

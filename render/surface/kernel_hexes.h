@@ -15,8 +15,29 @@
 #ifndef RENDER_KERNEL_HEXES_H
 #define RENDER_KERNEL_HEXES_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_batch.h"
+#include "kernel_bounds.h"
 #include "kernel_bounds_hexes.h"
+#include "kernel_cell.h"
+#include "kernel_field.h"
 #include "kernel_hex_rays.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_placed_hexes.h"
+#include "kernel_plain.h"
+#include "kernel_poly.h"
+#include "kernel_roots.h"
+#include "kernel_surface.h"
+#include "kernel_tile_surface.h"
+#include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "render.h"
+#include "simd.h"
 
 typedef struct kernel_hexes {
     int count, layer, part; /* -1: of none yet */
@@ -369,7 +390,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
             continue;
         }
         kernel_hex_ready(h, n);
-        t->poly.is_set_up = false;
+        t->poly->is_set_up = false;
         kernel_blocks_meet(t, blocks, h->part, h->cell[n], &h->cells[n], h->value[n]);
     }
 }
@@ -447,13 +468,13 @@ SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const k
 {
     if (h->count == SIMD_WIDTH) kernel_hexes_run(t, h);
     const int n = h->count++;
-    h->cells[n] = t->cell;
-    h->polys[n] = t->poly;
+    h->cells[n] = *t->cell;
+    h->polys[n] = *t->poly;
     h->ready |= 1u << n;
     h->value[n] = value;
     h->near[n] = shown->near;
-    kernel_hexes_bounds_put(&h->bounds, n, &t->poly.bounds, t->cell.z);
-    kernel_placed_hex_put(&h->placed, n, &t->cell);
+    kernel_hexes_bounds_put(&h->bounds, n, &t->poly->bounds, t->cell->z);
+    kernel_placed_hex_put(&h->placed, n, t->cell);
     kernel_hexes_rays_of(t, h, n, shown->box, shown->blocks);
 }
 

@@ -8,11 +8,20 @@
 #ifndef RENDER_KERNEL_NORMALS_H
 #define RENDER_KERNEL_NORMALS_H
 
-#include "kernel_neubauer.h"
-#include "kernel_traverse.h"
+#include <math.h>
 
-SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                    vf t_low, const vf *t_high, kernel_leaf *leaf, void *state);
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_cache.h"
+#include "kernel_field.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_poly.h"
+#include "kernel_tet.h"
+#include "kernel_traverse.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 /* The field at one point of each ray. */
 typedef struct kernel_probe {

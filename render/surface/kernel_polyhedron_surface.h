@@ -17,8 +17,19 @@
 #ifndef RENDER_KERNEL_POLYHEDRON_SURFACE_H
 #define RENDER_KERNEL_POLYHEDRON_SURFACE_H
 
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_values.h"
+#include "kernel_field.h"
+#include "kernel_packet.h"
 #include "kernel_polyhedron.h"
 #include "kernel_surface.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "render_polyhedra.h"
+#include "simd.h"
 
 SIMD_INLINE bool kernel_polyhedron_straddles(const polyhedron *c, double value)
 {

@@ -32,7 +32,12 @@
 #define RENDER_KERNEL_ROOTS_H
 
 #include "kernel_bounds.h"
-#include "kernel_neubauer.h"
+#include "kernel_cell.h"
+#include "kernel_field.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_wide.h"
+#include "simd.h"
 
 #define KERNEL_ROOT_BAND 3e-7f /* rounding of F where the largest |F| at a vertex is near 1 */
 #define KERNEL_SMALLEST_PIECE 0x1p-12f

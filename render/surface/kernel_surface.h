@@ -1,5 +1,4 @@
-/* Isosurfaces: packet traversal to the cells whose values straddle an isovalue, and Neubauer's method in them (thesis,
- * sections 4.3.1 to 4.3.5).
+/* Isosurfaces in cells: which crossings a ray has, and what becomes of a hit (thesis, sections 4.3.3 to 4.3.5).
  *
  * Within a cell, values are taken relative to the isovalue in double before they are rounded, so that their signs are
  * exact, and scaled by a power of two. Whether the surface crosses an interval an odd number of times is decided by the
@@ -9,48 +8,24 @@
 #ifndef RENDER_KERNEL_SURFACE_H
 #define RENDER_KERNEL_SURFACE_H
 
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_bounds.h"
+#include "kernel_cell.h"
 #include "kernel_colour.h"
+#include "kernel_field.h"
+#include "kernel_hits.h"
+#include "kernel_map.h"
+#include "kernel_neubauer.h"
 #include "kernel_normals.h"
+#include "kernel_packet.h"
+#include "kernel_poly.h"
 #include "kernel_roots.h"
-#include "kernel_traverse.h"
-
-/* Nearest opaque hits so far; and the crossings of transparent surfaces, by which volume fragments are cut. */
-enum { KERNEL_MAX_CUTS = 32 };
-
-typedef struct kernel_hits {
-    vm found;
-    vf normal[3]; /* along the gradient, camera axes, any length */
-    vf colour[3]; /* unlit */
-    vf reach;     /* of differences; only where asked for */
-    vf kind;
-    int cut_count;           /* rows: the n-th that was found of each ray, +inf where it has fewer */
-    vf cut[KERNEL_MAX_CUTS]; /* in the order in which they were found */
-    vm crowded;              /* rays that have more */
-} kernel_hits;
-
-static inline void kernel_hits_begin(kernel_hits *hits)
-{
-    hits->found = hits->crowded = vm_none();
-    hits->cut_count = 0;
-    hits->kind = hits->reach = vf_set(0);
-    for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
-}
-
-/* A row holds each ray's own n-th crossing, whichever rays met their cells together: where fragments are cut depends
- * neither on the traversal nor on the other rays of the packet. */
-SIMD_INLINE void kernel_hits_cut(kernel_hits *hits, vm hit, vf t)
-{
-    for (int n = 0; vm_any(hit); n++) {
-        if (n == KERNEL_MAX_CUTS) {
-            hits->crowded = vm_or(hits->crowded, hit);
-            return;
-        }
-        if (n == hits->cut_count) hits->cut[hits->cut_count++] = vf_set(INFINITY);
-        const vm room = vm_andnot(hit, vf_lt(hits->cut[n], vf_set(INFINITY)));
-        hits->cut[n] = vf_select(room, t, hits->cut[n]);
-        hit = vm_andnot(hit, room);
-    }
-}
+#include "kernel_tet.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 typedef struct kernel_surface_state {
     const kernel_surface *surface;
@@ -58,51 +33,6 @@ typedef struct kernel_surface_state {
     kernel_hits *hits;
     bool is_opaque;
 } kernel_surface_state;
-
-SIMD_INLINE bool kernel_cell_straddles(const kernel_cell *c, double value)
-{
-    bool below = false, above = false;
-    for (int i = 0; i < c->count; i++) {
-        below = below || c->values[i] < value;
-        above = above || c->values[i] >= value;
-    }
-    return below && above;
-}
-
-/* The power of two that brings largest near 1, read off its bits: its exponent, mirrored. */
-SIMD_INLINE double kernel_mirrored_power(double largest)
-{
-    uint64_t bits;
-    memcpy(&bits, &largest, sizeof bits);
-    const uint64_t exponent = bits >> 52;
-    const uint64_t mirrored = exponent < 23 ? 2023 : exponent > 2023 ? 23 : 2046 - exponent;
-    bits = mirrored << 52;
-    double scale;
-    memcpy(&scale, &bits, sizeof scale);
-    return scale;
-}
-
-/* f: values minus the isovalue, times a power of two that brings the largest near 1. */
-SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
-{
-    double largest = 0;
-    for (int i = 0; i < c->count; i++) {
-        const double size = fabs(c->values[i] - value);
-        largest = size > largest ? size : largest;
-    }
-    const double scale = kernel_mirrored_power(largest);
-    for (int i = 0; i < c->count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
-}
-
-/* g: the colour field in its transfer's domain. Cells keep the field's order of vertices. */
-SIMD_INLINE void kernel_cell_colours(kernel_cell *c, const kernel_surface *s, int part)
-{
-    const grid_field *field = &s->layer->colour_field.fields[part];
-    for (int i = 0; i < c->count; i++) {
-        const double v = grid_field_value(field, field->is_cell_centred ? c->index : c->vertices[i]);
-        c->g[i] = (float)((v - s->colour.low) * s->colour.inverse_width);
-    }
-}
 
 SIMD_INLINE void kernel_base_colour(const kernel_surface *s, int value, vf w, vf out[3])
 {
@@ -240,11 +170,6 @@ typedef struct kernel_poly {
     kernel_bounds bounds; /* robust roots alone */
 } kernel_poly;
 
-typedef struct kernel_surface_cache {
-    kernel_cache cells;
-    kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
-} kernel_surface_cache;
-
 /* The tile's rays. */
 SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
 {
@@ -267,8 +192,7 @@ SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *til
 
 SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_cell *c)
 {
-    kernel_surface_cache *cache = p->thread->cache;
-    return &cache->polys[c - cache->cells.cells];
+    return &p->thread->polys[c - p->thread->cells->cells];
 }
 
 /* The crossings at the places that are visible; returns these. */
@@ -325,14 +249,6 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
     }
 }
 
-/* kernel_spmd.h */
-SIMD_INLINE void kernel_trace_parts_spmd(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                         kernel_surface_state *state);
-
-/* kernel_polyhedron_surface.h */
-static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *state, int part, uint32_t index,
-                                       vm rays);
-
 /* In a cell that is neither a polyhedron nor without finite values: its surface of an isovalue. The cell is in the
  * frame's coordinates. */
 static __attribute__((noinline)) void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state,
@@ -342,95 +258,6 @@ static __attribute__((noinline)) void kernel_cell_surface(kernel_packet *p, kern
         kernel_tet_surface(p, state, c, value, rays);
     else
         kernel_poly_surface(p, state, c, poly, value, rays);
-}
-
-/* Make the cell ready for the isovalue. */
-SIMD_INLINE void kernel_surface_prepare(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
-                                        int part, int value, kernel_cell *c, kernel_poly *poly)
-{
-    const bool is_fresh = !c->is_placed;
-    if (is_fresh) {
-        kernel_cell_place_in(c, f, tile, f->job->parts[part].cells);
-        if (s->layer->colour_map) kernel_cell_colours(c, s, part);
-    }
-    if (is_fresh || s->layer->value_count > 1) {
-        kernel_cell_relative(c, s->layer->values[value]);
-        poly->is_set_up = false;
-    }
-}
-
-static void kernel_surface_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
-                                vm rays)
-{
-    kernel_surface_state *state = opaque_state;
-    const render_surface_layer *layer = state->surface->layer;
-    for (int n = 0; n < count; n++) {
-        kernel_cell *c = kernel_cell_find(p, state->layer, part, &layer->field.fields[part], cells[n]);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_polyhedron_surfaces(p, state, part, cells[n], rays);
-            continue;
-        }
-        kernel_poly *poly = kernel_poly_find(p, c);
-        if (!c->is_finite) continue;
-        kernel_cell own_cell;
-        kernel_poly own_poly;
-        if (layer->normal == RENDER_DIFFERENCES) {
-            /* Looking for samples fills the cache with other cells while this one is in use. */
-            own_cell = *c;
-            own_poly = *poly;
-            c = &own_cell;
-            poly = &own_poly;
-        }
-        for (int value = 0; value < layer->value_count; value++) {
-            if (!kernel_cell_straddles(c, layer->values[value])) continue;
-            kernel_surface_prepare(p->frame, p->tile, state->surface, part, value, c, poly);
-            kernel_cell_lines(c, p->frame, p->tile);
-            kernel_cell_surface(p, state, c, poly, value, rays);
-        }
-    }
-}
-
-/* All surface layers: opaque hits go to p->t_far and hits, transparent ones into fragments. */
-SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
-{
-    const kernel_frame *f = p->frame;
-    for (int n = 0; n < f->surface_count; n++) {
-        kernel_surface_state state = {
-            .surface = &f->surfaces[n], .layer = n, .hits = hits, .is_opaque = n < f->opaque_count};
-        const render_field *field = &f->surfaces[n].layer->field;
-        const kernel_interest *interest = &f->surfaces[n].interest;
-        if (f->job->traversal == RENDER_SPMD)
-            kernel_trace_parts_spmd(p, field, interest, &state);
-        else
-            kernel_trace_parts(p, field, interest, p->t_near, &p->t_far, kernel_surface_leaf, &state);
-    }
-}
-
-/* Normals by differences of the nearest opaque hits of a surface. */
-SIMD_INLINE void kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, int layer, vm rays,
-                                           kernel_hits *hits)
-{
-    for (int value = 0; value < s->layer->value_count; value++) {
-        const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
-        if (vm_any(mine)) kernel_differences(p, s, layer, value, mine, p->t_far, hits->reach, hits->normal);
-    }
-}
-
-/* The nearest opaque hits, lit. */
-SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
-{
-    for (int n = 0; n < p->frame->opaque_count; n++) {
-        const kernel_surface *s = &p->frame->surfaces[n];
-        const vf first = vf_set((float)s->first_kind);
-        const vm mine = vm_and(vf_le(first, hits->kind), vf_lt(hits->kind, first + (float)s->layer->value_count));
-        const vm write = vm_and(hits->found, mine);
-        if (!vm_any(write)) continue;
-        if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, n, write, hits);
-        vf colour[3] = {hits->colour[0], hits->colour[1], hits->colour[2]};
-        kernel_packet_view(p);
-        kernel_shade(p, &s->layer->material, hits->normal, colour);
-        kernel_emit(p, write, 0, hits->kind, p->t_far, p->t_far, colour, vf_set(0));
-    }
 }
 
 #endif

@@ -3,8 +3,20 @@
 #ifndef RENDER_KERNEL_TILE_SHOWN_H
 #define RENDER_KERNEL_TILE_SHOWN_H
 
+#include "grid.h"
 #include "kernel_batch.h"
+#include "kernel_bins.h"
+#include "kernel_cell.h"
+#include "kernel_cell_values.h"
 #include "kernel_hexes.h"
+#include "kernel_plain.h"
+#include "kernel_prefetch.h"
+#include "kernel_surface.h"
+#include "kernel_tile_surface.h"
+#include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 /* A tile's cells by depth, as far as it takes to leave out what is hidden: in so many parts of the tile's depth, in any
  * order within each. */
@@ -41,24 +53,12 @@ static inline void kernel_sort_by_depth(kernel_by_depth *q, kernel_tile_shown *i
     }
 }
 
-/* The farthest that a block knows of. */
-SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
-{
-    const unsigned lanes = (1u << SIMD_WIDTH) - 1;
-    vf far = vf_set(-INFINITY);
-    for (int v = 0; v < KERNEL_BLOCKS / SIMD_WIDTH; v++) {
-        const vm wanted = vm_from_bits(t->wanted >> v * SIMD_WIDTH & lanes);
-        far = vf_max(far, vf_select(wanted, t->far[v], vf_set(-INFINITY)));
-    }
-    return vf_reduce_max(far);
-}
-
 static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const kernel_plain *plain,
                              const kernel_tile_shown *shown, int part, int value, unsigned blocks)
 {
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
-    kernel_cell *c = &t->cell;
+    kernel_cell *c = t->cell;
     if (plain->is_so) {
         kernel_plain_cell(c, plain, t->frame, &t->tile, shown->cell);
     } else {
@@ -71,8 +71,8 @@ static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const ke
     }
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
-    t->poly.is_set_up = false;
-    if (c->type == GRID_HEX) kernel_poly_setup(t->frame, &t->tile, &t->poly, layer, c, value);
+    t->poly->is_set_up = false;
+    if (c->type == GRID_HEX) kernel_poly_setup(t->frame, &t->tile, t->poly, layer, c, value);
     if (kernel_hexes_take(t, c)) {
         kernel_hexes_turn(t, hexes, plain, part);
         kernel_hexes_add(t, hexes, shown, value);
@@ -96,7 +96,7 @@ SIMD_INLINE void kernel_shown_prefetch(const kernel_frame *f, const kernel_tile_
     const int part = (int)(shown->source / RENDER_MAX_ISOVALUES);
     const kernel_kept *kept = kernel_kept_of(f, f->isovalues[shown->source % RENDER_MAX_ISOVALUES].surface, part);
     if (!kept) {
-        kernel_tile_prefetch_indices(f->job->parts[part].cells, shown->cell);
+        kernel_prefetch_indices(f->job->parts[part].cells, shown->cell);
         return;
     }
     const float *record = kept->records + (int64_t)shown->cell * kept->vertices * KERNEL_KEPT_FLOATS;
@@ -125,8 +125,8 @@ static __attribute__((noinline)) void kernel_tile_meet_waiting(kernel_tile_trace
         const bool is_known = b->layer == t->layer && b->part == part;
         if (kernel_kept_of(t->frame, t->layer, part)) continue;                     /* all of it was asked for */
         if (is_known && (b->is_for_it || kernel_hexes_fit(t, &b->plain))) continue; /* batches ask for theirs */
-        kernel_tile_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
-                                      w->items[n]->cell);
+        kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
+                                 w->items[n]->cell);
     }
     for (int n = 0; n < w->count; n++) {
         int part;
@@ -169,21 +169,6 @@ static __attribute__((noinline)) void kernel_tile_trace_shown(kernel_tile_trace 
     kernel_tile_meet_waiting(t, &batch, &hexes, &waiting);
     kernel_batch_end(t, &batch);
     kernel_hexes_end(t, &hexes);
-}
-
-/* The cells that the tile has of a picture's; returns how many they are. */
-SIMD_INLINE int kernel_bin(const kernel_frame *f, kernel_tile_shown *shown, const uint32_t *starts, int x0, int y0,
-                           kernel_tile_shown **items)
-{
-    const int columns = (f->job->camera.width + KERNEL_TILE - 1) / KERNEL_TILE;
-    starts += y0 / KERNEL_TILE * columns + x0 / KERNEL_TILE;
-    *items = shown + starts[0];
-    return (int)(starts[1] - starts[0]);
-}
-
-SIMD_INLINE int kernel_shown_in_tile(const kernel_frame *f, int x0, int y0, kernel_tile_shown **items)
-{
-    return kernel_bin(f, f->shown, f->shown_starts, x0, y0, items);
 }
 
 SIMD_INLINE void kernel_tile_surfaces_shown(kernel_tile_trace *t)

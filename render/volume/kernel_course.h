@@ -4,8 +4,18 @@
 #ifndef RENDER_KERNEL_COURSE_H
 #define RENDER_KERNEL_COURSE_H
 
+#include "fragment.h"
+#include "kernel_cell.h"
+#include "kernel_colour.h"
+#include "kernel_field.h"
+#include "kernel_fine.h"
+#include "kernel_integral.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_pieces.h"
 #include "kernel_segment_list.h"
-#include "kernel_volume.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 /* Of equal parts. */
 enum { KERNEL_MAX_PARTS = 256 };

@@ -31,8 +31,19 @@
 #ifndef RENDER_KERNEL_HALVING_H
 #define RENDER_KERNEL_HALVING_H
 
+#include <math.h>
+#include <string.h>
+
+#include "kernel_cell.h"
 #include "kernel_course.h"
 #include "kernel_exact.h"
+#include "kernel_fine.h"
+#include "kernel_integral.h"
+#include "kernel_packet.h"
+#include "kernel_pieces.h"
+#include "kernel_segment_list.h"
+#include "kernel_types.h"
+#include "simd.h"
 
 /* KERNEL_HALVING_DEPTH: 2^-40 of a stretch is nothing to any medium. The count of parts is a guard that no function in
  * use comes to: what is left of the stretch is then one part each time. */

@@ -2,9 +2,18 @@
 #ifndef RENDER_KERNEL_POLYHEDRON_VOLUME_H
 #define RENDER_KERNEL_POLYHEDRON_VOLUME_H
 
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_segments.h"
+#include "kernel_cell_values.h"
+#include "kernel_course.h"
+#include "kernel_interest.h"
+#include "kernel_packet.h"
 #include "kernel_polyhedron.h"
-#include "kernel_segments.h"
-#include "kernel_volume.h"
+#include "kernel_samples.h"
+#include "kernel_types.h"
+#include "render_polyhedra.h"
+#include "simd.h"
 
 SIMD_INLINE bool kernel_polyhedron_shows(const polyhedron *c, const kernel_transfer *t)
 {

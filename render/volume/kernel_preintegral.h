@@ -32,6 +32,8 @@
 #define RENDER_KERNEL_PREINTEGRAL_H
 
 #include "kernel_integral.h"
+#include "kernel_pieces.h"
+#include "simd.h"
 
 /* The most parts of a segment. */
 #define KERNEL_PRE_PARTS 32.0f

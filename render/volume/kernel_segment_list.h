@@ -3,8 +3,16 @@
 #ifndef RENDER_KERNEL_SEGMENT_LIST_H
 #define RENDER_KERNEL_SEGMENT_LIST_H
 
+#include <math.h>
+#include <string.h>
+
+#include "fragment.h"
+#include "kernel_cell.h"
 #include "kernel_fine.h"
 #include "kernel_integral.h"
+#include "kernel_packet.h"
+#include "kernel_pieces.h"
+#include "simd.h"
 
 enum { KERNEL_WINDOW = 128, KERNEL_LANE_CUTS = 32 };
 

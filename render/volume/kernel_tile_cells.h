@@ -9,10 +9,27 @@
 #ifndef RENDER_KERNEL_TILE_CELLS_H
 #define RENDER_KERNEL_TILE_CELLS_H
 
-#include "kernel_fine.h"
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_bins.h"
+#include "kernel_cell.h"
+#include "kernel_cell_values.h"
+#include "kernel_interest.h"
+#include "kernel_map.h"
+#include "kernel_outline.h"
 #include "kernel_placed.h"
-#include "kernel_tile_shown.h"
-#include "kernel_volume.h"
+#include "kernel_plain.h"
+#include "kernel_poly.h"
+#include "kernel_prefetch.h"
+#include "kernel_tile.h"
+#include "kernel_tile_blocks.h"
+#include "kernel_tile_trace.h"
+#include "kernel_tile_traverse.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "render.h"
+#include "simd.h"
 
 enum { KERNEL_OPEN_PIECE = 16 };
 
@@ -26,6 +43,7 @@ typedef struct kernel_tile_cells {
     kernel_plain plain; /* of the volume's field on the part: */
     int plain_volume, plain_part;
     kernel_placed placed;
+    kernel_block_rays block_rays;
     /* Tets that wait to be placed together, with the blocks that they may meet. */
     int waiting;
     uint32_t wait_cell[SIMD_WIDTH], wait_blocks[SIMD_WIDTH];
@@ -35,9 +53,6 @@ typedef struct kernel_tile_cells {
 /* What is to be done with a cell that is ready; of a polyhedron it has the index alone. map NULL: needs none. */
 typedef void kernel_tile_take(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                               unsigned blocks);
-
-/* Of the frame's thread memory. */
-SIMD_INLINE kernel_tile_cells *kernel_tile_cells_of(kernel_tile_trace *t);
 
 /* Ready the fetched cell for rays of blocks, which are a pencil or are not; returns the blocks that it may show in. */
 SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
@@ -53,7 +68,7 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
     kernel_cell_order(c);
     kernel_cell_domain(c, transfer);
     if (is_pencil || c->type == GRID_TET) kernel_cell_lines(c, t->frame, &t->tile);
-    if (c->type == GRID_TET) return meets & kernel_tet_blocks(&t->block_rays, c);
+    if (c->type == GRID_TET) return meets & kernel_tet_blocks(&cells->block_rays, c);
     if (!c->is_constant) kernel_map_setup(&cells->map, c);
     return meets;
 }
@@ -61,7 +76,7 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
 SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,
                                        unsigned blocks, kernel_tile_take *take)
 {
-    kernel_tile_cells *cells = kernel_tile_cells_of(t);
+    kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_cell *c = &cells->cell;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell_fetch(c, g, &t->frame->job->volumes[volume].field.fields[part], index);
@@ -122,7 +137,7 @@ static __attribute__((noinline)) void kernel_tile_take_waiting(kernel_tile_trace
         if (!blocks) continue;
         kernel_placed_cell(&cells->placed, n, &cells->cell);
         if (is_fine) kernel_placed_exactly(&cells->placed, n, &cells->cell);
-        blocks &= kernel_tet_blocks(&t->block_rays, &cells->cell);
+        blocks &= kernel_tet_blocks(&cells->block_rays, &cells->cell);
         cells->cell.index = cells->wait_cell[n];
         if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
     }
@@ -160,8 +175,8 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, int volume, int par
                                        bool is_pencil, unsigned blocks, kernel_tile_take *take)
 {
     const grid *g = t->frame->job->parts[part].cells;
-    kernel_tile_cells *waiting = kernel_tile_cells_of(t);
-    kernel_tile_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
+    kernel_tile_cells *waiting = t->thread->tile_cells;
+    kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
     if (kernel_tile_wait_for(t, waiting, volume, part, take))
         for (int n = 0; n < count; n++) kernel_tile_wait(t, waiting, cells[n], blocks, take);
     else
@@ -190,7 +205,7 @@ SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, ke
         kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, parts);
     else
         for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
-    kernel_tile_take_waiting(t, kernel_tile_cells_of(t), take);
+    kernel_tile_take_waiting(t, t->thread->tile_cells, take);
 }
 
 /* ---- those that are known ---- */
@@ -237,7 +252,7 @@ static void kernel_order_by_depth(kernel_tile_shown *items, int count)
 SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
-    kernel_tile_cells *cells = kernel_tile_cells_of(t);
+    kernel_tile_cells *cells = t->thread->tile_cells;
     cells->waiting = 0;
     cells->plain_part = -1;
     if (!f->volume_shown) return true;
@@ -281,9 +296,9 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
             const kernel_tile_shown *item = &cells->items[n];
             const grid *g = job->parts[item->source].cells;
             if (pass)
-                kernel_tile_prefetch_vertices(g, &job->volumes[0].field.fields[item->source], item->cell);
+                kernel_prefetch_vertices(g, &job->volumes[0].field.fields[item->source], item->cell);
             else
-                kernel_tile_prefetch_indices(g, item->cell);
+                kernel_prefetch_indices(g, item->cell);
         }
     }
 }
@@ -291,7 +306,7 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
 /* The window's cells. */
 SIMD_INLINE void kernel_tile_meet_shown(kernel_tile_trace *t, bool is_pencil, unsigned blocks, kernel_tile_take *take)
 {
-    kernel_tile_cells *cells = kernel_tile_cells_of(t);
+    kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_cells_open(t, cells);
     for (int n = 0; n < cells->open_count; n++) {
         const kernel_tile_shown *item = &cells->items[n];

@@ -15,8 +15,27 @@
 #ifndef RENDER_KERNEL_TILE_SEGMENTS_H
 #define RENDER_KERNEL_TILE_SEGMENTS_H
 
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_segments.h"
+#include "kernel_course.h"
+#include "kernel_fine.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_poly.h"
+#include "kernel_polyhedron_volume.h"
+#include "kernel_samples.h"
+#include "kernel_segment_list.h"
 #include "kernel_segments.h"
+#include "kernel_tile.h"
+#include "kernel_tile_cells.h"
+#include "kernel_tile_trace.h"
 #include "kernel_tile_volume.h"
+#include "kernel_types.h"
+#include "kernel_volume.h"
+#include "simd.h"
 
 typedef struct kernel_tile_ray_segments {
     kernel_segments list;
@@ -31,9 +50,6 @@ typedef struct kernel_tile_segments {
     kernel_fine_cell fine;
     float depth; /* of windows; 0: not known yet */
 } kernel_tile_segments;
-
-/* Of the frame's thread memory. */
-SIMD_INLINE kernel_tile_segments *kernel_tile_segments_of(kernel_tile_trace *t);
 
 /* ---- cells ---- */
 
@@ -65,7 +81,7 @@ SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kern
 static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                       unsigned blocks)
 {
-    kernel_tile_segments *s = kernel_tile_segments_of(t);
+    kernel_tile_segments *s = t->thread->tile_segments;
     if (c->type == GRID_TET && t->frame->is_fine)
         kernel_fine_begin(t->frame, &t->tile, c, &t->frame->volumes[0], &s->fine);
     for (; blocks; blocks &= blocks - 1) {
@@ -170,7 +186,7 @@ SIMD_INLINE void kernel_tile_segments_learn(kernel_tile_segments *s, const int *
 /* Behind the tile's opaque surfaces, whose hits are in the packets. */
 static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
-    kernel_tile_segments *s = kernel_tile_segments_of(t);
+    kernel_tile_segments *s = t->thread->tile_segments;
     if (!kernel_tile_cells_begin(t)) return;
     const kernel_lie reach = kernel_tile_reach(t);
     int packets[KERNEL_TILE_PACKETS];

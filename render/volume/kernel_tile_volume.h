@@ -7,15 +7,30 @@
  *     block 2  |--s--s--s--s--s--s--|  dark: takes no part in the next window
  *              ^ t_near of window 1 ^ t_near of window 2
  *
- * The traversal is that of surfaces (kernel_tile_surface.h), with the window's begin in the place of the eye and each
+ * The traversal is that of surfaces (kernel_tile_traverse.h), with the window's begin in the place of the eye and each
  * block's end of the window in that of its nearest hits. What is in a window does not show in the picture: samples are
  * numbered along the ray, and owned by cells. */
 #ifndef RENDER_KERNEL_TILE_VOLUME_H
 #define RENDER_KERNEL_TILE_VOLUME_H
 
 #include <limits.h>
+#include <math.h>
 
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_poly.h"
+#include "kernel_polyhedron_volume.h"
+#include "kernel_samples.h"
+#include "kernel_tet.h"
+#include "kernel_tile.h"
+#include "kernel_tile_blocks.h"
 #include "kernel_tile_cells.h"
+#include "kernel_tile_trace.h"
+#include "kernel_volume.h"
+#include "render.h"
+#include "simd.h"
 
 typedef struct kernel_tile_ray_samples {
     kernel_samples samples;
@@ -27,9 +42,6 @@ typedef struct kernel_tile_volume {
     kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
     int volume; /* under way */
 } kernel_tile_volume;
-
-/* Of the frame's thread memory, which holds both. */
-SIMD_INLINE kernel_tile_volume *kernel_tile_volume_of(kernel_tile_trace *t);
 
 /* ---- cells ---- */
 
@@ -53,7 +65,7 @@ static __attribute__((noinline)) void kernel_tile_poly_samples(kernel_packet *p,
 static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                                 unsigned blocks)
 {
-    kernel_tile_volume *v = kernel_tile_volume_of(t);
+    kernel_tile_volume *v = t->thread->tile_volume;
     for (; blocks; blocks &= blocks - 1) {
         const int first = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
         for (int i = first; i < first + KERNEL_BLOCK_PACKETS; i++) {
@@ -71,14 +83,14 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
 
 static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_tile_meet_leaf(t, kernel_tile_volume_of(t)->volume, part, cells, count, true, blocks, kernel_tile_samples);
+    kernel_tile_meet_leaf(t, t->thread->tile_volume->volume, part, cells, count, true, blocks, kernel_tile_samples);
 }
 
 static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
                                      unsigned blocks)
 {
     (void)unused;
-    kernel_tile_volume_trees(t, kernel_tile_volume_of(t)->volume, parts, count, blocks, kernel_tile_volume_leaf);
+    kernel_tile_volume_trees(t, t->thread->tile_volume->volume, parts, count, blocks, kernel_tile_volume_leaf);
 }
 
 /* ---- windows ---- */
@@ -107,7 +119,7 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
         kernel_block_begin(t, block);
         for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
     }
-    if (count) kernel_block_rays_setup(&t->block_rays, t->frame, &t->tile);
+    if (count) kernel_block_rays_setup(&t->thread->tile_cells->block_rays, t->frame, &t->tile);
     return count;
 }
 
@@ -173,7 +185,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
 /* Behind the tile's opaque surfaces, whose hits are in the packets. */
 static void kernel_tile_volumes(kernel_tile_trace *t)
 {
-    kernel_tile_volume *v = kernel_tile_volume_of(t);
+    kernel_tile_volume *v = t->thread->tile_volume;
     if (!kernel_tile_cells_begin(t)) return;
     const kernel_lie reach = kernel_tile_reach(t);
     const unsigned blocks = reach.blocks;

@@ -7,7 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "error.h"
+#include "insitu/status.h"
+#include "kernel_pieces.h"
 #include "memory.h"
+#include "render.h"
 
 /* Far outside of every domain, and finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;

@@ -2,6 +2,8 @@
 #ifndef RENDER_RENDER_PIECES_H
 #define RENDER_RENDER_PIECES_H
 
+#include "error.h"
+#include "insitu/status.h"
 #include "kernel_pieces.h"
 #include "render.h"
 

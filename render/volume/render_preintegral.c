@@ -3,7 +3,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "error.h"
+#include "insitu/status.h"
+#include "kernel_pieces.h"
 #include "memory.h"
+#include "render.h"
 #include "render_pieces.h"
 
 enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 };

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cpu.h"
+#include "kernel_types.h"
 
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 static cpu_isa chosen;

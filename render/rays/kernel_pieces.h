@@ -2,9 +2,6 @@
 #ifndef RENDER_KERNEL_PIECES_H
 #define RENDER_KERNEL_PIECES_H
 
-#include <stdbool.h>
-#include <stdint.h>
-
 #include "render.h"
 
 /* KERNEL_BLACK: what is behind so little light is left out of a segment. KERNEL_SHORT: kernel_integral.h. */

@@ -1,0 +1,32 @@
+/* Cells that packets on their own have met, kept while their tile is traced. */
+#ifndef RENDER_KERNEL_CELL_CACHE_H
+#define RENDER_KERNEL_CELL_CACHE_H
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_packet.h"
+#include "simd.h"
+
+/* Cells that rays of the tile have met, by hash: a cell is fetched, ordered and moved into tile space once for all the
+ * tile's packets, and for all of a volume's windows, as long as it is not pushed out. */
+enum { KERNEL_CACHE_BITS = 8, KERNEL_CACHE_CELLS = 1 << KERNEL_CACHE_BITS };
+
+typedef struct kernel_cell_cache {
+    kernel_cell cells[KERNEL_CACHE_CELLS];
+} kernel_cell_cache;
+
+/* The same from the cache, where it may have been placed. layer tells apart the fields that cells are asked for. */
+SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
+                                          uint32_t index)
+{
+    const uint32_t key = index + 0x85ebca6bu * (uint32_t)part + 0xc2b2ae35u * (uint32_t)layer;
+    kernel_cell *c = &p->thread->cells->cells[(key * 0x9e3779b1u) >> (32 - KERNEL_CACHE_BITS)];
+    if (c->serial == p->thread->serial && c->index == index && c->part == part && c->layer == layer) return c;
+    c->serial = p->thread->serial;
+    c->part = part;
+    c->layer = layer;
+    kernel_cell_fetch(c, p->frame->job->parts[part].cells, field, index);
+    return c;
+}
+
+#endif

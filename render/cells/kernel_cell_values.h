@@ -1,0 +1,86 @@
+/* A cell's values as layers want them: beside an isovalue, in the domain of a transfer function, as colours. */
+#ifndef RENDER_KERNEL_CELL_VALUES_H
+#define RENDER_KERNEL_CELL_VALUES_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_interest.h"
+#include "kernel_types.h"
+#include "simd.h"
+
+SIMD_INLINE bool kernel_cell_straddles(const kernel_cell *c, double value)
+{
+    bool below = false, above = false;
+    for (int i = 0; i < c->count; i++) {
+        below = below || c->values[i] < value;
+        above = above || c->values[i] >= value;
+    }
+    return below && above;
+}
+
+/* The power of two that brings largest near 1, read off its bits: its exponent, mirrored. */
+SIMD_INLINE double kernel_mirrored_power(double largest)
+{
+    uint64_t bits;
+    memcpy(&bits, &largest, sizeof bits);
+    const uint64_t exponent = bits >> 52;
+    const uint64_t mirrored = exponent < 23 ? 2023 : exponent > 2023 ? 23 : 2046 - exponent;
+    bits = mirrored << 52;
+    double scale;
+    memcpy(&scale, &bits, sizeof scale);
+    return scale;
+}
+
+/* f: values minus the isovalue, times a power of two that brings the largest near 1. */
+SIMD_INLINE void kernel_cell_relative(kernel_cell *c, double value)
+{
+    double largest = 0;
+    for (int i = 0; i < c->count; i++) {
+        const double size = fabs(c->values[i] - value);
+        largest = size > largest ? size : largest;
+    }
+    const double scale = kernel_mirrored_power(largest);
+    for (int i = 0; i < c->count; i++) c->f[i] = (float)((c->values[i] - value) * scale);
+}
+
+/* g: the colour field in its transfer's domain. Cells keep the field's order of vertices. */
+SIMD_INLINE void kernel_cell_colours(kernel_cell *c, const kernel_surface *s, int part)
+{
+    const grid_field *field = &s->layer->colour_field.fields[part];
+    for (int i = 0; i < c->count; i++) {
+        const double v = grid_field_value(field, field->is_cell_centred ? c->index : c->vertices[i]);
+        c->g[i] = (float)((v - s->colour.low) * s->colour.inverse_width);
+    }
+}
+
+/* v to float, held within -limit .. limit. */
+SIMD_INLINE float kernel_hold(double v, double limit)
+{
+    return (float)(v < -limit ? -limit : v > limit ? limit : v);
+}
+
+/* Does the cell show? */
+SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)
+{
+    double low = c->values[0], high = low;
+    for (int i = 1; i < c->count; i++) {
+        low = c->values[i] < low ? c->values[i] : low;
+        high = c->values[i] > high ? c->values[i] : high;
+    }
+    return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
+}
+
+/* f: values in the transfer's domain, held to 1e18 so that interpolation cannot overflow. */
+SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
+{
+    c->is_constant = true;
+    for (int i = 0; i < c->count; i++) {
+        c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+        c->is_constant = c->is_constant && c->values[i] == c->values[0];
+    }
+}
+
+#endif

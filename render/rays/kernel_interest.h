@@ -1,0 +1,37 @@
+/* Do a node's or a cell's values meet those that show? */
+#ifndef RENDER_KERNEL_INTEREST_H
+#define RENDER_KERNEL_INTEREST_H
+
+#include <string.h>
+
+#include "kernel_types.h"
+#include "mmbvh.h"
+#include "simd.h"
+
+SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float low, float high)
+{
+    for (int i = 0; i < interest->count; i++)
+        if (low <= interest->high[i] && high >= interest->low[i]) return true;
+    return false;
+}
+
+/* The same of cells, a lane each, of four values. */
+SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf v[4])
+{
+    const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3]));
+    const vf high = vf_max(vf_max(v[0], v[1]), vf_max(v[2], v[3]));
+    vm meets = vm_none();
+    for (int i = 0; i < interest->count; i++)
+        meets = vm_or(meets, vm_and(vf_le(low, vf_set(interest->high[i])), vf_le(vf_set(interest->low[i]), high)));
+    return meets;
+}
+
+SIMD_INLINE bool kernel_node_shows(const kernel_interest *interest, const mmbvh_ranges *ranges, int64_t node)
+{
+    float low, high;
+    memcpy(&low, ranges->low + node * ranges->stride, sizeof low);
+    memcpy(&high, ranges->high + node * ranges->stride, sizeof high);
+    return kernel_interest_meets(interest, low, high);
+}
+
+#endif

@@ -1,0 +1,140 @@
+/* Samples of volumes in one cell (thesis, section 4.4). In a cell the rays' intervals are found once, and each of the N
+ * samples that an interval owns, t_in <= t < t_out, gets its value.
+ *
+ * A sample's place depends on its number and its ray alone, so that every rank means the same samples; each sample has
+ * one owner, for neighbours share the bits of t at their face. Only where cells overlap has it several. */
+#ifndef RENDER_KERNEL_SAMPLES_H
+#define RENDER_KERNEL_SAMPLES_H
+
+#include <math.h>
+
+#include "fragment.h"
+#include "kernel_cell.h"
+#include "kernel_colour.h"
+#include "kernel_field.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
+
+/* What is behind so little light does not show: far below the 1e-6 that ranks may differ by. */
+#define KERNEL_DARK 1e-7f
+
+/* Two faces that are one in truth, but not the same to the bit, may be so far apart along a ray, in t: of a hanging
+ * node the coarse cell's face and the small ones on it, and faces whose crossings come in the wrong order beside a
+ * vertex. Near 1, where t of the scene is, each face's crossing is off by a rounding of its vertices' depths and one of
+ * t, 6e-8 each, and by its weights' or Newton's, 2.4e-7 (kernel_line.h) to 1e-6 times the cell's size (kernel_quad.h):
+ * twice that is 3e-6 for a cell as large as the scene. Across the ray vertices are off by 6e-8 of their distance from
+ * the tile's centre, a cell's size: of cells of 0.1 that is no more than this where a face's cosine to the ray is above
+ * 1.5e-3. */
+#define KERNEL_FACE_ERROR 4e-6f
+
+/* The samples of a window: NaN where this rank has none. */
+typedef struct kernel_samples {
+    int first, count;
+    float pad; /* numbers of samples are known to so much */
+    vf value[RENDER_MAX_VOLUMES][KERNEL_MAX_GROUP];
+    vf t_in[KERNEL_MAX_GROUP], t_out[KERNEL_MAX_GROUP]; /* of the owning interval; only where contact is asked for */
+    vf marked; /* where the rays' nearest sample with two owners is, of those of this window and before */
+} kernel_samples;
+
+typedef struct kernel_volume_state {
+    int volume;
+    kernel_samples *samples;
+} kernel_volume_state;
+
+SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
+{
+    return p->sample_base + p->sample_step * (float)m;
+}
+
+/* The window, of samples first .. first + count - 1. A number found from t, by three roundings of it, and t found from
+ * the number, by one of step * m and one of t, are apart by no more than 6e-8 (4 m + t / step), and t / step is m and
+ * base / step at most. */
+SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s, int first, int count)
+{
+    const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));
+    s->first = first;
+    s->count = count;
+    s->pad = 1e-4f + 4e-7f * ((float)(abs(first) + count) + base);
+}
+
+/* The window's samples that may be in the interval of some ray: indices into the window. */
+SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
+                                    int *begin, int *end)
+{
+    const vf from = (i->t_in - p->sample_base) * p->sample_inverse;
+    const vf to = (i->t_out - p->sample_base) * p->sample_inverse;
+    const float low = vf_reduce_min(vf_select(i->mask, from, vf_set(INFINITY)));
+    const float high = vf_reduce_max(vf_select(i->mask, to, vf_set(-INFINITY)));
+    const float first = simd_min(simd_max((low - (float)s->first) - s->pad, 0), KERNEL_MAX_GROUP);
+    const float last = simd_min(simd_max((high - (float)s->first) + s->pad + 1, 0), (float)s->count);
+    *begin = (int)first;
+    *begin += (float)*begin < first;
+    *end = (int)last;
+}
+
+/* A sample as a fragment of its own, in front of what is opaque. Of those that another cell owns too, which mark their
+ * ray (render.h), the nearest counts, for others may be behind what is opaque on another rank; a clear one beside it
+ * makes sure that it overlaps something. cell: from where to where the sample's cell has the ray. */
+static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state,
+                                                               const kernel_interval *cell, vm mask, vf t, vf value)
+{
+    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
+    const vf zero = vf_set(0), clear[3] = {zero, zero, zero};
+    vf absorbed, colour[3];
+    const vf left = kernel_transmittance(kernel_opacity(transfer, value), transfer->exponent, &absorbed);
+    kernel_table_colour(transfer, value, colour);
+    for (int a = 0; a < 3; a++) colour[a] *= absorbed;
+    mask = vm_and(mask, vm_and(vf_lt(t, p->t_far), vf_lt(zero, absorbed)));
+    if (!p->frame->job->separate_samples) {
+        mask = vm_and(mask, vf_lt(t, state->samples->marked));
+        state->samples->marked = vf_select(mask, t, state->samples->marked);
+        kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, clear, vf_set(1));
+        kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, colour, left);
+        return;
+    }
+    const vf error = vf_max(vf_abs(t), vf_set(1)) * KERNEL_FACE_ERROR;
+    const vf early = vf_select(vf_lt(t - cell->t_in, error), vf_set(FRAGMENT_EARLY), zero);
+    const vf late = vf_select(vf_lt(cell->t_out - t, error), vf_set(FRAGMENT_LATE), zero);
+    const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)state->volume;
+    kernel_emit(p, mask, kind, early + late, t, t, colour, left);
+}
+
+/* A sample that another cell owns too stays the other's. */
+SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
+                             const kernel_interval *i)
+{
+    kernel_samples *s = state->samples;
+    int begin, end;
+    kernel_sample_span(p, s, i, &begin, &end);
+    if (begin >= end) return;
+    const vf length = i->t_out - i->t_in;
+    const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
+    const vf base = p->sample_base, step = p->sample_step;
+    const bool needs_contact = p->frame->needs_contact;
+    vf *values = s->value[state->volume];
+    for (int n = begin; n < end; n++) {
+        const vf t = base + step * (float)(s->first + n);
+        vm own = vm_and(i->mask, vm_andnot(vf_lt(t, i->t_out), vf_lt(t, i->t_in)));
+        vf value = i->v_in + slope * (t - i->t_in);
+        if (map) {
+            if (!vm_any(own)) continue;
+            value = kernel_value_at(p, map, i, own, t);
+        }
+        const vf kept = values[n];
+        const vm apart = vm_and(own, vf_eq(kept, kept));
+        if (__builtin_expect(vm_any(apart), 0)) {
+            kernel_emit_sample(p, state, i, apart, t, value);
+            own = vm_andnot(own, apart);
+        }
+        values[n] = vf_select(own, value, kept);
+        if (needs_contact) {
+            s->t_in[n] = vf_select(own, i->t_in, s->t_in[n]);
+            s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);
+        }
+    }
+}
+
+#endif
