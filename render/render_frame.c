@@ -13,7 +13,7 @@
 #include "pixel_set.h"
 #include "render.h"
 #include "render_fragments.h"
-#include "render_isa.h"
+#include "render_kernels.h"
 #include "render_kept.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"

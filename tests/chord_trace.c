@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "chord_trace.h"
+#include "kernel_cell_cache.h"
 #include "kernel_polyhedron.h"
 #include "kernel_traverse.h"
 
@@ -141,4 +142,4 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
     }
 }
 
-const chord_table CHORD_TABLE = {SIMD_WIDTH, sizeof(kernel_cache), chord_trace};
+const chord_table CHORD_TABLE = {SIMD_WIDTH, sizeof(kernel_cell_cache), chord_trace};

@@ -25,7 +25,7 @@ typedef struct chord_rays {
 
 typedef struct chord_table {
     int width;
-    size_t cache_bytes;
+    size_t cells_bytes; /* of a thread's cells */
     void (*trace)(const kernel_frame *frame, kernel_thread *thread, chord_rays *rays);
 } chord_table;
 

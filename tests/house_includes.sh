@@ -18,7 +18,7 @@ function room_of(path, parts) {
     if (path ~ /^libinsitu\/include\//) return "public"
     if (path ~ /^adaptors\/[^\/]*\/include\//) return "adaptor_headers"
     if (parts[1] == "libinsitu") return parts[2]
-    if (path == "render/render.h") return "render_face"
+    if (path ~ /^render\/render(_isa)?\.h$/) return "render_face"
     if (path ~ /^render\/[a-z]+\//) return parts[2]
     return parts[1]
 }

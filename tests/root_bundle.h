@@ -2,6 +2,7 @@
 #ifndef ROOT_BUNDLE_H
 #define ROOT_BUNDLE_H
 
+#include "kernel_poly.h"
 #include "kernel_roots.h"
 
 typedef struct bundle {

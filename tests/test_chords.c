@@ -10,6 +10,7 @@
 #include "cpu.h"
 #include "memory.h"
 #include "render_isa.h"
+#include "render_polyhedra.h"
 #include "render_prepare.h"
 #include "test_mesh_honeycomb.h"
 #include "test_render_fixture.h"
@@ -213,11 +214,11 @@ static void judge_ray(const render_job *job, const chord_rays *rays, int ray, ch
 
 static kernel_thread open_thread(void)
 {
-    kernel_thread thread = {.cache = base_calloc(1, kernels()->cache_bytes),
+    kernel_thread thread = {.cells = base_calloc(1, kernels()->cells_bytes),
                             .polyhedra = polyhedra_create(),
                             .find_polyhedron = polyhedra_find,
                             .polyhedron_scratch = polyhedra_scratch};
-    assert_non_null(thread.cache);
+    assert_non_null(thread.cells);
     assert_non_null(thread.polyhedra);
     return thread;
 }
@@ -261,7 +262,7 @@ static void judge_mesh(chord_mesh kind, double jitter, chord_aim aim, int64_t co
     fixture_free(&f);
     test_mesh_free(&mesh);
     polyhedra_free(thread.polyhedra);
-    base_free(thread.cache);
+    base_free(thread.cells);
 }
 
 static void tell(const char *what, const char *mesh, int by_tile, const tally *t)

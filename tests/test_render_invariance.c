@@ -1,6 +1,7 @@
 /* What must not change a picture: threads, groups of samples, the order and numbering of cells and vertices, layouts,
  * how cells are dealt to parts and ranks, ghosts; and what values that are not finite may change. */
 #include "memory.h"
+#include "pixel_set.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>

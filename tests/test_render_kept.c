@@ -1,6 +1,7 @@
 /* Kept cells change no bit of a picture, whatever is kept and whatever comes after; they are as many as the meshes say,
  * and their memory comes back. */
 #include "memory.h"
+#include "pixel_set.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>

@@ -13,7 +13,7 @@
 #include "memory.h"
 #include "mmbvh.h"
 #include "render.h"
-#include "render_isa.h"
+#include "render_kernels.h"
 #include "render_subtrees.h"
 
 enum {

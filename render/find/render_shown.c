@@ -9,7 +9,7 @@
 #include "kernel_types.h"
 #include "memory.h"
 #include "render.h"
-#include "render_isa.h"
+#include "render_kernels.h"
 #include "render_subtrees.h"
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };

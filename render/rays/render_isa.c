@@ -7,6 +7,8 @@
 
 #include "cpu.h"
 #include "kernel_types.h"
+#include "render.h"
+#include "render_kernels.h"
 
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 static cpu_isa chosen;
