@@ -24,15 +24,15 @@ static const char *const builder_names[3] = {"low", "medium", "medium wide"};
 /* The first of several pictures, and a further one. */
 static void trace_kept(bench_scene *scene, peers_series *series, int number)
 {
-    scene->job.kept = render_kept_create();
+    scene->job.active = render_active_cells_create();
     const double first_began = bench_begin();
     bench_scene_frame(scene);
     bench_end(first_began, number, &series->keeping);
     const double began = bench_begin();
     bench_scene_frame(scene);
     bench_end(began, number, &series->kept);
-    render_kept_free(scene->job.kept);
-    scene->job.kept = NULL;
+    render_active_cells_free(scene->job.active);
+    scene->job.active = NULL;
 }
 
 static void run(bench_scene *scene, bench_routes *routes, peers_series *series, int number)

@@ -148,17 +148,17 @@ typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integ
 #define RENDER_MIXING_ERROR 1e-4
 
 /* The cells that isosurfaces cross, kept side by side for other pictures of the same cells and values: what a picture
- * needs of 662,000 of 12 million tets lies in 40 MiB then, in the order of the tree (docs/decisions/find.md has the gain). A
- * frame whose job has one fills it with what is not in it yet: tets or hexes with float32 coordinates and values and
- * int32 indices, of opaque surfaces in one colour with the cells' gradients for normals (hexes: robust roots), by
- * RENDER_BINNED and all pixels, of parts most of whose box the picture has, up to 64 MiB in all. Pictures are the same
- * to the last bit. For one frame at a time. */
-typedef struct render_kept render_kept;
-render_kept *render_kept_create(void); /* NULL: no memory */
-void render_kept_free(render_kept *kept);
+ * needs of 662,000 of 12 million tets lies in 40 MiB then, in the order of the tree (docs/decisions/find.md has the
+ * gain). A frame whose job has one fills it with what is not in it yet: tets or hexes with float32 coordinates and
+ * values and int32 indices, of opaque surfaces in one colour with the cells' gradients for normals (hexes: robust
+ * roots), by RENDER_BINNED and all pixels, of parts most of whose box the picture has, up to 64 MiB in all. Pictures
+ * are the same to the last bit. For one frame at a time. */
+typedef struct render_active_cells render_active_cells;
+render_active_cells *render_active_cells_create(void); /* NULL: no memory */
+void render_active_cells_free(render_active_cells *active);
 /* To be called before the next frame where a mesh's cells, coordinates or values have changed. */
-void render_kept_clear(render_kept *kept);
-int64_t render_kept_bytes(const render_kept *kept);
+void render_active_cells_clear(render_active_cells *active);
+int64_t render_active_cells_bytes(const render_active_cells *active);
 
 typedef struct render_job {
     render_camera camera;
@@ -169,7 +169,7 @@ typedef struct render_job {
     const render_surface_layer *surfaces;
     int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
     render_traversal traversal;
-    render_kept *kept; /* NULL: nothing is kept */
+    render_active_cells *active; /* NULL: nothing is kept */
     const render_volume_layer *volumes;
     int volume_count;
     const render_light *lights;

@@ -14,10 +14,10 @@
 #include "render.h"
 #include "render_fragments.h"
 #include "render_kernels.h"
-#include "render_kept.h"
+#include "render_active_cells.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
-#include "render_shown.h"
+#include "render_candidates.h"
 
 static double now(void)
 {
@@ -115,23 +115,23 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     *statistics = (render_statistics){.rays = job->pixels ? pixel_set_count(job->pixels, pixels) : pixels};
     if (has_memory && frame->is_binned) {
         const double start = now();
-        render_kept_begin(frame, states, threads);
-        render_shown_find(frame, states, threads);
+        render_active_cells_begin(frame, states, threads);
+        render_candidates_find(frame, states, threads);
         statistics->surface_ms = 1e3 * (now() - start);
     }
     if (has_memory && frame->bins_volume) {
         const double start = now();
-        render_shown_find_volume(frame, states, threads);
+        render_candidates_find_volume(frame, states, threads);
         statistics->volume_ms = 1e3 * (now() - start);
     }
-    frame->needs_planes = (job->surface_count && !frame->shown) || job->volume_count;
+    frame->needs_planes = (job->surface_count && !frame->candidates) || job->volume_count;
     if (has_memory) {
         const kernel_table *kernels = render_kernels();
 #pragma omp parallel num_threads(threads)
         trace_tiles(kernels, frame, &states[omp_get_thread_num()], end);
     }
-    render_shown_free(frame);
-    render_kept_end(frame);
+    render_candidates_free(frame);
+    render_active_cells_end(frame);
     has_memory = end_threads(states, threads, statistics) && has_memory;
     base_free(states);
     return has_memory;

@@ -9,12 +9,12 @@
 #include "kernel_packet.h"
 #include "kernel_packet_surface.h"
 #include "kernel_segments.h"
-#include "kernel_shown.h"
+#include "kernel_candidates.h"
 #include "kernel_surface.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_segments.h"
-#include "kernel_tile_shown.h"
+#include "kernel_tile_candidates.h"
 #include "kernel_tile_surface.h"
 #include "kernel_tile_trace.h"
 #include "kernel_tile_volume.h"
@@ -105,8 +105,8 @@ static unsigned wanted_blocks(const render_job *job, int x0, int y0)
 static void trace_tile_surfaces(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    if (t->frame->shown)
-        kernel_tile_surfaces_shown(t);
+    if (t->frame->candidates)
+        kernel_tile_surface_candidates(t);
     else
         kernel_tile_surfaces(t);
     for (unsigned begun = t->begun; begun; begun &= begun - 1)
@@ -153,8 +153,8 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
         return;
     }
     kernel_tile_trace *t = thread->tile;
-    kernel_tile_shown *items;
-    if (f->shown && !f->volume_count && !kernel_shown_in_tile(f, x0, y0, &items)) return;
+    kernel_tile_candidate *items;
+    if (f->candidates && !f->volume_count && !kernel_candidates_in_tile(f, x0, y0, &items)) return;
     const unsigned wanted = wanted_blocks(f->job, x0, y0);
     if (!wanted) return;
     kernel_tile_begin(t, f, thread, x0, y0, wanted);
@@ -168,27 +168,27 @@ static void trace_tile(const kernel_frame *f, kernel_thread *thread, int x0, int
         trace_tile_samples(t);
 }
 
-static void find_shown(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
-                       kernel_shown_list *list, bool (*grow)(kernel_shown_list *list))
+static void find_candidates(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
+                            kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list))
 {
     kernel_finder *finder = thread->finder;
     kernel_finder_begin(finder, f, subtree);
     finder->list = list;
     finder->grow = grow;
     if (subtree->count)
-        kernel_find_kept(finder, subtree->first, subtree->count);
+        kernel_find_active(finder, subtree->first, subtree->count);
     else
-        kernel_find_shown(finder, subtree->node);
+        kernel_find_candidates(finder, subtree->node);
 }
 
-static void keep_crossed(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
-                         kernel_keeper *keeper, bool (*grow)(kernel_keeper *keeper))
+static void write_active(const kernel_frame *f, kernel_thread *thread, const kernel_subtree *subtree,
+                         kernel_active_writer *writer, bool (*grow)(kernel_active_writer *writer))
 {
     kernel_finder *finder = thread->finder;
     kernel_finder_begin(finder, f, subtree);
-    finder->keeper = keeper;
+    finder->writer = writer;
     finder->keep = grow;
-    kernel_keep_subtree(finder, subtree->node);
+    kernel_activate_subtree(finder, subtree->node);
 }
 
 /* Megabytes, most of which no tile of the frame may touch: only what is read before it is written is set. */
@@ -208,4 +208,4 @@ static void begin(kernel_thread *thread)
     m->segments.depth = 0;
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), begin, trace_tile, find_shown, keep_crossed};
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), begin, trace_tile, find_candidates, write_active};

@@ -222,7 +222,7 @@ static double scene_reach(const render_job *job)
 
 /* Below it max_error asks for more than float32 ends promise: of random tets with functions that step and rise to an
  * opacity of 1 they were off by 3.4e-5 at most. */
-static const double fine_error = 2e-4;
+static const double double_error = 2e-4;
 
 /* Of max_error an eighth goes to the colours' table, and four fifths to the field (docs/error_budget.md): half of them
  * over the length of the ray, half over what is absorbed. Segments that are mixed with others take a half of that for
@@ -233,7 +233,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const bool is_apart = job->separate_samples;
     insitu_status status = INSITU_OK;
     f->has_segments = job->integration == RENDER_SEGMENTS && (job->volume_count == 1 || is_apart);
-    f->is_fine = f->has_segments && job->max_error < fine_error;
+    f->is_double = f->has_segments && job->max_error < double_error;
     if (!f->has_segments) return INSITU_OK;
     const double error_of_each = job->max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
@@ -246,7 +246,7 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
         const render_transfer *t = job->volumes[i].transfer;
         f->reach[i] = (float)fmax(reach / (t->unit_distance * job->space.scale), 1e-30);
         status = render_pieces_build(&f->pieces[i], t, error_of_each / 8, error);
-        f->is_fine = f->is_fine || f->pieces[i].has_rests;
+        f->is_double = f->is_double || f->pieces[i].has_rests;
         if (status == INSITU_OK && error_of_each > 0 && !is_apart)
             status = render_preintegral_build(&f->pieces[i], t, error_of_each, (double)f->reach[i], error);
     }

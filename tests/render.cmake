@@ -28,10 +28,10 @@ foreach(isa plain sse4.2 avx2 avx512)
   set_tests_properties(render_batches_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 120)
 endforeach()
 
-insitu_render_program(test_render_kept)
+insitu_render_program(test_render_active_cells)
 foreach(isa plain sse4.2 avx2 avx512)
-  add_test(NAME render_kept_${isa} COMMAND test_render_kept)
-  set_tests_properties(render_kept_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 180)
+  add_test(NAME render_active_cells_${isa} COMMAND test_render_active_cells)
+  set_tests_properties(render_active_cells_${isa} PROPERTIES ENVIRONMENT "INSITU_ISA=${isa}" TIMEOUT 180)
 endforeach()
 
 insitu_render_program(test_render_isa)

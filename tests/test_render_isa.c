@@ -24,7 +24,7 @@ enum {
 
 static const char *program;
 
-/* By segments, with steps and a narrow ramp of the opacity: stretches are halved in double (kernel_halving.h), ray by
+/* By segments, with steps and a narrow ramp of the opacity: stretches are halved in double (kernel_bisection.h), ray by
  * ray, from the caller's coordinates. */
 static void set_steps(render_fixture *f)
 {

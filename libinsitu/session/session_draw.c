@@ -111,7 +111,7 @@ static render_job make_job(const insitu_session *session, const scene_image *ima
                         .parent = layers->part_count > 1 ? &session->parent : NULL,
                         .surfaces = layers->surfaces,
                         .surface_count = image->isosurface_count,
-                        .kept = layers->kept,
+                        .active = layers->kept,
                         .volumes = layers->volumes,
                         .volume_count = image->volume_count,
                         .lights = view->lights,
@@ -208,8 +208,8 @@ static insitu_status write_outputs(insitu_session *session, const scene_image *i
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
 /* kept: NULL, or for the image's frames to fill and to draw from. */
-static insitu_status draw_image(insitu_session *session, const scene_image *image, render_kept *kept, int64_t cycle,
-                                base_error *error)
+static insitu_status draw_image(insitu_session *session, const scene_image *image, render_active_cells *kept,
+                                int64_t cycle, base_error *error)
 {
     session_view view;
     session_layers layers = {0};
@@ -247,10 +247,10 @@ static insitu_status prepare(insitu_session *session, const session_plan *plan, 
 }
 
 /* The step's kept cells, made for the first image that shares some; without memory nothing is kept. */
-static render_kept *kept_for(const session_plan *plan, const scene_image *image, render_kept **kept)
+static render_active_cells *kept_for(const session_plan *plan, const scene_image *image, render_active_cells **kept)
 {
     if (!session_kept_pays(plan, image)) return NULL;
-    if (!*kept) *kept = render_kept_create();
+    if (!*kept) *kept = render_active_cells_create();
     return *kept;
 }
 
@@ -259,7 +259,7 @@ insitu_status session_draw_images(insitu_session *session, const scene_image *co
 {
     session_plan plan = {0};
     base_error first = {0};
-    render_kept *kept = NULL;
+    render_active_cells *kept = NULL;
     insitu_status status = session_make_plan(session, due, count, &plan, &first, error);
     if (status) return status;
     status = prepare(session, &plan, error);
@@ -268,7 +268,7 @@ insitu_status session_draw_images(insitu_session *session, const scene_image *co
         draw_image(session, plan.images[i], kept_for(&plan, plan.images[i], &kept), cycle, &reason);
         if (first.status == INSITU_OK) first = reason;
     }
-    render_kept_free(kept);
+    render_active_cells_free(kept);
     session_plan_free(&plan);
     if (!status && first.status) *error = first;
     return error->status;

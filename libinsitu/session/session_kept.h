@@ -1,4 +1,4 @@
-/* Which of a step's images share the cells of isosurfaces (render.h: render_kept). */
+/* Which of a step's images share the cells of isosurfaces (render.h: render_active_cells). */
 #ifndef SESSION_KEPT_H
 #define SESSION_KEPT_H
 

@@ -13,7 +13,7 @@ typedef struct session_layers {
     session_transfer *transfers; /* of surfaces, then of volumes */
     grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
     mmbvh_ranges *ranges;        /* as the fields */
-    render_kept *kept;           /* the step's (session_kept.h), for the caller to set; NULL: nothing is kept */
+    render_active_cells *kept;   /* the step's (session_kept.h), for the caller to set; NULL: nothing is kept */
 } session_layers;
 
 /* Collective: ranges from the data are over all ranks. On an error nothing is left to free. */

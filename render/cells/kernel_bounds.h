@@ -195,9 +195,9 @@ static inline float kernel_bounds_jump(const kernel_bounds *b, const kernel_map 
                                   (double)beam->spread * (double)map->reach[2]);
     double gap = 0;
     for (int i = 0; i < 3; i++) {
-        const double part = across * (fabs((double)b->inverse[i][0]) + fabs((double)b->inverse[i][1])) +
+        const double term = across * (fabs((double)b->inverse[i][0]) + fabs((double)b->inverse[i][1])) +
                             1e-6 * (double)map->reach[2] * fabs((double)b->inverse[i][2]);
-        gap += part * part;
+        gap += term * term;
     }
     return (float)((double)b->slope * (double)b->stretch * sqrt(gap)) + KERNEL_FACE_BAND;
 }
@@ -215,26 +215,26 @@ static inline bool kernel_bounds_rise(const kernel_bounds *b, const double e[8],
     kernel_corner_gradient(e, slopes, de);
     for (int i = 0; i < 3; i++) {
         const double j0 = (double)b->inverse[i][0], j1 = (double)b->inverse[i][1];
-        const double part = spread * (fabs(j0) + fabs(j1));
+        const double term = spread * (fabs(j0) + fabs(j1));
         w[i] = j0 * x + j1 * y + (double)b->inverse[i][2];
         length += w[i] * w[i];
-        off += part * part;
+        off += term * term;
         along += de[i] * w[i];
         steep += de[i] * de[i];
     }
     for (int i = 0; i < 3; i++) {
-        const kernel_corners part = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
-        bent += part * part;
+        const kernel_corners term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
+        bent += term * term;
     }
     const double stretch = (double)b->stretch, slant = sqrt(kernel_corners_most(steep));
     length = sqrt(length);
     off = sqrt(off);
     const double whole = slant * stretch * (length + off);
-    const double parts =
+    const double apart =
         sqrt(kernel_corners_most(along * along)) +
         slant * (sqrt(kernel_corners_most(bent)) + theta * theta * stretch * (length + off) + (1 + theta) * off);
     const double rise = fabs(g[0] * x + g[1] * y + g[2]) - spread * (fabs(g[0]) + fabs(g[1]));
-    return rise * 0.9999 > (whole < parts ? whole : parts);
+    return rise * 0.9999 > (whole < apart ? whole : apart);
 }
 
 /* L, E and what follows of them. */

@@ -207,10 +207,10 @@ SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, const kernel
             for (int i = 0; i < 3; i++) bend[i][a] = s->bend[i][a][at];
         }
         for (int i = 0; i < 3; i++) {
-            const kernel_half part = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
+            const kernel_half term = bend[i][0] * w[0] + bend[i][1] * w[1] + bend[i][2] * w[2];
             along += de[i] * w[i];
             steep += de[i] * de[i];
-            bent += part * part;
+            bent += term * term;
         }
         const kernel_half eighth = kernel_half_eighth((const kernel_half(*)[3])bend), slope = kernel_half_length(df);
         if (!n) *out = (kernel_lanes_most){eighth, slope, along * along, steep, bent};
@@ -270,29 +270,29 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
         2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
     for (int i = 0; i < 3; i++) {
         const kernel_half side = kernel_half_abs(b.inverse[i][0]) + kernel_half_abs(b.inverse[i][1]);
-        const kernel_half part = spread * side;
+        const kernel_half term = spread * side;
         const kernel_half blur = across * side + 1e-6 * b.reach[2] * kernel_half_abs(b.inverse[i][2]);
         w[i] = b.inverse[i][2];
         length += w[i] * w[i];
-        off += part * part;
+        off += term * term;
         gap += blur * blur;
         kernel_half_planes(&b, i, blur + 1e-5, half, out);
     }
     kernel_lanes_corners(&slopes, w, &most);
     const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));
-    const kernel_half_mask is_fine = b.is_solid & (kernel_half_mask)(theta < 0.9);
+    const kernel_half_mask is_regular = b.is_solid & (kernel_half_mask)(theta < 0.9);
     const kernel_half stretch =
         kernel_half_select((kernel_half_mask)(theta < 0.9), kernel_half_rounded(1 / (1 - theta)), kernel_half_all(10));
     const kernel_half slope = kernel_half_rounded(kernel_half_sqrt(most.df)), slant = kernel_half_sqrt(most.steep);
     length = kernel_half_sqrt(length);
     off = kernel_half_sqrt(off);
     const kernel_half whole = slant * stretch * (length + off);
-    const kernel_half parts =
+    const kernel_half apart =
         kernel_half_sqrt(most.along) +
         slant * (kernel_half_sqrt(most.bent) + theta * theta * stretch * (length + off) + (one + theta) * off);
     const kernel_half rise = kernel_half_abs(g[2]) - spread * (kernel_half_abs(g[0]) + kernel_half_abs(g[1]));
-    const kernel_half least = kernel_half_select((kernel_half_mask)(whole < parts), whole, parts);
-    const kernel_half_mask rises = is_fine & (kernel_half_mask)(rise * 0.9999 > least);
+    const kernel_half least = kernel_half_select((kernel_half_mask)(whole < apart), whole, apart);
+    const kernel_half_mask rises = is_regular & (kernel_half_mask)(rise * 0.9999 > least);
     const kernel_half_floats jump = kernel_half_narrow(slope * stretch * kernel_half_sqrt(gap)) + KERNEL_FACE_BAND;
     kernel_half_store(out->jump, half, kernel_half_select(rises, kernel_half_widen(jump), -one));
     /* L, and its thickness. */
@@ -301,7 +301,7 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     const kernel_half thickness = kernel_half_error(e) + 1e-5 + 16 * 6e-8 * size;
     kernel_half_store(out->level, half, level);
     for (int a = 0; a < 3; a++) kernel_half_store(out->gradient[a], half, g[a]);
-    kernel_half_store(out->thickness, half, kernel_half_select(is_fine, thickness, endless));
+    kernel_half_store(out->thickness, half, kernel_half_select(is_regular, thickness, endless));
 }
 
 /* Lane by lane, of places in tile space and values. */

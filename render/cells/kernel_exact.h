@@ -7,7 +7,7 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_fine.h"
+#include "kernel_double.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_types.h"
@@ -24,11 +24,11 @@ static void kernel_exact_setup(kernel_exact_map *m, const kernel_packet *p, cons
 {
     double d[4][GRID_MAX_CELL_VERTICES];
     for (int i = 0; i < c->count; i++) {
-        const kernel_fine_spot spot = kernel_fine_place(p->frame, p->tile, c->world[i]);
+        const kernel_double_spot spot = kernel_double_place(p->frame, p->tile, c->world[i]);
         d[0][i] = spot.x;
         d[1][i] = spot.y;
         d[2][i] = spot.t;
-        d[3][i] = kernel_fine_domain(transfer, c->values[i]);
+        d[3][i] = kernel_double_domain(transfer, c->values[i]);
     }
     m->is_pyramid = c->type == GRID_PYRAMID;
     for (int a = 0; a < 3; a++) kernel_polynomial_fit(m->position[a], c->type, d[a]);

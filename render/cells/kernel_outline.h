@@ -150,8 +150,8 @@ static inline bool kernel_is_unfolded(const kernel_cell *c, const kernel_differe
         off[n] = 0;
         for (int a = 0; a < 3; a++) {
             const float more = v[2] != v[3] ? y[v[3]][a] - y[v[2]][a] : 0;
-            const float part = (y[v[1]][a] - y[v[0]][a]) + more - (a == d->columns[n].along ? 1.0f : 0);
-            off[n] += part * part;
+            const float term = (y[v[1]][a] - y[v[0]][a]) + more - (a == d->columns[n].along ? 1.0f : 0);
+            off[n] += term * term;
         }
     }
     for (int n = 0; n < d->corner_count; n++) {
@@ -162,7 +162,7 @@ static inline bool kernel_is_unfolded(const kernel_cell *c, const kernel_differe
 }
 
 /* L at the vertices, and how thick the slab is: |L| <= *thickness. False where no L is of use. */
-static inline bool kernel_linear_part(const kernel_cell *c, float at[GRID_MAX_CELL_VERTICES], float *thickness)
+static inline bool kernel_linearize(const kernel_cell *c, float at[GRID_MAX_CELL_VERTICES], float *thickness)
 {
     const float *places[4] = {c->x, c->y, c->z, c->f};
     const kernel_differential *differential = kernel_cell_differential(c->type);
@@ -187,9 +187,9 @@ static inline bool kernel_linear_part(const kernel_cell *c, float at[GRID_MAX_CE
     for (int i = 0; i < c->count; i++) {
         at[i] = middle[3];
         for (int a = 0; a < 3; a++) {
-            const float part = g[a] * (places[a][i] - middle[a]);
-            at[i] += part;
-            size = fabsf(part) > size ? fabsf(part) : size;
+            const float term = g[a] * (places[a][i] - middle[a]);
+            at[i] += term;
+            size = fabsf(term) > size ? fabsf(term) : size;
         }
         error = fabsf(at[i] - c->f[i]) > error ? fabsf(at[i] - c->f[i]) : error;
     }
@@ -212,7 +212,7 @@ static inline void kernel_outline_add(kernel_outline *o, const kernel_cell *c, i
 static inline bool kernel_slab_outline(const kernel_cell *c, kernel_outline *o)
 {
     float at[GRID_MAX_CELL_VERTICES], thickness;
-    if (!kernel_linear_part(c, at, &thickness)) return true;
+    if (!kernel_linearize(c, at, &thickness)) return true;
     o->count = 0;
     for (int i = 0; i < c->count; i++) {
         if (fabsf(at[i]) <= thickness) kernel_outline_add(o, c, i, i, 0);

@@ -1,4 +1,4 @@
-/* Tets of a plain mesh, one a lane, placed for a tile and given their lines: the operations of kernel_tet_place(),
+/* Tets of a packed mesh, one a lane, placed for a tile and given their lines: the operations of kernel_tet_place(),
  * kernel_cell_order() and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes.
  * Vertices are put in order first, by coordinates that float32 has as they are, so that all else comes in order. What
  * is computed in double is computed in two halves. */
@@ -12,7 +12,7 @@
 #include "kernel_cell.h"
 #include "kernel_line.h"
 #include "kernel_packet.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_tet.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -49,7 +49,7 @@ SIMD_INLINE void kernel_ordered_swap(kernel_ordered *a, kernel_ordered *b)
 
 /* Neighbours alone change places, and equal ones do not: vertices in one place stay as they came. Lanes from count on
  * are as the first. */
-SIMD_INLINE void kernel_ordered_fetch(const kernel_plain *p, int32_t vertices[4][SIMD_WIDTH], int count,
+SIMD_INLINE void kernel_ordered_fetch(const kernel_packed *p, int32_t vertices[4][SIMD_WIDTH], int count,
                                       kernel_ordered spots[4])
 {
     for (int i = 0; i < 4; i++) {
@@ -124,7 +124,7 @@ SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, 
 }
 
 /* Lane by lane the four vertices of count tets; lanes from count on are set to the first's. */
-static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_plain *p,
+static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_packed *p,
                                                         const kernel_frame *f, const kernel_tile *tile,
                                                         int32_t vertices[4][SIMD_WIDTH], int count)
 {
@@ -156,7 +156,7 @@ SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_c
     c->doubt = placed->doubt[n];
 }
 
-/* What kernel_fine.h asks beside that. */
+/* What kernel_double.h asks beside that. */
 SIMD_INLINE void kernel_placed_exactly(const kernel_placed *placed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {

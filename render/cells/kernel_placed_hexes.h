@@ -1,7 +1,7 @@
-/* Hexes of a plain mesh, one a lane, placed for a tile and given their lines: the operations of kernel_cell_relative(),
- * kernel_place_in(), kernel_cell_order() and kernel_poly_lines(), and so the same bits, for as many hexes at once as a
- * vector has lanes. Vertices are turned into the order of coordinates first, so that all else comes in order. What is
- * computed in double is computed in two halves. */
+/* Hexes of a packed mesh, one a lane, placed for a tile and given their lines: the operations of
+ * kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_poly_lines(), and so the same bits, for as
+ * many hexes at once as a vector has lanes. Vertices are turned into the order of coordinates first, so that all else
+ * comes in order. What is computed in double is computed in two halves. */
 #ifndef RENDER_KERNEL_PLACED_HEXES_H
 #define RENDER_KERNEL_PLACED_HEXES_H
 
@@ -12,7 +12,7 @@
 #include "kernel_cell.h"
 #include "kernel_line.h"
 #include "kernel_packet.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_poly.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -104,7 +104,7 @@ SIMD_INLINE void kernel_turned_turn(kernel_turned_hexes *h)
     }
 }
 
-SIMD_INLINE void kernel_turned_fetch(kernel_turned_hexes *h, const kernel_plain *p, int32_t vertices[8][SIMD_WIDTH])
+SIMD_INLINE void kernel_turned_fetch(kernel_turned_hexes *h, const kernel_packed *p, int32_t vertices[8][SIMD_WIDTH])
 {
     for (int i = 0; i < 8; i++) {
         const int b = kernel_hex_bits[i];
@@ -260,7 +260,7 @@ SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_hexes *h)
 }
 
 /* The eight vertices of hexes, lane by lane. Returns the lanes of which some face is a triangle. */
-static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out, const kernel_plain *p,
+static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out, const kernel_packed *p,
                                                        const kernel_frame *f, const kernel_tile *tile,
                                                        int32_t vertices[8][SIMD_WIDTH],
                                                        const double isovalues[SIMD_WIDTH])

@@ -1,5 +1,5 @@
 /* Which of a tile's blocks a tet's outline meets, all of them at once: a block is a lane. The bounds of the outline
- * (kernel_outline_lie()) leave blocks that lie beside its slanted edges; two of five packets would be asked for
+ * (kernel_outline_placement()) leave blocks that lie beside its slanted edges; two of five packets would be asked for
  * nothing.
  *
  * An edge function is affine over the tile (kernel_line.h), so that over a block it is that of the block's middle, give

@@ -1,6 +1,6 @@
-/* The search of a subtree for what shows of it (kernel_shown.h), and what it asks of a cell alone: the pixels that its
- * isosurfaces, or all of it, may show in. Types of which there are many are asked for many at once
- * (kernel_shown_tets.h, kernel_shown_hexes.h). */
+/* The search of a subtree for what shows of it (kernel_candidates.h), and what it asks of a cell alone: the pixels that
+ * its isosurfaces, or all of it, may show in. Types of which there are many are asked for many at once
+ * (kernel_candidate_tets.h, kernel_candidate_hexes.h). */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
@@ -12,7 +12,7 @@
 #include "kernel_cell_values.h"
 #include "kernel_outline.h"
 #include "kernel_packet.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
 #include "render.h"
@@ -23,17 +23,17 @@ typedef struct kernel_tets {
     int count;
     uint32_t cell[SIMD_WIDTH];
     int64_t vertices[SIMD_WIDTH][GRID_MAX_CELL_VERTICES];
-    int32_t plain[8][SIMD_WIDTH]; /* the vertices of a plain mesh, instead; or of hexes */
+    int32_t packed[8][SIMD_WIDTH]; /* the vertices of a packed mesh, instead; or of hexes */
 } kernel_tets;
 
-/* Of a plain mesh's cells of so many vertices, lanes from count on are as the first. */
+/* Of a packed mesh's cells of so many vertices, lanes from count on are as the first. */
 SIMD_INLINE void kernel_tets_fill(kernel_tets *t, int vertices)
 {
     for (int n = t->count; n < SIMD_WIDTH; n++)
-        for (int i = 0; i < vertices; i++) t->plain[i][n] = t->plain[i][0];
+        for (int i = 0; i < vertices; i++) t->packed[i][n] = t->packed[i][0];
 }
 
-/* Hexes of a plain mesh that the isovalue under way crosses (kernel_shown_hexes.h). */
+/* Hexes of a packed mesh that the isovalue under way crosses (kernel_candidate_hexes.h). */
 typedef struct kernel_crossed_hexes {
     int count, value;
     uint32_t cell[SIMD_WIDTH];
@@ -47,22 +47,22 @@ typedef struct kernel_finder {
     const kernel_transfer *transfer; /* the volume's */
     const render_field *field;
     const kernel_interest *interest;
-    kernel_shown_list *list;
-    bool (*grow)(kernel_shown_list *list);
+    kernel_candidate_list *list;
+    bool (*grow)(kernel_candidate_list *list);
     int part;
     uint32_t source;     /* of the layer's first isovalue */
     kernel_tile picture; /* all of it as one tile, about the axis of view */
     kernel_planes planes;
     float t_near, column_scale, row_scale, column_0, row_0;
     kernel_cell cell;
-    uint32_t coming[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
+    uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
     kernel_tets tets;            /* tets whose vertices are */
     kernel_crossed_hexes hexes;
-    kernel_plain plain;
-    int coming_count;
+    kernel_packed packed;
+    int queued_count;
     /* The other end: what is crossed is kept, and the picture is not asked. */
-    kernel_keeper *keeper; /* NULL: none */
-    bool (*keep)(kernel_keeper *keeper);
+    kernel_active_writer *writer; /* NULL: none */
+    bool (*keep)(kernel_active_writer *writer);
 } kernel_finder;
 
 /* The least float that is not below x. */
@@ -93,13 +93,13 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
-    s->coming_count = s->tets.count = s->hexes.count = s->hexes.value = 0;
-    s->keeper = NULL;
+    s->queued_count = s->tets.count = s->hexes.count = s->hexes.value = 0;
+    s->writer = NULL;
     if (s->surface)
-        kernel_plain_surface(&s->plain, f, subtree->surface, s->part);
+        kernel_packed_surface(&s->packed, f, subtree->surface, s->part);
     else
-        kernel_plain_begin(&s->plain, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
-    s->plain.is_hexes = s->plain.is_hexes && s->surface;
+        kernel_packed_begin(&s->packed, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
+    s->packed.is_hexes = s->packed.is_hexes && s->surface;
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);
@@ -151,8 +151,8 @@ SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, in
 
 /* Of a cell whose surface has these depths and columns and rows, relative to the axis of view, size the largest depth
  * of anything in it. Where some of it is near the eye's plane or behind it, it may be anywhere. */
-SIMD_INLINE bool kernel_extents_shown(const kernel_finder *s, kernel_extent depth, float size, kernel_extent columns,
-                                      kernel_extent rows, kernel_shown *out)
+SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent depth, float size,
+                                          kernel_extent columns, kernel_extent rows, kernel_candidate *out)
 {
     const render_camera *camera = &s->frame->job->camera;
     const float pad = KERNEL_OUTLINE_PAD * size;
@@ -173,7 +173,7 @@ SIMD_INLINE bool kernel_extents_shown(const kernel_finder *s, kernel_extent dept
            kernel_extent_range(rows, s->row_0, blur * fabsf(s->row_scale), camera->height, &out->y0, &out->y1);
 }
 
-SIMD_INLINE bool kernel_outline_shown(const kernel_finder *s, kernel_outline *o, kernel_shown *out)
+SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline *o, kernel_candidate *out)
 {
     kernel_outline_fill(o);
     const kernel_extent depth = kernel_extent_of(o, vf_set(1), o->point[2], NULL);
@@ -181,7 +181,7 @@ SIMD_INLINE bool kernel_outline_shown(const kernel_finder *s, kernel_outline *o,
     const float *by = s->frame->job->camera.is_orthographic ? NULL : o->point[2];
     const kernel_extent columns = kernel_extent_of(o, vf_set(s->column_scale), o->point[0], by);
     const kernel_extent rows = kernel_extent_of(o, vf_set(s->row_scale), o->point[1], by);
-    return kernel_extents_shown(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
+    return kernel_extents_candidate(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
 }
 
 /* ---- hexes: kernel_slab_outline() with a pair of vertices a lane ---- */
@@ -213,8 +213,8 @@ SIMD_INLINE void kernel_slab_add(const kernel_finder *s, kernel_slab_ends *e, vm
 }
 
 /* L at the vertices, and the slab's thickness. */
-SIMD_INLINE bool kernel_slab_shown(const kernel_finder *s, const kernel_cell *c, const float values[16],
-                                   float thickness, kernel_shown *out)
+SIMD_INLINE bool kernel_slab_candidate(const kernel_finder *s, const kernel_cell *c, const float values[16],
+                                       float thickness, kernel_candidate *out)
 {
     static const int32_t from[KERNEL_HEX_PAIRS] = {1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 5, 6,
                                                    6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 7, 0, 0, 0, 0};
@@ -253,11 +253,12 @@ SIMD_INLINE bool kernel_slab_shown(const kernel_finder *s, const kernel_cell *c,
     if (!vm_any(ends.any)) return false;
     kernel_extent extents[3];
     for (int a = 0; a < 3; a++) extents[a] = (kernel_extent){vf_reduce_min(ends.low[a]), vf_reduce_max(ends.high[a])};
-    return kernel_extents_shown(s, extents[0], kernel_largest(c->z, 8) + fabsf(s->t_near), extents[1], extents[2], out);
+    return kernel_extents_candidate(s, extents[0], kernel_largest(c->z, 8) + fabsf(s->t_near), extents[1], extents[2],
+                                    out);
 }
 
 /* One more in each of its tiles. Most have one, or two side by side: no branch foresees which. */
-SIMD_INLINE void kernel_count_tiles(kernel_shown_list *list, int x0, int x1, int y0, int y1)
+SIMD_INLINE void kernel_count_tiles(kernel_candidate_list *list, int x0, int x1, int y0, int y1)
 {
     const int left = x0 / KERNEL_TILE, columns = x1 / KERNEL_TILE - left, top = y0 / KERNEL_TILE,
               rows = y1 / KERNEL_TILE - top;
@@ -274,19 +275,19 @@ SIMD_INLINE void kernel_count_tiles(kernel_shown_list *list, int x0, int x1, int
         for (int x = 0; x <= columns; x++) first[y * list->tile_columns + x]++;
 }
 
-SIMD_INLINE void kernel_add_shown(kernel_finder *s, const kernel_shown *shown)
+SIMD_INLINE void kernel_add_candidate(kernel_finder *s, const kernel_candidate *candidate)
 {
-    kernel_shown_list *list = s->list;
+    kernel_candidate_list *list = s->list;
     if (list->count == list->capacity && !s->grow(list)) return;
-    list->items[list->count++] = *shown;
-    kernel_count_tiles(list, shown->x0, shown->x1, shown->y0, shown->y1);
+    list->items[list->count++] = *candidate;
+    kernel_count_tiles(list, candidate->x0, candidate->x1, candidate->y0, candidate->y1);
 }
 
 static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
 {
     const grid *g = s->frame->job->parts[s->part].cells;
     kernel_outline o = {0};
-    kernel_shown shown = {.cell = index, .source = s->source};
+    kernel_candidate candidate = {.cell = index, .source = s->source};
     /* The corners of the vertices' box. */
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     grid_walk walk = grid_walk_cell(g, index);
@@ -305,7 +306,7 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     for (int i = 0; i < 8; i++)
         for (int a = 0; a < 3; a++) o.point[a][i] = i >> a & 1 ? high[a] : low[a];
     for (int a = 0; a < 3; a++) o.size[a] = simd_max(fabsf(low[a]), fabsf(high[a]));
-    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+    if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
 /* One isovalue of the fetched cell. */
@@ -314,21 +315,21 @@ static void kernel_find_value(kernel_finder *s, int value)
     const render_surface_layer *layer = s->surface->layer;
     kernel_cell *c = &s->cell;
     kernel_outline o;
-    kernel_shown shown = {.cell = c->index, .source = s->source + (uint32_t)value};
+    kernel_candidate candidate = {.cell = c->index, .source = s->source + (uint32_t)value};
     float at[16] = {0}, thickness;
     if (!kernel_cell_straddles(c, layer->values[value])) return;
     if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_cell_relative(c, layer->values[value]);
     if (c->type == GRID_TET) {
         if (!kernel_tet_outline(c, &o)) return;
-    } else if (c->type == GRID_HEX && kernel_linear_part(c, at, &thickness)) {
-        if (kernel_slab_shown(s, c, at, thickness, &shown)) kernel_add_shown(s, &shown);
+    } else if (c->type == GRID_HEX && kernel_linearize(c, at, &thickness)) {
+        if (kernel_slab_candidate(s, c, at, thickness, &candidate)) kernel_add_candidate(s, &candidate);
         return;
     } else {
         kernel_vertex_outline(c, &o);
         if (!kernel_slab_outline(c, &o)) return;
     }
-    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+    if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
 /* All of the fetched cell, in the volume. */
@@ -336,11 +337,11 @@ static void kernel_find_volume(kernel_finder *s)
 {
     kernel_cell *c = &s->cell;
     kernel_outline o;
-    kernel_shown shown = {.cell = c->index, .source = s->source};
+    kernel_candidate candidate = {.cell = c->index, .source = s->source};
     if (!kernel_cell_shows(c, s->transfer)) return;
     kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_vertex_outline(c, &o);
-    if (kernel_outline_shown(s, &o, &shown)) kernel_add_shown(s, &shown);
+    if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
 /* What of the fetched cell shows. */

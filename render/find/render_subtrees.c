@@ -42,10 +42,10 @@ static void add_records(render_subtrees *list, int64_t count, int surface, int p
 
 void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part)
 {
-    const kernel_kept *kept =
-        surface >= 0 && frame->kept ? &frame->kept[surface * frame->job->part_count + part] : NULL;
-    if (kept && kept->records)
-        add_records(list, kept->count, surface, part);
+    const kernel_active *active =
+        surface >= 0 && frame->active ? &frame->active[surface * frame->job->part_count + part] : NULL;
+    if (active && active->records)
+        add_records(list, active->count, surface, part);
     else
         add_tree(list, frame->job->parts[part].tree, surface, part);
 }

@@ -198,13 +198,14 @@ SIMD_INLINE void kernel_sides_add(kernel_sides *s, int v, vf low, vf high)
 }
 
 /* How a body lies: the blocks it may meet, its least and greatest depth, and its place along the tile's direction. */
-typedef struct kernel_lie {
+typedef struct kernel_placement {
     unsigned blocks;
     float near, far, along;
-} kernel_lie;
+} kernel_placement;
 
-/* On which sides a node's box is; of its lie all but the blocks. */
-SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *tree, int64_t node, kernel_lie *lie)
+/* On which sides a node's box is; of its placement all but the blocks. */
+SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *tree, int64_t node,
+                                          kernel_placement *placement)
 {
     float lower[4], upper[4];
     kernel_sides sides = {0, 0};
@@ -217,19 +218,19 @@ SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *t
         const vf reach = (q->size[0][v] * half[0] + q->size[1][v] * half[1]) + (q->size[2][v] * half[2] + q->error[v]);
         kernel_sides_add(&sides, v, at - reach, at + reach);
         if (v == KERNEL_DEPTH_LANE / SIMD_WIDTH) {
-            lie->near = (at - reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            lie->far = (at + reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            lie->along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
+            placement->near = (at - reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            placement->far = (at + reach)[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            placement->along = at[KERNEL_ALONG_LANE % SIMD_WIDTH];
         }
     }
     return sides;
 }
 
-SIMD_INLINE kernel_lie kernel_box_lie(const kernel_planes *q, const mmbvh *tree, int64_t node)
+SIMD_INLINE kernel_placement kernel_box_placement(const kernel_planes *q, const mmbvh *tree, int64_t node)
 {
-    kernel_lie lie = {0};
-    lie.blocks = kernel_blocks_of(kernel_box_sides(q, tree, node, &lie));
-    return lie;
+    kernel_placement placement = {0};
+    placement.blocks = kernel_blocks_of(kernel_box_sides(q, tree, node, &placement));
+    return placement;
 }
 
 /* Points in tile space. */
@@ -244,10 +245,10 @@ typedef struct kernel_outline {
 /* Pads of a hundred-thousandth of the cell and its place: rays that hit by a rounding have theirs wholly within. */
 #define KERNEL_OUTLINE_PAD 1e-5f
 
-SIMD_INLINE kernel_lie kernel_outline_lie(const kernel_planes *q, const kernel_outline *o)
+SIMD_INLINE kernel_placement kernel_outline_placement(const kernel_planes *q, const kernel_outline *o)
 {
     kernel_sides sides = {0, 0};
-    kernel_lie lie = {0};
+    kernel_placement placement = {0};
     for (int v = 0; v < KERNEL_LANE_VECTORS; v++) {
         vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
         for (int i = 0; i < o->count; i++) {
@@ -262,12 +263,12 @@ SIMD_INLINE kernel_lie kernel_outline_lie(const kernel_planes *q, const kernel_o
         high += size * KERNEL_OUTLINE_PAD;
         kernel_sides_add(&sides, v, low, high);
         if (v == KERNEL_DEPTH_LANE / SIMD_WIDTH) {
-            lie.near = low[KERNEL_DEPTH_LANE % SIMD_WIDTH];
-            lie.far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            placement.near = low[KERNEL_DEPTH_LANE % SIMD_WIDTH];
+            placement.far = high[KERNEL_DEPTH_LANE % SIMD_WIDTH];
         }
     }
-    lie.blocks = kernel_blocks_of(sides);
-    return lie;
+    placement.blocks = kernel_blocks_of(sides);
+    return placement;
 }
 
 #endif

@@ -68,9 +68,9 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
 /* Blocks in which a body of this outline may show. */
 SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
 {
-    const kernel_lie lie = kernel_outline_lie(&t->tile_planes, outline);
-    if (lie.far < t->t_near) return 0;
-    return blocks & lie.blocks & kernel_blocks_beyond(t, lie.near);
+    const kernel_placement placement = kernel_outline_placement(&t->tile_planes, outline);
+    if (placement.far < t->t_near) return 0;
+    return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
 }
 
 /* The farthest that a block knows of. */

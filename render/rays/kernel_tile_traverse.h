@@ -19,14 +19,14 @@ typedef struct kernel_tile_entry {
 typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
 
 /* Where the node may be met, of blocks: none where it does not show. interest NULL: everything shows. */
-SIMD_INLINE kernel_lie kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                        const kernel_interest *interest, int64_t node, unsigned blocks)
+SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                              const kernel_interest *interest, int64_t node, unsigned blocks)
 {
-    kernel_lie lie = {0};
-    if (interest && !kernel_node_shows(interest, ranges, node)) return lie;
-    lie = kernel_box_lie(&t->tree_planes, tree, node);
-    lie.blocks &= lie.far < t->t_near ? 0 : blocks;
-    if (lie.blocks) {
+    kernel_placement placement = {0};
+    if (interest && !kernel_node_shows(interest, ranges, node)) return placement;
+    placement = kernel_box_placement(&t->tree_planes, tree, node);
+    placement.blocks &= placement.far < t->t_near ? 0 : blocks;
+    if (placement.blocks) {
         /* What comes next of it, if it is an inner node or a leaf. */
         const int64_t ref = mmbvh_node_ref(tree, node);
         if (mmbvh_node_count(tree, node))
@@ -34,7 +34,7 @@ SIMD_INLINE kernel_lie kernel_tile_look(const kernel_tile_trace *t, const mmbvh 
         else if (interest)
             __builtin_prefetch(ranges->low + ref * ranges->stride);
     }
-    return lie;
+    return placement;
 }
 
 SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
@@ -44,7 +44,7 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
     kernel_tile_entry stack[MMBVH_MAX_DEPTH + 1];
     int top = 0;
     if (!tree->node_count) return;
-    const kernel_lie root = kernel_tile_look(t, tree, ranges, interest, 0, blocks);
+    const kernel_placement root = kernel_tile_look(t, tree, ranges, interest, 0, blocks);
     if (root.blocks) stack[top++] = (kernel_tile_entry){0, root.near, root.blocks};
     while (top) {
         const kernel_tile_entry e = stack[--top];
@@ -56,8 +56,8 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
             visit(t, part, tree->cells + ref, count, blocks);
             continue;
         }
-        const kernel_lie left = kernel_tile_look(t, tree, ranges, interest, ref, blocks);
-        const kernel_lie right = kernel_tile_look(t, tree, ranges, interest, ref + 1, blocks);
+        const kernel_placement left = kernel_tile_look(t, tree, ranges, interest, ref, blocks);
+        const kernel_placement right = kernel_tile_look(t, tree, ranges, interest, ref + 1, blocks);
         const kernel_tile_entry entries[2] = {{ref, left.near, left.blocks}, {ref + 1, right.near, right.blocks}};
         const int far = left.along < right.along;
         if (entries[far].blocks) stack[top++] = entries[far];

@@ -15,7 +15,7 @@ enum {
     KERNEL_BLOCK = 4, /* pixels along its side */
     KERNEL_MAX_GROUP = 64,
     KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS,
-    KERNEL_KEPT_FLOATS = 4 /* of a vertex */
+    KERNEL_ACTIVE_FLOATS = 4 /* of a vertex */
 };
 
 /* Values that show: a node whose range meets none of these intervals is skipped. Rounded outward. */
@@ -47,41 +47,41 @@ typedef struct kernel_surface {
 } kernel_surface;
 
 /* Where a cell's surface of an isovalue, or its volume, may show: its depths, and pixels, ends included. */
-typedef struct kernel_shown {
+typedef struct kernel_candidate {
     uint32_t cell;
     uint32_t source; /* part * RENDER_MAX_ISOVALUES + index into the frame's isovalues; of a volume: part */
     float near, far;
     uint16_t x0, x1, y0, y1;
-} kernel_shown;
+} kernel_candidate;
 
 /* The same for one tile: a bit a block; and the first and last column, first and last row of pixels, from the low bits
  * on. */
-typedef struct kernel_tile_shown {
+typedef struct kernel_tile_candidate {
     float near;
     union {
         float far;
-        int32_t next; /* of a surface's, in the tile: kernel_tile_shown.h */
+        int32_t next; /* of a surface's, in the tile: kernel_tile_candidates.h */
     };
     uint32_t cell, source;
     uint16_t blocks, box;
-} kernel_tile_shown;
+} kernel_tile_candidate;
 
 /* A list is a chain of chunks, none of which moves. */
-typedef struct kernel_shown_chunk {
-    struct kernel_shown_chunk *before;
+typedef struct kernel_candidate_chunk {
+    struct kernel_candidate_chunk *before;
     int64_t count; /* of one that is full */
-    kernel_shown items[];
-} kernel_shown_chunk;
+    kernel_candidate items[];
+} kernel_candidate_chunk;
 
-typedef struct kernel_shown_list {
-    kernel_shown_chunk *chunk; /* the one that is filled; NULL at first */
-    kernel_shown *items;       /* its own, */
-    int64_t count, capacity;   /* count of which are filled */
-    uint32_t *counts;          /* of a picture's tiles, row by row: how many of all there are of each */
+typedef struct kernel_candidate_list {
+    kernel_candidate_chunk *chunk; /* the one that is filled; NULL at first */
+    kernel_candidate *items;       /* its own, */
+    int64_t count, capacity;       /* count of which are filled */
+    uint32_t *counts;              /* of a picture's tiles, row by row: how many of all there are of each */
     int tile_columns;
     bool is_full;   /* no more are wanted: memory ran out, or the bound is reached */
     int64_t *bound; /* how many more all lists together may have room for */
-} kernel_shown_list;
+} kernel_candidate_list;
 
 /* A subtree to look for them in, or so many records that are kept, from the first on. */
 typedef struct kernel_subtree {
@@ -90,24 +90,24 @@ typedef struct kernel_subtree {
 } kernel_subtree;
 
 /* The cells of a part that a layer's isovalues cross, side by side: of each its vertices in their order, of each vertex
- * x, y, z and the value (render_kept.h). Tets or hexes. */
-typedef struct kernel_kept {
+ * x, y, z and the value (render_active_cells.h). Tets or hexes. */
+typedef struct kernel_active {
     const float *records;
     int64_t count;
     int vertices; /* of a cell */
-} kernel_kept;
+} kernel_active;
 
 /* No larger are a kept cell's values; nor its coordinates and the eye's times the space's scale. */
-#define KERNEL_KEPT_VALUE 4e29f
-#define KERNEL_KEPT_PLACE 4e14f
+#define KERNEL_ACTIVE_VALUE 4e29f
+#define KERNEL_ACTIVE_PLACE 4e14f
 
 /* One thread's share of them while they are put there. */
-typedef struct kernel_keeper {
+typedef struct kernel_active_writer {
     float *at, *end;        /* of its room */
     int vertices;           /* of a cell */
     bool is_refused;        /* none are to be kept: of another mesh, with odd numbers, or too many */
-    struct kernel_room *of; /* render_kept.c */
-} kernel_keeper;
+    struct kernel_room *of; /* render_active_cells.c */
+} kernel_active_writer;
 
 typedef struct kernel_isovalue {
     int surface, value;
@@ -119,10 +119,11 @@ typedef struct kernel_frame {
     kernel_surface *surfaces; /* opaque ones first */
     int opaque_count;
     kernel_isovalue isovalues[RENDER_MAX_ISOVALUES];
-    const kernel_kept *kept;  /* surface by surface, part by part: records NULL where none are; NULL: nowhere */
-    kernel_tile_shown *shown; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
-    uint32_t *shown_starts;
-    kernel_tile_shown *volume_shown; /* the same of the volume's cells */
+    const kernel_active *active; /* surface by surface, part by part: records NULL where none are; NULL: nowhere */
+    kernel_tile_candidate
+        *candidates; /* tile by tile, from starts[tile] to starts[tile + 1]; NULL: tiles go down the trees */
+    uint32_t *candidate_starts;
+    kernel_tile_candidate *volume_candidates; /* the same of the volume's cells */
     uint32_t *volume_starts;
     kernel_transfer volumes[RENDER_MAX_VOLUMES];
     double scaled_axes[3][3];  /* right, up, forward, each times the space's scale */
@@ -138,9 +139,9 @@ typedef struct kernel_frame {
     bool by_tiles;      /* surfaces and samples are traced a tile at a time */
     bool needs_packets; /* rays go down trees on their own beside that: for differences */
     bool has_segments;  /* volumes are integrated by segments, else sampled; */
-    bool is_fine;       /* their ends are taken in double (kernel_fine.h) */
+    bool is_double;     /* their ends are taken in double (kernel_double.h) */
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
-    float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_course.h */
+    float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_span.h */
     bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there
                          */
 } kernel_frame;
@@ -179,11 +180,11 @@ typedef struct kernel_table {
     /* Trace the tile of pixels whose upper left one is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
     /* What may show of the subtree is added to the list; grow() makes room for more, or the list full. */
-    void (*find_shown)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
-                       kernel_shown_list *list, bool (*grow)(kernel_shown_list *list));
+    void (*find_candidates)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
+                            kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
     /* Keep what the surface's isovalues cross of the subtree, whether or not it shows in the picture. */
-    void (*keep_crossed)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
-                         kernel_keeper *keeper, bool (*grow)(kernel_keeper *keeper));
+    void (*write_active)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
+                         kernel_active_writer *writer, bool (*grow)(kernel_active_writer *writer));
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

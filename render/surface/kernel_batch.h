@@ -1,4 +1,4 @@
-/* Tets of a plain mesh, as many at once as there are lanes, in a tile that traces what is binned there:
+/* Tets of a packed mesh, as many at once as there are lanes, in a tile that traces what is binned there:
  *
  *     lanes are cells:     fetched, ordered, placed, edge functions' lines          (once a batch)
  *     lanes are pixels:    each with the lines of its own cell                      (cells of few pixels)
@@ -20,7 +20,7 @@
 #include "kernel_line.h"
 #include "kernel_packet.h"
 #include "kernel_placed.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_surface.h"
 #include "kernel_tet.h"
 #include "kernel_tile_surface.h"
@@ -37,8 +37,8 @@ enum {
 
 typedef struct kernel_batch {
     int count, layer, part; /* -1: of none yet */
-    kernel_plain plain;     /* of the layer's field on the part */
-    bool is_for_it;         /* its cells may be put into batches */
+    kernel_packed packed;   /* of the layer's field on the part */
+    bool takes_batches;     /* its cells may be put into batches */
     /* cell by cell */
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
@@ -355,7 +355,7 @@ SIMD_INLINE void kernel_batch_rays_of(kernel_batch *b, int n, int columns, int r
 
 static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b)
 {
-    kernel_place_tets(&b->tets, &b->plain, t->frame, &t->tile, b->vertex, b->count);
+    kernel_place_tets(&b->tets, &b->packed, t->frame, &t->tile, b->vertex, b->count);
     kernel_batch_relative(b);
     b->has_normals = false;
     b->ray_count = 0;
@@ -401,8 +401,8 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     }
     b->layer = layer;
     b->part = part;
-    kernel_plain_surface(&b->plain, t->frame, layer, part);
-    b->is_for_it = b->plain.is_so && kernel_tile_layer_batches(t);
+    kernel_packed_surface(&b->packed, t->frame, layer, part);
+    b->takes_batches = b->packed.is_tets && kernel_tile_layer_batches(t);
 }
 
 /* The last ones. */
@@ -413,19 +413,20 @@ SIMD_INLINE void kernel_batch_end(kernel_tile_trace *t, kernel_batch *b)
     kernel_batch_run(t, b);
 }
 
-SIMD_INLINE void kernel_batch_add(kernel_tile_trace *t, kernel_batch *b, const kernel_tile_shown *shown, int value)
+SIMD_INLINE void kernel_batch_add(kernel_tile_trace *t, kernel_batch *b, const kernel_tile_candidate *candidate,
+                                  int value)
 {
     if (b->count == SIMD_WIDTH) kernel_batch_run(t, b);
     const int n = b->count++;
-    b->cell[n] = shown->cell;
-    b->blocks[n] = shown->blocks;
-    b->box[n] = shown->box;
-    b->near[n] = shown->near;
+    b->cell[n] = candidate->cell;
+    b->blocks[n] = candidate->blocks;
+    b->box[n] = candidate->box;
+    b->near[n] = candidate->near;
     b->value[n] = value;
     b->isovalue[n] = t->surface->layer->values[value];
-    for (int i = 0; i < 4; i++) b->vertex[i][n] = kernel_plain_vertex(&b->plain, shown->cell, 4, i);
-    for (int i = 0; i < 4; i++) kernel_plain_prefetch(&b->plain, b->vertex[i][n]);
-    for (unsigned blocks = shown->blocks & ~t->begun; blocks; blocks &= blocks - 1)
+    for (int i = 0; i < 4; i++) b->vertex[i][n] = kernel_packed_vertex(&b->packed, candidate->cell, 4, i);
+    for (int i = 0; i < 4; i++) kernel_packed_prefetch(&b->packed, b->vertex[i][n]);
+    for (unsigned blocks = candidate->blocks & ~t->begun; blocks; blocks &= blocks - 1)
         kernel_block_begin(t, __builtin_ctz(blocks));
 }
 

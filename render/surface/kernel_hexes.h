@@ -28,7 +28,7 @@
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_placed_hexes.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_poly.h"
 #include "kernel_roots.h"
 #include "kernel_surface.h"
@@ -41,7 +41,7 @@
 
 typedef struct kernel_hexes {
     int count, layer, part; /* -1: of none yet */
-    kernel_plain plain;     /* of the layer's field on the part: if it is of hexes, */
+    kernel_packed packed;   /* of the layer's field on the part: if it is of hexes, */
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH]; /* cells wait to be placed together */
     double isovalue[SIMD_WIDTH];
@@ -379,7 +379,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
         for (int i = 0; i < 8; i++) h->vertex[i][n] = h->vertex[i][0];
         h->isovalue[n] = h->isovalue[0];
     }
-    const vm collapsed = kernel_place_hexes(&h->placed, &h->plain, t->frame, &t->tile, h->vertex, h->isovalue);
+    const vm collapsed = kernel_place_hexes(&h->placed, &h->packed, t->frame, &t->tile, h->vertex, h->isovalue);
     kernel_hexes_bound((const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
     h->ready = 0;
     for (int n = 0; n < h->count; n++) {
@@ -397,7 +397,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
 
 static __attribute__((noinline)) void kernel_hexes_run(kernel_tile_trace *t, kernel_hexes *h)
 {
-    if (h->plain.is_hexes) kernel_hexes_place(t, h);
+    if (h->packed.is_hexes) kernel_hexes_place(t, h);
     if (h->rays.count) kernel_hexes_trace(t, h);
     h->count = 0;
 }
@@ -413,13 +413,13 @@ SIMD_INLINE void kernel_hexes_end(kernel_tile_trace *t, kernel_hexes *h)
 }
 
 /* What is added from now on is of the part and the layer under way. */
-SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const kernel_plain *plain, int part)
+SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const kernel_packed *packed, int part)
 {
     if (h->layer == t->layer && h->part == part) return;
     kernel_hexes_end(t, h);
     h->layer = t->layer;
     h->part = part;
-    h->plain = *plain;
+    h->packed = *packed;
 }
 
 /* Are hexes of the layer under way for batches? */
@@ -429,25 +429,26 @@ SIMD_INLINE bool kernel_hexes_layer_fits(const kernel_tile_trace *t)
 }
 
 /* Those of the mesh, all together? */
-SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t, const kernel_plain *plain)
+SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t, const kernel_packed *packed)
 {
-    return plain->is_hexes && kernel_hexes_layer_fits(t);
+    return packed->is_hexes && kernel_hexes_layer_fits(t);
 }
 
-/* A hex of a plain mesh waits. */
-SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_shown *shown, int value)
+/* A hex of a packed mesh waits. */
+SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_candidate *candidate,
+                                   int value)
 {
     if (h->count == SIMD_WIDTH) kernel_hexes_run(t, h);
     const int n = h->count++;
-    h->cell[n] = shown->cell;
-    h->blocks[n] = shown->blocks;
-    h->box[n] = shown->box;
-    h->near[n] = shown->near;
+    h->cell[n] = candidate->cell;
+    h->blocks[n] = candidate->blocks;
+    h->box[n] = candidate->box;
+    h->near[n] = candidate->near;
     h->value[n] = value;
     h->isovalue[n] = t->surface->layer->values[value];
     for (int i = 0; i < 8; i++) {
-        h->vertex[i][n] = kernel_plain_vertex(&h->plain, shown->cell, 8, i);
-        kernel_plain_prefetch(&h->plain, h->vertex[i][n]);
+        h->vertex[i][n] = kernel_packed_vertex(&h->packed, candidate->cell, 8, i);
+        kernel_packed_prefetch(&h->packed, h->vertex[i][n]);
     }
 }
 
@@ -464,7 +465,8 @@ SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell
 }
 
 /* The tile's cell is put to the others. */
-SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_shown *shown, int value)
+SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_candidate *candidate,
+                                  int value)
 {
     if (h->count == SIMD_WIDTH) kernel_hexes_run(t, h);
     const int n = h->count++;
@@ -472,10 +474,10 @@ SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const k
     h->polys[n] = *t->poly;
     h->ready |= 1u << n;
     h->value[n] = value;
-    h->near[n] = shown->near;
+    h->near[n] = candidate->near;
     kernel_hexes_bounds_put(&h->bounds, n, &t->poly->bounds, t->cell->z);
     kernel_placed_hex_put(&h->placed, n, t->cell);
-    kernel_hexes_rays_of(t, h, n, shown->box, shown->blocks);
+    kernel_hexes_rays_of(t, h, n, candidate->box, candidate->blocks);
 }
 
 #endif

@@ -14,7 +14,7 @@
  *
  * A piece whose coefficients are all farther from 0 than G dev has no root; one whose derivative's coefficients are
  * all of one sign and farther from 0 than their bound has one root where the ends' signs differ, else none; any other
- * piece is halved, the nearer half first. At 2^-12 of the interval halving ends: a pair of roots that is missed there
+ * piece is halved, the nearer half first. At 2^-12 of the interval bisection ends: a pair of roots that is missed there
  * dips below 0 by at most |F''| (2^-12)^2 / 8 < 16 · 7.5e-9 of the range, which is float32's own rounding of F.
  *
  * Before any of that bounds of the whole cell are asked (kernel_bounds.h): where the field is monotone along every ray

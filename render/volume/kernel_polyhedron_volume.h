@@ -6,7 +6,7 @@
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
 #include "kernel_cell_values.h"
-#include "kernel_course.h"
+#include "kernel_span.h"
 #include "kernel_interest.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
@@ -42,13 +42,13 @@ static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
         const vf t = kernel_sample_t(p, s->first + n);
         vm own = vm_and(stay->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
         if (!vm_any(own)) continue;
-        const vf value = piece->v0 + slope * (t - piece->t0), kept = s->value[state->volume][n];
-        const vm apart = vm_and(own, vf_eq(kept, kept));
+        const vf value = piece->v0 + slope * (t - piece->t0), active = s->value[state->volume][n];
+        const vm apart = vm_and(own, vf_eq(active, active));
         if (__builtin_expect(vm_any(apart), 0)) {
             kernel_emit_sample(p, state, &stay->interval, apart, t, value);
             own = vm_andnot(own, apart);
         }
-        s->value[state->volume][n] = vf_select(own, value, kept);
+        s->value[state->volume][n] = vf_select(own, value, active);
         if (p->frame->needs_contact) {
             s->t_in[n] = vf_select(own, stay->interval.t_in, s->t_in[n]);
             s->t_out[n] = vf_select(own, stay->interval.t_out, s->t_out[n]);
@@ -103,8 +103,8 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
     kernel_passage r;
     kernel_stay stay;
     if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
-    kernel_course course = {.map = NULL};
-    if (state->mixing > 0) kernel_course_bound(state, c->f, c->vertex_count, &course);
+    kernel_span span = {.map = NULL};
+    if (state->mixing > 0) kernel_span_bound(state, c->f, c->vertex_count, &span);
     while (kernel_passage_next(&r, &stay)) {
         if (!c->is_constant) kernel_passage_profile(p, c, rays, false, &r, &stay);
         kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
@@ -113,8 +113,8 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
             kernel_profile_next(&r, &stay, stay.u_out, &piece);
             const kernel_interval i = {
                 .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
-            course.interval = &i;
-            kernel_course_run(p, state, &course);
+            span.interval = &i;
+            kernel_span_run(p, state, &span);
             open = kernel_profile_open(&stay, &piece, open);
         }
     }

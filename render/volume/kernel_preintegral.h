@@ -24,10 +24,10 @@
  * are exact; their own rounding is in o. The mean is taken as one of positive terms, so that nothing cancels however
  * close the two ends are.
  *
- * The budget (docs/error_budget.md). A segment may be wrong by 0.15 max_error A + 0.05 max_error L / reach, both times the
- * light that gets there: summed over a ray no more than 0.2 max_error. A segment for which that does not suffice is cut
- * into parts, equal in values; what is wrong of the absorption falls with the square of their number. Where they would
- * be too many, and where a bin is not fine enough, kernel_integrate() has it. */
+ * The budget (docs/error_budget.md). A segment may be wrong by 0.15 max_error A + 0.05 max_error L / reach, both times
+ * the light that gets there: summed over a ray no more than 0.2 max_error. A segment for which that does not suffice is
+ * cut into subintervals, equal in values; what is wrong of the absorption falls with the square of their number. Where
+ * they would be too many, and where a bin is not fine enough, kernel_integrate() has it. */
 #ifndef RENDER_KERNEL_PREINTEGRAL_H
 #define RENDER_KERNEL_PREINTEGRAL_H
 
@@ -35,7 +35,7 @@
 #include "kernel_pieces.h"
 #include "simd.h"
 
-/* The most parts of a segment. */
+/* The most subintervals of a segment. */
 #define KERNEL_PRE_PARTS 32.0f
 
 /* A ray's place in the tables. */
@@ -45,11 +45,11 @@ typedef struct kernel_pre_end {
     vi before[4], colour; /* those of the bins before it */
 } kernel_pre_end;
 
-/* What a segment or a part of it is. */
-typedef struct kernel_pre_part {
+/* What a segment or a subinterval of it is. */
+typedef struct kernel_pre_subinterval {
     vf colour[3], depth, absorbed;
     vf error, rough, allowed; /* error: of the absorption within; rough: of the tables */
-} kernel_pre_part;
+} kernel_pre_subinterval;
 
 SIMD_INLINE void kernel_pre_find(const kernel_preintegral *t, vf value, kernel_pre_end *e)
 {
@@ -102,7 +102,7 @@ SIMD_INLINE vf kernel_pre_bend(const kernel_preintegral *t, vf v0, vf v1)
 }
 
 SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pre_end *a, const kernel_pre_end *b,
-                                    vf length, kernel_pre_part *out)
+                                    vf length, kernel_pre_subinterval *out)
 {
     const vf one = vf_set(1), bins = vf_abs(b->bin - a->bin);
     const vm same = vf_eq(a->bin, b->bin), rising = vf_lt(a->bin, b->bin);
@@ -131,25 +131,27 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }
 
-/* The segment in count parts, equal in values: each ray's own count, so that it does not depend on those beside it. */
-static __attribute__((noinline)) void kernel_pre_parts(const kernel_preintegral *t, const kernel_pre_end *from,
-                                                       vf v_out, vf length, vf count, int most, kernel_pre_part *all)
+/* The segment in count subintervals, equal in values: each ray's own count, so that it does not depend on those beside
+ * it. */
+static __attribute__((noinline)) void kernel_pre_subdivide(const kernel_preintegral *t, const kernel_pre_end *from,
+                                                           vf v_out, vf length, vf count, int most,
+                                                           kernel_pre_subinterval *all)
 {
     const vf zero = vf_set(0), share = 1.0f / count, rise = (v_out - from->value) * share;
     kernel_pre_end ends[2] = {*from};
     vf clear = vf_set(1), rough = zero;
-    *all = (kernel_pre_part){{zero, zero, zero}, zero, zero, zero, zero, zero};
+    *all = (kernel_pre_subinterval){{zero, zero, zero}, zero, zero, zero, zero, zero};
     for (int n = 1; n <= most; n++) {
         const vf number = vf_set((float)n);
         const vm inner = vf_lt(number, count), open = vf_le(number, count);
-        kernel_pre_part part;
+        kernel_pre_subinterval sub;
         kernel_pre_find(t, vf_select(inner, from->value + rise * number, v_out), &ends[n & 1]);
-        kernel_pre_between(t, &ends[~n & 1], &ends[n & 1], vf_select(open, length * share, zero), &part);
-        for (int c = 0; c < 3; c++) all->colour[c] += clear * part.colour[c];
-        all->depth += part.depth;
-        all->error += clear * part.error;
-        rough += part.rough;
-        clear -= clear * part.absorbed;
+        kernel_pre_between(t, &ends[~n & 1], &ends[n & 1], vf_select(open, length * share, zero), &sub);
+        for (int c = 0; c < 3; c++) all->colour[c] += clear * sub.colour[c];
+        all->depth += sub.depth;
+        all->error += clear * sub.error;
+        rough += sub.rough;
+        clear -= clear * sub.absorbed;
     }
     all->absorbed = 1.0f - clear;
     all->rough = all->absorbed * rough;
@@ -161,37 +163,39 @@ static __attribute__((noinline)) void kernel_integrate_apart(const kernel_pieces
     kernel_integrate(t, rays, run, light);
 }
 
-SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_part *part, const kernel_light *light)
+SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_subinterval *sub, const kernel_light *light)
 {
     kernel_light out;
-    for (int c = 0; c < 3; c++) out.colour[c] = vf_select(m, part->colour[c], light->colour[c]);
-    out.depth = vf_select(m, part->depth, light->depth);
-    out.transmittance = vf_select(m, 1.0f - part->absorbed, light->transmittance);
+    for (int c = 0; c < 3; c++) out.colour[c] = vf_select(m, sub->colour[c], light->colour[c]);
+    out.depth = vf_select(m, sub->depth, light->depth);
+    out.transmittance = vf_select(m, 1.0f - sub->absorbed, light->transmittance);
     return out;
 }
 
-/* Rays for which one part does not suffice. */
+/* Rays for which one subinterval does not suffice. */
 static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pieces, vm rays,
                                                         const kernel_pre_end *from, const kernel_run *run,
-                                                        const kernel_pre_part *whole, kernel_light *light)
+                                                        const kernel_pre_subinterval *whole, kernel_light *light)
 {
     const vf room = vf_max(whole->allowed - whole->rough, vf_set(1e-30f));
     const vf wanted = vf_sqrt(vf_min(whole->error / room, vf_set(1e6f))) * 1.1f;
     const vm few = vm_and(rays, vf_le(wanted, vf_set(KERNEL_PRE_PARTS)));
     vm left = rays;
     if (vm_any(few)) {
-        kernel_pre_part parts;
+        kernel_pre_subinterval subdivisions;
         const vf count = vf_select(few, 1.0f + vf_floor(wanted), vf_set(1));
-        kernel_pre_parts(pieces->preintegral, from, run->v_out, run->length, count, (int)vf_reduce_max(count), &parts);
-        const vm good = vm_and(few, vf_le(parts.error + parts.rough, whole->allowed - whole->rough));
-        *light = kernel_light_select(good, &parts, light);
+        kernel_pre_subdivide(pieces->preintegral, from, run->v_out, run->length, count, (int)vf_reduce_max(count),
+                             &subdivisions);
+        const vm good = vm_and(few, vf_le(subdivisions.error + subdivisions.rough, whole->allowed - whole->rough));
+        *light = kernel_light_select(good, &subdivisions, light);
         left = vm_andnot(rays, good);
     }
     if (!vm_any(left)) return;
     kernel_light exact = kernel_clear();
     kernel_integrate_apart(pieces, left, run, &exact);
-    const kernel_pre_part part = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]}, .depth = exact.depth};
-    *light = kernel_light_select(left, &part, light);
+    const kernel_pre_subinterval sub = {.colour = {exact.colour[0], exact.colour[1], exact.colour[2]},
+                                        .depth = exact.depth};
+    *light = kernel_light_select(left, &sub, light);
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
 }
 
@@ -202,13 +206,13 @@ SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm ra
 {
     kernel_light light = kernel_clear();
     kernel_pre_end next;
-    kernel_pre_part part;
+    kernel_pre_subinterval sub;
     if (vm_any(vm_andnot(rays, vf_eq(end->value, run->v_in)))) kernel_pre_find(pieces->preintegral, run->v_in, end);
     kernel_pre_find(pieces->preintegral, run->v_out, &next);
-    kernel_pre_between(pieces->preintegral, end, &next, run->length, &part);
-    const vm good = vf_le(part.error + part.rough, part.allowed);
-    light = kernel_light_select(good, &part, &light);
-    if (vm_any(vm_andnot(rays, good))) kernel_pre_finely(pieces, vm_andnot(rays, good), end, run, &part, &light);
+    kernel_pre_between(pieces->preintegral, end, &next, run->length, &sub);
+    const vm good = vf_le(sub.error + sub.rough, sub.allowed);
+    light = kernel_light_select(good, &sub, &light);
+    if (vm_any(vm_andnot(rays, good))) kernel_pre_finely(pieces, vm_andnot(rays, good), end, run, &sub, &light);
     *end = next;
     return light;
 }

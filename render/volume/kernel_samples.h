@@ -123,13 +123,13 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
             if (!vm_any(own)) continue;
             value = kernel_value_at(p, map, i, own, t);
         }
-        const vf kept = values[n];
-        const vm apart = vm_and(own, vf_eq(kept, kept));
+        const vf active = values[n];
+        const vm apart = vm_and(own, vf_eq(active, active));
         if (__builtin_expect(vm_any(apart), 0)) {
             kernel_emit_sample(p, state, i, apart, t, value);
             own = vm_andnot(own, apart);
         }
-        values[n] = vf_select(own, value, kept);
+        values[n] = vf_select(own, value, active);
         if (needs_contact) {
             s->t_in[n] = vf_select(own, i->t_in, s->t_in[n]);
             s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);

@@ -8,7 +8,7 @@
 
 #include "fragment.h"
 #include "kernel_cell.h"
-#include "kernel_fine.h"
+#include "kernel_double.h"
 #include "kernel_integral.h"
 #include "kernel_packet.h"
 #include "kernel_pieces.h"
@@ -20,11 +20,11 @@ typedef struct kernel_segment {
     float t_in, t_out, v_in, v_out;
 } kernel_segment;
 
-/* What a segment has beside that where no error is allowed: a lane of kernel_fine; as large, so that one index finds
+/* What a segment has beside that where no error is allowed: a lane of kernel_double; as large, so that one index finds
  * both. */
-typedef struct kernel_segment_fine {
+typedef struct kernel_segment_double {
     float length, rest_in, rest_out, unused;
-} kernel_segment_fine;
+} kernel_segment_double;
 
 /* Crossings of transparent surfaces: the first of each ray in rows, sorted, +inf where there are no more. */
 typedef struct kernel_cuts {
@@ -37,10 +37,10 @@ typedef struct kernel_cuts {
 typedef struct kernel_segments {
     int count[SIMD_WIDTH];
     kernel_segment items[SIMD_WIDTH][KERNEL_WINDOW]; /* each ray's, as they come */
-    kernel_segment_fine fine[SIMD_WIDTH][KERNEL_WINDOW];
-    bool is_fine; /* there are fine ones; */
-    int room;     /* for half as many segments then, so that a tile's lists stay in the cache */
-    kernel_fine_rays rays;
+    kernel_segment_double precise[SIMD_WIDTH][KERNEL_WINDOW];
+    bool is_double; /* ends are known in double; */
+    int room;       /* for half as many segments then, so that a tile's lists stay in the cache */
+    kernel_double_rays rays;
     /* Meshes that overlap to no end: of segments that begin at one place, where no order is meant, those for which
      * there is no room are integrated at once, and blended behind the window's. */
     kernel_light heap;
@@ -111,27 +111,27 @@ SIMD_INLINE vf kernel_next_cut(const kernel_packet *p, const kernel_cuts *cuts, 
 
 /* ---- a ray's segments ---- */
 
-SIMD_INLINE void kernel_segments_set_fine(const kernel_packet *p, kernel_segments *list, bool is_fine)
+SIMD_INLINE void kernel_segments_set_double(const kernel_packet *p, kernel_segments *list, bool is_double)
 {
-    list->is_fine = is_fine;
-    list->room = is_fine ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
-    if (is_fine) kernel_fine_rays_of(p, &list->rays);
+    list->is_double = is_double;
+    list->room = is_double ? KERNEL_WINDOW / 2 : KERNEL_WINDOW;
+    if (is_double) kernel_double_rays_of(p, &list->rays);
 }
 
 static void kernel_items_sort(kernel_segments *list, int lane)
 {
     kernel_segment *items = list->items[lane];
-    kernel_segment_fine *fine = list->fine[lane];
+    kernel_segment_double *precise = list->precise[lane];
     for (int n = 1; n < list->room; n++) {
         const kernel_segment s = items[n];
-        const kernel_segment_fine its = fine[n];
+        const kernel_segment_double its = precise[n];
         int at = n;
         for (; at > 0 && items[at - 1].t_in > s.t_in; at--) {
             items[at] = items[at - 1];
-            fine[at] = fine[at - 1];
+            precise[at] = precise[at - 1];
         }
         items[at] = s;
-        fine[at] = its;
+        precise[at] = its;
     }
 }
 
@@ -170,23 +170,23 @@ static __attribute__((noinline, cold)) bool kernel_segments_shorten(kernel_segme
 
 /* False where there is no room: more segments begin at one place than a window holds. */
 SIMD_INLINE bool kernel_segments_put(kernel_segments *list, int lane, const kernel_segment *s,
-                                     const kernel_segment_fine *fine)
+                                     const kernel_segment_double *precise)
 {
     if (__builtin_expect(list->count[lane] == list->room, 0)) {
         if (!kernel_segments_shorten(list, lane, s)) return false;
         if (!(s->t_in < list->t_end[lane])) return true;
     }
-    if (list->is_fine) list->fine[lane][list->count[lane]] = *fine;
+    if (list->is_double) list->precise[lane][list->count[lane]] = *precise;
     list->items[lane][list->count[lane]++] = *s;
     return true;
 }
 
-/* Of rays whose window they are of. fine: NULL unless the list is. */
+/* Of rays whose window they are of. precise: NULL unless the list is in double. */
 SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segments *list, vm rays,
-                                     const kernel_interval *i, const kernel_fine *fine)
+                                     const kernel_interval *i, const kernel_double *precise)
 {
     kernel_segment all[SIMD_WIDTH];
-    kernel_segment_fine fines[SIMD_WIDTH];
+    kernel_segment_double doubles[SIMD_WIDTH];
     float a[4][SIMD_WIDTH];
     unsigned bits = vm_bits(rays), left = 0;
     if (!bits) return;
@@ -195,19 +195,20 @@ SIMD_INLINE void kernel_segments_add(const kernel_pieces *pieces, kernel_segment
     vf_store(a[2], i->v_in);
     vf_store(a[3], i->v_out);
     for (int n = 0; n < SIMD_WIDTH; n++) all[n] = (kernel_segment){a[0][n], a[1][n], a[2][n], a[3][n]};
-    if (fine) {
-        vf_store(a[0], fine->length);
-        vf_store(a[1], fine->rest_in);
-        vf_store(a[2], fine->rest_out);
-        for (int n = 0; n < SIMD_WIDTH; n++) fines[n] = (kernel_segment_fine){a[0][n], a[1][n], a[2][n], 0};
+    if (precise) {
+        vf_store(a[0], precise->length);
+        vf_store(a[1], precise->rest_in);
+        vf_store(a[2], precise->rest_out);
+        for (int n = 0; n < SIMD_WIDTH; n++) doubles[n] = (kernel_segment_double){a[0][n], a[1][n], a[2][n], 0};
     }
     for (; bits; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
-        if (!kernel_segments_put(list, lane, &all[lane], &fines[lane])) left |= bits & -bits;
+        if (!kernel_segments_put(list, lane, &all[lane], &doubles[lane])) left |= bits & -bits;
     }
     if (__builtin_expect(left != 0, 0)) {
         kernel_run run = kernel_run_of((i->t_out - i->t_in) * list->per_t, i->v_in, i->v_out);
-        if (fine) run = (kernel_run){fine->length * list->per_t, i->v_in, i->v_out, fine->rest_in, fine->rest_out};
+        if (precise)
+            run = (kernel_run){precise->length * list->per_t, i->v_in, i->v_out, precise->rest_in, precise->rest_out};
         kernel_integrate(pieces, vm_from_bits(left), &run, &list->heap);
     }
 }
@@ -224,9 +225,9 @@ SIMD_INLINE vf kernel_items_gather(const kernel_segments *list, int member, vi i
     return vf_gather(&list->items[0][0].t_in + member, item);
 }
 
-SIMD_INLINE vf kernel_fines_gather(const kernel_segments *list, int member, vi item)
+SIMD_INLINE vf kernel_doubles_gather(const kernel_segments *list, int member, vi item)
 {
-    return vf_gather(&list->fine[0][0].length + member, item);
+    return vf_gather(&list->precise[0][0].length + member, item);
 }
 
 /* Rays whose two segments begin at one place, and the first of them, of no length in float32, ends there. */
@@ -259,7 +260,7 @@ static void kernel_segments_sort(const kernel_segments *list, kernel_sorted *out
             const vf before = out->t_in[at - 1];
             const vi earlier = out->item[at - 1];
             vm moves = vf_lt(t_in, before);
-            if (list->is_fine) {
+            if (list->is_double) {
                 const vm same = vm_and(vf_eq(t_in, before), vf_lt(t_in, vf_set(INFINITY)));
                 if (__builtin_expect(vm_any(same), 0))
                     moves = vm_or(moves, kernel_segments_tied(list, same, item, earlier));

@@ -30,8 +30,8 @@
 #include "kernel_cell_cache.h"
 #include "kernel_cell_segments.h"
 #include "kernel_cell_values.h"
-#include "kernel_course.h"
-#include "kernel_fine.h"
+#include "kernel_span.h"
+#include "kernel_double.h"
 #include "kernel_integral.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -65,23 +65,23 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
             kernel_cell_domain(c, transfer);
         }
         if (c->type == GRID_TET) {
-            kernel_fine_cell fine;
-            if (state->list->is_fine) kernel_fine_begin(p->frame, p->tile, c, transfer, &fine);
-            kernel_tet_segments(p, state, c, &fine, rays);
+            kernel_double_cell precise;
+            if (state->list->is_double) kernel_double_begin(p->frame, p->tile, c, transfer, &precise);
+            kernel_tet_segments(p, state, c, &precise, rays);
             continue;
         }
         kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-        kernel_course course = {.cell = c};
+        kernel_span span = {.cell = c};
         kernel_map map;
         const int intervals = kernel_poly_intervals(p, c, rays, false, list);
         if (intervals && !c->is_constant) {
             kernel_map_setup(&map, c);
-            course.map = &map;
+            span.map = &map;
         }
-        if (intervals && (course.map || state->pieces->has_rests)) kernel_course_bound(state, c->f, c->count, &course);
+        if (intervals && (span.map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
         for (int k = 0; k < intervals; k++) {
-            course.interval = &list[k];
-            kernel_course_run(p, state, &course);
+            span.interval = &list[k];
+            kernel_span_run(p, state, &span);
         }
     }
 }
@@ -151,10 +151,10 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         kernel_run run = kernel_run_of((t_out - t_in) * list->per_t, kernel_items_gather(list, 2, item),
                                        kernel_items_gather(list, 3, item));
         kernel_light light = kernel_clear();
-        if (list->is_fine) {
-            run.length = kernel_fines_gather(list, 0, item) * list->per_t;
-            run.rest_in = kernel_fines_gather(list, 1, item);
-            run.rest_out = kernel_fines_gather(list, 2, item);
+        if (list->is_double) {
+            run.length = kernel_doubles_gather(list, 0, item) * list->per_t;
+            run.rest_in = kernel_doubles_gather(list, 1, item);
+            run.rest_out = kernel_doubles_gather(list, 2, item);
         }
         if (pieces->preintegral)
             light = kernel_preintegrated(pieces, has, &run, &end);
@@ -175,7 +175,7 @@ SIMD_INLINE void kernel_trace_apart(kernel_packet *p)
     list.t_begin = p->t_near;
     list.t_end = vf_set(INFINITY);
     list.cuts.row_count = 0;
-    kernel_segments_set_fine(p, &list, false);
+    kernel_segments_set_double(p, &list, false);
     for (int v = 0; v < f->volume_count; v++) {
         kernel_segment_state state = {&list, &f->pieces[v], v, f->allowance, f->mixing, f->reach[v]};
         list.per_t = f->volumes[v].exponent / p->sample_step;
@@ -216,7 +216,7 @@ SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
     kernel_segment_state state = {&list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
     kernel_blend b = kernel_blend_begin();
     list.per_t = f->volumes[0].exponent / p->sample_step;
-    kernel_segments_set_fine(p, &list, f->is_fine);
+    kernel_segments_set_double(p, &list, f->is_double);
     list.t_begin = p->t_near;
     kernel_cuts_find(p, first_fragment, &list.cuts);
     const vm active = p->active;

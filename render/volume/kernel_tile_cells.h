@@ -1,7 +1,7 @@
 /* A volume's cells, for a whole tile and one window of depth: each is placed once and goes to the packets of the blocks
  * that it may meet. Which cells those are is known beforehand, where the picture has gone down the trees at once
- * (kernel_shown.h): they wait by depth, and a window has those that are in it. Else the tile goes down the trees for
- * each window.
+ * (kernel_candidates.h): they wait by depth, and a window has those that are in it. Else the tile goes down the trees
+ * for each window.
  *
  *     cells, by where they begin   |--a--|  |---b---|    |-c-|
  *                                     |--d--|   |--e--|
@@ -19,7 +19,7 @@
 #include "kernel_map.h"
 #include "kernel_outline.h"
 #include "kernel_placed.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_poly.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
@@ -36,16 +36,16 @@ enum { KERNEL_OPEN_PIECE = 16 };
 /* The tile's cells of a volume. Of items, the first open_count begin before the last window's end, and do not end
  * before its begin; next is the first that is still to come. */
 typedef struct kernel_tile_cells {
-    kernel_tile_shown *items;
+    kernel_tile_candidate *items;
     int count, open_count, next;
-    kernel_cell cell;   /* the one under way, */
-    kernel_map map;     /* and its map */
-    kernel_plain plain; /* of the volume's field on the part: */
+    kernel_cell cell;     /* the one under way, */
+    kernel_map map;       /* and its map */
+    kernel_packed packed; /* of the volume's field on the part: */
     int plain_volume, plain_part;
     kernel_placed placed;
     kernel_block_rays block_rays;
     /* Tets that wait to be placed together, with the blocks that they may meet. */
-    int waiting;
+    int pending;
     uint32_t wait_cell[SIMD_WIDTH], wait_blocks[SIMD_WIDTH];
     int32_t wait_vertices[4][SIMD_WIDTH];
 } kernel_tile_cells;
@@ -88,7 +88,7 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
     if (blocks) take(t, part, c, c->type == GRID_TET || c->is_constant ? NULL : &cells->map, blocks);
 }
 
-/* ---- tets of plain meshes, as many at once as there are lanes ---- */
+/* ---- tets of packed meshes, as many at once as there are lanes ---- */
 
 /* kernel_cell_domain(). */
 SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
@@ -104,8 +104,8 @@ SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transf
 }
 
 /* Lanes whose cells show and reach into the window, and where these begin. */
-SIMD_INLINE unsigned kernel_placed_shown(const kernel_tile_trace *t, const kernel_placed *placed,
-                                         const kernel_interest *interest, float near[SIMD_WIDTH])
+SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const kernel_placed *placed,
+                                           const kernel_interest *interest, float near[SIMD_WIDTH])
 {
     const vf *z = placed->at[2], *v = placed->values;
     vm is_finite = vm_all_lanes();
@@ -119,24 +119,24 @@ SIMD_INLINE unsigned kernel_placed_shown(const kernel_tile_trace *t, const kerne
 }
 
 /* The tets that wait. */
-static __attribute__((noinline)) void kernel_tile_take_waiting(kernel_tile_trace *t, kernel_tile_cells *cells,
+static __attribute__((noinline)) void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cells *cells,
                                                                kernel_tile_take *take)
 {
-    const int count = cells->waiting;
-    const bool is_fine = t->frame->is_fine;
+    const int count = cells->pending;
+    const bool is_double = t->frame->is_double;
     if (!count) return;
     const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
     float near[SIMD_WIDTH];
-    cells->waiting = 0;
-    kernel_place_tets(&cells->placed, &cells->plain, t->frame, &t->tile, cells->wait_vertices, count);
+    cells->pending = 0;
+    kernel_place_tets(&cells->placed, &cells->packed, t->frame, &t->tile, cells->wait_vertices, count);
     kernel_placed_domain(&cells->placed, transfer);
-    unsigned shown = kernel_placed_shown(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
-    for (; shown; shown &= shown - 1) {
-        const int n = __builtin_ctz(shown);
+    unsigned candidates = kernel_placed_showing(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
+    for (; candidates; candidates &= candidates - 1) {
+        const int n = __builtin_ctz(candidates);
         unsigned blocks = cells->wait_blocks[n] & kernel_blocks_beyond(t, near[n]);
         if (!blocks) continue;
         kernel_placed_cell(&cells->placed, n, &cells->cell);
-        if (is_fine) kernel_placed_exactly(&cells->placed, n, &cells->cell);
+        if (is_double) kernel_placed_exactly(&cells->placed, n, &cells->cell);
         blocks &= kernel_tet_blocks(&cells->block_rays, &cells->cell);
         cells->cell.index = cells->wait_cell[n];
         if (blocks) take(t, cells->plain_part, &cells->cell, NULL, blocks);
@@ -148,25 +148,25 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
                                       kernel_tile_take *take)
 {
     if (part != cells->plain_part || volume != cells->plain_volume) {
-        kernel_tile_take_waiting(t, cells, take);
-        kernel_plain_begin(&cells->plain, t->frame, t->frame->job->parts[part].cells,
-                           &t->frame->job->volumes[volume].field.fields[part]);
+        kernel_tile_take_pending(t, cells, take);
+        kernel_packed_begin(&cells->packed, t->frame, t->frame->job->parts[part].cells,
+                            &t->frame->job->volumes[volume].field.fields[part]);
         cells->plain_volume = volume;
         cells->plain_part = part;
     }
-    return cells->plain.is_so;
+    return cells->packed.is_tets;
 }
 
 /* Until a vector is full. */
 SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
                                   kernel_tile_take *take)
 {
-    const int32_t *vertices = cells->plain.connectivity + 4 * (int64_t)cell;
-    const int n = cells->waiting++;
+    const int32_t *vertices = cells->packed.connectivity + 4 * (int64_t)cell;
+    const int n = cells->pending++;
     for (int i = 0; i < 4; i++) cells->wait_vertices[i][n] = vertices[i];
     cells->wait_cell[n] = cell;
     cells->wait_blocks[n] = blocks;
-    if (cells->waiting == SIMD_WIDTH) kernel_tile_take_waiting(t, cells, take);
+    if (cells->pending == SIMD_WIDTH) kernel_tile_take_pending(t, cells, take);
 }
 
 /* ---- from trees ---- */
@@ -175,10 +175,10 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, int volume, int par
                                        bool is_pencil, unsigned blocks, kernel_tile_take *take)
 {
     const grid *g = t->frame->job->parts[part].cells;
-    kernel_tile_cells *waiting = t->thread->tile_cells;
+    kernel_tile_cells *pending = t->thread->tile_cells;
     kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
-    if (kernel_tile_wait_for(t, waiting, volume, part, take))
-        for (int n = 0; n < count; n++) kernel_tile_wait(t, waiting, cells[n], blocks, take);
+    if (kernel_tile_wait_for(t, pending, volume, part, take))
+        for (int n = 0; n < count; n++) kernel_tile_wait(t, pending, cells[n], blocks, take);
     else
         for (int n = 0; n < count; n++) kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
 }
@@ -205,13 +205,13 @@ SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, ke
         kernel_tile_traverse(t, job->parent, NULL, NULL, blocks, 0, parts);
     else
         for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
-    kernel_tile_take_waiting(t, t->thread->tile_cells, take);
+    kernel_tile_take_pending(t, t->thread->tile_cells, take);
 }
 
 /* ---- those that are known ---- */
 
 /* Items before the returned index are no farther than those from it on; neither part is empty. */
-static inline int kernel_part_by_depth(kernel_tile_shown *items, int count)
+static inline int kernel_depth_bin_of(kernel_tile_candidate *items, int count)
 {
     const float a = items[0].near, b = items[count / 2].near, c = items[count - 1].near;
     const float least = a < b ? a : b, most = a < b ? b : a;
@@ -223,25 +223,25 @@ static inline int kernel_part_by_depth(kernel_tile_shown *items, int count)
         do j--;
         while (pivot < items[j].near);
         if (i >= j) return j + 1 < count ? j + 1 : j;
-        const kernel_tile_shown moved = items[i];
+        const kernel_tile_candidate moved = items[i];
         items[i] = items[j];
         items[j] = moved;
     }
 }
 
 /* All of them, by quicksort down to pieces of a few; the shorter part is called for, so that calls stay few. */
-static void kernel_order_by_depth(kernel_tile_shown *items, int count)
+static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
 {
     enum { PIECE = 8 };
     while (count > PIECE) {
-        const int middle = kernel_part_by_depth(items, count);
+        const int middle = kernel_depth_bin_of(items, count);
         const bool is_first = middle < count - middle;
         kernel_order_by_depth(is_first ? items : items + middle, is_first ? middle : count - middle);
         items += is_first ? middle : 0;
         count = is_first ? count - middle : middle;
     }
     for (int i = 1; i < count; i++) {
-        const kernel_tile_shown moved = items[i];
+        const kernel_tile_candidate moved = items[i];
         int j = i;
         for (; j > 0 && moved.near < items[j - 1].near; j--) items[j] = items[j - 1];
         items[j] = moved;
@@ -253,10 +253,10 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
     kernel_tile_cells *cells = t->thread->tile_cells;
-    cells->waiting = 0;
+    cells->pending = 0;
     cells->plain_part = -1;
-    if (!f->volume_shown) return true;
-    cells->count = kernel_bin(f, f->volume_shown, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
+    if (!f->volume_candidates) return true;
+    cells->count = kernel_bin(f, f->volume_candidates, f->volume_starts, t->tile.x0, t->tile.y0, &cells->items);
     cells->open_count = cells->next = 0;
     kernel_order_by_depth(cells->items, cells->count);
     return cells->count > 0;
@@ -265,7 +265,7 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
 /* Those of the window are open. */
 SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_cells *cells)
 {
-    kernel_tile_shown *items = cells->items;
+    kernel_tile_candidate *items = cells->items;
     const float far = kernel_tile_far(t);
     int count = 0;
     for (int n = 0; n < cells->open_count; n++)
@@ -276,8 +276,9 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
 }
 
 /* One of the window's cells. */
-SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells, const kernel_tile_shown *item,
-                                       bool is_pencil, unsigned blocks, kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells,
+                                       const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
+                                       kernel_tile_take *take)
 {
     const int part = (int)item->source;
     if (kernel_tile_wait_for(t, cells, 0, part, take))
@@ -293,7 +294,7 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
     for (int pass = 0; pass < 2; pass++) {
         const int end = first + (pass ? KERNEL_OPEN_PIECE : 2 * KERNEL_OPEN_PIECE);
         for (int n = first; n < end && n < cells->open_count; n++) {
-            const kernel_tile_shown *item = &cells->items[n];
+            const kernel_tile_candidate *item = &cells->items[n];
             const grid *g = job->parts[item->source].cells;
             if (pass)
                 kernel_prefetch_vertices(g, &job->volumes[0].field.fields[item->source], item->cell);
@@ -304,17 +305,18 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
 }
 
 /* The window's cells. */
-SIMD_INLINE void kernel_tile_meet_shown(kernel_tile_trace *t, bool is_pencil, unsigned blocks, kernel_tile_take *take)
+SIMD_INLINE void kernel_tile_meet_candidate(kernel_tile_trace *t, bool is_pencil, unsigned blocks,
+                                            kernel_tile_take *take)
 {
     kernel_tile_cells *cells = t->thread->tile_cells;
     kernel_tile_cells_open(t, cells);
     for (int n = 0; n < cells->open_count; n++) {
-        const kernel_tile_shown *item = &cells->items[n];
+        const kernel_tile_candidate *item = &cells->items[n];
         if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
         const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
         if (met) kernel_tile_meet_item(t, cells, item, is_pencil, met, take);
     }
-    kernel_tile_take_waiting(t, cells, take);
+    kernel_tile_take_pending(t, cells, take);
 }
 
 #endif

@@ -20,8 +20,8 @@
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
-#include "kernel_course.h"
-#include "kernel_fine.h"
+#include "kernel_span.h"
+#include "kernel_double.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_poly.h"
@@ -47,7 +47,7 @@ typedef struct kernel_tile_ray_segments {
 
 typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
-    kernel_fine_cell fine;
+    kernel_double_cell precise;
     float depth; /* of windows; 0: not known yet */
 } kernel_tile_segments;
 
@@ -57,12 +57,12 @@ static __attribute__((noinline)) void kernel_tile_poly_segments(kernel_packet *p
                                                                 const kernel_cell *c, const kernel_map *map)
 {
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_course course = {.map = map, .cell = c};
+    kernel_span span = {.map = map, .cell = c};
     const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
-    if (intervals && (map || state->pieces->has_rests)) kernel_course_bound(state, c->f, c->count, &course);
+    if (intervals && (map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
     for (int k = 0; k < intervals; k++) {
-        course.interval = &list[k];
-        kernel_course_run(p, state, &course);
+        span.interval = &list[k];
+        kernel_span_run(p, state, &span);
     }
 }
 
@@ -82,8 +82,8 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
                                       unsigned blocks)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
-    if (c->type == GRID_TET && t->frame->is_fine)
-        kernel_fine_begin(t->frame, &t->tile, c, &t->frame->volumes[0], &s->fine);
+    if (c->type == GRID_TET && t->frame->is_double)
+        kernel_double_begin(t->frame, &t->tile, c, &t->frame->volumes[0], &s->precise);
     for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
         bool is_shortened = false;
@@ -94,7 +94,7 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
             if (c->type == GRID_POLYHEDRON)
                 kernel_polyhedron_segments(p, state, part, c->index, p->active);
             else if (c->type == GRID_TET)
-                kernel_tet_segments(p, state, c, &s->fine, p->active);
+                kernel_tet_segments(p, state, c, &s->precise, p->active);
             else
                 kernel_tile_poly_segments(p, state, c, map);
             is_shortened = is_shortened || state->list->is_shortened;
@@ -130,7 +130,7 @@ SIMD_INLINE void kernel_ray_segments_begin(kernel_packet *p, kernel_tile_ray_seg
     r->list.t_begin = p->t_near;
     r->list.per_t = f->volumes[0].exponent / p->sample_step;
     r->list.cuts.row_count = 0;
-    kernel_segments_set_fine(p, &r->list, f->is_fine);
+    kernel_segments_set_double(p, &r->list, f->is_double);
     r->state = (kernel_segment_state){&r->list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
 }
 
@@ -161,8 +161,8 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         if (blocks >> b & 1) far = kernel_block_window_end(t, s, b);
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
     }
-    if (t->frame->volume_shown)
-        kernel_tile_meet_shown(t, false, blocks, kernel_tile_cell_segments);
+    if (t->frame->volume_candidates)
+        kernel_tile_meet_candidate(t, false, blocks, kernel_tile_cell_segments);
     else
         kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
 }
@@ -188,7 +188,7 @@ static void kernel_tile_segments_trace(kernel_tile_trace *t)
 {
     kernel_tile_segments *s = t->thread->tile_segments;
     if (!kernel_tile_cells_begin(t)) return;
-    const kernel_lie reach = kernel_tile_reach(t);
+    const kernel_placement reach = kernel_tile_reach(t);
     int packets[KERNEL_TILE_PACKETS];
     const int count = kernel_tile_volume_begin(t, reach.blocks, packets);
     for (int n = 0; n < count; n++) {

@@ -96,16 +96,16 @@ static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uin
 /* ---- windows ---- */
 
 /* The blocks that any tree's box may meet, and the depths between which. */
-SIMD_INLINE kernel_lie kernel_tile_reach(const kernel_tile_trace *t)
+SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;
-    kernel_lie all = {.near = INFINITY, .far = -INFINITY};
+    kernel_placement all = {.near = INFINITY, .far = -INFINITY};
     for (int i = 0; i < job->part_count; i++) {
         if (!job->parts[i].tree->node_count) continue;
-        const kernel_lie lie = kernel_box_lie(&t->tree_planes, job->parts[i].tree, 0);
-        all.blocks |= lie.blocks & t->wanted;
-        all.near = fminf(all.near, lie.near);
-        all.far = fmaxf(all.far, lie.far);
+        const kernel_placement placement = kernel_box_placement(&t->tree_planes, job->parts[i].tree, 0);
+        all.blocks |= placement.blocks & t->wanted;
+        all.near = fminf(all.near, placement.near);
+        all.far = fmaxf(all.far, placement.far);
     }
     return all;
 }
@@ -174,8 +174,8 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     }
     if (!is_lit) return false;
     for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
-        if (t->frame->volume_shown)
-            kernel_tile_meet_shown(t, true, blocks, kernel_tile_samples);
+        if (t->frame->volume_candidates)
+            kernel_tile_meet_candidate(t, true, blocks, kernel_tile_samples);
         else
             kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts, kernel_tile_samples);
     }
@@ -187,7 +187,7 @@ static void kernel_tile_volumes(kernel_tile_trace *t)
 {
     kernel_tile_volume *v = t->thread->tile_volume;
     if (!kernel_tile_cells_begin(t)) return;
-    const kernel_lie reach = kernel_tile_reach(t);
+    const kernel_placement reach = kernel_tile_reach(t);
     const unsigned blocks = reach.blocks;
     int packets[KERNEL_TILE_PACKETS], first = INT_MAX, last = INT_MIN;
     const int count = kernel_tile_volume_begin(t, blocks, packets);

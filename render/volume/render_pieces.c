@@ -62,10 +62,10 @@ static double domain_of(const render_transfer *t, double value)
 /* Places in the domain, sorted, no two the same; entries gets the colours of the table that are kept. */
 static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, int *entries)
 {
-    int count = 0, kept = 0;
-    for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance)) entries[kept++] = i;
-    entries[kept++] = t->colour_count - 1;
-    for (int i = 0; i < kept; i++) cuts[count++] = (kernel_real)((double)entries[i] / (t->colour_count - 1));
+    int count = 0, active = 0;
+    for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance)) entries[active++] = i;
+    entries[active++] = t->colour_count - 1;
+    for (int i = 0; i < active; i++) cuts[count++] = (kernel_real)((double)entries[i] / (t->colour_count - 1));
     for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)domain_of(t, t->opacity_values[i]);
     qsort(cuts, (size_t)count, sizeof *cuts, compare_cuts);
     int unique = 1;
@@ -226,7 +226,8 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* Of the function's domain: equal parts are enough for wider ramps, up to 1000 optical depths (docs/error_budget.md). */
+/* Of the function's domain: equal parts are enough for wider ramps, up to 1000 optical depths (docs/error_budget.md).
+ */
 static const double steep_width = 1.0 / 64;
 
 static void fill_steep(kernel_pieces *out, const render_transfer *t)

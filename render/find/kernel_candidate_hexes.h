@@ -1,7 +1,7 @@
-/* Isosurfaces of hexes of plain meshes, found as many at once as there are lanes (kernel_shown.h):
+/* Isosurfaces of hexes of packed meshes, found as many at once as there are lanes (kernel_candidates.h):
  *
  *     lanes are cells that come out of leaves:  do their values straddle an isovalue?
- *     lanes are cells that do:                  kernel_linear_part(), kernel_slab_outline() and the box of pixels
+ *     lanes are cells that do:                  kernel_linearize(), kernel_slab_outline() and the box of pixels
  *
  * Places are float32 differences from the eye, along the camera's axes. A hit is the mean of the vertices with weights
  * that are not negative, and its value is that of theirs (kernel_outline.h), so that |L| <= E there for whatever places
@@ -9,8 +9,8 @@
  * the vertices are, 8 roundings of their distance from the eye, which is within the pads of kernel_add_lanes(). What
  * is said of cells that are not folded holds but for rounding as well, and those whose size is near that are within
  * the pads anywhere. */
-#ifndef RENDER_KERNEL_SHOWN_HEXES_H
-#define RENDER_KERNEL_SHOWN_HEXES_H
+#ifndef RENDER_KERNEL_CANDIDATES_HEXES_H
+#define RENDER_KERNEL_CANDIDATES_HEXES_H
 
 #include <math.h>
 #include <string.h>
@@ -18,8 +18,8 @@
 #include "kernel_cell.h"
 #include "kernel_finder.h"
 #include "kernel_outline.h"
-#include "kernel_plain.h"
-#include "kernel_shown_tets.h"
+#include "kernel_packed.h"
+#include "kernel_candidate_tets.h"
 #include "kernel_tile.h"
 #include "render.h"
 #include "simd.h"
@@ -75,7 +75,7 @@ SIMD_INLINE vm kernel_hex_lanes_unfolded(const kernel_hex_lanes *l, vf inverse[3
     return unfolded;
 }
 
-/* kernel_linear_part(). Lanes whose volume is near float32's least are not usual. */
+/* kernel_linearize(). Lanes whose volume is near float32's least are not usual. */
 static __attribute__((noinline)) void kernel_hex_lanes_slab(kernel_hex_lanes *l, kernel_hex_slab *out)
 {
     vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, blur = size;
@@ -141,7 +141,7 @@ static __attribute__((noinline)) void kernel_hex_lanes_ends(const kernel_finder 
 /* The vertices along the camera's axes, and the values, of the crossed cells. */
 SIMD_INLINE void kernel_hex_lanes_fetch(const kernel_finder *s, kernel_hex_lanes *l)
 {
-    const kernel_plain *p = &s->plain;
+    const kernel_packed *p = &s->packed;
     const render_camera *camera = &s->frame->job->camera;
     const double isovalue = s->surface->layer->values[s->hexes.value],
                  *axes[3] = {camera->right, camera->up, camera->forward};
@@ -173,13 +173,13 @@ SIMD_INLINE void kernel_hex_lanes_fetch(const kernel_finder *s, kernel_hex_lanes
 /* One of those that wait, from the mesh or as it is kept: then its number is none of the mesh's. */
 static void kernel_hex_fetch(kernel_finder *s, int n)
 {
-    const kernel_plain *p = &s->plain;
+    const kernel_packed *p = &s->packed;
     kernel_cell *c = &s->cell;
     if (p->connectivity) {
         kernel_cell_fetch(c, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], s->hexes.cell[n]);
         return;
     }
-    kernel_plain_fetch(c, p, s->hexes.cell[n], 8);
+    kernel_packed_fetch(c, p, s->hexes.cell[n], 8);
     for (int i = 0; i < 8; i++) kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
 }
 
@@ -214,13 +214,13 @@ SIMD_INLINE void kernel_crossed_hexes_add(kernel_finder *s, int value, unsigned 
         const int n = __builtin_ctz(lanes), to = h->count++;
         h->value = value;
         h->cell[to] = s->tets.cell[n];
-        for (int i = 0; i < 8; i++) h->vertex[i][to] = s->tets.plain[i][n];
+        for (int i = 0; i < 8; i++) h->vertex[i][to] = s->tets.packed[i][n];
         if (h->count == SIMD_WIDTH) kernel_find_crossed_hexes(s);
     }
 }
 
 /* Hexes whose vertices have come. v < value is v < the least float not below it. */
-static void kernel_find_plain_hexes(kernel_finder *s)
+static void kernel_find_packed_hexes(kernel_finder *s)
 {
     kernel_tets *t = &s->tets;
     const render_surface_layer *layer = s->surface->layer;
@@ -229,8 +229,8 @@ static void kernel_find_plain_hexes(kernel_finder *s)
     kernel_tets_fill(t, 8);
     for (int i = 0; i < 8; i++) {
         vi vertex;
-        memcpy(&vertex, t->plain[i], sizeof vertex);
-        const vf v = vf_gather(s->plain.values, vertex * s->plain.value_stride);
+        memcpy(&vertex, t->packed[i], sizeof vertex);
+        const vf v = vf_gather(s->packed.values, vertex * s->packed.value_stride);
         low = vf_min(v, low); /* one that is not a number passes neither */
         high = vf_max(v, high);
     }

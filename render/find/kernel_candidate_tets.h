@@ -1,9 +1,9 @@
-/* Tets, found as many at once as there are lanes (kernel_shown.h).
+/* Tets, found as many at once as there are lanes (kernel_candidates.h).
  *
  * In float32 from the eye on: positions err by 8 roundings of their distance from it, and so do X, Y and depth; all of
  * it is within the pads of kernel_pixel_range(), which take this of the picture's scale too. */
-#ifndef RENDER_KERNEL_SHOWN_TETS_H
-#define RENDER_KERNEL_SHOWN_TETS_H
+#ifndef RENDER_KERNEL_CANDIDATES_TETS_H
+#define RENDER_KERNEL_CANDIDATES_TETS_H
 
 #include <math.h>
 #include <string.h>
@@ -13,7 +13,7 @@
 #include "kernel_cell_values.h"
 #include "kernel_finder.h"
 #include "kernel_interest.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_tet.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
@@ -86,26 +86,26 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, int p
     return vf_le(*first, *last);
 }
 
-/* kernel_extents_shown() lane by lane, of so many lanes those whose bits are set. */
+/* kernel_extents_candidate() lane by lane, of so many lanes those whose bits are set. */
 static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigned lanes, const uint32_t *cells,
                              uint32_t source)
 {
     const render_camera *camera = &s->frame->job->camera;
     const bool flat = camera->is_orthographic;
-    kernel_shown_list *list = s->list;
+    kernel_candidate_list *list = s->list;
     vf first[2], last[2];
     float near[SIMD_WIDTH], far[SIMD_WIDTH];
     int32_t ends[4][SIMD_WIDTH];
     const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
     /* The largest blur of any lane stands for all. */
     const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
-    vm shown = kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), camera->width,
-                                  &first[0], &last[0]);
-    shown = vm_and(shown, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale), camera->height,
-                                             &first[1], &last[1]));
+    vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), camera->width,
+                                       &first[0], &last[0]);
+    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale),
+                                                       camera->height, &first[1], &last[1]));
     const vm anywhere = flat ? vm_none() : vm_not(vf_lt(0.01f * size, e->near));
     const vm behind = vf_lt((e->far + s->t_near) + pad, vf_set(s->t_near));
-    lanes &= vm_bits(vm_andnot(vm_or(shown, anywhere), behind));
+    lanes &= vm_bits(vm_andnot(vm_or(candidates, anywhere), behind));
     const int most[2] = {camera->width - 1, camera->height - 1};
     for (int a = 0; a < 2; a++) {
         const vi from = vi_from_vf(vf_select(anywhere, vf_set(0), first[a]));
@@ -118,21 +118,21 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigne
     if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        list->items[list->count++] = (kernel_shown){.cell = cells[n],
-                                                    .source = source,
-                                                    .near = near[n],
-                                                    .far = far[n],
-                                                    .x0 = (uint16_t)ends[0][n],
-                                                    .x1 = (uint16_t)ends[1][n],
-                                                    .y0 = (uint16_t)ends[2][n],
-                                                    .y1 = (uint16_t)ends[3][n]};
+        list->items[list->count++] = (kernel_candidate){.cell = cells[n],
+                                                        .source = source,
+                                                        .near = near[n],
+                                                        .far = far[n],
+                                                        .x0 = (uint16_t)ends[0][n],
+                                                        .x1 = (uint16_t)ends[1][n],
+                                                        .y0 = (uint16_t)ends[2][n],
+                                                        .y1 = (uint16_t)ends[3][n]};
         kernel_count_tiles(list, ends[0][n], ends[1][n], ends[2][n], ends[3][n]);
     }
 }
 
-/* Tets of a plain mesh. v < value is v < the least float not below it. The differences' signs are right but where they
+/* Tets of a packed mesh. v < value is v < the least float not below it. The differences' signs are right but where they
  * vanish in float32, and then along an edge that is as good as a point. */
-SIMD_INLINE void kernel_plain_value(kernel_finder *s, const vf v[4], kernel_tet_lanes *l, int value)
+SIMD_INLINE void kernel_packed_value(kernel_finder *s, const vf v[4], kernel_tet_lanes *l, int value)
 {
     const double isovalue = s->surface->layer->values[value];
     const float middle = (float)isovalue, rest = (float)(isovalue - (double)middle);
@@ -165,7 +165,7 @@ SIMD_INLINE void kernel_plain_value(kernel_finder *s, const vf v[4], kernel_tet_
 }
 
 /* The same of all that shows of them in the volume. */
-SIMD_INLINE void kernel_plain_volume(kernel_finder *s, const vf v[4], const kernel_tet_lanes *l)
+SIMD_INLINE void kernel_packed_volume(kernel_finder *s, const vf v[4], const kernel_tet_lanes *l)
 {
     vm usual = vm_all_lanes();
     for (int i = 0; i < 4; i++) {
@@ -188,9 +188,9 @@ SIMD_INLINE void kernel_plain_volume(kernel_finder *s, const vf v[4], const kern
     }
 }
 
-static void kernel_find_plain_tets(kernel_finder *s)
+static void kernel_find_packed_tets(kernel_finder *s)
 {
-    const kernel_plain *p = &s->plain;
+    const kernel_packed *p = &s->packed;
     kernel_tets *t = &s->tets;
     kernel_tet_lanes l;
     vf v[4];
@@ -198,15 +198,15 @@ static void kernel_find_plain_tets(kernel_finder *s)
     kernel_tets_fill(t, 4);
     for (int i = 0; i < 4; i++) {
         vi vertex;
-        memcpy(&vertex, t->plain[i], sizeof vertex);
+        memcpy(&vertex, t->packed[i], sizeof vertex);
         v[i] = vf_gather(p->values, vertex * p->value_stride);
         vertex *= p->stride;
         for (int a = 0; a < 3; a++)
             l.at[a][i] = ((vf_gather(p->coordinates[a], vertex) - p->eye[a][0]) - p->eye[a][1]) * p->scale;
     }
-    if (!s->surface) kernel_plain_volume(s, v, &l);
+    if (!s->surface) kernel_packed_volume(s, v, &l);
     for (int value = 0; s->surface && value < s->surface->layer->value_count; value++)
-        kernel_plain_value(s, v, &l, value);
+        kernel_packed_value(s, v, &l, value);
     t->count = 0;
 }
 

@@ -1,8 +1,8 @@
 /* Isosurfaces by one traversal a frame: the trees are gone down once for the whole picture, and each cell that the
  * surface crosses, or that shows in the volume, is fetched and placed once, to find the pixels that it may show in; the
- * cells are then binned by tile (render_shown.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace them
- * from the nearest on, blocks that know of something nearer left out (kernel_tile_shown.h, kernel_batch.h; of the
- * volume kernel_tile_cells.h):
+ * cells are then binned by tile (render_candidates.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace
+ * them from the nearest on, blocks that know of something nearer left out (kernel_tile_candidates.h, kernel_batch.h; of
+ * the volume kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
  *
@@ -12,32 +12,32 @@
  *
  * Boxes are of the outline projected (kernel_outline.h), widened by pads that are more than all rounding. Rays test
  * what boxes hold, so that the picture is that of any traversal, to the last bit. */
-#ifndef RENDER_KERNEL_SHOWN_H
-#define RENDER_KERNEL_SHOWN_H
+#ifndef RENDER_KERNEL_CANDIDATES_H
+#define RENDER_KERNEL_CANDIDATES_H
 
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
 #include "kernel_interest.h"
-#include "kernel_keep.h"
-#include "kernel_plain.h"
+#include "kernel_active_cells.h"
+#include "kernel_packed.h"
 #include "kernel_prefetch.h"
-#include "kernel_shown_hexes.h"
-#include "kernel_shown_tets.h"
+#include "kernel_candidate_hexes.h"
+#include "kernel_candidate_tets.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
 #include "mmbvh.h"
 #include "simd.h"
 
 /* Those that wait for their vertices. */
-static void kernel_find_waiting(kernel_finder *s)
+static void kernel_find_pending(kernel_finder *s)
 {
-    if (s->keeper)
-        kernel_keep_waiting(s);
-    else if (s->plain.is_hexes)
-        kernel_find_plain_hexes(s);
-    else if (s->plain.is_so)
-        kernel_find_plain_tets(s);
+    if (s->writer)
+        kernel_activate_pending(s);
+    else if (s->packed.is_hexes)
+        kernel_find_packed_hexes(s);
+    else if (s->packed.is_tets)
+        kernel_find_packed_tets(s);
     else
         kernel_find_any_tets(s);
 }
@@ -45,34 +45,34 @@ static void kernel_find_waiting(kernel_finder *s)
 /* ---- leaves ---- */
 
 /* Their vertices are on their way. */
-static void kernel_find_coming_plain(kernel_finder *s)
+static void kernel_find_queued_packed(kernel_finder *s)
 {
-    const kernel_plain *p = &s->plain;
+    const kernel_packed *p = &s->packed;
     const int count = p->is_hexes ? 8 : 4;
-    for (int n = 0; n < s->coming_count; n++) {
-        s->tets.cell[n] = s->coming[n];
+    for (int n = 0; n < s->queued_count; n++) {
+        s->tets.cell[n] = s->queued[n];
         for (int i = 0; i < count; i++) {
-            s->tets.plain[i][n] = kernel_plain_vertex(p, s->coming[n], count, i);
-            kernel_plain_prefetch(p, s->tets.plain[i][n]);
+            s->tets.packed[i][n] = kernel_packed_vertex(p, s->queued[n], count, i);
+            kernel_packed_prefetch(p, s->tets.packed[i][n]);
         }
     }
-    s->tets.count = s->coming_count;
-    s->coming_count = 0;
+    s->tets.count = s->queued_count;
+    s->queued_count = 0;
 }
 
 /* Cells whose connectivity has come: tets wait for their vertices, others are done with. */
-static void kernel_find_coming(kernel_finder *s)
+static void kernel_find_queued(kernel_finder *s)
 {
-    if (s->plain.is_so || s->plain.is_hexes) {
-        kernel_find_coming_plain(s);
+    if (s->packed.is_tets || s->packed.is_hexes) {
+        kernel_find_queued_packed(s);
         return;
     }
     const grid *g = s->frame->job->parts[s->part].cells;
     const grid_field *field = &s->field->fields[s->part];
     if (!s->surface || g->cell_type != GRID_TET)
-        for (int n = 0; n < s->coming_count; n++) kernel_prefetch_vertices(g, field, s->coming[n]);
-    for (int n = 0; n < s->coming_count; n++) {
-        const uint32_t cell = s->coming[n];
+        for (int n = 0; n < s->queued_count; n++) kernel_prefetch_vertices(g, field, s->queued[n]);
+    for (int n = 0; n < s->queued_count; n++) {
+        const uint32_t cell = s->queued[n];
         if (s->surface && grid_cell_type(g, cell) == GRID_TET) {
             int64_t *vertices = s->tets.vertices[s->tets.count];
             s->tets.cell[s->tets.count++] = cell;
@@ -86,7 +86,7 @@ static void kernel_find_coming(kernel_finder *s)
         else
             kernel_find_cell(s);
     }
-    s->coming_count = 0;
+    s->queued_count = 0;
 }
 
 static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
@@ -94,20 +94,20 @@ static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
     const grid *g = s->frame->job->parts[s->part].cells;
     const int vertices = g->offsets.data ? 0 : grid_type_vertices(g->cell_type);
     for (int n = 0; n < count; n++) {
-        if (s->coming_count == SIMD_WIDTH) {
-            kernel_find_waiting(s);
-            kernel_find_coming(s);
+        if (s->queued_count == SIMD_WIDTH) {
+            kernel_find_pending(s);
+            kernel_find_queued(s);
         }
-        s->coming[s->coming_count++] = cells[n];
+        s->queued[s->queued_count++] = cells[n];
         if (vertices) __builtin_prefetch(g->connectivity.data + (int64_t)cells[n] * vertices * g->connectivity.stride);
     }
 }
 
 static void kernel_find_rest(kernel_finder *s)
 {
-    kernel_find_waiting(s);
-    kernel_find_coming(s);
-    kernel_find_waiting(s);
+    kernel_find_pending(s);
+    kernel_find_queued(s);
+    kernel_find_pending(s);
     kernel_find_crossed_hexes(s);
 }
 
@@ -123,13 +123,13 @@ typedef struct kernel_front {
 /* May it show in the picture? Children of one that lies in it need not be asked. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
 {
-    kernel_lie lie = {0};
+    kernel_placement placement = {0};
     if (*is_inside) return true;
-    const kernel_sides sides = kernel_box_sides(&s->planes, tree, node, &lie);
+    const kernel_sides sides = kernel_box_sides(&s->planes, tree, node, &placement);
     const unsigned outside =
         (sides.below & (1u | 1u << KERNEL_ROWS_LANE)) | (sides.above & (2u | 2u << KERNEL_ROWS_LANE));
-    *is_inside = !outside && lie.near >= s->t_near;
-    return kernel_blocks_of(sides) && !(lie.far < s->t_near);
+    *is_inside = !outside && placement.near >= s->t_near;
+    return kernel_blocks_of(sides) && !(placement.far < s->t_near);
 }
 
 /* Those of the entries whose values and whose boxes show. About half of them do by their values, which no branch
@@ -137,17 +137,17 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
 SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
                                      kernel_front *front, const int64_t *entries, int count)
 {
-    int64_t shown[KERNEL_FRONT];
+    int64_t candidates[KERNEL_FRONT];
     int left = 0;
     for (int n = 0; n < count; n++) {
-        shown[left] = entries[n];
+        candidates[left] = entries[n];
         left += kernel_node_shows(s->interest, ranges, entries[n] >> 1);
     }
     front->count = 0;
     for (int n = 0; n < left; n++) {
-        bool is_inside = shown[n] & 1;
-        if (kernel_node_in_picture(s, tree, shown[n] >> 1, &is_inside))
-            front->entries[front->count++] = shown[n] | is_inside;
+        bool is_inside = candidates[n] & 1;
+        if (kernel_node_in_picture(s, tree, candidates[n] >> 1, &is_inside))
+            front->entries[front->count++] = candidates[n] | is_inside;
     }
 }
 
@@ -171,14 +171,14 @@ SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges
 
 /* Depth first, from the left, KERNEL_FRONT nodes at once: about in the order in which leaves lie in memory. One node at
  * once needs no more room than the tree is deep. */
-static void kernel_find_shown(kernel_finder *s, int64_t root)
+static void kernel_find_candidates(kernel_finder *s, int64_t root)
 {
     const mmbvh *tree = s->frame->job->parts[s->part].tree;
     const mmbvh_ranges *ranges = &s->field->ranges[s->part];
     int64_t stack[KERNEL_FRONT_ROOM + 2 * KERNEL_FRONT];
     int top = 0;
-    stack[top++] = 2 * root + (s->keeper != NULL);
-    while (top && !(s->keeper ? s->keeper->is_refused : s->list->is_full)) {
+    stack[top++] = 2 * root + (s->writer != NULL);
+    while (top && !(s->writer ? s->writer->is_refused : s->list->is_full)) {
         kernel_front front, leaves, children;
         const int most = top < KERNEL_FRONT_ROOM - MMBVH_MAX_DEPTH ? KERNEL_FRONT : 1;
         const int count = top < most ? top : most;
@@ -200,25 +200,25 @@ static void kernel_find_shown(kernel_finder *s, int64_t root)
 }
 
 /* What is crossed of the subtree, if it is of a mesh that can be kept. */
-static void kernel_keep_subtree(kernel_finder *s, int64_t root)
+static void kernel_activate_subtree(kernel_finder *s, int64_t root)
 {
-    kernel_keeper *k = s->keeper;
-    k->vertices = s->plain.is_hexes ? 8 : 4;
-    k->is_refused = k->is_refused || !(s->plain.is_so || s->plain.is_hexes);
-    if (!k->is_refused) kernel_find_shown(s, root);
+    kernel_active_writer *k = s->writer;
+    k->vertices = s->packed.is_hexes ? 8 : 4;
+    k->is_refused = k->is_refused || !(s->packed.is_tets || s->packed.is_hexes);
+    if (!k->is_refused) kernel_find_candidates(s, root);
 }
 
 /* What shows of so many records that are kept, from the first on. */
-static void kernel_find_kept(kernel_finder *s, int64_t first, int64_t count)
+static void kernel_find_active(kernel_finder *s, int64_t first, int64_t count)
 {
-    const int vertices = s->plain.is_hexes ? 8 : 4;
+    const int vertices = s->packed.is_hexes ? 8 : 4;
     for (int64_t at = first, end = first + count; at < end && !s->list->is_full; at += SIMD_WIDTH) {
         s->tets.count = end - at < SIMD_WIDTH ? (int)(end - at) : SIMD_WIDTH;
         for (int n = 0; n < s->tets.count; n++) {
             s->tets.cell[n] = (uint32_t)(at + n);
-            for (int i = 0; i < vertices; i++) s->tets.plain[i][n] = (int32_t)((at + n) * vertices + i);
+            for (int i = 0; i < vertices; i++) s->tets.packed[i][n] = (int32_t)((at + n) * vertices + i);
         }
-        kernel_find_waiting(s);
+        kernel_find_pending(s);
     }
     kernel_find_crossed_hexes(s);
 }

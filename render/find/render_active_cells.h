@@ -1,13 +1,13 @@
 /* Crossed cells kept from one picture to the next (render.h): a frame that has fewer cells to look at, and these side
  * by side, neither goes down trees nor gathers vertices from all over the mesh. */
-#ifndef RENDER_RENDER_KEPT_H
-#define RENDER_RENDER_KEPT_H
+#ifndef RENDER_RENDER_ACTIVE_H
+#define RENDER_RENDER_ACTIVE_H
 
 #include "kernel_types.h"
 
 /* Set frame->kept to what the job's kept cells have of it, which is put there first where it can be; thread_of is one
  * state a thread. Without memory nothing is kept. */
-void render_kept_begin(kernel_frame *frame, kernel_thread *thread_of, int threads);
-void render_kept_end(kernel_frame *frame);
+void render_active_cells_begin(kernel_frame *frame, kernel_thread *thread_of, int threads);
+void render_active_cells_end(kernel_frame *frame);
 
 #endif

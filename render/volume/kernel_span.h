@@ -1,14 +1,14 @@
-/* A ray's course through a cell: how its field is known, and how finely a stretch of it is cut into segments with a
- * linear field each (kernel_segments.h): into equal parts, or, where these do not suffice, by halving
- * (kernel_halving.h). */
-#ifndef RENDER_KERNEL_COURSE_H
-#define RENDER_KERNEL_COURSE_H
+/* A ray's span in a cell: how its field is known, and how finely a stretch of it is cut into segments with a
+ * linear field each (kernel_segments.h): into equal subintervals, or, where these do not suffice, by bisection
+ * (kernel_bisection.h). */
+#ifndef RENDER_KERNEL_SPAN_H
+#define RENDER_KERNEL_SPAN_H
 
 #include "fragment.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
 #include "kernel_field.h"
-#include "kernel_fine.h"
+#include "kernel_double.h"
 #include "kernel_integral.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
@@ -17,8 +17,8 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-/* Of equal parts. */
-enum { KERNEL_MAX_PARTS = 256 };
+/* Of equal subintervals. */
+enum { KERNEL_MAX_SUBDIVISIONS = 256 };
 /* exp(-it) is KERNEL_BLACK, or a little more. */
 #define KERNEL_DARK_DEPTH 18.4f
 
@@ -26,26 +26,25 @@ typedef struct kernel_segment_state {
     kernel_segments *list;
     const kernel_pieces *pieces;
     int volume;
-    float allowance; /* the error a unit distance, and a unit of optical depth, may make; 0: parts by step */
-    float mixing;    /* > 0: segments go out as they are met, to be mixed with others: see kernel_course_mixed() */
+    float allowance; /* the error a unit distance, and a unit of optical depth, may make; 0: subintervals by step */
+    float mixing;    /* > 0: segments go out as they are met, to be mixed with others: see kernel_span_mixed() */
     float reach;     /* no ray is longer in the cells, unit distances */
 } kernel_segment_state;
 
 /* A cell under way: how its field is known, and how finely it must be. */
-typedef struct kernel_course {
+typedef struct kernel_span {
     const kernel_map *map;   /* NULL: linear */
     const kernel_cell *cell; /* NULL: a tet or a polyhedron; without a map it is of one value */
     const kernel_interval *interval;
-    const kernel_fine *fine;    /* of a tet's interval in double; NULL: none */
+    const kernel_double *precise; /* of a tet's interval in double; NULL: none */
     float cost;                 /* what light changes by a unit distance for a field off by one; 0 where nobody asks */
     int first_step, step_count; /* the steps of the opacity among the cell's values */
     bool is_steep, is_narrow;   /* steep ramps are, narrow ones */
-} kernel_course;
+} kernel_span;
 
 /* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
  * unit distance (docs/error_budget.md): the most of that over the cell's values, between steps. */
-SIMD_INLINE void kernel_course_bound(const kernel_segment_state *state, const float *values, int count,
-                                     kernel_course *out)
+SIMD_INLINE void kernel_span_bound(const kernel_segment_state *state, const float *values, int count, kernel_span *out)
 {
     const kernel_pieces *t = state->pieces;
     float low = values[0], high = low;
@@ -74,14 +73,14 @@ SIMD_INLINE void kernel_course_bound(const kernel_segment_state *state, const fl
     }
 }
 
-SIMD_INLINE vf kernel_course_value(kernel_packet *p, const kernel_course *course, vm rays, vf t)
+SIMD_INLINE vf kernel_span_value(kernel_packet *p, const kernel_span *span, vm rays, vf t)
 {
-    const kernel_interval *i = course->interval;
-    return course->map ? kernel_value_at(p, course->map, i, rays, t) : kernel_line_value(i, t);
+    const kernel_interval *i = span->interval;
+    return span->map ? kernel_value_at(p, span->map, i, rays, t) : kernel_line_value(i, t);
 }
 
 /* Rays whose values, from low to high, have a steep ramp among them, or a narrow one. */
-SIMD_INLINE vm kernel_course_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
+SIMD_INLINE vm kernel_span_is_steep(const kernel_segment_state *state, vf low, vf high, bool is_narrow)
 {
     vm any = vm_none();
     for (int i = 0; i < state->pieces->steep_count; i++) {
@@ -93,96 +92,97 @@ SIMD_INLINE vm kernel_course_is_steep(const kernel_segment_state *state, vf low,
 }
 
 /* The same for a step. */
-SIMD_INLINE vm kernel_course_steps(const kernel_segment_state *state, const kernel_course *course, vf low, vf high)
+SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel_span *span, vf low, vf high)
 {
     vm any = vm_none();
-    for (int i = 0; i < course->step_count; i++) {
-        const vf cut = vf_set(state->pieces->steps[course->first_step + i].cut);
+    for (int i = 0; i < span->step_count; i++) {
+        const vf cut = vf_set(state->pieces->steps[span->first_step + i].cut);
         any = vm_or(any, vm_and(vf_le(low, cut), vf_le(cut, high)));
     }
     return any;
 }
 
-/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/error_budget.md: 4e-7 at most).
+/* Of a stretch's values, the rounding of those in float32, up to 1 or of their size (docs/error_budget.md: 4e-7 at
+ * most).
  */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 
-/* Into how many parts, as a real number, to cut the stretch from t0 to t1, with values v0 and v1 there, and how far its
- * field is off the line between them. By error: the deviation from the
- * line at a quarter, the half and three quarters, half as much again (the three see 7/8 of a cubic's), goes as the
- * square of a part, and its mean is two thirds of it. Allowed is the stretch's share of the ray's length and of its
- * absorption, 1 - exp(-depth) >= depth / (1 + depth), with the opacity as the least of the extinction. Where a step of
- * the opacity is among the values no number is enough, nor where a steep ramp is among them and asks for too many, nor
- * where a narrow one is in which the values' rounding alone would take an eighth of what is allowed. */
-SIMD_INLINE vf kernel_course_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
-                                    vm rays, vf t0, vf t1, vf v0, vf v1, vf *deviation)
+/* Into how many subintervals, as a real number, to cut the stretch from t0 to t1, with values v0 and v1 there, and how
+ * far its field is off the line between them. By error: the deviation from the line at a quarter, the half and three
+ * quarters, half as much again (the three see 7/8 of a cubic's), goes as the square of a subinterval, and its mean is
+ * two thirds of it. Allowed is the stretch's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth
+ * / (1 + depth), with the opacity as the least of the extinction. Where a step of the opacity is among the values no
+ * number is enough, nor where a steep ramp is among them and asks for too many, nor where a narrow one is in which the
+ * values' rounding alone would take an eighth of what is allowed. */
+SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span, vm rays,
+                                  vf t0, vf t1, vf v0, vf v1, vf *deviation)
 {
     const vf length = t1 - t0;
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
     vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
     for (int quarter = 1; quarter < 4; quarter++) {
         const float share = 0.25f * (float)quarter;
-        const vf v = kernel_value_at(p, course->map, course->interval, rays, t0 + length * share);
+        const vf v = kernel_value_at(p, span->map, span->interval, rays, t0 + length * share);
         off = vf_max(off, vf_abs((v0 + (v1 - v0) * share) - v));
         opacity += kernel_opacity(transfer, v);
     }
     const vf distance = length * state->list->per_t, depth = distance * opacity * 0.25f;
     const vf allowed = state->allowance * (distance / state->reach + depth / (1.0f + depth));
-    const vf made = off * course->cost * distance; /* 3/2 of 2/3 */
+    const vf made = off * span->cost * distance; /* 3/2 of 2/3 */
     *deviation = off;
     const vf wanted = vf_sqrt(vf_min(made / vf_max(allowed, vf_set(1e-30f)), vf_set(1e6f)));
-    const vf parts = vf_min(wanted, vf_set(KERNEL_MAX_PARTS));
-    if (!course->step_count && !course->is_steep) return parts;
+    const vf subdivisions = vf_min(wanted, vf_set(KERNEL_MAX_SUBDIVISIONS));
+    if (!span->step_count && !span->is_steep) return subdivisions;
     const vf largest = vf_max(vf_max(vf_abs(v0), vf_abs(v1)), vf_set(1));
     const vf wide = 1.5f * off + KERNEL_VALUE_ROUNDING * largest, low = vf_min(v0, v1) - wide,
              high = vf_max(v0, v1) + wide;
-    vm too_few = kernel_course_steps(state, course, low, high);
-    if (course->is_steep) {
-        const vm many = vf_lt(vf_set(KERNEL_MAX_PARTS), wanted);
-        too_few = vm_or(too_few, vm_and(many, kernel_course_is_steep(state, low, high, false)));
+    vm too_few = kernel_span_steps(state, span, low, high);
+    if (span->is_steep) {
+        const vm many = vf_lt(vf_set(KERNEL_MAX_SUBDIVISIONS), wanted);
+        too_few = vm_or(too_few, vm_and(many, kernel_span_is_steep(state, low, high, false)));
     }
-    if (course->is_narrow) {
-        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * course->cost * distance;
+    if (span->is_narrow) {
+        const vf rounded = (8 * KERNEL_VALUE_ROUNDING) * largest * span->cost * distance;
         const vm shows = vf_lt(allowed, rounded);
-        too_few = vm_or(too_few, vm_and(shows, kernel_course_is_steep(state, low, high, true)));
+        too_few = vm_or(too_few, vm_and(shows, kernel_span_is_steep(state, low, high, true)));
     }
-    return vf_select(too_few, vf_set(2 * KERNEL_MAX_PARTS), parts);
+    return vf_select(too_few, vf_set(2 * KERNEL_MAX_SUBDIVISIONS), subdivisions);
 }
 
 /* The same for a stretch that others are mixed with, who take it for a medium that is the same throughout (comp.h). Of
  * a stretch of depth d whose extinction and colour vary by the share v, no more than d v / 4 is elsewhere than it is
  * said to be, and what that does to light is attenuated by the others' depth in it. That depth, times the light that
  * gets there, sums to 1 over a ray; so d v / 4 may be the whole error allowed. */
-SIMD_INLINE vf kernel_course_mixed(const kernel_segment_state *state, const kernel_course *course, vf length, vf change)
+SIMD_INLINE vf kernel_span_mixed(const kernel_segment_state *state, const kernel_span *span, vf length, vf change)
 {
-    const vf moved = change * course->cost * (length * state->list->per_t) * 0.25f;
+    const vf moved = change * span->cost * (length * state->list->per_t) * 0.25f;
     return vf_sqrt(vf_min(moved / state->mixing, vf_set(1e6f)));
 }
 
-/* How many equal parts; halved: the rays for which no number is enough. */
-SIMD_INLINE vf kernel_course_parts(kernel_packet *p, const kernel_segment_state *state, const kernel_course *course,
-                                   vm rays, vf t0, vf t1, vf v0, vf v1, vm *halved)
+/* How many equal subintervals; halved: the rays for which no number is enough. */
+SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
+                                        vm rays, vf t0, vf t1, vf v0, vf v1, vm *halved)
 {
-    const vf length = t1 - t0, most = vf_set(KERNEL_MAX_PARTS);
-    vf parts = vf_set(1), off = vf_set(0);
+    const vf length = t1 - t0, most = vf_set(KERNEL_MAX_SUBDIVISIONS);
+    vf subdivisions = vf_set(1), off = vf_set(0);
     *halved = vm_none();
-    if (course->map && state->allowance > 0) {
-        parts = kernel_course_curved(p, state, course, rays, t0, t1, v0, v1, &off);
-        *halved = vm_and(rays, vf_lt(most, parts));
-    } else if (course->map) {
-        parts = length / p->sample_step;
-        if (course->step_count && state->mixing > 0) {
-            const vf wanted = kernel_course_curved(p, state, course, rays, t0, t1, v0, v1, &off);
+    if (span->map && state->allowance > 0) {
+        subdivisions = kernel_span_curved(p, state, span, rays, t0, t1, v0, v1, &off);
+        *halved = vm_and(rays, vf_lt(most, subdivisions));
+    } else if (span->map) {
+        subdivisions = length / p->sample_step;
+        if (span->step_count && state->mixing > 0) {
+            const vf wanted = kernel_span_curved(p, state, span, rays, t0, t1, v0, v1, &off);
             *halved = vm_and(rays, vf_lt(most, wanted));
         }
-    } else if (course->step_count && state->mixing > 0) {
-        *halved = vm_and(rays, kernel_course_steps(state, course, vf_min(v0, v1), vf_max(v0, v1)));
-    } else if (course->is_narrow && course->cell) {
+    } else if (span->step_count && state->mixing > 0) {
+        *halved = vm_and(rays, kernel_span_steps(state, span, vf_min(v0, v1), vf_max(v0, v1)));
+    } else if (span->is_narrow && span->cell) {
         *halved = rays;
     }
     if (state->mixing > 0)
-        parts = vf_max(parts, kernel_course_mixed(state, course, length, vf_abs(v1 - v0) + 2.0f * off));
-    return vf_clamp(-vf_floor(-parts), vf_set(1), most);
+        subdivisions = vf_max(subdivisions, kernel_span_mixed(state, span, length, vf_abs(v1 - v0) + 2.0f * off));
+    return vf_clamp(-vf_floor(-subdivisions), vf_set(1), most);
 }
 
 /* a + b, and what that loses to rounding (Knuth). */

@@ -2,7 +2,7 @@
  * made for each tile, and every thread bins its own cells. The bound on cells is a bound on memory and on time lost:
  * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. Of a volume nothing is
  * hidden: there a million may be listed in any case. */
-#include "render_shown.h"
+#include "render_candidates.h"
 
 #include <omp.h>
 
@@ -33,14 +33,15 @@ static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *li
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
 /* Another chunk. A list that is full stays so: cells that found no room are missing from it. */
-static bool grow(kernel_shown_list *list)
+static bool grow(kernel_candidate_list *list)
 {
     if (list->is_full) return false;
     const int64_t twice = 2 * list->capacity, capacity = !twice ? ITEMS : twice < MOST_ITEMS ? twice : MOST_ITEMS;
     int64_t left;
 #pragma omp atomic capture
     left = *list->bound -= capacity;
-    kernel_shown_chunk *chunk = left < 0 ? NULL : base_alloc(sizeof *chunk + (size_t)capacity * sizeof *chunk->items);
+    kernel_candidate_chunk *chunk =
+        left < 0 ? NULL : base_alloc(sizeof *chunk + (size_t)capacity * sizeof *chunk->items);
     list->is_full = !chunk;
     if (!chunk) return false;
     if (list->chunk) list->chunk->count = list->count;
@@ -53,10 +54,10 @@ static bool grow(kernel_shown_list *list)
     return true;
 }
 
-static void free_list(kernel_shown_list *list)
+static void free_list(kernel_candidate_list *list)
 {
     while (list->chunk) {
-        kernel_shown_chunk *before = list->chunk->before;
+        kernel_candidate_chunk *before = list->chunk->before;
         base_free(list->chunk);
         list->chunk = before;
     }
@@ -91,24 +92,24 @@ static unsigned bits_of(within w)
     return ~0u << w.first / KERNEL_BLOCK & ((2u << w.last / KERNEL_BLOCK) - 1);
 }
 
-static kernel_tile_shown shown_within(const kernel_shown *s, within columns, within rows)
+static kernel_tile_candidate shown_within(const kernel_candidate *s, within columns, within rows)
 {
     /* A tile's rows of blocks, a bit each in the column of the first blocks. */
     static const uint16_t spread[1 << BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
                                                  0x1000, 0x1001, 0x1010, 0x1011, 0x1100, 0x1101, 0x1110, 0x1111};
-    return (kernel_tile_shown){.near = s->near,
-                               .far = s->far,
-                               .cell = s->cell,
-                               .source = s->source,
-                               .blocks = (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
-                               .box =
-                                   (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
+    return (kernel_tile_candidate){
+        .near = s->near,
+        .far = s->far,
+        .cell = s->cell,
+        .source = s->source,
+        .blocks = (uint16_t)(bits_of(columns) * spread[bits_of(rows)]),
+        .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
 /* at: where each tile's next one goes. */
-static void bin_tiles(const kernel_shown_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_shown *out)
+static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
-    for (const kernel_shown *s = chunk->items, *end = s + chunk->count; s < end; s++)
+    for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
         for (int y = s->y0 / KERNEL_TILE; y <= s->y1 / KERNEL_TILE; y++) {
             const within rows = within_tile(s->y0, s->y1, y);
             for (int x = s->x0 / KERNEL_TILE; x <= s->x1 / KERNEL_TILE; x++)
@@ -137,9 +138,9 @@ static uint64_t place_tiles(uint32_t *counts, int threads, int64_t tiles, uint32
 typedef struct search {
     kernel_frame *frame;
     render_subtrees subtrees;
-    kernel_shown_list *lists; /* one a thread */
+    kernel_candidate_list *lists; /* one a thread */
     uint32_t *counts, *starts;
-    kernel_tile_shown *shown;
+    kernel_tile_candidate *candidates;
     int64_t bound;
 } search;
 
@@ -151,10 +152,10 @@ static void run(search *s, kernel_thread *thread_of, int threads)
 #pragma omp parallel num_threads(threads)
     {
         const int me = omp_get_thread_num();
-        kernel_shown_list *list = &s->lists[me];
+        kernel_candidate_list *list = &s->lists[me];
 #pragma omp for schedule(dynamic, 1)
         for (int64_t i = 0; i < s->subtrees.count; i++)
-            if (!list->is_full) kernels->find_shown(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
+            if (!list->is_full) kernels->find_candidates(s->frame, &thread_of[me], &s->subtrees.items[i], list, grow);
         if (list->chunk) list->chunk->count = list->count;
 #pragma omp barrier
 #pragma omp single
@@ -162,16 +163,16 @@ static void run(search *s, kernel_thread *thread_of, int threads)
             for (int t = 0; t < threads; t++) is_full = is_full || s->lists[t].is_full;
             const uint64_t count = is_full ? 0 : place_tiles(s->counts, threads, tiles, s->starts);
             is_full = is_full || count > (uint64_t)most;
-            if (!is_full) s->shown = base_alloc(count * sizeof *s->shown);
+            if (!is_full) s->candidates = base_alloc(count * sizeof *s->candidates);
         }
-        for (const kernel_shown_chunk *c = s->shown ? list->chunk : NULL; c; c = c->before)
-            bin_tiles(c, across, s->counts + me * tiles, s->shown);
+        for (const kernel_candidate_chunk *c = s->candidates ? list->chunk : NULL; c; c = c->before)
+            bin_tiles(c, across, s->counts + me * tiles, s->candidates);
     }
 }
 
 /* What the search has found, or NULL. */
-static kernel_tile_shown *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads,
-                               uint32_t **starts)
+static kernel_tile_candidate *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads,
+                                   uint32_t **starts)
 {
     const int64_t tiles = tile_count(frame), pixels = (int64_t)frame->job->camera.width * frame->job->camera.height;
     const int64_t cells = is_volume && pixels < VOLUME_ITEMS ? VOLUME_ITEMS : pixels;
@@ -181,7 +182,7 @@ static kernel_tile_shown *find(kernel_frame *frame, bool is_volume, kernel_threa
     s.starts = base_alloc((size_t)(tiles + 1) * sizeof *s.starts);
     if (s.lists && s.counts && s.starts && cut_trees(frame, is_volume, &s.subtrees)) {
         for (int t = 0; t < threads; t++)
-            s.lists[t] = (kernel_shown_list){
+            s.lists[t] = (kernel_candidate_list){
                 .bound = &s.bound, .counts = s.counts + t * tiles, .tile_columns = (int)tiles_across(frame)};
         run(&s, thread_of, threads);
     }
@@ -189,27 +190,27 @@ static kernel_tile_shown *find(kernel_frame *frame, bool is_volume, kernel_threa
     base_free(s.lists);
     base_free(s.counts);
     base_free(s.subtrees.items);
-    if (!s.shown) base_free(s.starts);
-    *starts = s.shown ? s.starts : NULL;
-    return s.shown;
+    if (!s.candidates) base_free(s.starts);
+    *starts = s.candidates ? s.starts : NULL;
+    return s.candidates;
 }
 
-void render_shown_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
+void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
-    frame->shown = find(frame, false, thread_of, threads, &frame->shown_starts);
+    frame->candidates = find(frame, false, thread_of, threads, &frame->candidate_starts);
 }
 
-void render_shown_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
+void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
-    frame->volume_shown = find(frame, true, thread_of, threads, &frame->volume_starts);
+    frame->volume_candidates = find(frame, true, thread_of, threads, &frame->volume_starts);
 }
 
-void render_shown_free(kernel_frame *frame)
+void render_candidates_free(kernel_frame *frame)
 {
-    base_free(frame->shown);
-    base_free(frame->shown_starts);
-    base_free(frame->volume_shown);
+    base_free(frame->candidates);
+    base_free(frame->candidate_starts);
+    base_free(frame->volume_candidates);
     base_free(frame->volume_starts);
-    frame->shown = frame->volume_shown = NULL;
-    frame->shown_starts = frame->volume_starts = NULL;
+    frame->candidates = frame->volume_candidates = NULL;
+    frame->candidate_starts = frame->volume_starts = NULL;
 }

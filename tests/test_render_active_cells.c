@@ -25,13 +25,13 @@ static int by_bytes(const void *a, const void *b)
     return memcmp(a, b, sizeof(fragment));
 }
 
-static insitu_status draw(render_fixture *f, render_kept *kept, fragment_list *list)
+static insitu_status draw(render_fixture *f, render_active_cells *kept, fragment_list *list)
 {
     base_error error = {0};
     *list = (fragment_list){0};
-    f->job.kept = kept;
+    f->job.active = kept;
     const insitu_status status = render_frame(&f->job, list, NULL, &error);
-    f->job.kept = NULL;
+    f->job.active = NULL;
     if (!status) qsort(list->items, (size_t)list->count, sizeof *list->items, by_bytes);
     return status;
 }
@@ -43,7 +43,7 @@ static void assert_same(const fragment_list *a, const fragment_list *b, const ch
 }
 
 /* Returns how many fragments there are. */
-static int64_t compare(render_fixture *f, render_kept *kept, const char *what)
+static int64_t compare(render_fixture *f, render_active_cells *kept, const char *what)
 {
     fragment_list without, with;
     assert_int_equal(draw(f, NULL, &without), INSITU_OK);
@@ -55,7 +55,7 @@ static int64_t compare(render_fixture *f, render_kept *kept, const char *what)
 }
 
 /* From all cameras in turn, twice, by so many threads or less; what is kept by the first serves the others. */
-static void look_around_by(render_fixture *f, render_kept *kept, int threads, const char *what)
+static void look_around_by(render_fixture *f, render_active_cells *kept, int threads, const char *what)
 {
     int64_t fragments = 0, bytes = 0;
     for (int turn = 0; turn < 2 * CAMERA_COUNT; turn++) {
@@ -65,13 +65,13 @@ static void look_around_by(render_fixture *f, render_kept *kept, int threads, co
         fixture_look(f, camera, WIDTH, HEIGHT);
         f->job.threads = 1 + (turn + 1) % threads;
         fragments += compare(f, kept, name);
-        if (turn == 0) bytes = render_kept_bytes(kept);
-        assert_int_equal(render_kept_bytes(kept), bytes);
+        if (turn == 0) bytes = render_active_cells_bytes(kept);
+        assert_int_equal(render_active_cells_bytes(kept), bytes);
     }
     assert_true(fragments > 0);
 }
 
-static void look_around(render_fixture *f, render_kept *kept, const char *what)
+static void look_around(render_fixture *f, render_active_cells *kept, const char *what)
 {
     look_around_by(f, kept, 3, what);
 }
@@ -126,15 +126,15 @@ static void plain_meshes_are_kept_and_draw_the_same(void **state)
             const int count = variant & 1 ? 3 : 1;
             const double *values = variant & 1 ? three_values : one_value;
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             lattice(&f, plain_kinds[i], variant & 4 ? 13 : 4, variant & 2 ? interleaved : narrow, test_wave);
             fixture_add_surface(&f, values, count, 1);
             f.surfaces[0].root = RENDER_ROBUST;
-            assert_int_equal(render_kept_bytes(kept), 0);
+            assert_int_equal(render_active_cells_bytes(kept), 0);
             look_around(&f, kept, test_mesh_kind_name(plain_kinds[i]));
-            assert_int_equal(render_kept_bytes(kept), expected_bytes(&f.views[0], values, count));
+            assert_int_equal(render_active_cells_bytes(kept), expected_bytes(&f.views[0], values, count));
             fixture_free(&f);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
             assert_int_equal(base_memory_held(), held);
         }
 }
@@ -146,7 +146,7 @@ static void tiny_hexes_draw_the_same(void **state)
     static const double size = 1e-11;
     test_mesh mesh;
     render_fixture f;
-    render_kept *kept = render_kept_create();
+    render_active_cells *kept = render_active_cells_create();
     (void)state;
     test_mesh_lattice(TEST_HEXES, 6, 0.2, test_wave, &mesh);
     test_mesh_transform(&mesh, size, origin);
@@ -155,10 +155,10 @@ static void tiny_hexes_draw_the_same(void **state)
     fixture_add_surface(&f, three_values, 3, 1);
     f.surfaces[0].root = RENDER_ROBUST;
     look_around(&f, kept, "tiny hexes");
-    assert_int_equal(render_kept_bytes(kept), expected_bytes(&f.views[0], three_values, 3));
+    assert_int_equal(render_active_cells_bytes(kept), expected_bytes(&f.views[0], three_values, 3));
     fixture_free(&f);
     test_mesh_free(&mesh);
-    render_kept_free(kept);
+    render_active_cells_free(kept);
 }
 
 /* Every second layer of vertices lies on the one before: flat hexes, and where only half of it does some are wedges. */
@@ -168,7 +168,7 @@ static void collapsed_hexes_draw_the_same(void **state)
     for (int wedges = 0; wedges < 2; wedges++) {
         test_mesh mesh;
         render_fixture f;
-        render_kept *kept = render_kept_create();
+        render_active_cells *kept = render_active_cells_create();
         test_mesh_lattice(TEST_HEXES, 6, 0, test_wave, &mesh);
         for (int64_t i = 0; i < mesh.vertex_count; i++) {
             double *at = mesh.coordinates + 3 * i;
@@ -182,7 +182,7 @@ static void collapsed_hexes_draw_the_same(void **state)
         look_around(&f, kept, wedges ? "wedges told as hexes" : "flat hexes");
         fixture_free(&f);
         test_mesh_free(&mesh);
-        render_kept_free(kept);
+        render_active_cells_free(kept);
     }
 }
 
@@ -193,17 +193,17 @@ static void ghosts_are_not_kept(void **state)
     for (int i = 0; i < 2; i++) {
         test_mesh mesh;
         render_fixture f;
-        render_kept *kept = render_kept_create();
+        render_active_cells *kept = render_active_cells_create();
         test_mesh_lattice(plain_kinds[i], 5, 0.2, test_wave, &mesh);
         for (int64_t cell = 0; cell < mesh.cell_count; cell++) mesh.ghosts[cell] = cell % 3 == 0;
         fixture_create(&f, &mesh, 1, narrow, 2.0 / 5, 1, origin);
         fixture_add_surface(&f, three_values, 3, 1);
         f.surfaces[0].root = RENDER_ROBUST;
         look_around(&f, kept, "with ghosts");
-        assert_int_equal(render_kept_bytes(kept), expected_bytes(&f.views[0], three_values, 3));
+        assert_int_equal(render_active_cells_bytes(kept), expected_bytes(&f.views[0], three_values, 3));
         fixture_free(&f);
         test_mesh_free(&mesh);
-        render_kept_free(kept);
+        render_active_cells_free(kept);
     }
 }
 
@@ -214,7 +214,7 @@ static void small_pictures_of_many_cells_draw_the_same(void **state)
     for (int i = 0; i < 2; i++)
         for (int size = 1; size <= 16; size *= 4) {
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             lattice(&f, plain_kinds[i], 20, narrow, test_wave);
             fixture_add_surface(&f, three_values, 3, 1);
             f.surfaces[0].root = RENDER_ROBUST;
@@ -222,9 +222,9 @@ static void small_pictures_of_many_cells_draw_the_same(void **state)
                 fixture_look(&f, turn == 1 ? CAMERA_INSIDE : CAMERA_OUTSIDE, size, size);
                 compare(&f, kept, "a small picture");
             }
-            assert_true(render_kept_bytes(kept) == expected_bytes(&f.views[0], three_values, 3));
+            assert_true(render_active_cells_bytes(kept) == expected_bytes(&f.views[0], three_values, 3));
             fixture_free(&f);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -236,7 +236,7 @@ static void subsets_of_pixels_and_other_traversals_draw_the_same(void **state)
         if (p * p % 7 < 3) pixel_set_add(pixels, p);
     for (int i = 0; i < 2; i++) {
         render_fixture f;
-        render_kept *kept = render_kept_create();
+        render_active_cells *kept = render_active_cells_create();
         lattice(&f, plain_kinds[i], 6, narrow, test_wave);
         fixture_look(&f, CAMERA_OUTSIDE, WIDTH, HEIGHT);
         fixture_add_surface(&f, three_values, 3, 1);
@@ -251,7 +251,7 @@ static void subsets_of_pixels_and_other_traversals_draw_the_same(void **state)
             f.job.traversal = RENDER_BINNED;
         }
         fixture_free(&f);
-        render_kept_free(kept);
+        render_active_cells_free(kept);
     }
 }
 
@@ -267,18 +267,18 @@ static void other_meshes_and_layouts_are_not_kept(void **state)
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (int layout = -1; layout < 4; layout++) {
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             if (layout < 0 && (kind == TEST_TETS || kind == TEST_HEXES)) {
-                render_kept_free(kept);
+                render_active_cells_free(kept);
                 continue;
             }
             lattice(&f, kind, 4, layout < 0 ? narrow : wide[layout], test_wave);
             fixture_add_surface(&f, three_values, 3, 1);
             f.surfaces[0].root = RENDER_ROBUST;
             look_around(&f, kept, test_mesh_kind_name(kind));
-            assert_int_equal(render_kept_bytes(kept), 0);
+            assert_int_equal(render_active_cells_bytes(kept), 0);
             fixture_free(&f);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -290,7 +290,7 @@ static void layers_that_want_more_are_not_kept(void **state)
     for (int i = 0; i < 2; i++)
         for (int c = 0; c < CASE_COUNT; c++) {
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             lattice(&f, plain_kinds[i], 5, narrow, test_wave);
             fixture_set_volume(&f, 0.3);
             f.job.volume_count = 0;
@@ -306,9 +306,10 @@ static void layers_that_want_more_are_not_kept(void **state)
             }
             look_around(&f, kept, "a layer that wants more");
             const bool is_kept = c == NEUBAUER && plain_kinds[i] == TEST_TETS;
-            assert_int_equal(render_kept_bytes(kept), is_kept ? expected_bytes(&f.views[0], three_values, 3) : 0);
+            assert_int_equal(render_active_cells_bytes(kept),
+                             is_kept ? expected_bytes(&f.views[0], three_values, 3) : 0);
             fixture_free(&f);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -353,7 +354,7 @@ static void layers_of_two_fields_draw_the_same(void **state)
             for (int first = 0; first < 2; first++) { /* which of them comes first in the job */
                 render_fixture f;
                 other_field other;
-                render_kept *kept = render_kept_create();
+                render_active_cells *kept = render_active_cells_create();
                 lattice(&f, plain_kinds[i], 6, narrow, test_wave);
                 other_field_create(&f, plain_kinds[i], 6, test_linear, &other);
                 fixture_set_volume(&f, 0.3);
@@ -375,10 +376,10 @@ static void layers_of_two_fields_draw_the_same(void **state)
                     const test_view view = {f.views[0].cells, other.field, {0}};
                     expected += expected_bytes(&view, one_value, 1);
                 }
-                assert_int_equal(render_kept_bytes(kept), expected);
+                assert_int_equal(render_active_cells_bytes(kept), expected);
                 other_field_free(&other);
                 fixture_free(&f);
-                render_kept_free(kept);
+                render_active_cells_free(kept);
             }
 }
 
@@ -390,7 +391,7 @@ static void layers_are_told_apart(void **state)
     for (int i = 0; i < 2; i++) {
         render_fixture f;
         other_field other;
-        render_kept *kept = render_kept_create();
+        render_active_cells *kept = render_active_cells_create();
         int64_t expected = 0;
         lattice(&f, plain_kinds[i], 6, narrow, test_wave);
         other_field_create(&f, plain_kinds[i], 6, test_linear, &other);
@@ -407,11 +408,11 @@ static void layers_are_told_apart(void **state)
             f.surfaces[0].root = RENDER_ROBUST;
             assert_true(compare(&f, kept, "one layer after the other") > 0);
             if (turn < 4) expected += expected_bytes(is_other ? &view : &f.views[0], values, count);
-            assert_int_equal(render_kept_bytes(kept), expected);
+            assert_int_equal(render_active_cells_bytes(kept), expected);
         }
         other_field_free(&other);
         fixture_free(&f);
-        render_kept_free(kept);
+        render_active_cells_free(kept);
     }
 }
 
@@ -421,16 +422,16 @@ static void volumes_behind_draw_the_same(void **state)
     for (int i = 0; i < 2; i++)
         for (int segments = 0; segments < 2; segments++) {
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             lattice(&f, plain_kinds[i], 5, narrow, test_wave);
             fixture_add_surface(&f, one_value, 1, 1);
             f.surfaces[0].root = RENDER_ROBUST;
             fixture_set_volume(&f, 0.3);
             f.job.integration = segments ? RENDER_SEGMENTS : RENDER_SAMPLES;
             look_around(&f, kept, segments ? "a volume by segments" : "a volume by samples");
-            assert_int_equal(render_kept_bytes(kept), expected_bytes(&f.views[0], one_value, 1));
+            assert_int_equal(render_active_cells_bytes(kept), expected_bytes(&f.views[0], one_value, 1));
             fixture_free(&f);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -441,7 +442,7 @@ static void parts_draw_the_same(void **state)
     static const double beside[2][3] = {{0.9, 0.8, -0.7}, {-0.8, 0.9, 0.6}};
     test_mesh whole, meshes[PARTS];
     render_fixture f;
-    render_kept *kept = render_kept_create();
+    render_active_cells *kept = render_active_cells_create();
     int64_t expected = 0;
     (void)state;
     test_mesh_lattice(TEST_TETS, 5, 0.2, test_wave, &whole);
@@ -457,12 +458,12 @@ static void parts_draw_the_same(void **state)
     f.surfaces[0].root = RENDER_ROBUST;
     look_around(&f, kept, "parts");
     for (int part = 0; part < 5; part++) expected += expected_bytes(&f.views[part], three_values, 3);
-    assert_int_equal(render_kept_bytes(kept), expected);
+    assert_int_equal(render_active_cells_bytes(kept), expected);
     fixture_free(&f);
     for (int part = 0; part < PARTS; part++) test_mesh_free(&meshes[part]);
     test_mesh_free(&whole);
     free(owners);
-    render_kept_free(kept);
+    render_active_cells_free(kept);
 }
 
 /* ---- numbers -------------------------------------------------------------------------------------------------- */
@@ -478,7 +479,7 @@ static void odd_values_draw_the_same(void **state)
         for (size_t o = 0; o < sizeof odd / sizeof odd[0]; o++) {
             test_mesh mesh;
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             char what[80];
             snprintf(what, sizeof what, "%s with a value of %g", test_mesh_kind_name(plain_kinds[i]), odd[o]);
             test_mesh_lattice(plain_kinds[i], 5, 0.2, test_wave, &mesh);
@@ -489,7 +490,7 @@ static void odd_values_draw_the_same(void **state)
             look_around_by(&f, kept, 1, what);
             fixture_free(&f);
             test_mesh_free(&mesh);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -503,7 +504,7 @@ static void scaled_values_draw_the_same(void **state)
             double values[3];
             test_mesh mesh;
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             char what[80];
             snprintf(what, sizeof what, "%s with values of %g", test_mesh_kind_name(plain_kinds[i]), scales[s]);
             test_mesh_lattice(plain_kinds[i], 5, 0.2, test_wave, &mesh);
@@ -515,7 +516,7 @@ static void scaled_values_draw_the_same(void **state)
             look_around(&f, kept, what);
             fixture_free(&f);
             test_mesh_free(&mesh);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -533,13 +534,13 @@ static void odd_isovalues_draw_the_same(void **state)
     for (int i = 0; i < 2; i++)
         for (size_t o = 0; o < sizeof odd / sizeof odd[0]; o++) {
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             lattice(&f, plain_kinds[i], 5, narrow, level_field);
             fixture_add_surface(&f, odd[o], 2, 1);
             f.surfaces[0].root = RENDER_ROBUST;
             look_around(&f, kept, "odd isovalues");
             fixture_free(&f);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -552,7 +553,7 @@ static void vertices_far_out_are_not_kept(void **state)
         for (size_t o = 0; o < sizeof far / sizeof far[0]; o++) {
             test_mesh mesh;
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             char what[80];
             snprintf(what, sizeof what, "%s with vertices at %g", test_mesh_kind_name(plain_kinds[i]), far[o]);
             test_mesh_lattice(plain_kinds[i], 5, 0.2, test_wave, &mesh);
@@ -561,10 +562,10 @@ static void vertices_far_out_are_not_kept(void **state)
             fixture_add_surface(&f, three_values, 3, 1);
             f.surfaces[0].root = RENDER_ROBUST;
             look_around_by(&f, kept, 1, what);
-            assert_int_equal(render_kept_bytes(kept), 0);
+            assert_int_equal(render_active_cells_bytes(kept), 0);
             fixture_free(&f);
             test_mesh_free(&mesh);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -578,7 +579,7 @@ static void sizes_and_distant_eyes_draw_the_same(void **state)
         for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; s++) {
             test_mesh mesh;
             render_fixture f;
-            render_kept *kept = render_kept_create();
+            render_active_cells *kept = render_active_cells_create();
             test_mesh_lattice(plain_kinds[i], 5, 0.2, test_wave, &mesh);
             test_mesh_transform(&mesh, sizes[s], origin);
             fixture_create(&f, &mesh, 1, narrow, 2.0 / 5 * sizes[s], sizes[s], origin);
@@ -601,7 +602,7 @@ static void sizes_and_distant_eyes_draw_the_same(void **state)
             }
             fixture_free(&f);
             test_mesh_free(&mesh);
-            render_kept_free(kept);
+            render_active_cells_free(kept);
         }
 }
 
@@ -612,7 +613,7 @@ static void cleared_after_a_change_draws_the_same(void **state)
     (void)state;
     for (int i = 0; i < 2; i++) {
         render_fixture f;
-        render_kept *kept = render_kept_create();
+        render_active_cells *kept = render_active_cells_create();
         lattice(&f, plain_kinds[i], 5, narrow, test_wave);
         fixture_add_surface(&f, three_values, 3, 1);
         f.surfaces[0].root = RENDER_ROBUST;
@@ -622,12 +623,12 @@ static void cleared_after_a_change_draws_the_same(void **state)
         assert_int_equal(
             mmbvh_refit_ranges(&f.trees[0], &f.views[0].cells, &f.fields[0], &(mmbvh_options){.threads = 1}),
             INSITU_OK);
-        render_kept_clear(kept);
-        assert_int_equal(render_kept_bytes(kept), 0);
+        render_active_cells_clear(kept);
+        assert_int_equal(render_active_cells_bytes(kept), 0);
         look_around(&f, kept, "after a change");
-        assert_int_equal(render_kept_bytes(kept), expected_bytes(&f.views[0], three_values, 3));
+        assert_int_equal(render_active_cells_bytes(kept), expected_bytes(&f.views[0], three_values, 3));
         fixture_free(&f);
-        render_kept_free(kept);
+        render_active_cells_free(kept);
     }
 }
 
@@ -648,7 +649,7 @@ static void more_than_the_bound_draws_the_same(void **state)
         double values[LAYERS];
         render_surface_layer layers[LAYERS];
         render_fixture f;
-        render_kept *kept = render_kept_create();
+        render_active_cells *kept = render_active_cells_create();
         int64_t all = 0, largest = 0;
         lattice(&f, TEST_TETS, SIDE, narrow, rough);
         fixture_add_surface(&f, one_value, 1, 1);
@@ -671,11 +672,11 @@ static void more_than_the_bound_draws_the_same(void **state)
             if (turn == 1) f.job.camera.half_height = 0.01;
             assert_true(compare(&f, kept, "sixteen layers") > 0);
             /* Less what room the threads leave at the end, 256 KiB each at most. */
-            assert_true(render_kept_bytes(kept) <= MOST_BYTES);
-            assert_true(render_kept_bytes(kept) > MOST_BYTES - largest - threads * (1 << 18));
+            assert_true(render_active_cells_bytes(kept) <= MOST_BYTES);
+            assert_true(render_active_cells_bytes(kept) > MOST_BYTES - largest - threads * (1 << 18));
         }
         fixture_free(&f);
-        render_kept_free(kept);
+        render_active_cells_free(kept);
     }
 }
 
@@ -684,7 +685,7 @@ static bool draws_without_the_nth(render_fixture *f, const fragment_list *expect
 {
     const int64_t held = base_memory_held();
     fragment_list list;
-    render_kept *kept = render_kept_create();
+    render_active_cells *kept = render_active_cells_create();
     const int64_t before = base_memory_allocations();
     base_memory_fail_nth(n);
     const insitu_status status = draw(f, kept, &list);
@@ -697,7 +698,7 @@ static bool draws_without_the_nth(render_fixture *f, const fragment_list *expect
     assert_int_equal(draw(f, kept, &list), INSITU_OK);
     assert_same(expected, &list, "an allocation failed before");
     base_free(list.items);
-    render_kept_free(kept);
+    render_active_cells_free(kept);
     assert_int_equal(base_memory_held(), held);
     return was_reached;
 }
@@ -727,9 +728,9 @@ static void failing_allocations_are_survived(void **state)
             fixture_free(&f);
         }
     base_memory_fail_nth(1);
-    assert_null(render_kept_create());
+    assert_null(render_active_cells_create());
     base_memory_fail_nth(0);
-    render_kept_free(NULL);
+    render_active_cells_free(NULL);
 }
 
 /* An argument: the tests to run, as cmocka matches names. */

@@ -1,20 +1,20 @@
-/* Crossed cells of a plain mesh put side by side, for pictures to come (render_kept.h). Sizes are such that each
- * picture of the same scale finds a tet's numbers usual (kernel_shown_tets.h): a mesh that has others among them is not
- * kept. */
-#ifndef RENDER_KERNEL_KEEP_H
-#define RENDER_KERNEL_KEEP_H
+/* Crossed cells of a packed mesh put side by side, for pictures to come (render_active_cells.h). Sizes are such that
+ * each picture of the same scale finds a tet's numbers usual (kernel_candidate_tets.h): a mesh that has others among
+ * them is not kept. */
+#ifndef RENDER_KERNEL_ACTIVE_CELLS_H
+#define RENDER_KERNEL_ACTIVE_CELLS_H
 
 #include <math.h>
 #include <string.h>
 
 #include "kernel_finder.h"
-#include "kernel_plain.h"
+#include "kernel_packed.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
 
 /* Lanes that some isovalue crosses; unusual: one of these has a difference that float32 has not, or hardly. */
-SIMD_INLINE unsigned kernel_keep_crossed(const kernel_finder *s, const vf *v, int vertices, bool *unusual)
+SIMD_INLINE unsigned kernel_activate_crossed(const kernel_finder *s, const vf *v, int vertices, bool *unusual)
 {
     const render_surface_layer *layer = s->surface->layer;
     vf low = vf_set(INFINITY), high = vf_set(-INFINITY), most = vf_set(0);
@@ -35,50 +35,50 @@ SIMD_INLINE unsigned kernel_keep_crossed(const kernel_finder *s, const vf *v, in
         odd = vm_or(odd, vm_and(crossed, vm_not(vf_lt(vf_set(1e-30f), largest))));
         any = vm_or(any, crossed);
     }
-    odd = vm_or(odd, vm_and(any, vm_not(vf_lt(most, vf_set(KERNEL_KEPT_VALUE)))));
+    odd = vm_or(odd, vm_and(any, vm_not(vf_lt(most, vf_set(KERNEL_ACTIVE_VALUE)))));
     const unsigned lanes = (1u << s->tets.count) - 1;
     *unusual = vm_bits(odd) & lanes;
     return vm_bits(any) & lanes;
 }
 
 /* False where a coordinate is of no usual size. */
-SIMD_INLINE bool kernel_keep_cell(kernel_finder *s, int lane, int vertices)
+SIMD_INLINE bool kernel_activate_cell(kernel_finder *s, int lane, int vertices)
 {
-    const kernel_plain *p = &s->plain;
-    const float most = KERNEL_KEPT_PLACE / p->scale;
-    float *at = s->keeper->at;
+    const kernel_packed *p = &s->packed;
+    const float most = KERNEL_ACTIVE_PLACE / p->scale;
+    float *at = s->writer->at;
     bool is_usual = true;
-    for (int i = 0; i < vertices; i++, at += KERNEL_KEPT_FLOATS) {
-        const int64_t vertex = s->tets.plain[i][lane];
+    for (int i = 0; i < vertices; i++, at += KERNEL_ACTIVE_FLOATS) {
+        const int64_t vertex = s->tets.packed[i][lane];
         for (int a = 0; a < 3; a++) {
             at[a] = p->coordinates[a][vertex * p->stride];
             is_usual = is_usual && fabsf(at[a]) < most;
         }
         at[3] = p->values[vertex * p->value_stride];
     }
-    s->keeper->at = at;
+    s->writer->at = at;
     return is_usual;
 }
 
 /* Cells whose vertices have come. */
-static void kernel_keep_waiting(kernel_finder *s)
+static void kernel_activate_pending(kernel_finder *s)
 {
-    const int vertices = s->keeper->vertices;
-    kernel_keeper *k = s->keeper;
+    const int vertices = s->writer->vertices;
+    kernel_active_writer *k = s->writer;
     vf v[8];
     bool unusual;
     if (!s->tets.count) return;
     kernel_tets_fill(&s->tets, vertices);
     for (int i = 0; i < vertices; i++) {
         vi vertex;
-        memcpy(&vertex, s->tets.plain[i], sizeof vertex);
-        v[i] = vf_gather(s->plain.values, vertex * s->plain.value_stride);
+        memcpy(&vertex, s->tets.packed[i], sizeof vertex);
+        v[i] = vf_gather(s->packed.values, vertex * s->packed.value_stride);
     }
-    unsigned lanes = kernel_keep_crossed(s, v, vertices, &unusual);
+    unsigned lanes = kernel_activate_crossed(s, v, vertices, &unusual);
     k->is_refused = k->is_refused || unusual;
     for (; lanes && !k->is_refused; lanes &= lanes - 1) {
         if (k->at == k->end && !s->keep(k)) break;
-        if (!kernel_keep_cell(s, __builtin_ctz(lanes), vertices)) k->is_refused = true;
+        if (!kernel_activate_cell(s, __builtin_ctz(lanes), vertices)) k->is_refused = true;
     }
     s->tets.count = 0;
 }

@@ -1,7 +1,7 @@
 /* Threads put the crossed cells of the subtrees dealt to them into blocks of one array, and the gaps that their last
  * blocks leave are closed from its end: gathers reach records by index. The array has room for all cells, or for as
  * many as may be kept: memory that is not written to is none. */
-#include "render_kept.h"
+#include "render_active_cells.h"
 
 #include <math.h>
 #include <omp.h>
@@ -29,36 +29,36 @@ typedef struct kept_cells {
     grid_field field;
     int value_count;
     double values[RENDER_MAX_ISOVALUES];
-    kernel_kept kept;
+    kernel_active active;
 } kept_cells;
 
-struct render_kept {
+struct render_active_cells {
     int count;
     kept_cells *items;
     int64_t floats;
 };
 
-render_kept *render_kept_create(void)
+render_active_cells *render_active_cells_create(void)
 {
-    return base_calloc(1, sizeof(render_kept));
+    return base_calloc(1, sizeof(render_active_cells));
 }
 
-void render_kept_clear(render_kept *kept)
+void render_active_cells_clear(render_active_cells *active)
 {
-    for (int i = 0; i < kept->count; i++) base_free((void *)kept->items[i].kept.records);
-    base_free(kept->items);
-    *kept = (render_kept){0};
+    for (int i = 0; i < active->count; i++) base_free((void *)active->items[i].active.records);
+    base_free(active->items);
+    *active = (render_active_cells){0};
 }
 
-void render_kept_free(render_kept *kept)
+void render_active_cells_free(render_active_cells *active)
 {
-    if (kept) render_kept_clear(kept);
-    base_free(kept);
+    if (active) render_active_cells_clear(active);
+    base_free(active);
 }
 
-int64_t render_kept_bytes(const render_kept *kept)
+int64_t render_active_cells_bytes(const render_active_cells *active)
 {
-    return kept->floats * (int64_t)sizeof(float);
+    return active->floats * (int64_t)sizeof(float);
 }
 
 /* ---- filling -------------------------------------------------------------------------------------------------- */
@@ -69,34 +69,34 @@ typedef struct kernel_room {
     int64_t blocks, taken;
 } kernel_room;
 
-static bool grow(kernel_keeper *keeper)
+static bool grow(kernel_active_writer *writer)
 {
     int64_t block;
 #pragma omp atomic capture
-    block = keeper->of->taken++;
-    keeper->is_refused = block >= keeper->of->blocks;
-    if (keeper->is_refused) return false;
-    keeper->at = keeper->of->floats + block * BLOCK;
-    keeper->end = keeper->at + BLOCK;
+    block = writer->of->taken++;
+    writer->is_refused = block >= writer->of->blocks;
+    if (writer->is_refused) return false;
+    writer->at = writer->of->floats + block * BLOCK;
+    writer->end = writer->at + BLOCK;
     return true;
 }
 
 static int by_place(const void *a, const void *b)
 {
-    const float *x = ((const kernel_keeper *)a)->at, *y = ((const kernel_keeper *)b)->at;
+    const float *x = ((const kernel_active_writer *)a)->at, *y = ((const kernel_active_writer *)b)->at;
     return (x > y) - (x < y);
 }
 
 /* What threads left of their last blocks is filled from the end. Returns how many floats there are. */
-static int64_t close_gaps(const kernel_room *room, kernel_keeper *keepers, int threads)
+static int64_t close_gaps(const kernel_room *room, kernel_active_writer *writers, int threads)
 {
     float *top = room->floats + room->taken * BLOCK;
     int low = 0, high = threads;
-    qsort(keepers, (size_t)threads, sizeof *keepers, by_place);
-    while (low < threads && !keepers[low].at) low++;
+    qsort(writers, (size_t)threads, sizeof *writers, by_place);
+    while (low < threads && !writers[low].at) low++;
     while (low < high) {
-        const kernel_keeper *last = &keepers[high - 1];
-        kernel_keeper *gap = &keepers[low];
+        const kernel_active_writer *last = &writers[high - 1];
+        kernel_active_writer *gap = &writers[low];
         if (last->end == top) {
             top = last->at;
             high--;
@@ -111,32 +111,32 @@ static int64_t close_gaps(const kernel_room *room, kernel_keeper *keepers, int t
     return top - room->floats;
 }
 
-static void fill(kernel_room *room, const render_subtrees *subtrees, kernel_keeper *keepers, const kernel_frame *frame,
-                 kernel_thread *thread_of, int threads)
+static void fill(kernel_room *room, const render_subtrees *subtrees, kernel_active_writer *writers,
+                 const kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
     const kernel_table *kernels = render_kernels();
 #pragma omp parallel num_threads(threads)
     {
         const int me = omp_get_thread_num();
-        kernel_keeper *keeper = &keepers[me];
-        keeper->of = room;
+        kernel_active_writer *writer = &writers[me];
+        writer->of = room;
 #pragma omp for schedule(dynamic, 1)
         for (int64_t i = 0; i < subtrees->count; i++)
-            if (!keeper->is_refused) kernels->keep_crossed(frame, &thread_of[me], &subtrees->items[i], keeper, grow);
+            if (!writer->is_refused) kernels->write_active(frame, &thread_of[me], &subtrees->items[i], writer, grow);
     }
 }
 
 static bool is_usual(const kernel_frame *frame, const kernel_surface *surface)
 {
     const double scale = frame->job->space.scale;
-    bool is_so = scale > 1e-20 && scale < 1e20;
+    bool is_tets = scale > 1e-20 && scale < 1e20;
     for (int a = 0; a < 3; a++) {
         const double eye = fabs(frame->job->camera.eye[a]);
-        is_so = is_so && eye * scale < (double)KERNEL_KEPT_PLACE && eye < 1e15; /* kernel_plain_begin() */
+        is_tets = is_tets && eye * scale < (double)KERNEL_ACTIVE_PLACE && eye < 1e15; /* kernel_packed_begin() */
     }
     for (int i = 0; i < surface->layer->value_count; i++)
-        is_so = is_so && fabs(surface->layer->values[i]) < (double)KERNEL_KEPT_VALUE;
-    return is_so;
+        is_tets = is_tets && fabs(surface->layer->values[i]) < (double)KERNEL_ACTIVE_VALUE;
+    return is_tets;
 }
 
 /* Along the camera's axes, from the eye, of a point of the tree's box that is given by its shares. */
@@ -182,7 +182,7 @@ static bool is_in_view(const kernel_frame *frame, const mmbvh *tree)
     return inside >= POINTS * 3 / 4;
 }
 
-/* Is all that the tiles ask of the layer's cells in records? (kernel_tile_shown.h) */
+/* Is all that the tiles ask of the layer's cells in records? (kernel_tile_candidates.h) */
 static bool can_keep(const kernel_frame *frame, int surface, int part)
 {
     const kernel_surface *s = &frame->surfaces[surface];
@@ -193,32 +193,33 @@ static bool can_keep(const kernel_frame *frame, int surface, int part)
     return cells->cell_type == GRID_TET || (cells->cell_type == GRID_HEX && s->layer->root == RENDER_ROBUST);
 }
 
-static kernel_kept keep(const render_kept *kept, const kernel_frame *frame, int surface, int part,
-                        kernel_thread *thread_of, int threads)
+static kernel_active keep(const render_active_cells *active, const kernel_frame *frame, int surface, int part,
+                          kernel_thread *thread_of, int threads)
 {
     const bool is_hexes = frame->job->parts[part].cells->cell_type == GRID_HEX;
-    const int64_t size = (is_hexes ? 8 : 4) * KERNEL_KEPT_FLOATS, cells = frame->job->parts[part].tree->cell_count;
-    const int64_t most = (MOST_FLOATS - kept->floats) / BLOCK, all = (cells * size + BLOCK - 1) / BLOCK + threads;
+    const int64_t size = (is_hexes ? 8 : 4) * KERNEL_ACTIVE_FLOATS, cells = frame->job->parts[part].tree->cell_count;
+    const int64_t most = (MOST_FLOATS - active->floats) / BLOCK, all = (cells * size + BLOCK - 1) / BLOCK + threads;
     kernel_room room = {.blocks = most < all ? most : all};
-    kernel_keeper *keepers = base_calloc((size_t)threads, sizeof *keepers);
+    kernel_active_writer *writers = base_calloc((size_t)threads, sizeof *writers);
     render_subtrees subtrees = {0};
     int64_t floats = 0;
     bool is_refused = true;
     room.floats = base_reserve((size_t)(room.blocks * BLOCK) * sizeof *room.floats);
-    if (keepers && room.floats && render_subtrees_begin(&subtrees, 1)) {
+    if (writers && room.floats && render_subtrees_begin(&subtrees, 1)) {
         is_refused = false;
         render_subtrees_add(&subtrees, frame, surface, part);
-        fill(&room, &subtrees, keepers, frame, thread_of, threads);
-        for (int t = 0; t < threads; t++) is_refused = is_refused || keepers[t].is_refused;
-        if (!is_refused) floats = close_gaps(&room, keepers, threads);
+        fill(&room, &subtrees, writers, frame, thread_of, threads);
+        for (int t = 0; t < threads; t++) is_refused = is_refused || writers[t].is_refused;
+        if (!is_refused) floats = close_gaps(&room, writers, threads);
     }
-    base_free(keepers);
+    base_free(writers);
     base_free(subtrees.items);
     if (is_refused)
         base_free(room.floats);
     else
         base_use(room.floats, (size_t)floats * sizeof *room.floats);
-    return is_refused ? (kernel_kept){0} : (kernel_kept){room.floats, floats / size, (int)size / KERNEL_KEPT_FLOATS};
+    return is_refused ? (kernel_active){0}
+                      : (kernel_active){room.floats, floats / size, (int)size / KERNEL_ACTIVE_FLOATS};
 }
 
 /* ---- what there is -------------------------------------------------------------------------------------------- */
@@ -241,14 +242,14 @@ static bool is_of(const kept_cells *k, const kernel_frame *frame, int surface, i
 }
 
 /* A place for the layer's cells on the part; NULL where there is no memory. */
-static kept_cells *place(render_kept *kept, const kernel_frame *frame, int surface, int part)
+static kept_cells *place(render_active_cells *active, const kernel_frame *frame, int surface, int part)
 {
     const render_part *p = &frame->job->parts[part];
     const render_surface_layer *layer = frame->surfaces[surface].layer;
-    kept_cells *items = base_realloc(kept->items, (size_t)(kept->count + 1) * sizeof *items);
+    kept_cells *items = base_realloc(active->items, (size_t)(active->count + 1) * sizeof *items);
     if (!items) return NULL;
-    kept->items = items;
-    kept_cells *item = &items[kept->count++];
+    active->items = items;
+    kept_cells *item = &items[active->count++];
     *item = (kept_cells){.cells = p->cells,
                          .tree = p->tree,
                          .scale = frame->job->space.scale,
@@ -258,32 +259,32 @@ static kept_cells *place(render_kept *kept, const kernel_frame *frame, int surfa
     return item;
 }
 
-static kernel_kept find(render_kept *kept, const kernel_frame *frame, int surface, int part, kernel_thread *thread_of,
-                        int threads)
+static kernel_active find(render_active_cells *active, const kernel_frame *frame, int surface, int part,
+                          kernel_thread *thread_of, int threads)
 {
-    for (int i = 0; i < kept->count; i++)
-        if (is_of(&kept->items[i], frame, surface, part)) return kept->items[i].kept;
-    kept_cells *item = place(kept, frame, surface, part);
-    if (!item) return (kernel_kept){0};
-    item->kept = keep(kept, frame, surface, part, thread_of, threads);
-    kept->floats += item->kept.count * item->kept.vertices * KERNEL_KEPT_FLOATS;
-    return item->kept;
+    for (int i = 0; i < active->count; i++)
+        if (is_of(&active->items[i], frame, surface, part)) return active->items[i].active;
+    kept_cells *item = place(active, frame, surface, part);
+    if (!item) return (kernel_active){0};
+    item->active = keep(active, frame, surface, part, thread_of, threads);
+    active->floats += item->active.count * item->active.vertices * KERNEL_ACTIVE_FLOATS;
+    return item->active;
 }
 
-void render_kept_begin(kernel_frame *frame, kernel_thread *thread_of, int threads)
+void render_active_cells_begin(kernel_frame *frame, kernel_thread *thread_of, int threads)
 {
     const render_job *job = frame->job;
-    if (!job->kept) return;
-    kernel_kept *kept = base_calloc((size_t)(frame->surface_count * job->part_count), sizeof *kept);
-    for (int surface = 0; kept && surface < frame->surface_count; surface++)
+    if (!job->active) return;
+    kernel_active *active = base_calloc((size_t)(frame->surface_count * job->part_count), sizeof *active);
+    for (int surface = 0; active && surface < frame->surface_count; surface++)
         for (int part = 0; part < job->part_count; part++)
             if (is_usual(frame, &frame->surfaces[surface]) && can_keep(frame, surface, part))
-                kept[surface * job->part_count + part] = find(job->kept, frame, surface, part, thread_of, threads);
-    frame->kept = kept;
+                active[surface * job->part_count + part] = find(job->active, frame, surface, part, thread_of, threads);
+    frame->active = active;
 }
 
-void render_kept_end(kernel_frame *frame)
+void render_active_cells_end(kernel_frame *frame)
 {
-    base_free((void *)frame->kept);
-    frame->kept = NULL;
+    base_free((void *)frame->active);
+    frame->active = NULL;
 }

@@ -1,0 +1,14 @@
+/* The cells whose isosurfaces or volume may show, binned by tile of the picture (kernel_candidates.h). */
+#ifndef RENDER_RENDER_CANDIDATES_H
+#define RENDER_RENDER_CANDIDATES_H
+
+#include "kernel_types.h"
+
+/* Fill frame->shown, which render_candidates_free() frees; thread_of is one state a thread. Where more cells show than
+ * pay, or there is no memory for them, it stays NULL, and tiles go down the trees themselves. */
+void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
+/* The same of the only volume's cells, as frame->volume_candidates. */
+void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
+void render_candidates_free(kernel_frame *frame);
+
+#endif
