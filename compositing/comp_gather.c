@@ -49,6 +49,16 @@ static int post_next(inbox *in, MPI_Comm comm, int slot)
                      in->rank, tag_pixels, comm, &in->requests[slot]);
 }
 
+/* After a failure: nothing may be received into memory that is about to be freed. */
+static void give_up(inbox *in)
+{
+    for (int slot = 0; slot < slot_count; slot++) {
+        if (in->requests[slot] == MPI_REQUEST_NULL) continue;
+        MPI_Cancel(&in->requests[slot]);
+        MPI_Wait(&in->requests[slot], MPI_STATUS_IGNORE);
+    }
+}
+
 static int receive_all(inbox *in, MPI_Comm comm, image *out)
 {
     int code = MPI_SUCCESS;
@@ -61,6 +71,7 @@ static int receive_all(inbox *in, MPI_Comm comm, image *out)
         for (int64_t i = 0; i < in->pixels[slot]; i++) comp_pixels_store(out, &from[i]);
         code = post_next(in, comm, slot);
     }
+    if (code != MPI_SUCCESS) give_up(in);
     return code;
 }
 
@@ -80,6 +91,7 @@ insitu_status comp_gather(MPI_Comm comm, const comp_pixel_list *finished, int64_
                           int64_t *sent_bytes, base_error *error)
 {
     inbox in = {.message_pixels = message_pixels};
+    for (int slot = 0; slot < slot_count; slot++) in.requests[slot] = MPI_REQUEST_NULL;
     int rank = 0;
     MPI_Comm_rank(comm, &rank);
     MPI_Comm_size(comm, &in.ranks);

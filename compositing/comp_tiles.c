@@ -115,7 +115,7 @@ static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
         for (int64_t y = area->y; y < area->y + area->height; y++) {
             float *rgba = tiles->out->rgba + 4 * (y * width + area->x);
             float *depth = tiles->out->depth ? tiles->out->depth + y * width + area->x : NULL;
-            for (int x = 0; x < area->width; x++) _mm_stream_ps(rgba + 4 * x, colour);
+            for (int x = 0; x < area->width; x++) _mm_stream_ps(rgba + 4 * (int64_t)x, colour);
             for (int x = 0; depth && x < area->width; x += 4) _mm_stream_ps(depth + x, endless);
         }
         _mm_sfence();

@@ -7,7 +7,7 @@ enum { RUN_MAX = INT16_MAX }; /* items that a lane can count */
 /* Few items need few bins: the bins' own cost is most of a small node's. */
 bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
 {
-    const int wanted = (int)(4 + (item_count < 8 * BINS_MAX ? item_count / 8 : BINS_MAX));
+    const int wanted = (int)(4 + (item_count < (int64_t)8 * BINS_MAX ? item_count / 8 : BINS_MAX));
     const int count = wanted < BINS_MAX ? wanted : BINS_MAX;
     const lanes used = centroids & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
     const ivec4 least = -lanes_lower(used), extent = lanes_upper(used) - least;

@@ -243,7 +243,7 @@ MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t 
         return;
     }
     fetch_span even = fetch_span_empty(), odd = even;
-    for (int k = 0; k < cell_count / 2; k++) {
+    for (int64_t k = 0; k < cell_count / 2; k++) {
         fetch_span_cell(&even, g, cells[2 * k], shape, wide_index, false);
         fetch_span_cell(&odd, g, cells[2 * k + 1], shape, wide_index, false);
     }
