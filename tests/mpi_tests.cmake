@@ -1,8 +1,9 @@
-# How tests start MPI programs: more ranks than cores, as root in a container too, one thread a rank.
+# How tests start MPI programs: more ranks than cores, which yield as they wait; as root in a container too; one thread a
+# rank.
 set(INSITU_TEST_ENVIRONMENT
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMP_NUM_THREADS=1
   OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
-  OMPI_MCA_btl_base_warn_component_unused=0)
+  OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_base_warn_component_unused=0)
 
 # insitu_add_mpi_test(NAME TARGET RANKS [RANKS ...] [ARGS arg ...]): one ctest case a count, named NAME_np<RANKS>.
 function(insitu_add_mpi_test name target)
@@ -11,9 +12,13 @@ function(insitu_add_mpi_test name target)
     set(arg_TIMEOUT 120)
   endif()
   foreach(ranks IN LISTS arg_UNPARSED_ARGUMENTS)
+    set(cores 2)
+    if(ranks EQUAL 1)
+      set(cores 1)
+    endif()
     add_test(NAME ${name}_np${ranks}
       COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}> ${arg_ARGS})
     set_tests_properties(${name}_np${ranks} PROPERTIES
-      ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT ${arg_TIMEOUT} PROCESSORS 2)
+      ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT ${arg_TIMEOUT} PROCESSORS ${cores})
   endforeach()
 endfunction()

@@ -6,6 +6,7 @@
  * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
 #include "reference_integral.h"
 #include "session_frame.h"
+#include "test_effort.h"
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -238,16 +239,18 @@ static bool is_as_counted(const test_mesh *mesh, const drawing *d, const image *
     return !wrong && doubtful <= PIXELS / 10;
 }
 
-/* Every seventeenth pixel against the integral: max_error holds in each where the truth is not in doubt. */
+/* Every seventeenth pixel against the integral, usually every 61st: max_error holds in each where the truth is not in
+ * doubt. */
 static bool is_as_integrated(const test_mesh *mesh, const drawing *d, const image *drawn, const char *what)
 {
     staged s;
     stage(&s, mesh, d);
     reference_scene *surfaces = reference_create(&s.f.job);
     reference_integral *scene = reference_integral_create(&s.f.job, 1e-8);
+    const int every = test_effort(61, 17);
     int doubtful = 0, count = 0;
     double worst = 0;
-    for (int p = 0; p < PIXELS; p += 17, count++) {
+    for (int p = 0; p < PIXELS; p += every, count++) {
         reference_ray ray;
         double rgba[4];
         reference_trace(surfaces, p % WIDTH, p / WIDTH, fixture_background, &ray);
@@ -286,9 +289,8 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && same_images(&whole, &ours, d, what);
         /* Slow, and once is enough: on any ranks the picture is that of one. */
-        if (with_reference && d->max_error > 0 && rank_count == 1)
-            good = is_as_integrated(mesh, d, &ours, what) && good;
-        if (with_reference && !(d->max_error > 0)) good = is_as_counted(mesh, d, &ours, what) && good;
+        if (with_reference && rank_count == 1)
+            good = (d->max_error > 0 ? is_as_integrated : is_as_counted)(mesh, d, &ours, what) && good;
         free_image(&whole);
     }
     free_image(&ours);

@@ -153,6 +153,7 @@ static void odd_values_are_found_one_by_one(void **state)
 
 int main(void)
 {
+    if (fixture_lacks_set()) return 77;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(hexes_are_numbered_anyhow),
         cmocka_unit_test(meshes_and_layers_take_turns),      cmocka_unit_test(ties_are_kept),

@@ -7,7 +7,9 @@
 #include "test_render_fixture.h"
 
 #include "comp.h"
+#include "cpu.h"
 #include "memory.h"
+#include "render_isa.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -187,6 +189,32 @@ static void index_pixels(drawn_frame *out, int64_t pixels)
     assert_int_equal(out->first[pixels], out->list.count);
 }
 
+static int used_set = CPU_ISA_COUNT - 1;
+
+int fixture_set_count(void)
+{
+    return render_isa_level() + 1;
+}
+
+const char *fixture_set_name(int set)
+{
+    return cpu_isa_name((cpu_isa)set);
+}
+
+void fixture_use_set(int set)
+{
+    used_set = set;
+    render_isa_limit(set);
+}
+
+bool fixture_lacks_set(void)
+{
+    const char *wish = getenv("INSITU_ISA");
+    const bool is_lacking = wish && strcmp(wish, render_isa()) != 0;
+    if (is_lacking) fprintf(stderr, "skipped: %s\n", render_isa_warning());
+    return is_lacking;
+}
+
 void fixture_draw(const render_fixture *f, drawn_frame *out)
 {
     fixture_draw_apart(f, 1, out);
@@ -345,42 +373,64 @@ static void compare_colour(comparison *c, int x, int y, const reference_ray *ray
     if (!(worst <= c->outcome.worst_colour)) c->outcome.worst_colour = worst;
 }
 
-static void compare_ray(comparison *c, const reference_scene *scene, int x, int y)
+static void compare_ray(comparison *c, const reference_ray *ray, int x, int y)
 {
-    reference_ray ray;
-    reference_trace(scene, x, y, fixture_background, &ray);
     c->outcome.rays++;
-    if (is_excluded(&ray, c->bounds->margin)) {
+    if (is_excluded(ray, c->bounds->margin)) {
         c->outcome.excluded++;
         return;
     }
-    const bool slow = is_slow(c, &ray);
-    c->outcome.ambiguous += ray.ambiguous;
-    c->outcome.slow += slow && !ray.ambiguous;
-    compare_hits(c, x, y, &ray);
-    if (!ray.ambiguous && !slow) compare_colour(c, x, y, &ray);
+    const bool slow = is_slow(c, ray);
+    c->outcome.ambiguous += ray->ambiguous;
+    c->outcome.slow += slow && !ray->ambiguous;
+    compare_hits(c, x, y, ray);
+    if (!ray->ambiguous && !slow) compare_colour(c, x, y, ray);
+}
+
+/* Each ray's truth once, for all sets. */
+static void compare_rays(const render_job *job, comparison *sets, int count)
+{
+    reference_scene *scene = reference_create(job);
+    for (int y = 0; y < job->camera.height; y++)
+        for (int x = 0; x < job->camera.width; x++) {
+            reference_ray ray;
+            reference_trace(scene, x, y, fixture_background, &ray);
+            for (int i = 0; i < count; i++) compare_ray(&sets[i], &ray, x, y);
+        }
+    reference_free(scene);
+}
+
+static void judge(const comparison *c, const char *set)
+{
+    const fixture_outcome *o = &c->outcome;
+    if (getenv("INSITU_TEST_VERBOSE"))
+        fprintf(
+            stderr,
+            "%s, %s: %d rays, %d hits, %d excluded, %d ambiguous, %d slow; depth %.2g cells (ambiguous %.2g), colour "
+            "%.2g\n",
+            c->what, set, (int)o->rays, (int)o->hits, (int)o->excluded, (int)o->ambiguous, (int)o->slow, o->worst_depth,
+            o->worst_ambiguous, o->worst_colour);
+    if (!(o->worst_depth <= c->bounds->depth)) fail_msg("%s, %s: depth off by %g cells", c->what, set, o->worst_depth);
+    if (!(o->worst_colour <= c->bounds->colour)) fail_msg("%s, %s: colour off by %g", c->what, set, o->worst_colour);
+    if ((double)o->excluded > c->bounds->excluded * (double)o->rays + 1)
+        fail_msg("%s: %d of %d rays excluded", c->what, (int)o->excluded, (int)o->rays);
 }
 
 fixture_outcome fixture_compare(const render_fixture *f, const fixture_bounds *bounds, const char *what)
 {
-    drawn_frame drawn;
-    fixture_draw(f, &drawn);
-    comparison c = {.f = f, .bounds = bounds, .what = what, .drawn = &drawn};
-    reference_scene *scene = reference_create(&f->job);
-    for (int y = 0; y < f->job.camera.height; y++)
-        for (int x = 0; x < f->job.camera.width; x++) compare_ray(&c, scene, x, y);
-    reference_free(scene);
-    const fixture_outcome *o = &c.outcome;
-    if (getenv("INSITU_TEST_VERBOSE"))
-        fprintf(stderr,
-                "%s: %d rays, %d hits, %d excluded, %d ambiguous, %d slow; depth %.2g cells (ambiguous %.2g), colour "
-                "%.2g\n",
-                what, (int)o->rays, (int)o->hits, (int)o->excluded, (int)o->ambiguous, (int)o->slow, o->worst_depth,
-                o->worst_ambiguous, o->worst_colour);
-    if (!(o->worst_depth <= bounds->depth)) fail_msg("%s: depth off by %g cells", what, o->worst_depth);
-    if (!(o->worst_colour <= bounds->colour)) fail_msg("%s: colour off by %g", what, o->worst_colour);
-    if ((double)o->excluded > bounds->excluded * (double)o->rays + 1)
-        fail_msg("%s: %d of %d rays excluded", what, (int)o->excluded, (int)o->rays);
-    drawn_free(&drawn);
-    return c.outcome;
+    drawn_frame drawn[CPU_ISA_COUNT];
+    comparison sets[CPU_ISA_COUNT];
+    const int count = fixture_set_count(), used_before = used_set;
+    for (int i = 0; i < count; i++) {
+        fixture_use_set(i);
+        fixture_draw(f, &drawn[i]);
+        sets[i] = (comparison){.f = f, .bounds = bounds, .what = what, .drawn = &drawn[i]};
+    }
+    fixture_use_set(used_before);
+    compare_rays(&f->job, sets, count);
+    for (int i = 0; i < count; i++) {
+        judge(&sets[i], fixture_set_name(i));
+        drawn_free(&drawn[i]);
+    }
+    return sets[count - 1].outcome;
 }

@@ -74,6 +74,13 @@ extern const float fixture_background[4];
 double fixture_depth(const render_fixture *f, float t);
 
 void fixture_draw(const render_fixture *f, drawn_frame *out);
+/* The instruction sets of this machine, up to that of INSITU_ISA, by number: fixture_use_set() chooses the one that
+ * frames are drawn by from then on, which is the best until it is called. A truth serves all of them. */
+int fixture_set_count(void);
+const char *fixture_set_name(int set);
+void fixture_use_set(int set);
+/* For programs that run once a set: whether INSITU_ISA names one that this machine lacks. They then end by 77. */
+bool fixture_lacks_set(void);
 /* Each fixture drawn as a rank of its own, all their fragments merged. */
 void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out);
 void drawn_free(drawn_frame *drawn);
@@ -103,7 +110,8 @@ typedef struct fixture_outcome {
     double total_depth; /* the errors of all hits together, the root finder's own included, in cells */
 } fixture_outcome;
 
-/* Draw and compare all rays; fails the test where a bound is broken, with the worst ray in the message. */
+/* Draw by every instruction set and compare all rays; fails the test where a bound is broken, with the worst ray in the
+ * message. Returns what came of the best set. */
 fixture_outcome fixture_compare(const render_fixture *f, const fixture_bounds *bounds, const char *what);
 
 #endif

@@ -3,6 +3,7 @@
  * sampling misses. Single cells, warped at random; where rays graze the step by a given amount; and functions that are
  * all but a step. */
 #include "reference_cell.h"
+#include "test_effort.h"
 #include "test_step_fixture.h"
 
 #include <setjmp.h>
@@ -190,13 +191,15 @@ static void a_ray_on_which_it_barely_does(void **state)
 
 enum { KINDS = 4, SEEDS = 12 };
 
+/* Usually a third of the seeds, another one for the next kind. */
 static void random_cells_and_steps(void **state)
 {
+    const uint64_t every = (uint64_t)test_effort(3, 1);
     (void)state;
     for (int polyhedra = 0; polyhedra < 2; polyhedra++)
         for (int kind = 0; kind < KINDS; kind++) {
             double worst[3] = {0};
-            for (uint64_t seed = 0; seed < SEEDS; seed++) {
+            for (uint64_t seed = (uint64_t)(kind + polyhedra) % every; seed < SEEDS; seed += every) {
                 test_mesh mesh;
                 render_fixture f;
                 fixture_function function;
@@ -270,14 +273,14 @@ static void graze_by_rays(int rays, double width)
 static void rays_that_graze_a_step(void **state)
 {
     (void)state;
-    graze_by_rays(10, 0);
+    graze_by_rays(test_effort(4, 10), 0);
 }
 
 static void rays_that_graze_a_steep_ramp(void **state)
 {
     static const double widths[] = {1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 0.02, 0.1};
     (void)state;
-    for (int i = 0; i < (int)(sizeof widths / sizeof *widths); i++) graze_by_rays(2, widths[i]);
+    for (int i = 0; i < (int)(sizeof widths / sizeof *widths); i++) graze_by_rays(test_effort(1, 2), widths[i]);
 }
 
 /* ---- all but a step ---- */

@@ -49,7 +49,7 @@ double *step_truth(const render_fixture *f, int every, double tolerance)
     return truth;
 }
 
-double step_worst(const drawn_frame *drawn, const double *truth, int every)
+static double step_worst(const drawn_frame *drawn, const double *truth, int every)
 {
     double worst = 0;
     for (int p = 0; p < drawn->picture.width * drawn->picture.height; p += every)
@@ -58,15 +58,25 @@ double step_worst(const drawn_frame *drawn, const double *truth, int every)
     return worst;
 }
 
+double step_worst_of_sets(const render_fixture *f, const double *truth, int every)
+{
+    double worst = 0;
+    for (int set = 0; set < fixture_set_count(); set++) {
+        drawn_frame drawn;
+        fixture_use_set(set);
+        fixture_draw(f, &drawn);
+        worst = test_worse(worst, step_worst(&drawn, truth, every));
+        drawn_free(&drawn);
+    }
+    return worst;
+}
+
 void step_judge(render_fixture *f, int every, double tolerance, double worst[3])
 {
     double *truth = step_truth(f, every, tolerance);
     for (int i = 0; i < 3; i++) {
-        drawn_frame drawn;
         f->job.max_error = pow(10, -2 - i);
-        fixture_draw(f, &drawn);
-        worst[i] = test_worse(worst[i], step_worst(&drawn, truth, every));
-        drawn_free(&drawn);
+        worst[i] = test_worse(worst[i], step_worst_of_sets(f, truth, every));
     }
     free(truth);
 }
