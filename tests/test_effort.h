@@ -1,5 +1,5 @@
 /* How much a test does: its usual part, which meets each kind of case, or the whole, by ./test --long. CMake's
- * insitu_add_test() registers both. */
+ * insitu_add_split_test() registers both. */
 #ifndef TEST_EFFORT_H
 #define TEST_EFFORT_H
 
