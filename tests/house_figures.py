@@ -50,27 +50,28 @@ def longest_chain(p):
 
 
 def functions(p):
-    """(name, number of parameters, lines, whether the file alone sees it) of each function that is defined in the file."""
+    """(name, number of parameters, lines, whether the file alone sees it, body) of each function that is defined in the file."""
     for m in re.finditer(r"^[A-Za-z_](?:[^;{}()=#]|__attribute__\(\(\w+\)\))*?\b([A-Za-z_]\w*)\(([^;{}]*?)\)\s*\n\{(.*?)^\}", code[p], re.M | re.S):
         inner, flat = 0, ""
         for letter in m[2]:
             inner += (letter == "(") - (letter == ")")
             flat += "" if inner and letter == "," else letter
         count = 0 if flat.strip() in ("", "void") else flat.count(",") + 1
-        yield m[1], count, m[0].count("\n") + 1, p.suffix == ".c" and m[0].startswith("static")
+        yield m[1], count, m[0].count("\n") + 1, p.suffix == ".c" and m[0].startswith("static"), m[3]
 
 
 def calls_in_circles(files):
     """Groups of files that call each other in a circle (Tarjan's strongly connected components); a .c and its .h are one."""
     places = collections.defaultdict(set)
     for p in files:
-        for name, _, _, own in functions(p):
+        for name, _, _, own, _ in functions(p):
             if not own:
                 places[name].add(p.stem)
     defined = {name: min(found) for name, found in places.items() if len(found) == 1}
     calls = collections.defaultdict(set)
     for p in files:
-        called = re.findall(r"(?<![>.\w])([a-z_]\w*)\(", code[p])  # by name, not by a pointer of a struct
+        bodies = "".join(body for *_, body in functions(p))
+        called = re.findall(r"(?<![>.\w])([a-z_]\w*)\(", bodies)  # by name, not by a pointer of a struct
         calls[p.stem] |= {defined[n] for n in called if n in defined and defined[n] != p.stem}
     index, low, stack, groups = {}, {}, [], []
 
@@ -98,7 +99,7 @@ def calls_in_circles(files):
 sys.setrecursionlimit(10000)
 for part in parts:
     files = [p for p in text if part_of(p) == part]
-    all_functions = [(n, c, lines, p) for p in files for n, c, lines, _ in functions(p)]
+    all_functions = [(n, c, lines, p) for p in files for n, c, lines, _, _ in functions(p)]
     lengths = sorted(lines for _, _, lines, _ in all_functions) or [0]
     long_lists = [(n, c) for n, c, _, _ in all_functions if c > MOST_PARAMETERS]
     folders = collections.Counter(str(p.parent.relative_to(root)) for p in files)
