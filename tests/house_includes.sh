@@ -17,6 +17,7 @@ function room_of(path, parts) {
     split(path, parts, "/")
     if (path ~ /^libinsitu\/include\//) return "public"
     if (path ~ /^adaptors\/[^\/]*\/include\//) return "adaptor_headers"
+    if (path ~ /^libinsitu\/session\/[a-z]+\//) return parts[3]
     if (parts[1] == "libinsitu") return parts[2]
     if (path ~ /^render\/render(_isa)?\.h$/) return "render_face"
     if (path ~ /^render\/[a-z]+\//) return parts[2]
@@ -32,7 +33,7 @@ function check_include(path, line, number, room, name, last, quoted, target) {
     name = substr(line, RSTART + 1, RLENGTH - 2)
     last = name
     sub(/.*\//, "", last)
-    if (room ~ /^(base|mmbvh|render|render_face|rays|cells|find|surface|volume)$/ && (name == "mpi.h" || name == "insitu/insitu.h"))
+    if (room ~ /^(base|mmbvh|scene|render|render_face|rays|cells|find|surface|volume)$/ && (name == "mpi.h" || name == "insitu/insitu.h"))
         complain(path ":" number ": " room " knows no MPI, yet includes " name)
     if (room in allowed && room !~ /^(adaptors|adaptor_headers|tools)$/ && name ~ /^(vtk[A-Z]|OpenImageIO\/)/)
         complain(path ":" number ": " room " includes " name ", which belongs behind an adaptor")
@@ -58,7 +59,8 @@ BEGIN {
     allowed["volume"] = " find" allowed["find"]
     allowed["render"] = " surface volume find" allowed["find"]
     allowed["compositing"] = " base public "
-    allowed["session"] = " render render_face compositing mmbvh base public "
+    allowed["scene"] = " render base public "
+    allowed["session"] = " scene render render_face compositing mmbvh base public "
     allowed["adaptor_headers"] = " public "
     allowed["adaptors"] = " adaptor_headers public "
     allowed["tools"] = " adaptor_headers public "

@@ -1,7 +1,7 @@
 /* A scene file as a tree of YAML nodes with their lines: where its errors are found and worded, before and beside what
  * libcyaml reads. */
-#ifndef SESSION_SCENE_DOCUMENT_H
-#define SESSION_SCENE_DOCUMENT_H
+#ifndef SCENE_SCENE_DOCUMENT_H
+#define SCENE_SCENE_DOCUMENT_H
 
 #include <yaml.h>
 

@@ -1,7 +1,7 @@
 /* The scene file: what to draw, when, and where to put it. Read from YAML text by a schema (libcyaml); docs/scene.md is
  * drawn from the same schema. Colours in the file are sRGB in [0, 1]; they are linear here. */
-#ifndef SESSION_SCENE_H
-#define SESSION_SCENE_H
+#ifndef SCENE_SCENE_H
+#define SCENE_SCENE_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* From what libcyaml read to struct scene: defaults filled in, and what the schema cannot say is checked. */
-#ifndef SESSION_SCENE_CONVERT_H
-#define SESSION_SCENE_CONVERT_H
+#ifndef SCENE_SCENE_CONVERT_H
+#define SCENE_SCENE_CONVERT_H
 
 #include "scene.h"
 #include "scene_document.h"

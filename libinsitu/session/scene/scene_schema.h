@@ -1,8 +1,8 @@
 /* The scene file's schema: what libcyaml reads into, and beside each key what it may hold and what it means.
  *
  * Everything optional is a pointer, NULL where the file does not give it; defaults are filled in by scene.c. */
-#ifndef SESSION_SCENE_SCHEMA_H
-#define SESSION_SCENE_SCHEMA_H
+#ifndef SCENE_SCENE_SCHEMA_H
+#define SCENE_SCENE_SCHEMA_H
 
 #include <cyaml/cyaml.h>
 #include <stdbool.h>
