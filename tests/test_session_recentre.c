@@ -136,7 +136,7 @@ static void part_free(part_input *in)
 
 static bool are_means_right(const insitu_session *session, const part_input *in)
 {
-    const session_mesh *mesh = session_find_mesh(session, "m");
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
     const double *means = mesh && mesh->scalar_count == 1 ? mesh->scalars[0].vertex_values : NULL;
     if (!means) return false;
     for (int64_t v = 0; v < in->part.vertex_count; v++) {

@@ -1,5 +1,5 @@
 /* How much of its stack a step takes, of the calling thread's and of a worker's: less than it is checked for
- * (session_team.h). The stacks are painted before a step, and looked at after it.
+ * (session_threads.h). The stacks are painted before a step, and looked at after it.
  *
  * With SMALL_STACKS in the environment OpenMP's are too small, and the step says so. */
 #define _GNU_SOURCE
@@ -9,8 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "render.h"
 #include "render_isa.h"
-#include "session_team.h"
+#include "session_threads.h"
 #include "test_session_fixture.h"
 
 enum { PAINT = 0xa5, PAINTED = 1 << 20, NEAR = 1024 /* frames of the painter itself */ };

@@ -14,6 +14,11 @@ insitu_status session_mpi(base_error *error, int code, const char *what)
     return base_fail(error, INSITU_ERROR_MPI, "%s: %s", what, reason);
 }
 
+insitu_status session_no_memory(base_error *error, int64_t bytes, const char *what)
+{
+    return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of %s", (long long)bytes, what);
+}
+
 insitu_status session_share_error(MPI_Comm comm, int root, base_error *error)
 {
     base_error shared = *error;

@@ -1,8 +1,12 @@
-/* How ranks come to one mind about an error. */
+/* How ranks come to one mind about an error.
+ *
+ * Every phase of a step is collective and ends here: it returns one status on all ranks, and where that is an error,
+ * *error is the same on all of them. */
 #ifndef SESSION_AGREE_H
 #define SESSION_AGREE_H
 
 #include <mpi.h>
+#include <stdint.h>
 
 #include "error.h"
 
@@ -18,5 +22,8 @@ insitu_status session_share_error(MPI_Comm comm, int root, base_error *error);
 
 /* The status of an MPI call; where it failed, record what. Local. */
 insitu_status session_mpi(base_error *error, int code, const char *what);
+
+/* Record that memory ran out. Local. */
+insitu_status session_no_memory(base_error *error, int64_t bytes, const char *what);
 
 #endif

@@ -4,14 +4,16 @@
  * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <is cell-centred>
  * <name>" is a field of it. Ranks whose tables are alike (the usual case, found by hashes in the step's one
  * reduction) exchange nothing; else the texts are gathered by all. */
+#include "session_catalogue.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "memory.h"
-#include "session.h"
 #include "session_agree.h"
+#include "session_hash.h"
 
 /* ---- a rank's table as text ---------------------------------------------------------------------------------- */
 
@@ -23,11 +25,11 @@ static size_t append_line(char *text, size_t capacity, size_t at, char kind, int
     return at + (size_t)size + 1;
 }
 
-static size_t write_table(const insitu_session *session, char *text, size_t capacity)
+static size_t write_table(const session_meshes *meshes, char *text, size_t capacity)
 {
     size_t at = 0;
-    for (int i = 0; i < session->mesh_count; i++) {
-        const session_mesh *mesh = session->meshes[i];
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
         if (!mesh->is_given) continue;
         at = append_line(text, capacity, at, 'm', mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL,
                          mesh->name);
@@ -40,11 +42,11 @@ static size_t write_table(const insitu_session *session, char *text, size_t capa
     return at;
 }
 
-uint64_t session_table_hash(const insitu_session *session)
+uint64_t session_names_hash(const session_meshes *meshes)
 {
     uint64_t hash = SESSION_HASH_BEGIN;
-    for (int i = 0; i < session->mesh_count; i++) {
-        const session_mesh *mesh = session->meshes[i];
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
         if (!mesh->is_given) continue;
         const int head[] = {mesh->given.cell_count > 0, mesh->given.vertex_ids.data != NULL, mesh->field_count};
         session_hash_bytes(&hash, head, sizeof head);
@@ -198,21 +200,21 @@ static void free_tables(gathered_tables *tables)
     base_free(tables->places);
 }
 
-static insitu_status write_mine(const insitu_session *session, gathered_tables *tables, int *size, base_error *error)
+static insitu_status write_mine(const session_meshes *meshes, gathered_tables *tables, int *size, base_error *error)
 {
-    const size_t bytes = write_table(session, NULL, 0);
+    const size_t bytes = write_table(meshes, NULL, 0);
     if (bytes > INT32_MAX / 2) return session_no_memory(error, (int64_t)bytes, "names of meshes and fields");
     *size = (int)bytes;
     tables->mine = base_alloc(bytes + 1);
     if (!tables->mine) return session_no_memory(error, (int64_t)bytes, "names of meshes and fields");
-    write_table(session, tables->mine, bytes + 1);
+    write_table(meshes, tables->mine, bytes + 1);
     return INSITU_OK;
 }
 
-static insitu_status place_tables(const insitu_session *session, gathered_tables *tables, base_error *error)
+static insitu_status place_tables(int ranks, gathered_tables *tables, base_error *error)
 {
     tables->total = 0;
-    for (int rank = 0; rank < session->ranks; rank++) {
+    for (int rank = 0; rank < ranks; rank++) {
         tables->places[rank] = (int)tables->total;
         tables->total += tables->sizes[rank];
         if (tables->total > INT32_MAX) return session_no_memory(error, tables->total, "names of meshes and fields");
@@ -221,59 +223,59 @@ static insitu_status place_tables(const insitu_session *session, gathered_tables
     return tables->all ? INSITU_OK : session_no_memory(error, tables->total, "names of meshes and fields");
 }
 
-static insitu_status gather_tables(const insitu_session *session, gathered_tables *tables, base_error *error)
+static insitu_status gather_tables(const session_meshes *meshes, const session_team *team, gathered_tables *tables,
+                                   base_error *error)
 {
     int size = 0;
-    write_mine(session, tables, &size, error);
-    tables->sizes = base_calloc((size_t)session->ranks, sizeof(int));
-    tables->places = base_calloc((size_t)session->ranks, sizeof(int));
-    if (!tables->sizes || !tables->places) session_no_memory(error, 8 * (int64_t)session->ranks, "counts");
-    insitu_status status = session_agree(session->comm, error);
+    write_mine(meshes, tables, &size, error);
+    tables->sizes = base_calloc((size_t)team->ranks, sizeof(int));
+    tables->places = base_calloc((size_t)team->ranks, sizeof(int));
+    if (!tables->sizes || !tables->places) session_no_memory(error, 8 * (int64_t)team->ranks, "counts");
+    insitu_status status = session_agree(team->comm, error);
     if (status) return status;
     status =
-        session_mpi(error, MPI_Allgather(&size, 1, MPI_INT, tables->sizes, 1, MPI_INT, session->comm), "MPI_Allgather");
+        session_mpi(error, MPI_Allgather(&size, 1, MPI_INT, tables->sizes, 1, MPI_INT, team->comm), "MPI_Allgather");
     if (status) return status;
-    place_tables(session, tables, error);
-    status = session_agree(session->comm, error);
+    place_tables(team->ranks, tables, error);
+    status = session_agree(team->comm, error);
     if (status) return status;
-    return session_mpi(error,
-                       MPI_Allgatherv(tables->mine, size, MPI_CHAR, tables->all, tables->sizes, tables->places,
-                                      MPI_CHAR, session->comm),
-                       "MPI_Allgatherv");
+    return session_mpi(
+        error,
+        MPI_Allgatherv(tables->mine, size, MPI_CHAR, tables->all, tables->sizes, tables->places, MPI_CHAR, team->comm),
+        "MPI_Allgatherv");
 }
 
-static bool take_tables(const insitu_session *session, const gathered_tables *tables, session_catalogue *out)
+static bool take_tables(int ranks, const gathered_tables *tables, session_catalogue *out)
 {
-    for (int rank = 0; rank < session->ranks; rank++)
+    for (int rank = 0; rank < ranks; rank++)
         if (!take_table(out, tables->all + tables->places[rank], (size_t)tables->sizes[rank], rank)) return false;
     return true;
 }
 
-insitu_status session_update_catalogue(insitu_session *session, bool is_shared, base_error *error)
+insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
+                                       bool is_shared, base_error *error)
 {
     gathered_tables tables = {0};
-    session_catalogue catalogue = {0};
+    session_catalogue found = {.is_known = true};
     insitu_status status = INSITU_OK;
     if (is_shared) {
         int size = 0;
-        if (write_mine(session, &tables, &size, error) == INSITU_OK &&
-            !take_table(&catalogue, tables.mine, (size_t)size, 0))
+        if (write_mine(meshes, &tables, &size, error) == INSITU_OK && !take_table(&found, tables.mine, (size_t)size, 0))
             session_no_memory(error, size, "the catalogue of meshes and fields");
     } else {
-        status = gather_tables(session, &tables, error);
-        if (status == INSITU_OK && !take_tables(session, &tables, &catalogue))
+        status = gather_tables(meshes, team, &tables, error);
+        if (status == INSITU_OK && !take_tables(team->ranks, &tables, &found))
             session_no_memory(error, tables.total, "the catalogue of meshes and fields");
     }
-    if (status == INSITU_OK) status = session_agree(session->comm, error);
+    if (status == INSITU_OK) status = session_agree(team->comm, error);
     free_tables(&tables);
     if (status) {
-        session_catalogue_free(&catalogue);
+        session_catalogue_free(&found);
         return status;
     }
-    sort_catalogue(&catalogue);
-    session_catalogue_free(&session->catalogue);
-    session->catalogue = catalogue;
-    session->has_catalogue = true;
-    session->is_table_changed = false;
+    sort_catalogue(&found);
+    session_catalogue_free(catalogue);
+    *catalogue = found;
+    meshes->are_names_changed = false;
     return INSITU_OK;
 }

@@ -4,12 +4,14 @@
  * the cell named in the end is the lowest of all, whatever the number of threads. What is wrong with it is worked out
  * once, afterwards. Coordinates are looked at where a drawn cell uses them: vertices of no cell, or of ghosts alone,
  * may hold anything. Indices are proved for ghosts too. */
+#include "session_check.h"
+
 #include <omp.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "memory.h"
-#include "session.h"
+#include "session_agree.h"
 #include "session_faces.h"
 #include "session_tally.h"
 
@@ -257,7 +259,7 @@ static insitu_status update_flat(session_mesh *mesh, int64_t count, int threads,
     return INSITU_OK;
 }
 
-insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *error)
+static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     mesh_tally tally = tally_empty();
     const int64_t bad = check_cells(mesh, threads, &tally);
@@ -276,4 +278,12 @@ insitu_status session_check_mesh(session_mesh *mesh, int threads, base_error *er
     mesh->size_sum = tally.sizes;
     mesh->is_check_stale = false;
     return INSITU_OK;
+}
+
+insitu_status session_check_meshes(const session_meshes *meshes, const session_team *team, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < meshes->count && !status; i++)
+        if (meshes->items[i]->is_check_stale) status = check_mesh(meshes->items[i], team->threads, error);
+    return session_agree(team->comm, error);
 }

@@ -4,51 +4,45 @@
  * left out, the next is tried; the first reason is the step's. */
 #include "session_draw.h"
 
-#include <stdint.h>
-
 #include "memory.h"
 #include "session_agree.h"
+#include "session_cell_cache.h"
 #include "session_frame.h"
 #include "session_image.h"
-#include "session_kept.h"
 #include "session_layers.h"
-#include "session_plan.h"
-#include "session_recentre.h"
-#include "session_tree.h"
 #include "session_view.h"
-#include "session_warnings.h"
 
 /* Of pixels where cells overlap, on all ranks together, at once: 128 MiB. */
 enum { overlap_fragments = 1 << 22 };
 
-/* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. */
+/* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
 typedef struct canvas {
-    image frame;
-    double *sum;
+    image frame; /* its memory is the session's picture */
+    double *sum; /* NULL: there is one frame */
 } canvas;
 
 /* A picture's memory stays for the next one, unless it is more than this: fresh pages cost as much as filling them. */
 enum { kept_bytes = 64 << 20 };
 
-void session_drop_picture(insitu_session *session)
+void session_drop_picture(session_picture *picture)
 {
-    base_free(session->picture);
-    session->picture = NULL;
-    session->picture_bytes = 0;
+    base_free(picture->pixels);
+    picture->pixels = NULL;
+    picture->bytes = 0;
 }
 
-static float *make_picture(insitu_session *session, size_t bytes)
+static float *reuse_pixels(session_picture *picture, size_t bytes)
 {
-    if (session->picture_bytes >= bytes) return session->picture;
-    session_drop_picture(session);
-    session->picture = base_alloc(bytes);
-    session->picture_bytes = session->picture ? bytes : 0;
-    return session->picture;
+    if (picture->bytes >= bytes) return picture->pixels;
+    session_drop_picture(picture);
+    picture->pixels = base_alloc(bytes);
+    picture->bytes = picture->pixels ? bytes : 0;
+    return picture->pixels;
 }
 
-static void canvas_free(insitu_session *session, canvas *c)
+static void canvas_free(canvas *c, session_picture *picture)
 {
-    if (session->picture_bytes > kept_bytes) session_drop_picture(session);
+    if (picture->bytes > kept_bytes) session_drop_picture(picture);
     base_free(c->sum);
 }
 
@@ -59,15 +53,16 @@ static bool wants_depth(const scene_image *image)
     return false;
 }
 
-static insitu_status canvas_create(insitu_session *session, const scene_image *image, canvas *out, base_error *error)
+static insitu_status canvas_create(const scene_image *image, int rank, session_picture *picture, canvas *out,
+                                   base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     const size_t bytes = pixels * (wants_depth(image) ? 5 : 4) * sizeof(float);
     const bool is_summed = image->frames > 1;
     out->frame.width = image->width;
     out->frame.height = image->height;
-    if (session->rank != 0) return INSITU_OK;
-    out->frame.rgba = make_picture(session, bytes);
+    if (rank != 0) return INSITU_OK;
+    out->frame.rgba = reuse_pixels(picture, bytes);
     if (wants_depth(image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
     if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
     if (!out->frame.rgba || (is_summed && !out->sum))
@@ -76,8 +71,9 @@ static insitu_status canvas_create(insitu_session *session, const scene_image *i
     return INSITU_OK;
 }
 
-static void add_frame(canvas *c, int threads)
+static void canvas_add(canvas *c, int threads)
 {
+    if (!c->sum) return;
     const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
 #pragma omp parallel for num_threads(threads) schedule(static)
     for (int64_t i = 0; i < count; i++) c->sum[i] += (double)c->frame.rgba[i];
@@ -99,16 +95,22 @@ static void scale_depths(canvas *c, const render_space *space, int threads)
         c->frame.depth[i] = (float)((double)c->frame.depth[i] / space->scale + space->depth_origin);
 }
 
+static void canvas_finish(canvas *c, int frames, const render_space *space, int threads)
+{
+    if (c->sum) average_frames(c, frames, threads);
+    if (c->frame.depth) scale_depths(c, space, threads);
+}
+
 /* ---- frames -------------------------------------------------------------------------------------------------- */
 
-static render_job make_job(const insitu_session *session, const scene_image *image, const session_view *view,
+static render_job make_job(const session_drawing *d, const scene_image *image, const session_view *view,
                            const session_layers *layers)
 {
     return (render_job){.camera = view->camera,
                         .space = view->space,
                         .parts = layers->parts,
                         .part_count = layers->part_count,
-                        .parent = layers->part_count > 1 ? &session->parent : NULL,
+                        .parent = layers->part_count > 1 ? d->parent : NULL,
                         .surfaces = layers->surfaces,
                         .surface_count = image->isosurface_count,
                         .active = layers->kept,
@@ -118,12 +120,12 @@ static render_job make_job(const insitu_session *session, const scene_image *ima
                         .light_count = image->light_count,
                         .integration = image->method == SCENE_SEGMENTS ? RENDER_SEGMENTS : RENDER_SAMPLES,
                         .max_error = image->max_error,
-                        .extent = 2 * session->extent.half_diagonal,
+                        .extent = 2 * d->space->extent.half_diagonal,
                         .step = view->step,
                         .sample_group = image->sample_group,
                         .jitter = image->jitter,
-                        .is_alone = session->extent.rank_count <= 1,
-                        .threads = session->threads};
+                        .is_alone = d->space->extent.rank_count <= 1,
+                        .threads = d->team->threads};
 }
 
 static void report_frame(insitu_report *report, const session_frame *frame)
@@ -136,32 +138,32 @@ static void report_frame(insitu_report *report, const session_frame *frame)
     report->composite_ms += frame->composite_ms;
 }
 
-static void warn_of_overlaps(insitu_session *session, const scene_image *image, int64_t pixels)
+static void warn_of_overlaps(session_report *report, const scene_image *image, int64_t pixels)
 {
     const session_warning warning = {WARNING_OVERLAP, image->name, NULL, 0};
     session_warn(
-        session, &warning, pixels > 0,
+        report, &warning, pixels > 0,
         "image \"%s\": %lld pixels where cells overlap: each cell adds its own volume (are ghost cells flagged?)",
         image->name, (long long)pixels);
 }
 
-static insitu_status draw_frames(insitu_session *session, const scene_image *image, const session_view *view,
-                                 const session_layers *layers, canvas *target, base_error *error)
+static insitu_status draw_frames(const session_drawing *d, const scene_image *image, const session_view *view,
+                                 const session_layers *layers, canvas *canvas, base_error *error)
 {
-    render_job job = make_job(session, image, view, layers);
+    const session_frame_target target = {d->team->comm, d->team->compositing_comm, image->background,
+                                         overlap_fragments};
+    render_job job = make_job(d, image, view, layers);
     int64_t overlaps = 0;
     for (job.frame = 0; job.frame < image->frames; job.frame++) {
         session_frame frame;
-        const insitu_status status = session_draw_frame(session->comm, session->comp_comm, &job, image->background,
-                                                        overlap_fragments, &target->frame, &frame, error);
-        report_frame(&session->report, &frame);
+        const insitu_status status = session_draw_frame(&target, &job, &canvas->frame, &frame, error);
+        report_frame(&d->report->numbers, &frame);
         if (status) return status;
         if (frame.overlaps > overlaps) overlaps = frame.overlaps;
-        if (target->sum) add_frame(target, session->threads);
+        canvas_add(canvas, d->team->threads);
     }
-    warn_of_overlaps(session, image, overlaps);
-    if (target->sum) average_frames(target, image->frames, session->threads);
-    if (target->frame.depth) scale_depths(target, &view->space, session->threads);
+    warn_of_overlaps(d->report, image, overlaps);
+    canvas_finish(canvas, image->frames, &view->space, d->team->threads);
     return INSITU_OK;
 }
 
@@ -195,81 +197,61 @@ static void write_output(const scene_image *image, const scene_output *output, c
     base_free(path);
 }
 
-static insitu_status write_outputs(insitu_session *session, const scene_image *image, const canvas *source,
-                                   int64_t cycle, base_error *error)
+static insitu_status write_outputs(const session_drawing *d, const scene_image *image, const canvas *source,
+                                   base_error *error)
 {
     const double start = MPI_Wtime();
-    for (int i = 0; i < image->output_count && session->rank == 0; i++)
-        write_output(image, &image->outputs[i], source, cycle, error);
-    if (session->rank == 0) session->report.write_ms += 1e3 * (MPI_Wtime() - start);
-    return session_agree(session->comm, error);
+    for (int i = 0; i < image->output_count && d->team->rank == 0; i++)
+        write_output(image, &image->outputs[i], source, d->cycle, error);
+    if (d->team->rank == 0) d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+    return session_agree(d->team->comm, error);
 }
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
 /* kept: NULL, or for the image's frames to fill and to draw from. */
-static insitu_status draw_image(insitu_session *session, const scene_image *image, render_active_cells *kept,
-                                int64_t cycle, base_error *error)
+static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *kept,
+                                session_picture *picture, base_error *error)
 {
+    const session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal};
     session_view view;
     session_layers layers = {0};
-    canvas target = {0};
-    insitu_status status = session_make_view(session, image, &view, error);
-    if (status) return status;
-    session_check_time(session, image, &view, error);
-    status = session_agree_as_is(session->comm, error);
-    if (status) return status;
-    session_warn_of_view(session, image, &view);
-    status = session_make_layers(session, image, &layers, error);
+    canvas canvas = {0};
+    insitu_status status = session_make_view(d->space, d->scene_path, image, d->team, d->report, &view, error);
+    if (!status) status = session_make_layers(&basis, image, &layers, error);
     if (status) return status;
     layers.kept = kept;
-    canvas_create(session, image, &target, error);
-    status = session_agree(session->comm, error);
-    if (!status) status = draw_frames(session, image, &view, &layers, &target, error);
+    canvas_create(image, d->team->rank, picture, &canvas, error);
+    status = session_agree(d->team->comm, error);
+    if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     session_layers_free(&layers);
     if (!status) {
-        status = write_outputs(session, image, &target, cycle, error);
-        session->report.images++;
+        status = write_outputs(d, image, &canvas, error);
+        d->report->numbers.images++;
     }
-    canvas_free(session, &target);
+    canvas_free(&canvas, picture);
     return status;
 }
 
-static insitu_status prepare(insitu_session *session, const session_plan *plan, base_error *error)
+/* The step's cell cache, made for the first image that shares one; without memory nothing is cached. */
+static render_active_cells *cache_for(const session_plan *plan, const scene_image *image, render_active_cells **kept)
 {
-    const double start = MPI_Wtime();
-    const insitu_status status = session_recentre(session, plan, error);
-    session->report.prepare_ms += 1e3 * (MPI_Wtime() - start);
-    if (status) return status;
-    session_update_trees(session, error);
-    const insitu_status built = session_agree(session->comm, error);
-    return built ? built : session_warn_of_isovalues(session, plan, error);
-}
-
-/* The step's kept cells, made for the first image that shares some; without memory nothing is kept. */
-static render_active_cells *kept_for(const session_plan *plan, const scene_image *image, render_active_cells **kept)
-{
-    if (!session_kept_pays(plan, image)) return NULL;
+    if (!session_cell_cache_pays(plan, image)) return NULL;
     if (!*kept) *kept = render_active_cells_create();
     return *kept;
 }
 
-insitu_status session_draw_images(insitu_session *session, const scene_image *const *due, int count, int64_t cycle,
+insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, session_picture *picture,
                                   base_error *error)
 {
-    session_plan plan = {0};
-    base_error first = {0};
+    base_error first = plan->refusal;
     render_active_cells *kept = NULL;
-    insitu_status status = session_make_plan(session, due, count, &plan, &first, error);
-    if (status) return status;
-    status = prepare(session, &plan, error);
-    for (int i = 0; i < plan.image_count && !status; i++) {
+    for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
-        draw_image(session, plan.images[i], kept_for(&plan, plan.images[i], &kept), cycle, &reason);
+        draw_image(d, plan->images[i], cache_for(plan, plan->images[i], &kept), picture, &reason);
         if (first.status == INSITU_OK) first = reason;
     }
     render_active_cells_free(kept);
-    session_plan_free(&plan);
-    if (!status && first.status) *error = first;
+    if (first.status) *error = first;
     return error->status;
 }

@@ -1,12 +1,35 @@
-/* Due images to pictures on rank 0. */
+/* The plan's images to pictures on rank 0. */
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
-#include "session.h"
+#include "session_mesh.h"
+#include "session_plan.h"
+#include "session_report.h"
+#include "session_space.h"
+#include "session_team.h"
 
-/* Draw the due images with the meshes as they are known to be right. Those that cannot be drawn are left out, and the
- * first reason is the error; the others are drawn. Collective. */
-insitu_status session_draw_images(insitu_session *session, const scene_image *const *due, int count, int64_t cycle,
+/* Rank 0: memory of the last picture, for the next one. */
+typedef struct session_picture {
+    float *pixels;
+    size_t bytes;
+} session_picture;
+
+void session_drop_picture(session_picture *picture);
+
+/* What images are drawn of. */
+typedef struct session_drawing {
+    const session_team *team;
+    const char *scene_path; /* for messages */
+    int64_t cycle;
+    const session_meshes *meshes; /* with their trees */
+    const mmbvh *parent;          /* over these trees (session_trees.h) */
+    const session_space *space;
+    session_report *report;
+} session_drawing;
+
+/* Draw and write the plan's images. One that fails is left out; the first reason, the plan's refusal before all others,
+ * is the error. Collective. */
+insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, session_picture *picture,
                                   base_error *error);
 
 #endif

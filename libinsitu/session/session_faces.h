@@ -1,8 +1,8 @@
 /* Proof of one polyhedron. */
-#ifndef SESSION_SESSION_FACES_H
-#define SESSION_SESSION_FACES_H
+#ifndef SESSION_FACES_H
+#define SESSION_FACES_H
 
-#include "session.h"
+#include "session_mesh.h"
 
 typedef enum face_fault {
     FACES_GOOD,

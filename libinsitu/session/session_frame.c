@@ -14,26 +14,20 @@
 #include "memory.h"
 #include "session_agree.h"
 
-typedef struct frame_target {
-    MPI_Comm comm, comp_comm;
-    const float *background;
-    session_frame *frame;
-} frame_target;
-
-static void add_to_frame(const frame_target *t, const render_statistics *rendered, int64_t fragments,
+static void add_to_frame(session_frame *frame, const render_statistics *rendered, int64_t fragments,
                          double composite_ms)
 {
-    t->frame->rays += rendered->rays;
-    t->frame->map_failures += rendered->map_failures;
-    t->frame->fragments += fragments;
-    t->frame->surface_ms += rendered->surface_ms;
-    t->frame->volume_ms += rendered->volume_ms;
-    t->frame->composite_ms += composite_ms;
+    frame->rays += rendered->rays;
+    frame->map_failures += rendered->map_failures;
+    frame->fragments += fragments;
+    frame->surface_ms += rendered->surface_ms;
+    frame->volume_ms += rendered->volume_ms;
+    frame->composite_ms += composite_ms;
 }
 
 /* One rank with something to trace: composited as it is traced (comp_tiles.h). */
-static insitu_status draw_alone(const frame_target *t, const render_job *job, image *out, comp_overlaps *overlaps,
-                                base_error *error)
+static insitu_status draw_alone(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
+                                comp_overlaps *overlaps, base_error *error)
 {
     render_statistics rendered = {0};
     comp_statistics composited = {0};
@@ -42,16 +36,16 @@ static insitu_status draw_alone(const frame_target *t, const render_job *job, im
         render_frame_tiles(job, comp_tiles_take, &tiles, &rendered, error);
         comp_tiles_end(&tiles, overlaps, &composited);
     }
-    add_to_frame(t, &rendered, composited.sent_fragments, composited.merge_ms);
+    add_to_frame(frame, &rendered, composited.sent_fragments, composited.merge_ms);
     return session_agree(t->comm, error);
 }
 
-static insitu_status draw(const frame_target *t, const render_job *job, image *out, comp_overlaps *overlaps,
-                          base_error *error)
+static insitu_status draw(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
+                          comp_overlaps *overlaps, base_error *error)
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
-    if (ranks == 1 && job->part_count > 0) return draw_alone(t, job, out, overlaps, error);
+    if (ranks == 1 && job->part_count > 0) return draw_alone(t, job, out, frame, overlaps, error);
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
@@ -59,13 +53,13 @@ static insitu_status draw(const frame_target *t, const render_job *job, image *o
     const double start = MPI_Wtime();
     insitu_status status = session_agree(t->comm, error);
     if (status == INSITU_OK && overlaps)
-        status = comp_composite_overlaps(t->comp_comm, &fragments, t->background, job->threads, out, overlaps,
+        status = comp_composite_overlaps(t->compositing_comm, &fragments, t->background, job->threads, out, overlaps,
                                          &composited, error);
     else if (status == INSITU_OK)
-        status = comp_composite(t->comp_comm, &fragments, t->background, job->threads, out, &composited, error);
+        status = comp_composite(t->compositing_comm, &fragments, t->background, job->threads, out, &composited, error);
     if (status) status = session_agree_as_is(t->comm, error); /* compositing agrees on the status alone */
     base_free(fragments.items);
-    add_to_frame(t, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
+    add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
     return status;
 }
 
@@ -119,50 +113,67 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     }
 }
 
-static insitu_status redraw(const frame_target *t, const render_job *job, int64_t fragment_limit,
-                            const comp_overlaps *overlaps, unsigned char *turn, image *beside, image *out,
-                            base_error *error)
+/* A second picture beside the first, on rank 0, of so many pixels at once. */
+typedef struct second_picture {
+    image picture;
+    unsigned char *turn; /* a set of pixels, on every rank */
+} second_picture;
+
+static insitu_status second_create(const session_frame_target *t, const comp_overlaps *overlaps, const image *first,
+                                   second_picture *out, base_error *error)
 {
-    const int64_t most = turn_pixels(job, fragment_limit);
+    const int64_t pixels = (int64_t)first->width * first->height;
+    image *second = &out->picture;
+    int rank = 0;
+    *out = (second_picture){.picture = {.width = first->width, .height = first->height}};
+    out->turn = base_alloc(pixel_set_bytes(pixels));
+    MPI_Comm_rank(t->comm, &rank);
+    if (rank == 0) {
+        second->rgba = base_alloc((size_t)pixels * 4 * sizeof *second->rgba);
+        if (first->depth) second->depth = base_alloc((size_t)pixels * sizeof *second->depth);
+    }
+    if (!out->turn || (rank == 0 && (!second->rgba || (first->depth && !second->depth))))
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld pixels in which cells overlap",
+                  (long long)overlaps->count);
+    return session_agree(t->comm, error);
+}
+
+static void second_free(second_picture *second)
+{
+    base_free(second->turn);
+    base_free(second->picture.rgba);
+    base_free(second->picture.depth);
+}
+
+static insitu_status redraw(const session_frame_target *t, const render_job *job, const comp_overlaps *overlaps,
+                            second_picture *second, image *out, session_frame *frame, base_error *error)
+{
+    const int64_t most = turn_pixels(job, t->fragment_limit);
     const bool is_sampled = job->integration == RENDER_SAMPLES;
     int64_t doubled = 0;
     render_job again = *job;
-    again.pixels = turn;
+    again.pixels = second->turn;
     again.separate_samples = true;
     for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
         comp_overlaps found = {0};
-        at = take_pixels(out, overlaps->pixels, at, most, turn);
-        const insitu_status status = draw(t, &again, beside, is_sampled ? &found : NULL, error);
+        at = take_pixels(out, overlaps->pixels, at, most, second->turn);
+        const insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
         base_free(found.pixels);
         if (status) return status;
-        if (beside->rgba) copy_pixels(turn, beside, out);
+        if (second->picture.rgba) copy_pixels(second->turn, &second->picture, out);
     }
-    if (doubled) t->frame->overlaps = overlaps->count;
+    if (doubled) frame->overlaps = overlaps->count;
     return INSITU_OK;
 }
 
-/* Rank 0 makes a second picture, all a set of pixels. */
-static insitu_status draw_overlaps(const frame_target *t, const render_job *job, int64_t fragment_limit,
-                                   const comp_overlaps *overlaps, image *out, base_error *error)
+static insitu_status draw_overlaps(const session_frame_target *t, const render_job *job, const comp_overlaps *overlaps,
+                                   image *out, session_frame *frame, base_error *error)
 {
-    const int64_t pixels = (int64_t)out->width * out->height;
-    image beside = {.width = out->width, .height = out->height};
-    unsigned char *turn = base_alloc(pixel_set_bytes(pixels));
-    int rank = 0;
-    MPI_Comm_rank(t->comm, &rank);
-    if (rank == 0) {
-        beside.rgba = base_alloc((size_t)pixels * 4 * sizeof *beside.rgba);
-        if (out->depth) beside.depth = base_alloc((size_t)pixels * sizeof *beside.depth);
-    }
-    if (!turn || (rank == 0 && (!beside.rgba || (out->depth && !beside.depth))))
-        base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld pixels in which cells overlap",
-                  (long long)overlaps->count);
-    insitu_status status = session_agree(t->comm, error);
-    if (!status) status = redraw(t, job, fragment_limit, overlaps, turn, &beside, out, error);
-    base_free(turn);
-    base_free(beside.rgba);
-    base_free(beside.depth);
+    second_picture second;
+    insitu_status status = second_create(t, overlaps, out, &second, error);
+    if (!status) status = redraw(t, job, overlaps, &second, out, frame, error);
+    second_free(&second);
     return status;
 }
 
@@ -172,7 +183,7 @@ static bool is_mixed_throughout(const render_job *job)
     return job->integration == RENDER_SEGMENTS && job->volume_count > 1;
 }
 
-static insitu_status take_all(const frame_target *t, const image *out, comp_overlaps *all, base_error *error)
+static insitu_status take_all(const session_frame_target *t, const image *out, comp_overlaps *all, base_error *error)
 {
     all->count = (int64_t)out->width * out->height;
     all->pixels = base_calloc(pixel_set_bytes(all->count), 1);
@@ -182,21 +193,20 @@ static insitu_status take_all(const frame_target *t, const image *out, comp_over
     return session_agree(t->comm, error);
 }
 
-insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render_job *job, const float background[4],
-                                 int64_t fragment_limit, image *out, session_frame *frame, base_error *error)
+insitu_status session_draw_frame(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
+                                 base_error *error)
 {
-    *frame = (session_frame){0};
-    const frame_target t = {comm, comp_comm, background, frame};
     comp_overlaps overlaps = {0};
     insitu_status status = INSITU_OK;
+    *frame = (session_frame){0};
     if (is_mixed_throughout(job)) {
-        status = take_all(&t, out, &overlaps, error);
+        status = take_all(t, out, &overlaps, error);
     } else {
-        status = draw(&t, job, out, job->volume_count ? &overlaps : NULL, error);
+        status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
         /* Separate samples tell whether any has two owners but by rounding of their common face: see redraw(). */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }
-    if (!status && overlaps.count) status = draw_overlaps(&t, job, fragment_limit, &overlaps, out, error);
+    if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);
     base_free(overlaps.pixels);
     return status;
 }

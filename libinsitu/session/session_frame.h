@@ -12,10 +12,18 @@ typedef struct session_frame {
     int64_t overlaps; /* pixels in which cells overlap */
 } session_frame;
 
-/* Draw one frame of the job, which differs between ranks in its parts alone, into out (comp.h). fragment_limit is for
- * all ranks together: more pixels in which cells overlap than make so many fragments are drawn in turns; the same on
- * every rank. comp_comm is compositing's own. Collective; returns the same on all ranks. */
-insitu_status session_draw_frame(MPI_Comm comm, MPI_Comm comp_comm, const render_job *job, const float background[4],
-                                 int64_t fragment_limit, image *out, session_frame *frame, base_error *error);
+/* Where and how a frame is drawn. */
+typedef struct session_frame_target {
+    MPI_Comm comm;
+    MPI_Comm compositing_comm; /* on which compositing alone talks */
+    const float *background;   /* 4; borrowed */
+    int64_t fragment_limit;    /* for all ranks together: more pixels in which cells overlap than make so many fragments
+                                  are drawn in turns; the same on every rank */
+} session_frame_target;
+
+/* Draw one frame of the job, which differs between ranks in its parts alone, into out (comp.h). Collective; returns the
+ * same on all ranks. */
+insitu_status session_draw_frame(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
+                                 base_error *error);
 
 #endif

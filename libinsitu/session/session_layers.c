@@ -3,19 +3,21 @@
  * not have is drawn there by values that are not numbers. */
 #include "session_layers.h"
 
+#include <math.h>
+
 #include "memory.h"
 #include "session_agree.h"
-#include "session_tree.h"
+#include "session_scalars.h"
 
 static bool is_part(const session_mesh *mesh)
 {
     return mesh->is_needed && mesh->has_tree && mesh->tree.node_count > 0;
 }
 
-static bool allocate_layers(const insitu_session *session, const scene_image *image, session_layers *out)
+static bool allocate_layers(const session_meshes *meshes, const scene_image *image, session_layers *out)
 {
     const size_t surfaces = (size_t)image->isosurface_count, volumes = (size_t)image->volume_count;
-    for (int i = 0; i < session->mesh_count; i++) out->part_count += is_part(session->meshes[i]);
+    for (int i = 0; i < meshes->count; i++) out->part_count += is_part(meshes->items[i]);
     const size_t fields = (size_t)out->part_count * (2 * surfaces + volumes);
     out->parts = base_calloc((size_t)out->part_count, sizeof *out->parts);
     out->surfaces = base_calloc(surfaces, sizeof *out->surfaces);
@@ -37,11 +39,11 @@ void session_layers_free(session_layers *layers)
     *layers = (session_layers){0};
 }
 
-static void fill_parts(const insitu_session *session, session_layers *layers)
+static void fill_parts(const session_meshes *meshes, session_layers *layers)
 {
     int part = 0;
-    for (int i = 0; i < session->mesh_count; i++) {
-        const session_mesh *mesh = session->meshes[i];
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
         if (is_part(mesh)) layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree};
     }
 }
@@ -55,14 +57,14 @@ static grid_field absent_field(void)
 }
 
 /* slot: which run of part_count fields. */
-static render_field place_field(const insitu_session *session, session_layers *layers, int slot,
+static render_field place_field(const session_meshes *meshes, session_layers *layers, int slot,
                                 const scene_field *field, bool wants_ranges)
 {
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
     ptrdiff_t at = first;
-    for (int i = 0; i < session->mesh_count; i++) {
-        const session_mesh *mesh = session->meshes[i];
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
@@ -73,44 +75,44 @@ static render_field place_field(const insitu_session *session, session_layers *l
 }
 
 /* Least and greatest value of a field over all ranks' drawn cells. Collective. */
-static insitu_status data_range(insitu_session *session, const scene_field *field, double *low, double *high,
+static insitu_status data_range(const session_layer_basis *basis, const scene_field *field, double *low, double *high,
                                 base_error *error)
 {
     double mine[2] = {INFINITY, INFINITY}, all[2];
-    for (int i = 0; i < session->mesh_count; i++) {
-        const session_mesh *mesh = session->meshes[i];
+    for (int i = 0; i < basis->meshes->count; i++) {
+        const session_mesh *mesh = basis->meshes->items[i];
         session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
         if (!scalar) continue;
         double least, most;
-        session_scalar_extent(mesh, scalar, session->threads, &least, &most);
+        session_scalar_extent(mesh, scalar, basis->team->threads, &least, &most);
         mine[0] = fmin(mine[0], least);
         mine[1] = fmin(mine[1], -most);
     }
     const insitu_status status =
-        session_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, session->comm), "MPI_Allreduce");
+        session_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, basis->team->comm), "MPI_Allreduce");
     *low = all[0];
     *high = -all[1];
     return status;
 }
 
-static insitu_status make_transfer(insitu_session *session, const scene_field *field, scene_colour_map map,
+static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field, scene_colour_map map,
                                    const scene_range *range, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
 {
     double low = range->low, high = range->high;
     if (!range->is_fixed) {
-        const insitu_status status = data_range(session, field, &low, &high, error);
+        const insitu_status status = data_range(basis, field, &low, &high, error);
         if (status) return status;
     }
-    return session_make_transfer(session, map, low, high, volume, out, error);
+    return session_make_transfer(basis->half_diagonal, map, low, high, volume, out, error);
 }
 
-static insitu_status fill_surface(insitu_session *session, const scene_isosurface *layer, int index,
+static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
                                   session_layers *layers, base_error *error)
 {
     render_surface_layer *out = &layers->surfaces[index];
     const scene_material *m = &layer->material;
-    *out = (render_surface_layer){.field = place_field(session, layers, 2 * index, &layer->field, true),
+    *out = (render_surface_layer){.field = place_field(basis->meshes, layers, 2 * index, &layer->field, true),
                                   .value_count = layer->value_count,
                                   .values = layer->values,
                                   .colours = layer->colours,
@@ -121,33 +123,33 @@ static insitu_status fill_surface(insitu_session *session, const scene_isosurfac
                                   .normal = layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES : RENDER_GRADIENT,
                                   .difference = layer->difference};
     if (!layer->has_colour_by) return INSITU_OK;
-    out->colour_field = place_field(session, layers, 2 * index + 1, &layer->colour_by, false);
+    out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, false);
     out->colour_map = &layers->transfers[index].transfer;
-    return make_transfer(session, &layer->colour_by, layer->colour_map, &layer->colour_range, NULL,
+    return make_transfer(basis, &layer->colour_by, layer->colour_map, &layer->colour_range, NULL,
                          &layers->transfers[index], error);
 }
 
-static insitu_status fill_volume(insitu_session *session, const scene_image *image, int index, session_layers *layers,
-                                 base_error *error)
+static insitu_status fill_volume(const session_layer_basis *basis, const scene_image *image, int index,
+                                 session_layers *layers, base_error *error)
 {
     const scene_volume *layer = &image->volumes[index];
     session_transfer *transfer = &layers->transfers[image->isosurface_count + index];
     layers->volumes[index] = (render_volume_layer){
-        .field = place_field(session, layers, 2 * image->isosurface_count + index, &layer->field, true),
+        .field = place_field(basis->meshes, layers, 2 * image->isosurface_count + index, &layer->field, true),
         .transfer = &transfer->transfer};
-    return make_transfer(session, &layer->field, layer->colour_map, &layer->range, layer, transfer, error);
+    return make_transfer(basis, &layer->field, layer->colour_map, &layer->range, layer, transfer, error);
 }
 
-insitu_status session_make_layers(insitu_session *session, const scene_image *image, session_layers *out,
+insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error)
 {
     session_layers layers = {0};
-    if (!allocate_layers(session, image, &layers)) session_no_memory(error, 1 << 10, "an image's layers");
-    insitu_status status = session_agree(session->comm, error);
-    if (!status) fill_parts(session, &layers);
+    if (!allocate_layers(basis->meshes, image, &layers)) session_no_memory(error, 1 << 10, "an image's layers");
+    insitu_status status = session_agree(basis->team->comm, error);
+    if (!status) fill_parts(basis->meshes, &layers);
     for (int i = 0; i < image->isosurface_count && !status; i++)
-        status = fill_surface(session, &image->isosurfaces[i], i, &layers, error);
-    for (int i = 0; i < image->volume_count && !status; i++) status = fill_volume(session, image, i, &layers, error);
+        status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
+    for (int i = 0; i < image->volume_count && !status; i++) status = fill_volume(basis, image, i, &layers, error);
     if (status)
         session_layers_free(&layers);
     else

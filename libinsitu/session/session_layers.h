@@ -2,8 +2,11 @@
 #ifndef SESSION_LAYERS_H
 #define SESSION_LAYERS_H
 
-#include "session_plan.h"
-#include "session_view.h"
+#include "render.h"
+#include "scene.h"
+#include "session_mesh.h"
+#include "session_team.h"
+#include "session_transfer.h"
 
 typedef struct session_layers {
     int part_count;
@@ -13,11 +16,18 @@ typedef struct session_layers {
     session_transfer *transfers; /* of surfaces, then of volumes */
     grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
     mmbvh_ranges *ranges;        /* as the fields */
-    render_active_cells *kept;   /* the step's (session_kept.h), for the caller to set; NULL: nothing is kept */
+    render_active_cells *kept;           /* the step's (session_cell_cache.h), for the caller to set; NULL: nothing is kept */
 } session_layers;
 
+/* What layers are made of. */
+typedef struct session_layer_basis {
+    const session_meshes *meshes;
+    const session_team *team;
+    double half_diagonal; /* of the global bounds */
+} session_layer_basis;
+
 /* Collective: ranges from the data are over all ranks. On an error nothing is left to free. */
-insitu_status session_make_layers(insitu_session *session, const scene_image *image, session_layers *out,
+insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 
 void session_layers_free(session_layers *layers);

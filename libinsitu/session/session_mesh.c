@@ -1,235 +1,10 @@
-/* The tables of meshes and fields: what the set calls fill in. Only descriptions are looked at here; the arrays behind
- * them are read by a step. An error is returned at once, and stays with the mesh or the field until that is set again,
- * so that the next step can tell every rank. */
-#include <stdio.h>
+/* The table of meshes: ordered by name, so that all ranks go through theirs in one order. */
+#include "session_mesh.h"
+
 #include <string.h>
 
 #include "memory.h"
-#include "session.h"
-
-void insitu_mesh_defaults(insitu_mesh *mesh)
-{
-    if (!mesh) return;
-    *mesh = (insitu_mesh){0};
-    mesh->cell_type = INSITU_TET;
-    mesh->changed = INSITU_CHANGED_ALL;
-}
-
-void insitu_field_defaults(insitu_field *field)
-{
-    if (!field) return;
-    *field = (insitu_field){0};
-    field->component_count = 1;
-    field->changed = INSITU_CHANGED_ALL;
-}
-
-void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insitu_type type)
-{
-    if (!mesh) return;
-    const int64_t size = session_type_size(type);
-    for (int axis = 0; axis < 3; axis++) {
-        mesh->coordinates[axis].data = xyz ? (const char *)xyz + axis * size : NULL;
-        mesh->coordinates[axis].type = type;
-        mesh->coordinates[axis].stride_bytes = 3 * size;
-    }
-}
-
-/* ---- descriptions -------------------------------------------------------------------------------------------- */
-
-enum { ALLOW_FLOATS = 1, ALLOW_INTEGERS = 2, ALLOW_BYTES = 4 };
-
-static bool is_allowed(insitu_type type, int allowed)
-{
-    switch (type) {
-    case INSITU_FLOAT32:
-    case INSITU_FLOAT64: return allowed & ALLOW_FLOATS;
-    case INSITU_INT32:
-    case INSITU_INT64: return allowed & ALLOW_INTEGERS;
-    case INSITU_UINT8: return allowed & ALLOW_BYTES;
-    }
-    return false;
-}
-
-static const char *allowed_words(int allowed)
-{
-    switch (allowed) {
-    case ALLOW_FLOATS: return "float32 or float64";
-    case ALLOW_INTEGERS: return "int32 or int64";
-    case ALLOW_BYTES: return "uint8";
-    case ALLOW_FLOATS | ALLOW_INTEGERS: return "float32, float64, int32 or int64";
-    default: return "uint8, int32 or int64";
-    }
-}
-
-typedef struct array_rule {
-    const char *name;
-    int64_t count;
-    int allowed;
-    bool is_optional;
-} array_rule;
-
-static insitu_status check_array(const insitu_array *array, const array_rule *rule, insitu_status bad,
-                                 base_error *error)
-{
-    if (!array->data) {
-        if (rule->is_optional || rule->count == 0) return INSITU_OK;
-        return base_fail(error, bad, "%s are not given", rule->name);
-    }
-    if (!is_allowed(array->type, rule->allowed))
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "%s are of element type %d, not %s", rule->name,
-                         (int)array->type, allowed_words(rule->allowed));
-    const int64_t size = session_type_size(array->type);
-    if (array->stride_bytes % size != 0)
-        return base_fail(error, bad, "%s have a stride of %lld bytes, no multiple of their %lld", rule->name,
-                         (long long)array->stride_bytes, (long long)size);
-    if ((uintptr_t)array->data % (uintptr_t)size != 0)
-        return base_fail(error, bad, "%s are not aligned to their %lld bytes", rule->name, (long long)size);
-    return INSITU_OK;
-}
-
-static insitu_status check_count(const char *name, int64_t count, int64_t most, base_error *error)
-{
-    if (count < 0) return base_fail(error, INSITU_ERROR_ARGUMENT, "%s is %lld", name, (long long)count);
-    if (count > most)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "%s is %lld, at most %lld is supported", name, (long long)count,
-                         (long long)most);
-    return INSITU_OK;
-}
-
-static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
-{
-    insitu_status status = check_count("vertex_count", mesh->vertex_count, INT64_MAX / 32, error);
-    if (!status) status = check_count("cell_count", mesh->cell_count, 4294967294, error);
-    if (!status) status = check_count("connectivity_count", mesh->connectivity_count, INT64_MAX / 32, error);
-    if (!status) status = check_count("face_count", mesh->face_count, INT64_MAX / 32, error);
-    if (!status) status = check_count("face_connectivity_count", mesh->face_connectivity_count, INT64_MAX / 32, error);
-    return status;
-}
-
-static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
-{
-    const insitu_array *const arrays[] = {&mesh->coordinates[0],   &mesh->coordinates[1], &mesh->coordinates[2],
-                                          &mesh->vertex_ids,       &mesh->cell_types,     &mesh->connectivity,
-                                          &mesh->offsets,          &mesh->ghosts,         &mesh->face_offsets,
-                                          &mesh->face_connectivity};
-    const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count;
-    const array_rule rules[] = {
-        {"x coordinates", vertices, ALLOW_FLOATS, false},
-        {"y coordinates", vertices, ALLOW_FLOATS, false},
-        {"z coordinates", vertices, ALLOW_FLOATS, false},
-        {"vertex ids", vertices, ALLOW_INTEGERS, true},
-        {"cell types", cells, ALLOW_INTEGERS | ALLOW_BYTES, true},
-        {"connectivity indices", mesh->connectivity_count, ALLOW_INTEGERS, false},
-        {"offsets", cells, ALLOW_INTEGERS, true},
-        {"ghost flags", cells, ALLOW_BYTES, true},
-        {"face offsets", mesh->face_count, ALLOW_INTEGERS, false},
-        {"face vertex indices", mesh->face_connectivity_count, ALLOW_INTEGERS, false},
-    };
-    for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
-        const insitu_status status = check_array(arrays[i], &rules[i], INSITU_ERROR_MESH, error);
-        if (status) return status;
-    }
-    return INSITU_OK;
-}
-
-static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
-{
-    if (mesh->changed & ~(unsigned)INSITU_CHANGED_ALL)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", mesh->changed);
-    if (mesh->cell_count == 0) return INSITU_OK;
-    if (mesh->cell_types.data) {
-        if (!mesh->offsets.data)
-            return base_fail(error, INSITU_ERROR_MESH, "offsets are not given, cell types are: mixed cells need both");
-        return INSITU_OK;
-    }
-    if (mesh->cell_type == INSITU_POLYHEDRON && !mesh->offsets.data)
-        return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polyhedra need them");
-    if (mesh->cell_type == INSITU_POLYHEDRON) return INSITU_OK;
-    const int vertices = grid_type_vertices((int)mesh->cell_type);
-    if (vertices == 0)
-        return base_fail(error, INSITU_ERROR_MESH,
-                         "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron)",
-                         (int)mesh->cell_type);
-    if (!mesh->offsets.data && mesh->connectivity_count != mesh->cell_count * vertices)
-        return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %d vertices need %lld",
-                         (long long)mesh->connectivity_count, (long long)mesh->cell_count, vertices,
-                         (long long)(mesh->cell_count * vertices));
-    return INSITU_OK;
-}
-
-static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
-{
-    insitu_status status = check_counts(mesh, error);
-    if (!status) status = check_arrays(mesh, error);
-    if (!status) status = check_shape(mesh, error);
-    return status;
-}
-
-static grid_array as_grid_array(const insitu_array *array)
-{
-    grid_array out = {0};
-    if (!array->data) return out;
-    out.data = array->data;
-    out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
-    out.is_wide = session_type_size(array->type) == 8;
-    out.is_integer = array->type == INSITU_INT32 || array->type == INSITU_INT64;
-    return out;
-}
-
-static grid as_grid(const insitu_mesh *mesh)
-{
-    grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
-    for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = as_grid_array(&mesh->coordinates[axis]);
-    g.connectivity = as_grid_array(&mesh->connectivity);
-    g.offsets = as_grid_array(&mesh->offsets);
-    g.face_count = mesh->face_count;
-    g.face_offsets = as_grid_array(&mesh->face_offsets);
-    g.face_connectivity = as_grid_array(&mesh->face_connectivity);
-    if (mesh->cell_types.data) {
-        const grid_array types = as_grid_array(&mesh->cell_types);
-        g.cell_types = types.data;
-        g.cell_types_stride = types.stride;
-        g.cell_types_bytes = (int)session_type_size(mesh->cell_types.type);
-    }
-    if (mesh->ghosts.data) {
-        g.ghosts = mesh->ghosts.data;
-        g.ghosts_stride = mesh->ghosts.stride_bytes ? mesh->ghosts.stride_bytes : 1;
-    }
-    return g;
-}
-
-/* Whether cells differ, whatever the caller says of them. */
-static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
-{
-    return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||
-           a->connectivity_count != b->connectivity_count || a->cell_type != b->cell_type ||
-           !a->cell_types.data != !b->cell_types.data || !a->offsets.data != !b->offsets.data ||
-           !a->ghosts.data != !b->ghosts.data || a->face_count != b->face_count ||
-           a->face_connectivity_count != b->face_connectivity_count;
-}
-
-static bool is_same_array(const insitu_array *a, const insitu_array *b)
-{
-    const grid_array x = as_grid_array(a), y = as_grid_array(b);
-    return x.data == y.data && x.stride == y.stride && (!x.data || a->type == b->type);
-}
-
-/* What must have changed by the looks of two descriptions of as many cells and vertices: arrays that lie elsewhere, or
- * are read otherwise, hold what nobody has looked at. */
-static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
-{
-    bool has_same_cells = is_same_array(&a->cell_types, &b->cell_types) &&
-                          is_same_array(&a->connectivity, &b->connectivity) &&
-                          is_same_array(&a->offsets, &b->offsets) && is_same_array(&a->ghosts, &b->ghosts) &&
-                          is_same_array(&a->face_offsets, &b->face_offsets) &&
-                          is_same_array(&a->face_connectivity, &b->face_connectivity);
-    bool has_same_vertices = is_same_array(&a->vertex_ids, &b->vertex_ids);
-    for (int axis = 0; axis < 3; axis++)
-        has_same_vertices = has_same_vertices && is_same_array(&a->coordinates[axis], &b->coordinates[axis]);
-    return (has_same_cells ? 0 : INSITU_CHANGED_TOPOLOGY) | (has_same_vertices ? 0 : INSITU_CHANGED_GEOMETRY);
-}
-
-/* ---- meshes -------------------------------------------------------------------------------------------------- */
+#include "session_agree.h"
 
 void session_drop_scalars(session_mesh *mesh)
 {
@@ -257,7 +32,7 @@ void session_drop_tree(session_mesh *mesh)
     }
 }
 
-static void drop_fields(session_mesh *mesh)
+void session_drop_fields(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->field_count; i++) base_free((void *)(uintptr_t)mesh->fields[i].given.name);
     base_free(mesh->fields);
@@ -265,147 +40,68 @@ static void drop_fields(session_mesh *mesh)
     mesh->field_count = 0;
 }
 
-/* All that depends on the cells. */
-static void drop_contents(session_mesh *mesh)
+void session_drop_contents(session_mesh *mesh)
 {
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
-    drop_fields(mesh);
+    session_drop_fields(mesh);
     base_free(mesh->flat);
     mesh->flat = NULL;
 }
 
-void session_mesh_free(session_mesh *mesh)
+static void free_mesh(session_mesh *mesh)
 {
     if (!mesh) return;
-    drop_contents(mesh);
+    session_drop_contents(mesh);
     base_free(mesh->name);
     base_free(mesh);
 }
 
 /* Where name stands, or would stand, among the meshes. */
-static int mesh_position(const insitu_session *session, const char *name)
+static int mesh_position(const session_meshes *meshes, const char *name)
 {
     int at = 0;
-    while (at < session->mesh_count && strcmp(session->meshes[at]->name, name) < 0) at++;
+    while (at < meshes->count && strcmp(meshes->items[at]->name, name) < 0) at++;
     return at;
 }
 
-session_mesh *session_find_mesh(const insitu_session *session, const char *name)
+session_mesh *session_find_mesh(const session_meshes *meshes, const char *name)
 {
-    const int at = mesh_position(session, name);
-    return at < session->mesh_count && strcmp(session->meshes[at]->name, name) == 0 ? session->meshes[at] : NULL;
+    const int at = mesh_position(meshes, name);
+    return at < meshes->count && strcmp(meshes->items[at]->name, name) == 0 ? meshes->items[at] : NULL;
 }
 
-static session_mesh *add_mesh(insitu_session *session, const char *name, base_error *error)
+session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error)
 {
     session_mesh *mesh = base_calloc(1, sizeof *mesh);
-    session_mesh **meshes = base_alloc((size_t)(session->mesh_count + 1) * sizeof *meshes);
+    session_mesh **items = base_alloc((size_t)(meshes->count + 1) * sizeof *items);
     if (mesh) mesh->name = base_strdup(name);
-    if (!mesh || !mesh->name || !meshes) goto fail;
-    const int at = mesh_position(session, name);
-    for (int i = 0; i < session->mesh_count; i++) meshes[i + (i >= at)] = session->meshes[i];
-    meshes[at] = mesh;
-    base_free(session->meshes);
-    session->meshes = meshes;
-    session->mesh_count++;
+    if (!mesh || !mesh->name || !items) goto fail;
+    const int at = mesh_position(meshes, name);
+    for (int i = 0; i < meshes->count; i++) items[i + (i >= at)] = meshes->items[i];
+    items[at] = mesh;
+    base_free(meshes->items);
+    meshes->items = items;
+    meshes->count++;
     return mesh;
 fail:
     session_no_memory(error, (int64_t)sizeof *mesh, "a mesh's description");
-    base_free(meshes);
-    session_mesh_free(mesh);
+    base_free(items);
+    free_mesh(mesh);
     return NULL;
 }
 
-static void remove_mesh(insitu_session *session, const char *name)
+void session_remove_mesh(session_meshes *meshes, const char *name)
 {
-    session_mesh *mesh = session_find_mesh(session, name);
+    session_mesh *mesh = session_find_mesh(meshes, name);
     if (!mesh) return;
-    const int at = mesh_position(session, name);
-    session->mesh_count--;
-    for (int i = at; i < session->mesh_count; i++) session->meshes[i] = session->meshes[i + 1];
-    session_mesh_free(mesh);
-    session->is_changed = true;
-    session->is_table_changed = true;
+    const int at = mesh_position(meshes, name);
+    meshes->count--;
+    for (int i = at; i < meshes->count; i++) meshes->items[i] = meshes->items[i + 1];
+    free_mesh(mesh);
+    meshes->are_cells_changed = true;
+    meshes->are_names_changed = true;
 }
-
-static void take_mesh(insitu_session *session, session_mesh *mesh, const insitu_mesh *given)
-{
-    unsigned changed = given->changed;
-    if (!mesh->is_given || has_other_shape(&mesh->given, given)) changed = INSITU_CHANGED_ALL;
-    if (changed & INSITU_CHANGED_TOPOLOGY) {
-        drop_fields(mesh);
-        session->is_table_changed = true;
-    }
-    changed |= seen_changes(&mesh->given, given);
-    if (changed & INSITU_CHANGED_TOPOLOGY) {
-        session_drop_scalars(mesh);
-        session_drop_tree(mesh);
-        mesh->rent = 0;
-        mesh->is_topology_stale = true;
-    }
-    if (!mesh->given.vertex_ids.data != !given->vertex_ids.data) session->is_table_changed = true;
-    if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
-        mesh->is_check_stale = true;
-        mesh->is_geometry_stale = true;
-        session->is_changed = true;
-        for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;
-    }
-    mesh->given = *given;
-    mesh->cells = as_grid(given);
-    mesh->cells.flat = mesh->flat;
-    mesh->is_given = true;
-    mesh->problem = (base_error){0};
-}
-
-/* Put "mesh "name": " in front of what a check said. */
-static insitu_status place_error(base_error *error, const char *mesh, const char *field, const base_error *what)
-{
-    if (field) return base_fail(error, what->status, "mesh \"%s\": field \"%s\": %.700s", mesh, field, what->message);
-    return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
-}
-
-static insitu_status set_mesh(insitu_session *session, const char *name, const insitu_mesh *given, base_error *error)
-{
-    if (!given) {
-        remove_mesh(session, name);
-        return INSITU_OK;
-    }
-    session_mesh *mesh = session_find_mesh(session, name);
-    if (!mesh) mesh = add_mesh(session, name, error);
-    if (!mesh) return INSITU_ERROR_MEMORY;
-    base_error what = {0};
-    if (check_mesh(given, &what) == INSITU_OK) {
-        take_mesh(session, mesh, given);
-        return INSITU_OK;
-    }
-    drop_contents(mesh);
-    mesh->is_given = false;
-    mesh->given = (insitu_mesh){0};
-    mesh->cells = (grid){0};
-    session->is_changed = true;
-    session->is_table_changed = true;
-    mesh->problem = (base_error){0};
-    place_error(&mesh->problem, name, NULL, &what);
-    *error = mesh->problem;
-    return error->status;
-}
-
-insitu_status insitu_set_mesh(insitu_session *session, const char *name, const insitu_mesh *mesh)
-{
-    if (!session) return INSITU_ERROR_ARGUMENT;
-    session->error = (base_error){0};
-    if (!name || !*name) {
-        base_fail(&session->error, INSITU_ERROR_ARGUMENT, "insitu_set_mesh: the mesh has no name");
-        session->pending = session->error;
-        return session->error.status;
-    }
-    const insitu_status status = set_mesh(session, name, mesh, &session->error);
-    if (status == INSITU_ERROR_MEMORY) session->pending = session->error;
-    return status;
-}
-
-/* ---- fields -------------------------------------------------------------------------------------------------- */
 
 int session_find_field(const session_mesh *mesh, const char *name)
 {
@@ -414,128 +110,20 @@ int session_find_field(const session_mesh *mesh, const char *name)
     return -1;
 }
 
-static session_field *add_field(session_mesh *mesh, const char *name, base_error *error)
+const base_error *session_pending_error(const session_meshes *meshes)
 {
-    char *copy = base_strdup(name);
-    session_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
-    if (fields) mesh->fields = fields;
-    if (!copy || !fields) {
-        base_free(copy);
-        session_no_memory(error, (int64_t)sizeof *fields, "a field's description");
-        return NULL;
-    }
-    session_field *field = &fields[mesh->field_count++];
-    *field = (session_field){.given = {.name = copy}};
-    return field;
-}
-
-static insitu_status check_field(const session_mesh *mesh, const insitu_field *field, base_error *error)
-{
-    if (field->centring != INSITU_VERTEX && field->centring != INSITU_CELL)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "unknown centring %d", (int)field->centring);
-    if (field->component_count < 1)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "component_count is %d", field->component_count);
-    if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
-    const bool is_vertex = field->centring == INSITU_VERTEX;
-    const int64_t expected = is_vertex ? mesh->given.vertex_count : mesh->given.cell_count;
-    if (field->count != expected)
-        return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s", (long long)field->count,
-                         (long long)expected, is_vertex ? "vertices" : "cells");
-    const array_rule rule = {"values", field->count, ALLOW_FLOATS | ALLOW_INTEGERS, false};
-    const insitu_status status = check_array(&field->values, &rule, INSITU_ERROR_FIELD, error);
-    if (status) return status;
-    const int64_t size = session_type_size(field->values.type);
-    if (field->values.data && field->component_stride_bytes % size != 0)
-        return base_fail(error, INSITU_ERROR_FIELD, "has a component stride of %lld bytes, no multiple of its %lld",
-                         (long long)field->component_stride_bytes, (long long)size);
-    return INSITU_OK;
-}
-
-static void spoil_scalars(session_mesh *mesh, int field)
-{
-    for (int i = 0; i < mesh->scalar_count; i++) {
-        session_scalar *scalar = &mesh->scalars[i];
-        if (scalar->field != field) continue;
-        scalar->are_values_stale = true;
-        scalar->is_suspect = true;
-    }
-}
-
-/* Are the values read from where they were? */
-static bool is_same_place(const insitu_field *a, const insitu_field *b)
-{
-    return is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes;
-}
-
-static void take_field(insitu_session *session, session_mesh *mesh, int index, const insitu_field *given)
-{
-    session_field *field = &mesh->fields[index];
-    const bool is_other = !field->values.data || field->given.centring != given->centring ||
-                          field->given.component_count != given->component_count || field->problem.status;
-    if (is_other) {
-        /* The scalars' components may have changed their meaning. */
-        session_drop_scalars(mesh);
-        session->is_table_changed = true;
-    } else if (given->changed & INSITU_CHANGED_VALUES || !is_same_place(&field->given, given)) {
-        spoil_scalars(mesh, index);
-    }
-    const char *name = field->given.name;
-    field->given = *given;
-    field->given.name = name;
-    field->values = as_grid_array(&given->values);
-    const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
-    if (given->values.stride_bytes == 0) field->values.stride = size * given->component_count;
-    field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;
-    field->problem = (base_error){0};
-}
-
-static insitu_status set_field(insitu_session *session, session_mesh *mesh, const insitu_field *given,
-                               base_error *error)
-{
-    int index = session_find_field(mesh, given->name);
-    if (index < 0) {
-        if (!add_field(mesh, given->name, error)) return INSITU_ERROR_MEMORY;
-        index = mesh->field_count - 1;
-        session->is_table_changed = true;
-    }
-    base_error what = {0};
-    if (check_field(mesh, given, &what) == INSITU_OK) {
-        take_field(session, mesh, index, given);
-        return INSITU_OK;
-    }
-    session_field *field = &mesh->fields[index];
-    field->problem = (base_error){0};
-    place_error(&field->problem, mesh->name, given->name, &what);
-    *error = field->problem;
-    return error->status;
-}
-
-insitu_status insitu_set_field(insitu_session *session, const char *name, const insitu_field *field)
-{
-    if (!session) return INSITU_ERROR_ARGUMENT;
-    base_error *error = &session->error;
-    *error = (base_error){0};
-    session_mesh *mesh = name ? session_find_mesh(session, name) : NULL;
-    if (!name || !field || !field->name || !*field->name)
-        base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_field: no mesh, no field, or a field without a name");
-    else if (!mesh)
-        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field->name, name);
-    else if (!mesh->is_given)
-        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", field->name, name);
-    else if (set_field(session, mesh, field, error) != INSITU_ERROR_MEMORY)
-        return error->status;
-    session->pending = *error;
-    return error->status;
-}
-
-const base_error *session_pending_error(const insitu_session *session)
-{
-    for (int i = 0; i < session->mesh_count; i++) {
-        const session_mesh *mesh = session->meshes[i];
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
         if (mesh->problem.status) return &mesh->problem;
         for (int f = 0; f < mesh->field_count; f++)
             if (mesh->fields[f].problem.status) return &mesh->fields[f].problem;
     }
-    return session->pending.status ? &session->pending : NULL;
+    return meshes->pending.status ? &meshes->pending : NULL;
+}
+
+void session_meshes_free(session_meshes *meshes)
+{
+    for (int i = 0; i < meshes->count; i++) free_mesh(meshes->items[i]);
+    base_free(meshes->items);
+    *meshes = (session_meshes){0};
 }

@@ -2,7 +2,10 @@
 #ifndef SESSION_PLAN_H
 #define SESSION_PLAN_H
 
-#include "session.h"
+#include "scene.h"
+#include "session_catalogue.h"
+#include "session_report.h"
+#include "session_space.h"
 
 /* Cell values that a layer wants at vertices; one item a mesh, field and component. */
 typedef struct session_recentring {
@@ -17,19 +20,27 @@ typedef struct session_plan {
     const scene_image **images;
     int recentring_count;
     session_recentring *recentrings;
+    int64_t cell_count; /* drawn ones of all ranks */
+    base_error refusal; /* of the first due image that cannot be drawn */
 } session_plan;
 
-/* Which of the due images can be drawn, and marks on this rank's meshes and scalars what they need. refusal gets the
- * reason of the first image that cannot be drawn; it is the same on every rank. Collective. */
-insitu_status session_make_plan(insitu_session *session, const scene_image *const *due, int count, session_plan *out,
-                                base_error *refusal, base_error *error);
+/* What a plan is made of; the same on every rank. */
+typedef struct session_plan_basis {
+    const scene *scene;
+    const char *scene_path; /* for messages */
+    int64_t cycle;
+    const session_catalogue *catalogue;
+    const session_extent *extent;
+} session_plan_basis;
+
+/* How many images are due. Local. */
+int session_count_due(const scene *scene, int64_t cycle);
+
+/* Find which of the due images can be drawn, and mark on this rank's meshes and scalars what they need. An image that
+ * cannot be drawn is no error of this call. Collective. */
+insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, MPI_Comm comm,
+                                session_report *report, session_plan *out, base_error *error);
 
 void session_plan_free(session_plan *plan);
-
-/* This rank's scalar for a layer's field: NULL where the mesh does not have it. */
-session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
-
-/* The values of a scalar. */
-grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar);
 
 #endif

@@ -19,6 +19,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_exchange.h"
+#include "session_scalars.h"
 
 /* Values by group: those of group g are values[starts[g]] .. values[starts[g + 1] - 1]. */
 typedef struct value_groups {
@@ -210,8 +211,8 @@ static bool do_boxes_meet(const rank_box *a, const rank_box *b)
 }
 
 /* The other ranks' boxes that meet this one's: to the front of boxes; returns how many. Collective. */
-static insitu_status gather_boxes(const insitu_session *session, const session_mesh *mesh, double margin,
-                                  rank_box *boxes, int *count, base_error *error)
+static insitu_status gather_boxes(const session_team *team, const session_mesh *mesh, double margin, rank_box *boxes,
+                                  int *count, base_error *error)
 {
     rank_box mine = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
@@ -219,10 +220,10 @@ static insitu_status gather_boxes(const insitu_session *session, const session_m
         mine.upper[axis] = mesh->upper[axis] + margin;
     }
     const insitu_status status =
-        session_mpi(error, MPI_Allgather(&mine, 6, MPI_DOUBLE, boxes, 6, MPI_DOUBLE, session->comm), "MPI_Allgather");
+        session_mpi(error, MPI_Allgather(&mine, 6, MPI_DOUBLE, boxes, 6, MPI_DOUBLE, team->comm), "MPI_Allgather");
     *count = 0;
-    for (int rank = 0; rank < session->ranks && !status; rank++)
-        if (rank != session->rank && do_boxes_meet(&boxes[rank], &mine)) boxes[(*count)++] = boxes[rank];
+    for (int rank = 0; rank < team->ranks && !status; rank++)
+        if (rank != team->rank && do_boxes_meet(&boxes[rank], &mine)) boxes[(*count)++] = boxes[rank];
     return status;
 }
 
@@ -361,17 +362,17 @@ done:
     return is_done;
 }
 
-static insitu_status exchange_means(insitu_session *session, const shared_groups *shared, vertex_groups *groups,
+static insitu_status exchange_means(const session_team *team, const shared_groups *shared, vertex_groups *groups,
                                     base_error *error)
 {
     session_mail in = {0}, reply = {0}, means = {0};
-    insitu_status status = session_mail_exchange(session->comm, &shared->mail, &in, error);
+    insitu_status status = session_mail_exchange(team->comm, &shared->mail, &in, error);
     if (status) return status;
-    if (!merge_records(&in, session->ranks, session->threads, &reply))
+    if (!merge_records(&in, team->ranks, team->threads, &reply))
         session_no_memory(error, in.total * 24, "values at vertices that ranks share");
     session_mail_free(&in);
-    status = session_agree(session->comm, error);
-    if (status == INSITU_OK) status = session_mail_exchange(session->comm, &reply, &means, error);
+    status = session_agree(team->comm, error);
+    if (status == INSITU_OK) status = session_mail_exchange(team->comm, &reply, &means, error);
     session_mail_free(&reply);
     if (status) return status;
     for (int64_t i = 0; i < shared->count; i++)
@@ -380,22 +381,21 @@ static insitu_status exchange_means(insitu_session *session, const shared_groups
     return INSITU_OK;
 }
 
-static insitu_status merge_shared(insitu_session *session, const session_mesh *mesh, bool by_id, vertex_groups *groups,
-                                  base_error *error)
+static insitu_status merge_shared(const session_team *team, const session_mesh *mesh, double margin,
+                                  vertex_groups *groups, base_error *error)
 {
     shared_groups shared = {0};
     int box_count = 0;
-    rank_box *boxes = base_alloc((size_t)session->ranks * sizeof *boxes);
-    if (!boxes) session_no_memory(error, session->ranks * (int64_t)sizeof *boxes, "boxes of ranks");
-    insitu_status status = session_agree(session->comm, error);
-    const double margin = by_id ? 1e-6 * session->extent.half_diagonal : 0;
-    if (!status) status = gather_boxes(session, mesh, margin, boxes, &box_count, error);
+    rank_box *boxes = base_alloc((size_t)team->ranks * sizeof *boxes);
+    if (!boxes) session_no_memory(error, team->ranks * (int64_t)sizeof *boxes, "boxes of ranks");
+    insitu_status status = session_agree(team->comm, error);
+    if (!status) status = gather_boxes(team, mesh, margin, boxes, &box_count, error);
     if (!status) {
-        if (!find_shared(mesh, groups, boxes, box_count, &shared) || !pack_records(groups, session->ranks, &shared))
+        if (!find_shared(mesh, groups, boxes, box_count, &shared) || !pack_records(groups, team->ranks, &shared))
             session_no_memory(error, groups->keys.count * 40, "values at vertices that ranks share");
-        status = session_agree(session->comm, error);
+        status = session_agree(team->comm, error);
     }
-    if (!status) status = exchange_means(session, &shared, groups, error);
+    if (!status) status = exchange_means(team, &shared, groups, error);
     base_free(boxes);
     base_free(shared.groups);
     session_mail_free(&shared.mail);
@@ -421,9 +421,10 @@ static void spread_means(const vertex_groups *groups, int64_t count, double *val
         values[v] = groups->of_vertex[v] < 0 ? NAN : groups->values.means[groups->of_vertex[v]];
 }
 
-static insitu_status recentre(insitu_session *session, const session_recentring *item, base_error *error)
+static insitu_status recentre(const session_recentring *item, const session_meshes *meshes, const session_team *team,
+                              double half_diagonal, base_error *error)
 {
-    session_mesh *mesh = session_find_mesh(session, item->mesh->name);
+    session_mesh *mesh = session_find_mesh(meshes, item->mesh->name);
     session_scalar *scalar = scalar_of(mesh, item);
     if (!scalar) mesh = NULL;
     const bool by_id = item->mesh->has_ids;
@@ -435,14 +436,14 @@ static insitu_status recentre(insitu_session *session, const session_recentring 
             session_no_memory(error, mesh->given.vertex_count * (int64_t)sizeof(double), "recentred values");
         grid_field field =
             session_scalar_field(mesh, &(session_scalar){.field = scalar->field, .component = scalar->component});
-        if (scalar->vertex_values) make_groups(mesh, &field, by_id, session->threads, &groups, error);
+        if (scalar->vertex_values) make_groups(mesh, &field, by_id, team->threads, &groups, error);
     } else {
-        make_groups(NULL, NULL, by_id, session->threads, &groups, error);
+        make_groups(NULL, NULL, by_id, team->threads, &groups, error);
     }
-    insitu_status status = session_agree(session->comm, error);
-    if (!status && session->ranks > 1) status = merge_shared(session, mesh, by_id, &groups, error);
+    insitu_status status = session_agree(team->comm, error);
+    if (!status && team->ranks > 1) status = merge_shared(team, mesh, by_id ? 1e-6 * half_diagonal : 0, &groups, error);
     if (!status && scalar) {
-        spread_means(&groups, mesh->given.vertex_count, scalar->vertex_values, session->threads);
+        spread_means(&groups, mesh->given.vertex_count, scalar->vertex_values, team->threads);
         scalar->are_values_stale = false;
         scalar->is_suspect = true;
     }
@@ -450,23 +451,24 @@ static insitu_status recentre(insitu_session *session, const session_recentring 
     return status;
 }
 
-insitu_status session_recentre(insitu_session *session, const session_plan *plan, base_error *error)
+insitu_status session_recentre(const session_plan *plan, const session_meshes *meshes, const session_team *team,
+                               double half_diagonal, base_error *error)
 {
     if (plan->recentring_count == 0) return INSITU_OK;
     const size_t count = (size_t)plan->recentring_count;
     int *stale = base_calloc(count, sizeof *stale);
     if (!stale) session_no_memory(error, (int64_t)(count * sizeof *stale), "flags");
-    insitu_status status = session_agree(session->comm, error);
+    insitu_status status = session_agree(team->comm, error);
     for (size_t i = 0; i < count && !status; i++) {
         const session_recentring *item = &plan->recentrings[i];
-        const session_scalar *scalar = scalar_of(session_find_mesh(session, item->mesh->name), item);
+        const session_scalar *scalar = scalar_of(session_find_mesh(meshes, item->mesh->name), item);
         stale[i] = scalar && scalar->are_values_stale;
     }
     if (!status)
-        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, (int)count, MPI_INT, MPI_MAX, session->comm),
+        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, (int)count, MPI_INT, MPI_MAX, team->comm),
                              "MPI_Allreduce");
     for (size_t i = 0; i < count && !status; i++)
-        if (stale[i]) status = recentre(session, &plan->recentrings[i], error);
+        if (stale[i]) status = recentre(&plan->recentrings[i], meshes, team, half_diagonal, error);
     base_free(stale);
     return status;
 }

@@ -3,9 +3,12 @@
 #define SESSION_RECENTRE_H
 
 #include "session_plan.h"
+#include "session_team.h"
 
 /* Fill the recentred arrays of the plan that are out of date on any rank. A vertex gets the mean of the finite values
- * of its cells that are no ghosts, over all ranks; NaN where there are none. Collective. */
-insitu_status session_recentre(insitu_session *session, const session_plan *plan, base_error *error);
+ * of its cells that are no ghosts, over all ranks; NaN where there are none. half_diagonal: of the global bounds.
+ * Collective. */
+insitu_status session_recentre(const session_plan *plan, const session_meshes *meshes, const session_team *team,
+                               double half_diagonal, base_error *error);
 
 #endif

@@ -1,31 +1,9 @@
-/* Where everything lies: global bounds, the origin and scale of float32 numbers.
- *
- * Every number here comes out of reductions, so that it is the same on every rank and for every partition. The space
+/* Every number here comes out of reductions, so that it is the same on every rank and for every partition. The space
  * is kept while the cells stay about where they were, since a new one means new trees: a moving mesh does not move it
  * at every step. */
-#include "session.h"
+#include "session_space.h"
+
 #include "session_agree.h"
-
-int session_node_ranks(MPI_Comm comm)
-{
-    MPI_Comm node = MPI_COMM_NULL;
-    int ranks = 1;
-    if (MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node) != MPI_SUCCESS) return 1;
-    MPI_Comm_size(node, &ranks);
-    MPI_Comm_free(&node);
-    return ranks;
-}
-
-static insitu_status check_meshes(insitu_session *session, base_error *error)
-{
-    for (int i = 0; i < session->mesh_count; i++) {
-        session_mesh *mesh = session->meshes[i];
-        if (!mesh->is_check_stale) continue;
-        const insitu_status status = session_check_mesh(mesh, session->threads, error);
-        if (status) return status;
-    }
-    return INSITU_OK;
-}
 
 /* To 13 bits, which is within 1.6e-4: steps are derived from it, and a sum over cells rounds by the order of the cells,
  * of a cell's vertices and of the ranks, by 1e-12 or so. Where to round up is a matter of choice. The golden ratio is
@@ -39,14 +17,14 @@ static double rounded_size(double size)
     return ldexp(floor(ldexp(mantissa, BITS) + 0.61803398874989485), exponent - BITS);
 }
 
-static insitu_status reduce_extent(insitu_session *session, session_extent *out, base_error *error)
+static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, session_extent *out, base_error *error)
 {
     double mine[6], all[6];
     int64_t counts[3] = {0, 0, 0}, totals[3] = {0, 0, 0};
     double sizes = 0, all_sizes = 0;
     for (int i = 0; i < 6; i++) mine[i] = INFINITY;
-    for (int i = 0; i < session->mesh_count; i++) {
-        const session_mesh *mesh = session->meshes[i];
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
         if (mesh->drawn_count == 0) continue;
         for (int axis = 0; axis < 3; axis++) {
             mine[axis] = fmin(mine[axis], mesh->lower[axis]);
@@ -57,14 +35,11 @@ static insitu_status reduce_extent(insitu_session *session, session_extent *out,
         sizes += mesh->size_sum;
     }
     counts[1] = counts[0] > 0;
-    insitu_status status =
-        session_mpi(error, MPI_Allreduce(mine, all, 6, MPI_DOUBLE, MPI_MIN, session->comm), "MPI_Allreduce");
+    insitu_status status = session_mpi(error, MPI_Allreduce(mine, all, 6, MPI_DOUBLE, MPI_MIN, comm), "MPI_Allreduce");
     if (!status)
-        status =
-            session_mpi(error, MPI_Allreduce(counts, totals, 3, MPI_INT64_T, MPI_SUM, session->comm), "MPI_Allreduce");
+        status = session_mpi(error, MPI_Allreduce(counts, totals, 3, MPI_INT64_T, MPI_SUM, comm), "MPI_Allreduce");
     if (!status)
-        status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, session->comm),
-                             "MPI_Allreduce");
+        status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, comm), "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .rank_count = (int)totals[1]};
     /* Of the cells that have one: flat ones change no sample. */
@@ -84,46 +59,45 @@ static double half_diagonal(const double lower[3], const double upper[3])
 }
 
 /* Kept while the bounds' centre is inside the old ones and the size is within a factor of 4 up, 8 down. */
-static bool space_still_fits(const insitu_session *session)
+static bool still_fits(const session_space *space)
 {
-    if (!session->has_space) return false;
-    const double old_half = half_diagonal(session->space_lower, session->space_upper);
-    const session_extent *e = &session->extent;
+    if (!space->has_origin) return false;
+    const double old_half = half_diagonal(space->lower, space->upper);
+    const session_extent *e = &space->extent;
     if (e->half_diagonal > 4 * old_half || e->half_diagonal < old_half / 8) return false;
     for (int axis = 0; axis < 3; axis++) {
         const double centre = 0.5 * e->lower[axis] + 0.5 * e->upper[axis];
-        if (centre < session->space_lower[axis] || centre > session->space_upper[axis]) return false;
+        if (centre < space->lower[axis] || centre > space->upper[axis]) return false;
     }
     return true;
 }
 
-static void make_space(insitu_session *session)
+static void choose_origin(session_space *space)
 {
-    const session_extent *e = &session->extent;
+    const session_extent *e = &space->extent;
     for (int axis = 0; axis < 3; axis++) {
-        session->origin[axis] = 0.5 * e->lower[axis] + 0.5 * e->upper[axis];
-        session->space_lower[axis] = e->lower[axis];
-        session->space_upper[axis] = e->upper[axis];
+        space->origin[axis] = 0.5 * e->lower[axis] + 0.5 * e->upper[axis];
+        space->lower[axis] = e->lower[axis];
+        space->upper[axis] = e->upper[axis];
     }
     int exponent = 0; /* half_diagonal = m 2^exponent, m in [0.5, 1) */
     if (e->half_diagonal > 0 && frexp(e->half_diagonal, &exponent) == 0.5) exponent--;
-    session->scale = ldexp(1.0, exponent < -1000 ? 1000 : -exponent);
-    session->has_space = true;
-    for (int i = 0; i < session->mesh_count; i++) session_drop_tree(session->meshes[i]);
+    space->scale = ldexp(1.0, exponent < -1000 ? 1000 : -exponent);
+    space->has_origin = true;
 }
 
-insitu_status session_update_extent(insitu_session *session, base_error *error)
+insitu_status session_update_space(session_space *space, session_meshes *meshes, MPI_Comm comm, base_error *error)
 {
-    check_meshes(session, error);
-    insitu_status status = session_agree(session->comm, error);
-    if (status) return status;
     session_extent extent;
-    status = reduce_extent(session, &extent, error);
+    const insitu_status status = reduce_extent(meshes, comm, &extent, error);
     if (status) return status;
     extent.half_diagonal = half_diagonal(extent.lower, extent.upper);
-    session->extent = extent;
-    session->has_extent = true;
-    if (!space_still_fits(session)) make_space(session);
-    session->is_changed = false;
+    space->extent = extent;
+    space->has_extent = true;
+    if (!still_fits(space)) {
+        choose_origin(space);
+        for (int i = 0; i < meshes->count; i++) session_drop_tree(meshes->items[i]);
+    }
+    meshes->are_cells_changed = false;
     return INSITU_OK;
 }

@@ -1,154 +1,106 @@
-/* The step: one small reduction always, and the phases in their order where a picture is due.
+/* The step: its phases in their order, each in a file of its own.
  *
- * The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
- * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
- * all tables of names are alike, whether any wants more threads, the lowest of the instruction sets, and, from rank 0,
- * the time and whether the scene file was edited. After it, ranks decide alike without another word. */
-#include <string.h>
-
+ * A phase takes the parts of the session that it may touch. It is collective, and returns one status on all ranks
+ * (session_agree.h), so that all of them leave the step at the same place. The first phase is one small reduction;
+ * nothing else is exchanged where no image is due and nothing has failed. */
 #include "cpu.h"
 #include "render_isa.h"
 #include "session.h"
 #include "session_agree.h"
+#include "session_changes.h"
+#include "session_check.h"
+#include "session_checksums.h"
 #include "session_draw.h"
 #include "session_guard.h"
-#include "session_team.h"
-#include "session_warnings.h"
+#include "session_isovalues.h"
+#include "session_recentre.h"
+#include "session_summary.h"
+#include "session_vertex_order.h"
 
-enum step_word {
-    CYCLE_HIGH,
-    CYCLE_LOW, /* negated, as is all that is called low */
-    FAILED,    /* ranks - lowest failing rank; 0: none */
-    CELLS_CHANGED,
-    NAMES_CHANGED,
-    NAMES_HIGH,
-    NAMES_LOW,
-    SCENE_CHANGED,
-    TEAM_GROWS,
-    ISA_LOW,
-    ROOT_TIME, /* the bits of rank 0's */
-    STEP_WORDS
-};
-
-typedef struct step_message {
-    int64_t words[STEP_WORDS];
-} step_message;
-
-static int64_t bits_of(double value)
+static double milliseconds_since(double start)
 {
-    int64_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
+    return 1e3 * (MPI_Wtime() - start);
 }
 
-static double double_of(int64_t bits)
+/* What was made for images of the old scene goes. */
+static void reload_scene(insitu_session *s)
 {
-    double value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
-static insitu_status exchange_message(insitu_session *session, int64_t cycle, double time, step_message *out,
-                                      base_error *error)
-{
-    step_message mine = {{0}};
-    const int64_t names = (int64_t)(session_table_hash(session) >> 1);
-    mine.words[CYCLE_HIGH] = cycle;
-    mine.words[CYCLE_LOW] = ~cycle; /* as a negation, without overflow */
-    mine.words[FAILED] = session_pending_error(session) ? session->ranks - session->rank : 0;
-    mine.words[CELLS_CHANGED] = session->is_changed || !session->has_extent;
-    mine.words[NAMES_CHANGED] = session->is_table_changed || !session->has_catalogue;
-    mine.words[NAMES_HIGH] = names;
-    mine.words[NAMES_LOW] = ~names;
-    mine.words[SCENE_CHANGED] = session_scene_file_changed(session);
-    mine.words[TEAM_GROWS] = session_team_grows(session);
-    mine.words[ISA_LOW] = -render_isa_level();
-    mine.words[ROOT_TIME] = session->rank == 0 ? bits_of(time) : INT64_MIN;
-    return session_mpi(error, MPI_Allreduce(mine.words, out->words, STEP_WORDS, MPI_INT64_T, MPI_MAX, session->comm),
-                       "MPI_Allreduce");
-}
-
-static insitu_status tell_pending_error(insitu_session *session, int root, base_error *error)
-{
-    base_error told = {0};
-    const base_error *mine = session_pending_error(session);
-    if (session->rank == root && mine) base_fail(&told, mine->status, "rank %d: %.900s", root, mine->message);
-    session->pending = (base_error){0};
-    const insitu_status status = session_share_error(session->comm, root, &told);
-    *error = told;
-    return status;
-}
-
-static bool is_due(const scene_image *image, int64_t cycle)
-{
-    return image->every <= 1 || cycle % image->every == 0;
-}
-
-static int due_count(const scene *scene, int64_t cycle)
-{
-    int count = 0;
-    for (int i = 0; i < scene->image_count; i++) count += is_due(&scene->images[i], cycle);
-    return count;
-}
-
-static insitu_status draw_due(insitu_session *session, const step_message *message, base_error *error)
-{
-    const double start = MPI_Wtime();
-    const int64_t cycle = message->words[CYCLE_HIGH];
-    const bool are_names_alike = message->words[NAMES_HIGH] == ~message->words[NAMES_LOW];
-    insitu_status status = INSITU_OK;
-    if (message->words[CELLS_CHANGED]) status = session_update_extent(session, error);
-    if (!status && message->words[NAMES_CHANGED]) status = session_update_catalogue(session, are_names_alike, error);
-    if (!status && (message->words[CELLS_CHANGED] || message->words[NAMES_CHANGED]))
-        status = session_warn_of_cells(session, error);
-    session->report.prepare_ms = 1e3 * (MPI_Wtime() - start);
-    if (status) return status;
-    const scene_image *due[due_count(&session->scene, cycle)];
-    int count = 0;
-    for (int i = 0; i < session->scene.image_count; i++)
-        if (is_due(&session->scene.images[i], cycle)) due[count++] = &session->scene.images[i];
-    return session_draw_images(session, due, count, cycle, error);
+    if (!session_reload_scene(&s->scene_file, &s->team)) return;
+    session_drop_picture(&s->picture);
+    session_forget_warnings(&s->report);
+    for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
 }
 
 /* The kernels that every rank has: two sets differ in roundings, and at a face between their cells volumes would
  * overlap. */
-static void take_common_kernels(insitu_session *session, int level)
+static void use_common_kernels(int level, session_report *report)
 {
     render_isa_limit(level);
     if (level < render_isa_level())
-        session_text_add(&session->warnings, "kernels are %s, the best that all ranks have, where %s ones would do",
+        session_text_add(&report->warnings, "kernels are %s, the best that all ranks have, where %s ones would do",
                          cpu_isa_name((cpu_isa)level), cpu_isa_name((cpu_isa)render_isa_level()));
 }
 
-static insitu_status draw_by_team(insitu_session *session, const step_message *message, const session_guard *guard,
-                                  base_error *error)
+/* The phases that bring what is known of the meshes up to date. */
+static insitu_status survey_meshes(insitu_session *s, const session_changes *changes, base_error *error)
 {
-    const bool is_new = message->words[TEAM_GROWS] || message->words[SCENE_CHANGED];
-    insitu_status status = is_new ? session_team_probe(session, error) : INSITU_OK;
-    if (status) return status;
-    take_common_kernels(session, (int)-message->words[ISA_LOW]);
-    session->threads = session_team_threads(session);
-    session_guard_begin_team(guard, session->threads);
-    if (is_new) status = session_team_check(session, error);
-    if (!status) status = draw_due(session, message, error);
-    session_guard_end_team(session->threads);
+    const double start = MPI_Wtime();
+    insitu_status status = INSITU_OK;
+    if (changes->of_cells) status = session_check_meshes(&s->meshes, &s->team, error);
+    if (!status && changes->of_cells) status = session_update_space(&s->space, &s->meshes, s->team.comm, error);
+    if (!status && changes->of_names)
+        status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, changes->are_names_shared, error);
+    if (!status && (changes->of_cells || changes->of_names))
+        status = session_check_vertex_order(&s->meshes, &s->catalogue, s->team.comm, &s->report, error);
+    s->report.numbers.prepare_ms += milliseconds_since(start);
     return status;
 }
 
-static insitu_status step(insitu_session *session, int64_t cycle, double time, const session_guard *guard,
-                          base_error *error)
+/* The phases from what the plan names to trees over it. */
+static insitu_status prepare_meshes(insitu_session *s, const session_plan *plan, base_error *error)
 {
-    step_message message;
-    const insitu_status status = exchange_message(session, cycle, time, &message, error);
+    const double start = MPI_Wtime();
+    insitu_status status = session_recentre(plan, &s->meshes, &s->team, s->space.extent.half_diagonal, error);
+    s->report.numbers.prepare_ms += milliseconds_since(start);
     if (status) return status;
-    const int64_t high = message.words[CYCLE_HIGH], low = ~message.words[CYCLE_LOW];
-    session->report.time = double_of(message.words[ROOT_TIME]);
-    if (message.words[SCENE_CHANGED]) session_reload_scene(session);
-    if (message.words[FAILED]) return tell_pending_error(session, session->ranks - (int)message.words[FAILED], error);
-    if (high != low)
-        return base_fail(error, INSITU_ERROR_MPI, "ranks disagree on the cycle: %lld on one, %lld on another",
-                         (long long)low, (long long)high);
-    return due_count(&session->scene, high) ? draw_by_team(session, &message, guard, error) : INSITU_OK;
+    session_compare_checksums(&s->meshes, s->team.threads, &s->report);
+    status = session_update_trees(&s->trees, &s->meshes, &s->space, s->scene_file.scene.tree, &s->team,
+                                  &s->report.numbers, error);
+    return status ? status : session_check_isovalues(plan, &s->meshes, &s->team, &s->report, error);
+}
+
+/* The phases of a step in which an image is due. Nothing is computed but what the plan names. */
+static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, base_error *error)
+{
+    const session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, changes->cycle, &s->catalogue,
+                                      &s->space.extent};
+    const session_drawing drawing = {&s->team,         s->scene_file.path, changes->cycle, &s->meshes,
+                                     &s->trees.parent, &s->space,          &s->report};
+    session_plan plan = {0};
+    insitu_status status = survey_meshes(s, changes, error);
+    if (!status) status = session_make_plan(&basis, &s->meshes, s->team.comm, &s->report, &plan, error);
+    if (!status) status = prepare_meshes(s, &plan, error);
+    if (!status) status = session_draw_images(&drawing, &plan, &s->picture, error);
+    session_plan_free(&plan);
+    return status;
+}
+
+static insitu_status step(insitu_session *s, int64_t cycle, double time, const session_guard *guard, base_error *error)
+{
+    session_changes changes;
+    insitu_status status = session_find_changes(s, cycle, time, &changes, error);
+    if (status) return status;
+    s->report.numbers.time = changes.time;
+    if (changes.of_scene) reload_scene(s);
+    status = session_check_input(&changes, &s->meshes, &s->team, error);
+    if (status || session_count_due(&s->scene_file.scene, changes.cycle) == 0) return status;
+    use_common_kernels(changes.isa_level, &s->report);
+    status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
+                                   changes.are_threads_lacking || changes.of_scene, guard, &s->report, error);
+    if (status) return status;
+    status = draw_due_images(s, &changes, error);
+    session_guard_end_team(s->team.threads);
+    return status;
 }
 
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
@@ -158,10 +110,11 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_guard_begin(&guard);
     const double start = MPI_Wtime();
     session->error = (base_error){0};
-    session_begin_report(session, cycle, time);
+    session_report_begin(&session->report, cycle, time);
     const insitu_status status = step(session, cycle, time, &guard, &session->error);
-    session_end_report(session);
-    session->report.total_ms = 1e3 * (MPI_Wtime() - start);
+    session_summarize(&session->meshes, &session->trees.parent, session->picture.bytes, session->scene_file.warning,
+                      &session->report);
+    session->report.numbers.total_ms = milliseconds_since(start);
     session_guard_end(&guard);
     return status;
 }

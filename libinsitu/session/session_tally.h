@@ -2,7 +2,7 @@
 #ifndef SESSION_TALLY_H
 #define SESSION_TALLY_H
 
-#include "session.h"
+#include "session_mesh.h"
 
 typedef struct mesh_tally {
     double lower[3], upper[3];

@@ -1,9 +1,9 @@
 /* The scene's words to the renderer's numbers. All of it is arithmetic on what ranks share, so nothing is exchanged. */
 #include "session_view.h"
 
-#include <float.h>
+#include <math.h>
 
-#include "colour_map.h"
+#include "session_agree.h"
 
 static double length(const double v[3])
 {
@@ -45,17 +45,17 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
     return render_camera_look_at(out, eye, focal, up, c->angle, image->width, image->height);
 }
 
-static insitu_status make_camera(const insitu_session *session, const scene_image *image, render_camera *out,
-                                 base_error *error)
+static insitu_status make_camera(const session_extent *extent, const char *scene_path, const scene_image *image,
+                                 render_camera *out, base_error *error)
 {
     const scene_camera *c = &image->camera;
     const bool is_made =
-        c->is_automatic ? automatic_camera(&session->extent, image, out)
+        c->is_automatic ? automatic_camera(extent, image, out)
                         : render_camera_look_at(out, c->eye, c->focal, c->up, c->angle, image->width, image->height);
     if (is_made) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_SCENE,
                      "%s:%d: image \"%s\": its camera stands at its focal point or looks along its up direction",
-                     session->scene_path, image->line, image->name);
+                     scene_path, image->line, image->name);
 }
 
 static void make_lights(const scene_image *image, const render_camera *camera, render_light *lights)
@@ -80,20 +80,15 @@ static double sample_distance(const session_extent *extent, const scene_image *i
     return cell > 0 ? image->step_cells * cell : 1;
 }
 
-insitu_status session_make_view(const insitu_session *session, const scene_image *image, session_view *out,
-                                base_error *error)
+static void fill_view(const session_space *space, const scene_image *image, session_view *out)
 {
-    *out = (session_view){0};
-    const insitu_status status = make_camera(session, image, &out->camera, error);
-    if (status) return status;
-    out->space.scale = session->scale;
+    out->space.scale = space->scale;
     for (int axis = 0; axis < 3; axis++) {
-        out->space.origin[axis] = session->origin[axis];
-        out->space.depth_origin += (session->origin[axis] - out->camera.eye[axis]) * out->camera.forward[axis];
+        out->space.origin[axis] = space->origin[axis];
+        out->space.depth_origin += (space->origin[axis] - out->camera.eye[axis]) * out->camera.forward[axis];
     }
     make_lights(image, &out->camera, out->lights);
-    out->step = sample_distance(&session->extent, image);
-    return INSITU_OK;
+    out->step = sample_distance(&space->extent, image);
 }
 
 /* ---- time ---------------------------------------------------------------------------------------------------- */
@@ -131,68 +126,89 @@ static double estimate_samples(const session_extent *e, const scene_image *image
     return sum / (PROBES * PROBES) / view->step * rays * image->volume_count;
 }
 
-insitu_status session_check_time(const insitu_session *session, const scene_image *image, const session_view *view,
-                                 base_error *error)
+static insitu_status check_time(const session_extent *e, const char *scene_path, const scene_image *image,
+                                const session_view *view, int threads, base_error *error)
 {
-    const session_extent *e = &session->extent;
     if (image->volume_count == 0 || image->method != SCENE_SAMPLES || e->rank_count == 0) return INSITU_OK;
     const double samples = estimate_samples(e, image, view);
-    const double seconds = samples * sample_seconds / ((double)session->threads * e->rank_count);
+    const double seconds = samples * sample_seconds / ((double)threads * e->rank_count);
     if (!(seconds > image->max_seconds)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_SCENE,
                      "%s:%d: image \"%s\" would take some %.1e samples at a step of %g, about %.2g s on %d ranks of %d "
                      "threads; its max_seconds is %g: expected a larger step, or more of that",
-                     session->scene_path, image->line, image->name, samples, view->step, seconds, e->rank_count,
-                     session->threads, image->max_seconds);
+                     scene_path, image->line, image->name, samples, view->step, seconds, e->rank_count, threads,
+                     image->max_seconds);
 }
 
-/* ---- transfer functions -------------------------------------------------------------------------------------- */
+/* ---- views that see nothing ---------------------------------------------------------------------------------- */
 
-static const char *map_name(scene_colour_map map)
+/* Where the corners of the bounds lie in the picture. */
+typedef struct corner_bounds {
+    double low[2], high[2]; /* of places in the picture: -1 and 1 are its borders; of corners in front */
+    int behind;             /* corners */
+    bool is_beside;         /* all of them beyond one border */
+} corner_bounds;
+
+static double along(const double v[3], const double axis[3])
 {
-    switch (map) {
-    case SCENE_VIRIDIS: return "viridis";
-    case SCENE_INFERNO: return "inferno";
-    case SCENE_COOL_TO_WARM: return "cool_to_warm";
-    case SCENE_GREY: return "grey";
-    }
-    return "viridis";
+    return v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2];
 }
 
-/* A constant field has its value in the middle of a range that float32 numbers can tell from nothing. */
-static void widen(double *low, double *high)
+static corner_bounds project_bounds(const session_extent *e, const render_camera *c)
 {
-    if (*low > *high) {
-        *low = 0;
-        *high = 1;
+    corner_bounds b = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, 0, false};
+    int beyond[4] = {0, 0, 0, 0};
+    const double half[2] = {c->half_height * c->width / c->height, c->half_height};
+    for (int corner = 0; corner < 8; corner++) {
+        double offset[3];
+        for (int a = 0; a < 3; a++) offset[a] = (corner >> a & 1 ? e->upper[a] : e->lower[a]) - c->eye[a];
+        const double z = along(offset, c->forward);
+        const double place[2] = {along(offset, c->right), along(offset, c->up)};
+        b.behind += z <= 0;
+        for (int a = 0; a < 2; a++) {
+            beyond[2 * a] += place[a] < -half[a] * z;
+            beyond[2 * a + 1] += place[a] > half[a] * z;
+            if (z > 0) b.low[a] = fmin(b.low[a], place[a] / (half[a] * z));
+            if (z > 0) b.high[a] = fmax(b.high[a], place[a] / (half[a] * z));
+        }
     }
-    const double least = fmax(1e-6 * fmax(fabs(*low), fabs(*high)), FLT_MIN);
-    if (*high - *low >= least) return;
-    const double middle = 0.5 * *low + 0.5 * *high;
-    *low = middle - 0.5 * least;
-    *high = middle + 0.5 * least;
+    for (int side = 0; side < 4; side++) b.is_beside = b.is_beside || beyond[side] == 8;
+    return b;
 }
 
-insitu_status session_make_transfer(const insitu_session *session, scene_colour_map map, double low, double high,
-                                    const scene_volume *volume, session_transfer *out, base_error *error)
+/* Why nothing is in view, NULL where something may be. */
+static const char *why_unseen(const session_extent *e, const render_camera *c)
 {
-    render_transfer *t = &out->transfer;
-    *out = (session_transfer){0};
-    widen(&low, &high);
-    t->low = low;
-    t->high = high;
-    t->colours = colour_map_table(map_name(map), &t->colour_count);
-    if (!t->colours) return base_fail(error, INSITU_ERROR_INTERNAL, "no colour map is called %s", map_name(map));
-    t->unit_distance = 1;
-    if (!volume) return INSITU_OK;
-    t->opacity_count = volume->opacity_count;
-    for (int i = 0; i < volume->opacity_count; i++) {
-        out->opacity_values[i] = low + volume->opacity[i].at * (high - low);
-        out->opacities[i] = volume->opacity[i].opacity;
-    }
-    t->opacity_values = out->opacity_values;
-    t->opacities = out->opacities;
-    t->unit_distance = volume->unit_distance > 0 ? volume->unit_distance : session->extent.half_diagonal / 10;
-    if (!(t->unit_distance > 0)) t->unit_distance = 1;
-    return INSITU_OK;
+    const corner_bounds b = project_bounds(e, c);
+    if (b.behind == 8) return "they are behind it";
+    if (b.is_beside) return "they are beside the picture";
+    const bool is_small =
+        b.behind == 0 && (b.high[0] - b.low[0]) * c->width < 2 && (b.high[1] - b.low[1]) * c->height < 2;
+    return is_small ? "together they are smaller than a pixel" : NULL;
+}
+
+static void warn_of_view(const session_extent *e, const scene_image *image, const session_view *view,
+                         session_report *report)
+{
+    const char *why = e->cell_count ? why_unseen(e, &view->camera) : NULL;
+    const session_warning warning = {WARNING_VIEW, image->name, NULL, 0};
+    session_warn(report, &warning, why != NULL,
+                 "image \"%s\": its camera does not see the cells, which lie between (%g, %g, %g) and (%g, %g, %g): %s",
+                 image->name, e->lower[0], e->lower[1], e->lower[2], e->upper[0], e->upper[1], e->upper[2],
+                 why ? why : "");
+}
+
+/* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
+                                const session_team *team, session_report *report, session_view *out, base_error *error)
+{
+    *out = (session_view){0};
+    insitu_status status = make_camera(&space->extent, scene_path, image, &out->camera, error);
+    if (status) return status; /* on all ranks alike */
+    fill_view(space, image, out);
+    check_time(&space->extent, scene_path, image, out, team->threads, error);
+    status = session_agree_as_is(team->comm, error);
+    if (!status) warn_of_view(&space->extent, image, out, report);
+    return status;
 }

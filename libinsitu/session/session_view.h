@@ -1,8 +1,12 @@
-/* What of an image depends on the global bounds: camera, lights, sample distance; and transfer functions. */
+/* What of an image depends on the global bounds: camera, lights, sample distance. */
 #ifndef SESSION_VIEW_H
 #define SESSION_VIEW_H
 
-#include "session.h"
+#include "render.h"
+#include "scene.h"
+#include "session_report.h"
+#include "session_space.h"
+#include "session_team.h"
 
 typedef struct session_view {
     render_camera camera;
@@ -11,22 +15,9 @@ typedef struct session_view {
     double step;
 } session_view;
 
-typedef struct session_transfer {
-    render_transfer transfer; /* points into this */
-    double opacity_values[RENDER_MAX_OPACITY_POINTS];
-    float opacities[RENDER_MAX_OPACITY_POINTS];
-} session_transfer;
-
-/* The same on every rank; fails where the camera looks nowhere. Local. */
-insitu_status session_make_view(const insitu_session *session, const scene_image *image, session_view *out,
-                                base_error *error);
-
-/* Fails where the samples of the image's volumes would take longer than its max_seconds, by estimate. Local. */
-insitu_status session_check_time(const insitu_session *session, const scene_image *image, const session_view *view,
-                                 base_error *error);
-
-/* low > high: there are no values. Local. */
-insitu_status session_make_transfer(const insitu_session *session, scene_colour_map map, double low, double high,
-                                    const scene_volume *volume, session_transfer *out, base_error *error);
+/* Fails where the camera looks nowhere, or where samples of the image's volumes would take longer than its max_seconds,
+ * by estimate; warns of a camera that has no cells in view. scene_path: for messages. Collective. */
+insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
+                                const session_team *team, session_report *report, session_view *out, base_error *error);
 
 #endif

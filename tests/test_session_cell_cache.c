@@ -7,7 +7,7 @@
 
 #include "memory.h"
 #include "session.h"
-#include "session_kept.h"
+#include "session_cell_cache.h"
 #include "test_session_fixture.h"
 
 enum { IMAGES = 3, TET_BYTES = 64, HEX_BYTES = 128, MOST_BYTES = 64 << 20, SIDE = 10 };
@@ -34,7 +34,7 @@ static unsigned keeping(const char *const *layers, const int *frames)
     if (scene_parse(text, strlen(text), "scene.yaml", &s, &error) != INSITU_OK) fail_msg("%s", error.message);
     for (int i = 0; i < s.image_count; i++) images[i] = &s.images[i];
     const session_plan plan = {.image_count = s.image_count, .images = images};
-    for (int i = 0; i < s.image_count; i++) bits |= (unsigned)session_kept_pays(&plan, images[i]) << i;
+    for (int i = 0; i < s.image_count; i++) bits |= (unsigned)session_cell_cache_pays(&plan, images[i]) << i;
     scene_free(&s);
     return bits;
 }

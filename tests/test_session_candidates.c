@@ -25,7 +25,7 @@ static const test_mesh_kind kinds[] = {TEST_TETS, TEST_MIXED, TEST_POLYHEDRA};
 static insitu_session *open_tree(scene_tree tree, const char *scene)
 {
     insitu_session *session = open_session(MPI_COMM_WORLD, scene);
-    session->scene.tree = tree;
+    session->scene_file.scene.tree = tree;
     return session;
 }
 
@@ -52,7 +52,7 @@ static void step_same(insitu_session *full, insitu_session *other, const session
 /* Cells in the trees of all ranks. */
 static int64_t tree_cells(const insitu_session *session)
 {
-    int64_t own = session->mesh_count ? session->meshes[0]->tree.cell_count : 0, all = 0;
+    int64_t own = session->meshes.count ? session->meshes.items[0]->tree.cell_count : 0, all = 0;
     MPI_Allreduce(&own, &all, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     return all;
 }
@@ -175,7 +175,7 @@ static void full_trees_are_built_where_most_cells_show(void **context)
                   write_scene(IMAGE("      - volume: {field: f, range: [-4, 4], opacity: [[0, 0.1], [1, 0.5]]}\n")));
     everywhere(hand_over(session, &in) == INSITU_OK);
     told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
-    everywhere(tree_cells(session) == all && !session->meshes[0]->is_partial);
+    everywhere(tree_cells(session) == all && !session->meshes.items[0]->is_partial);
     forget_pictures();
     insitu_destroy(&session);
     input_free(&in);

@@ -1,16 +1,14 @@
-#include "session_shown.h"
+#include "session_candidates.h"
 
 #include <string.h>
 
 #include "memory.h"
-#include "session_plan.h"
-#include "session_view.h"
+#include "render.h"
+#include "session_hash.h"
+#include "session_scalars.h"
+#include "session_transfer.h"
 
-void session_shown_clear(session_scalar *scalar)
-{
-    scalar->shows_all = false;
-    scalar->interval_count = 0;
-}
+/* ---- which values show ---------------------------------------------------------------------------------------- */
 
 static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, int count)
 {
@@ -23,10 +21,10 @@ static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, in
     return true;
 }
 
-bool session_shown_surface(session_scalar *scalar, const scene_isosurface *layer)
+static bool add_surface(session_scalar *scalar, const scene_isosurface *layer)
 {
     /* Differences look at cells around the surface's. */
-    if (layer->normals == SCENE_DIFFERENCES) scalar->shows_all = true;
+    if (layer->normals == SCENE_DIFFERENCES) scalar->needs_all = true;
     bool is_added = true;
     for (int i = 0; i < layer->value_count && is_added; i++) {
         const mmbvh_interval interval = render_isovalue_interval(layer->values[i]);
@@ -35,7 +33,7 @@ bool session_shown_surface(session_scalar *scalar, const scene_isosurface *layer
     return is_added;
 }
 
-bool session_shown_volume(const insitu_session *session, session_scalar *scalar, const scene_volume *layer)
+static bool add_volume(session_scalar *scalar, const scene_volume *layer, double half_diagonal)
 {
     const scene_range *range = &layer->range;
     session_transfer t;
@@ -43,21 +41,65 @@ bool session_shown_volume(const insitu_session *session, session_scalar *scalar,
     base_error error = {0};
     /* A range from the data is known when all ranks have told theirs. */
     if (!range->is_fixed ||
-        session_make_transfer(session, layer->colour_map, range->low, range->high, layer, &t, &error)) {
-        scalar->shows_all = true;
+        session_make_transfer(half_diagonal, layer->colour_map, range->low, range->high, layer, &t, &error)) {
+        scalar->needs_all = true;
         return true;
     }
     return add_intervals(scalar, intervals, render_visible_intervals(&t.transfer, intervals));
 }
 
-bool session_shown_is_bounded(const session_mesh *mesh)
+static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)
 {
-    for (int i = 0; i < mesh->scalar_count; i++)
-        if (mesh->scalars[i].wants_ranges && mesh->scalars[i].shows_all) return false;
+    session_scalar *scalar;
+    if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
+    if (!scalar) return true;
+    if (!add_surface(scalar, layer)) return false;
+    return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
+}
+
+static bool mark_volume(session_mesh *mesh, const scene_volume *layer, double half_diagonal)
+{
+    session_scalar *scalar;
+    if (!session_mark_scalar(mesh, &layer->field, true, &scalar)) return false;
+    return !scalar || add_volume(scalar, layer, half_diagonal);
+}
+
+static bool mark_image(session_mesh *mesh, const scene_image *image, double half_diagonal)
+{
+    bool is_marked = true;
+    for (int i = 0; i < image->isosurface_count && is_marked; i++)
+        is_marked = mark_surface(mesh, &image->isosurfaces[i]);
+    for (int i = 0; i < image->volume_count && is_marked; i++)
+        is_marked = mark_volume(mesh, &image->volumes[i], half_diagonal);
+    return is_marked;
+}
+
+bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count, double half_diagonal)
+{
+    for (int m = 0; m < meshes->count; m++) {
+        session_mesh *mesh = meshes->items[m];
+        mesh->is_needed = false;
+        for (int i = 0; i < mesh->scalar_count; i++) {
+            mesh->scalars[i].is_used = mesh->scalars[i].wants_ranges = false;
+            mesh->scalars[i].needs_all = false;
+            mesh->scalars[i].interval_count = 0;
+        }
+        for (int i = 0; i < count && mesh->is_given; i++)
+            if (!mark_image(mesh, images[i], half_diagonal)) return false;
+    }
     return true;
 }
 
-uint64_t session_shown_key(const session_mesh *mesh)
+/* ---- which cells have them ------------------------------------------------------------------------------------ */
+
+bool session_has_candidates(const session_mesh *mesh)
+{
+    for (int i = 0; i < mesh->scalar_count; i++)
+        if (mesh->scalars[i].wants_ranges && mesh->scalars[i].needs_all) return false;
+    return true;
+}
+
+uint64_t session_candidates_key(const session_mesh *mesh)
 {
     uint64_t key = SESSION_HASH_BEGIN;
     for (int i = 0; i < mesh->scalar_count; i++) {
@@ -70,7 +112,7 @@ uint64_t session_shown_key(const session_mesh *mesh)
     return key;
 }
 
-insitu_status session_shown_select(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error)
+insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error)
 {
     const size_t most = (size_t)mesh->scalar_count;
     grid_field *fields = base_calloc(most, sizeof *fields);

@@ -1,8 +1,9 @@
-#include "session_values.h"
+/* What depends on a scalar's values is stale only where they are other values than before. */
+#include "session_checksums.h"
 
 #include <string.h>
 
-#include "session_plan.h"
+#include "session_scalars.h"
 
 enum { BLOCK_VALUES = 1 << 14, LANES = 4 };
 
@@ -74,12 +75,12 @@ static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scal
     return field.own ? sum_field(sum, mesh, field.own, threads) : sum;
 }
 
-static void settle(insitu_session *session, const session_mesh *mesh, session_scalar *scalar)
+static void compare(const session_mesh *mesh, session_scalar *scalar, int threads, session_report *report)
 {
-    const uint64_t checksum = checksum_of(mesh, scalar, session->threads);
+    const uint64_t checksum = checksum_of(mesh, scalar, threads);
     scalar->is_suspect = false;
     if (scalar->has_checksum && scalar->checksum == checksum) {
-        session_text_add(&session->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
+        session_text_add(&report->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
                          mesh->name, mesh->fields[scalar->field].given.name);
         return;
     }
@@ -89,11 +90,13 @@ static void settle(insitu_session *session, const session_mesh *mesh, session_sc
     scalar->is_extent_known = false;
 }
 
-void session_settle_values(insitu_session *session)
+void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report)
 {
-    for (int i = 0; i < session->mesh_count; i++) {
-        session_mesh *mesh = session->meshes[i];
-        for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++)
-            if (mesh->scalars[k].is_used && mesh->scalars[k].is_suspect) settle(session, mesh, &mesh->scalars[k]);
+    for (int i = 0; i < meshes->count; i++) {
+        session_mesh *mesh = meshes->items[i];
+        for (int k = 0; k < mesh->scalar_count && mesh->is_given; k++) {
+            session_scalar *scalar = &mesh->scalars[k];
+            if (scalar->is_used && scalar->is_suspect) compare(mesh, scalar, threads, report);
+        }
     }
 }

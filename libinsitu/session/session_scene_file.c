@@ -1,15 +1,15 @@
 /* The scene file: rank 0 reads it and everyone parses the same text, so that all ranks come to the same scene without a
  * word about its structure. A file edited while the simulation runs is taken at the next step; an edit that does not
  * parse leaves the old scene in place and a warning in the reports until it is mended. */
+#include "session_scene_file.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "memory.h"
-#include "session.h"
 #include "session_agree.h"
-#include "session_warnings.h"
 
 enum { MAX_SCENE_BYTES = 1 << 22 };
 
@@ -58,26 +58,27 @@ static insitu_status read_file(const char *path, scene_file_text *text, base_err
 }
 
 /* Rank 0's bytes to all; *data is allocated on the others. Collective. */
-static insitu_status share_bytes(insitu_session *session, char **data, int64_t *size, base_error *error)
+static insitu_status share_bytes(const session_team *team, char **data, int64_t *size, base_error *error)
 {
-    insitu_status status = session_mpi(error, MPI_Bcast(size, 1, MPI_INT64_T, 0, session->comm), "MPI_Bcast");
+    insitu_status status = session_mpi(error, MPI_Bcast(size, 1, MPI_INT64_T, 0, team->comm), "MPI_Bcast");
     if (status) return status;
-    if (session->rank != 0) {
+    if (team->rank != 0) {
         *data = base_alloc((size_t)*size + 1);
         if (!*data) session_no_memory(error, *size, "scene text");
     }
-    status = session_agree(session->comm, error);
+    status = session_agree(team->comm, error);
     if (status) return status;
-    return session_mpi(error, MPI_Bcast(*data, (int)*size, MPI_CHAR, 0, session->comm), "MPI_Bcast");
+    return session_mpi(error, MPI_Bcast(*data, (int)*size, MPI_CHAR, 0, team->comm), "MPI_Bcast");
 }
 
-static insitu_status parse_shared(insitu_session *session, scene_file_text *text, scene *out, base_error *error)
+static insitu_status parse_shared(const char *path, const session_team *team, scene_file_text *text, scene *out,
+                                  base_error *error)
 {
-    insitu_status status = share_bytes(session, &text->data, &text->size, error);
+    insitu_status status = share_bytes(team, &text->data, &text->size, error);
     if (status) return status;
     scene parsed = {0};
-    scene_parse(text->data, (size_t)text->size, session->scene_path, &parsed, error);
-    status = session_agree_as_is(session->comm, error);
+    scene_parse(text->data, (size_t)text->size, path, &parsed, error);
+    status = session_agree_as_is(team->comm, error);
     if (status == INSITU_OK)
         *out = parsed;
     else
@@ -92,63 +93,69 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
 }
 
 /* Read, share and parse. Where memory ran out the file counts as unread, and the next step tries again. */
-static insitu_status read_scene(insitu_session *session, scene *out, base_error *error)
+static insitu_status read_scene(session_scene_file *file, const session_team *team, scene *out, base_error *error)
 {
     scene_file_text text = {0};
-    if (session->rank == 0) read_file(session->scene_path, &text, error);
-    insitu_status status = session_agree_as_is(session->comm, error);
-    if (status == INSITU_OK) status = parse_shared(session, &text, out, error);
-    if (session->rank == 0 && text.has_stamp && status != INSITU_ERROR_MEMORY) {
-        session->stamp = text.stamp;
-        session->has_stamp = true;
+    if (team->rank == 0) read_file(file->path, &text, error);
+    insitu_status status = session_agree_as_is(team->comm, error);
+    if (status == INSITU_OK) status = parse_shared(file->path, team, &text, out, error);
+    if (team->rank == 0 && text.has_stamp && status != INSITU_ERROR_MEMORY) {
+        file->stamp = text.stamp;
+        file->has_stamp = true;
     }
     base_free(text.data);
     return status;
 }
 
-static insitu_status share_path(insitu_session *session, const char *path, base_error *error)
+static insitu_status share_path(session_scene_file *file, const session_team *team, const char *path, base_error *error)
 {
     int64_t size = 0;
-    if (session->rank == 0) {
+    if (team->rank == 0) {
         if (!path)
             base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_create: no scene file is given");
-        else if (!(session->scene_path = base_strdup(path)))
+        else if (!(file->path = base_strdup(path)))
             session_no_memory(error, (int64_t)strlen(path), "the scene file's name");
         else
             size = (int64_t)strlen(path) + 1;
     }
-    const insitu_status status = session_agree(session->comm, error);
+    const insitu_status status = session_agree(team->comm, error);
     if (status) return status;
-    return share_bytes(session, &session->scene_path, &size, error);
+    return share_bytes(team, &file->path, &size, error);
 }
 
-insitu_status session_load_scene(insitu_session *session, const char *path, base_error *error)
+insitu_status session_load_scene(session_scene_file *file, const session_team *team, const char *path,
+                                 base_error *error)
 {
-    const insitu_status status = share_path(session, path, error);
-    return status ? status : read_scene(session, &session->scene, error);
+    const insitu_status status = share_path(file, team, path, error);
+    return status ? status : read_scene(file, team, &file->scene, error);
 }
 
-bool session_scene_file_changed(const insitu_session *session)
+bool session_is_scene_edited(const session_scene_file *file, int rank)
 {
     struct stat now;
     /* An editor may have taken the file away for a moment: it is back at a later step. */
-    if (session->rank != 0 || stat(session->scene_path, &now) != 0) return false;
-    return !session->has_stamp || !is_same_file(&now, &session->stamp);
+    if (rank != 0 || stat(file->path, &now) != 0) return false;
+    return !file->has_stamp || !is_same_file(&now, &file->stamp);
 }
 
-void session_reload_scene(insitu_session *session)
+bool session_reload_scene(session_scene_file *file, const session_team *team)
 {
     scene edited = {0};
     base_error error = {0};
-    base_free(session->scene_warning);
-    session->scene_warning = NULL;
-    if (read_scene(session, &edited, &error) != INSITU_OK) {
-        session->scene_warning = base_strdup(error.message);
-        return;
+    base_free(file->warning);
+    file->warning = NULL;
+    if (read_scene(file, team, &edited, &error) != INSITU_OK) {
+        file->warning = base_strdup(error.message);
+        return false;
     }
-    scene_free(&session->scene);
-    session->scene = edited;
-    session_drop_picture(session);
-    session_forget_warnings(session);
-    for (int i = 0; i < session->mesh_count; i++) session_drop_scalars(session->meshes[i]);
+    scene_free(&file->scene);
+    file->scene = edited;
+    return true;
+}
+
+void session_scene_file_free(session_scene_file *file)
+{
+    scene_free(&file->scene);
+    base_free(file->path);
+    base_free(file->warning);
 }

@@ -1,0 +1,20 @@
+/* Candidates: the cells that the due images can show, told by the values that these show. A partial tree is over them
+ * alone. */
+#ifndef SESSION_CANDIDATES_H
+#define SESSION_CANDIDATES_H
+
+#include "scene.h"
+#include "session_mesh.h"
+
+/* Mark on this rank's meshes and scalars what the images need, and forget what an earlier step's needed. half_diagonal:
+ * of the global bounds. False where memory ran out. Local. */
+bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count, double half_diagonal);
+
+/* Do values alone tell which cells can be seen? Else any may be. */
+bool session_has_candidates(const session_mesh *mesh);
+/* A hash of all that decides on the candidates but the values: the scalars and their intervals. */
+uint64_t session_candidates_key(const session_mesh *mesh);
+/* Select the candidates. Sets the scalars' counts of unusable cells. Parallel. Local. */
+insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error);
+
+#endif

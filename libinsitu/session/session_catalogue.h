@@ -1,0 +1,44 @@
+/* Which meshes and fields there are over all ranks. */
+#ifndef SESSION_CATALOGUE_H
+#define SESSION_CATALOGUE_H
+
+#include "session_mesh.h"
+#include "session_team.h"
+
+/* A mesh over all ranks; the same on every rank. */
+typedef struct session_catalogue_field {
+    char *name;
+    int component_count;
+    bool is_cell_centred;
+    int first_rank;   /* that has it */
+    int last_rank;    /* that has it together with cells; -1: none */
+    int odd_rank;     /* -1, or one that has it with another centring or count of components */
+    int lacking_rank; /* -1, or one that has cells of the mesh but not the field */
+} session_catalogue_field;
+
+typedef struct session_catalogue_mesh {
+    char *name;
+    int first_rank; /* that has cells of it; -1: none */
+    bool has_ids;   /* all of these give vertex ids */
+    int field_count;
+    session_catalogue_field *fields;
+} session_catalogue_mesh;
+
+typedef struct session_catalogue {
+    bool is_known; /* by a step before this one */
+    int mesh_count;
+    session_catalogue_mesh *meshes;
+} session_catalogue;
+
+/* is_shared: all ranks have the same names, by session_names_hash(). Collective. */
+insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
+                                       bool is_shared, base_error *error);
+void session_catalogue_free(session_catalogue *catalogue);
+
+/* A hash of this rank's names: equal on two ranks when their tables say the same. Local. */
+uint64_t session_names_hash(const session_meshes *meshes);
+
+/* NULL: no rank has the field. Local. */
+const session_catalogue_field *session_catalogue_find(const session_catalogue_mesh *mesh, const char *name);
+
+#endif

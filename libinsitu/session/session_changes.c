@@ -1,0 +1,99 @@
+/* The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
+ * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
+ * all tables of names are alike, whether any rank lacks threads, the lowest of the instruction sets, and, from rank 0,
+ * the time and whether the scene file was edited. After it, ranks decide alike without another word. */
+#include "session_changes.h"
+
+#include <string.h>
+
+#include "render_isa.h"
+#include "session_agree.h"
+
+enum change_word {
+    CYCLE_HIGH,
+    CYCLE_LOW, /* negated, as is all that is called low */
+    FAILED,    /* ranks - lowest failing rank; 0: none */
+    CELLS_CHANGED,
+    NAMES_CHANGED,
+    NAMES_HIGH,
+    NAMES_LOW,
+    SCENE_CHANGED,
+    THREADS_LACKING,
+    ISA_LOW,
+    ROOT_TIME, /* the bits of rank 0's */
+    CHANGE_WORDS
+};
+
+static int64_t bits_of(double value)
+{
+    int64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+static double double_of(int64_t bits)
+{
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static void fill_words(const insitu_session *session, int64_t cycle, double time, int64_t words[CHANGE_WORDS])
+{
+    const session_team *team = &session->team;
+    const session_meshes *meshes = &session->meshes;
+    const session_scene_file *file = &session->scene_file;
+    const int64_t names = (int64_t)(session_names_hash(meshes) >> 1);
+    words[CYCLE_HIGH] = cycle;
+    words[CYCLE_LOW] = ~cycle; /* as a negation, without overflow */
+    words[FAILED] = session_pending_error(meshes) ? team->ranks - team->rank : 0;
+    words[CELLS_CHANGED] = meshes->are_cells_changed || !session->space.has_extent;
+    words[NAMES_CHANGED] = meshes->are_names_changed || !session->catalogue.is_known;
+    words[NAMES_HIGH] = names;
+    words[NAMES_LOW] = ~names;
+    words[SCENE_CHANGED] = session_is_scene_edited(file, team->rank);
+    words[THREADS_LACKING] = session_lacks_threads(&session->threads, file->scene.threads, team->node_ranks);
+    words[ISA_LOW] = -render_isa_level();
+    words[ROOT_TIME] = team->rank == 0 ? bits_of(time) : INT64_MIN;
+}
+
+insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
+                                   base_error *error)
+{
+    int64_t mine[CHANGE_WORDS], all[CHANGE_WORDS];
+    fill_words(session, cycle, time, mine);
+    const insitu_status status = session_mpi(
+        error, MPI_Allreduce(mine, all, CHANGE_WORDS, MPI_INT64_T, MPI_MAX, session->team.comm), "MPI_Allreduce");
+    if (status) return status;
+    *out = (session_changes){.cycle = all[CYCLE_HIGH],
+                             .lowest_cycle = ~all[CYCLE_LOW],
+                             .time = double_of(all[ROOT_TIME]),
+                             .failed_rank = all[FAILED] ? session->team.ranks - (int)all[FAILED] : -1,
+                             .of_scene = all[SCENE_CHANGED],
+                             .of_cells = all[CELLS_CHANGED],
+                             .of_names = all[NAMES_CHANGED],
+                             .are_names_shared = all[NAMES_HIGH] == ~all[NAMES_LOW],
+                             .are_threads_lacking = all[THREADS_LACKING],
+                             .isa_level = (int)-all[ISA_LOW]};
+    return INSITU_OK;
+}
+
+static insitu_status tell_pending_error(int root, session_meshes *meshes, const session_team *team, base_error *error)
+{
+    base_error told = {0};
+    const base_error *mine = session_pending_error(meshes);
+    if (team->rank == root && mine) base_fail(&told, mine->status, "rank %d: %.900s", root, mine->message);
+    meshes->pending = (base_error){0};
+    const insitu_status status = session_share_error(team->comm, root, &told);
+    *error = told;
+    return status;
+}
+
+insitu_status session_check_input(const session_changes *changes, session_meshes *meshes, const session_team *team,
+                                  base_error *error)
+{
+    if (changes->failed_rank >= 0) return tell_pending_error(changes->failed_rank, meshes, team, error);
+    if (changes->cycle == changes->lowest_cycle) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MPI, "ranks disagree on the cycle: %lld on one, %lld on another",
+                     (long long)changes->lowest_cycle, (long long)changes->cycle);
+}

@@ -1,0 +1,27 @@
+/* What has changed anywhere since the last step, and whether the ranks' input fits together. */
+#ifndef SESSION_CHANGES_H
+#define SESSION_CHANGES_H
+
+#include "session.h"
+
+/* The same on every rank. */
+typedef struct session_changes {
+    int64_t cycle, lowest_cycle; /* equal, unless ranks disagree */
+    double time;                 /* rank 0's */
+    int failed_rank;             /* the lowest whose set calls left an error behind; -1: none */
+    bool of_scene, of_cells, of_names;
+    bool are_names_shared; /* all ranks have the same tables of names */
+    bool are_threads_lacking;
+    int isa_level; /* the lowest of the ranks' instruction sets (render_isa.h) */
+} session_changes;
+
+/* One small reduction. Collective. */
+insitu_status session_find_changes(const insitu_session *session, int64_t cycle, double time, session_changes *out,
+                                   base_error *error);
+
+/* Tell every rank the error that a set call left behind on one; ranks at different cycles are an error too.
+ * Collective. */
+insitu_status session_check_input(const session_changes *changes, session_meshes *meshes, const session_team *team,
+                                  base_error *error);
+
+#endif

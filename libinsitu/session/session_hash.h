@@ -1,0 +1,15 @@
+/* FNV-1a: *hash, SESSION_HASH_BEGIN at first, takes bytes in. */
+#ifndef SESSION_HASH_H
+#define SESSION_HASH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define SESSION_HASH_BEGIN 0xcbf29ce484222325u
+
+static inline void session_hash_bytes(uint64_t *hash, const void *data, size_t size)
+{
+    for (size_t i = 0; i < size; i++) *hash = (*hash ^ ((const unsigned char *)data)[i]) * 0x100000001b3u;
+}
+
+#endif

@@ -1,0 +1,109 @@
+/* This rank's parts of the meshes: what the caller gave, what is known of it, and the trees over it. */
+#ifndef SESSION_MESH_H
+#define SESSION_MESH_H
+
+#include "error.h"
+#include "grid.h"
+#include "insitu/insitu.h"
+#include "mmbvh.h"
+
+typedef struct session_field {
+    insitu_field given; /* name is a copy of ours, the values are borrowed */
+    grid_array values;
+    int64_t component_stride;
+    base_error problem; /* of the last insitu_set_field() */
+} session_field;
+
+/* One scalar of a field as a layer uses it: a component or the magnitude, as it is or recentred to vertices. */
+typedef struct session_scalar {
+    int field;     /* in the mesh's fields */
+    int component; /* as grid_field.component */
+    bool is_recentred;
+    bool is_used;       /* by an image of this step */
+    bool wants_ranges;  /* by an image of this step: colours need none */
+    bool needs_all;     /* an image of this step may need any cell */
+    int interval_count; /* else the values that this step's images show: cells with some are candidates */
+    mmbvh_interval *intervals;
+    double *vertex_values; /* recentred values, a declared copy; NULL until computed */
+    grid_field own;        /* of a recentred one in use: the cells' */
+    bool are_values_stale; /* recentred ones are to be computed again */
+    bool is_suspect;       /* the values were set anew: they may have changed */
+    bool has_checksum;
+    uint64_t checksum;
+    bool has_own_ranges; /* the tree nodes' own, else pairs */
+    float *pairs;        /* NULL until computed */
+    bool are_ranges_stale;
+    int64_t unusable;
+    bool is_extent_known;
+    double low, high; /* over drawn cells all of whose values are finite; low > high: there are none */
+} session_scalar;
+
+/* One rank's part of a mesh. */
+typedef struct session_mesh {
+    char *name;
+    insitu_mesh given;
+    grid cells;
+    bool is_given;      /* false after an insitu_set_mesh() that failed: problem says why */
+    base_error problem; /* of the last insitu_set_mesh() */
+    int field_count;
+    session_field *fields;
+
+    bool is_check_stale;
+    bool is_topology_stale;    /* the tree is of other cells */
+    bool is_geometry_stale;    /* the tree is of other coordinates */
+    double lower[3], upper[3]; /* of the drawn cells; lower > upper: there are none */
+    int64_t drawn_count, ghost_count, inverted_count, flat_count;
+    double size_sum; /* of drawn cells: cube roots of volumes */
+    uint64_t *flat;  /* NULL: no cell is flat; else as in cells */
+
+    bool is_needed; /* by an image of this step */
+    bool has_tree;
+    mmbvh tree;
+    bool is_partial; /* the tree is over the candidates of candidates_key, while nothing changes */
+    uint64_t candidates_key;
+    double rent; /* seconds spent on partial trees since the cells last changed, beyond what a full one would cost */
+    int scalar_count;
+    session_scalar *scalars;
+} session_mesh;
+
+/* All meshes of this rank. */
+typedef struct session_meshes {
+    int count;
+    session_mesh **items;   /* by name */
+    bool are_cells_changed; /* or coordinates, since the last agreed extent */
+    bool are_names_changed; /* since the last agreed catalogue */
+    base_error pending;     /* of a set call that had no mesh to stay with; for one step */
+} session_meshes;
+
+static inline int64_t session_type_size(insitu_type type)
+{
+    switch (type) {
+    case INSITU_FLOAT32:
+    case INSITU_INT32: return 4;
+    case INSITU_FLOAT64:
+    case INSITU_INT64: return 8;
+    case INSITU_UINT8: return 1;
+    }
+    return 0;
+}
+
+/* NULL: there is none of this name. */
+session_mesh *session_find_mesh(const session_meshes *meshes, const char *name);
+int session_find_field(const session_mesh *mesh, const char *name); /* -1: there is none */
+
+/* Add an empty mesh, whose name is new. NULL where memory runs out. */
+session_mesh *session_add_mesh(session_meshes *meshes, const char *name, base_error *error);
+/* Nothing happens where there is none of this name. */
+void session_remove_mesh(session_meshes *meshes, const char *name);
+
+/* Free what depends on the fields' values, on the cells, or all that is known of the mesh. */
+void session_drop_scalars(session_mesh *mesh);
+void session_drop_tree(session_mesh *mesh);
+void session_drop_fields(session_mesh *mesh);
+void session_drop_contents(session_mesh *mesh);
+void session_meshes_free(session_meshes *meshes);
+
+/* The first error that a set call left behind, or NULL. */
+const base_error *session_pending_error(const session_meshes *meshes);
+
+#endif

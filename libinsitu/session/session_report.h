@@ -1,0 +1,68 @@
+/* The report of a step while it is written: its numbers, its lists of words, and which warnings were told.
+ *
+ * Warnings are of what is drawn as asked, but hardly as meant. All but WARNING_ISA are the same on every rank: they are
+ * made of what ranks share. A warning is told in the first step that it is true of, and again when it has ceased to be
+ * true in between, or the scene was edited. */
+#ifndef SESSION_REPORT_H
+#define SESSION_REPORT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "insitu/insitu.h"
+
+/* Lines of text, which grow. A line that memory cannot hold is left out. */
+typedef struct session_text {
+    char *data;
+    size_t size, capacity;
+} session_text;
+
+typedef struct session_report {
+    insitu_report numbers; /* its texts are set at the end of a step */
+    session_text copied_why, left_out, warnings;
+    int told_count;
+    uint64_t *told; /* hashes of the warnings that were told and have held since */
+} session_report;
+
+/* Add a line. */
+void session_text_add(session_text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* All texts empty; nothing to free yet. Local. */
+void session_report_create(session_report *report);
+
+/* Empty numbers and lists for a new step. Local. */
+void session_report_begin(session_report *report, int64_t cycle, double time);
+
+/* Hand the lists to the caller. Local. */
+void session_report_end(session_report *report);
+
+void session_report_free(session_report *report);
+
+typedef enum session_warning_kind {
+    WARNING_ORDER,    /* of vertices, as far as volumes tell */
+    WARNING_ISOVALUE, /* outside of its field */
+    WARNING_VIEW,     /* of nothing */
+    WARNING_GREY,     /* a surface without the field that colours it */
+    WARNING_OVERLAP,
+    WARNING_ISA /* of this rank's environment */
+} session_warning_kind;
+
+/* What a warning is about: two warnings are one if all of this is the same. */
+typedef struct session_warning {
+    session_warning_kind kind;
+    const char *image, *mesh; /* NULL: of none */
+    int number;
+} session_warning;
+
+/* Tell a warning where it holds and has not been told. Local. */
+void session_warn(session_report *report, const session_warning *warning, bool holds, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/* Was the warning told, and has it held since? Local. */
+bool session_is_warned(const session_report *report, const session_warning *warning);
+
+/* Forget which warnings were told. Local. */
+void session_forget_warnings(session_report *report);
+
+#endif

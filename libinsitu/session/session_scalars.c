@@ -1,0 +1,125 @@
+#include "session_scalars.h"
+
+#include <math.h>
+
+#include "memory.h"
+#include "mmbvh_fetch.h"
+
+int session_resolve_component(const scene_field *field, int component_count)
+{
+    if (field->component != SCENE_COMPONENT_DEFAULT) return field->component;
+    return component_count == 1 ? 0 : -1;
+}
+
+static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred)
+{
+    for (int i = 0; i < mesh->scalar_count; i++) {
+        session_scalar *scalar = &mesh->scalars[i];
+        if (scalar->field == field && scalar->component == component && scalar->is_recentred == is_recentred)
+            return scalar;
+    }
+    return NULL;
+}
+
+/* -1 where the layer does not show the field on the mesh. */
+static int find_field(const session_mesh *mesh, const scene_field *field)
+{
+    return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
+}
+
+session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field)
+{
+    const int index = find_field(mesh, field);
+    if (index < 0) return NULL;
+    const insitu_field *given = &mesh->fields[index].given;
+    return find_scalar(mesh, index, session_resolve_component(field, given->component_count),
+                       field->at_vertices && given->centring == INSITU_CELL);
+}
+
+/* As the caller gave it. */
+static grid_field given_field(const session_mesh *mesh, const session_scalar *scalar)
+{
+    const session_field *field = &mesh->fields[scalar->field];
+    return (grid_field){.values = field->values,
+                        .component_stride = field->component_stride,
+                        .component_count = field->given.component_count,
+                        .component = scalar->component,
+                        .is_cell_centred = field->given.centring == INSITU_CELL};
+}
+
+grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
+{
+    if (!scalar->is_recentred) return given_field(mesh, scalar);
+    return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
+                        .component_stride = (int64_t)sizeof(double),
+                        .component_count = 1,
+                        .own = &scalar->own};
+}
+
+static bool add_scalar(session_mesh *mesh, int field, int component, bool is_recentred)
+{
+    session_scalar *scalars = base_realloc(mesh->scalars, (size_t)(mesh->scalar_count + 1) * sizeof *scalars);
+    if (!scalars) return false;
+    mesh->scalars = scalars;
+    scalars[mesh->scalar_count++] = (session_scalar){.field = field,
+                                                     .component = component,
+                                                     .is_recentred = is_recentred,
+                                                     .are_values_stale = true,
+                                                     .is_suspect = true,
+                                                     .are_ranges_stale = true};
+    return true;
+}
+
+bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool wants_ranges, session_scalar **marked)
+{
+    const int index = find_field(mesh, field);
+    *marked = NULL;
+    if (index < 0) return true;
+    const insitu_field *given = &mesh->fields[index].given;
+    session_scalar *scalar = session_find_scalar(mesh, field);
+    if (!scalar) {
+        if (!add_scalar(mesh, index, session_resolve_component(field, given->component_count),
+                        field->at_vertices && given->centring == INSITU_CELL))
+            return false;
+        scalar = &mesh->scalars[mesh->scalar_count - 1];
+    }
+    scalar->is_used = true;
+    scalar->own = given_field(mesh, scalar);
+    scalar->wants_ranges = scalar->wants_ranges || wants_ranges;
+    mesh->is_needed = mesh->is_needed || wants_ranges;
+    *marked = scalar;
+    return true;
+}
+
+/* ---- ranges and extents -------------------------------------------------------------------------------------- */
+
+mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar)
+{
+    return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
+}
+
+static void find_extent(const grid *g, const grid_field *field, int threads, double *low, double *high)
+{
+    double least = INFINITY, most = -INFINITY;
+#pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (!grid_is_drawn(g, cell)) continue;
+        const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
+        if (!of_cell.is_finite) continue;
+        least = fmin(least, of_cell.low);
+        most = fmax(most, of_cell.high);
+    }
+    *low = least;
+    *high = most;
+}
+
+void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, double *low, double *high)
+{
+    if (!scalar->is_extent_known) {
+        const grid_field field = session_scalar_field(mesh, scalar);
+        find_extent(&mesh->cells, &field, threads, &scalar->low, &scalar->high);
+        scalar->is_extent_known = true;
+    }
+    *low = scalar->low;
+    *high = scalar->high;
+}

@@ -1,0 +1,28 @@
+/* The scalars that layers are drawn by: a component or the magnitude of a field, as it is or recentred to vertices. */
+#ifndef SESSION_SCALARS_H
+#define SESSION_SCALARS_H
+
+#include "scene.h"
+#include "session_mesh.h"
+
+/* Which component a layer means, as grid_field.component. */
+int session_resolve_component(const scene_field *field, int component_count);
+
+/* Note that an image of this step uses the layer's field on the mesh; *marked: NULL where the mesh does not have it.
+ * False where memory ran out. Local. */
+bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool wants_ranges, session_scalar **marked);
+
+/* This rank's scalar for a layer's field: NULL where the mesh does not have it. */
+session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
+
+/* The values of a scalar. */
+grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar);
+
+/* The ranges of a scalar in use. */
+mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scalar *scalar);
+
+/* Least and greatest value over the drawn cells all of whose values are finite; low > high: there are none. Parallel.
+ * Local. */
+void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, double *low, double *high);
+
+#endif

@@ -1,0 +1,93 @@
+/* Bytes and counts are added up from what is there at the end of a step, not kept while it runs. */
+#include "session_summary.h"
+
+#include "render.h"
+
+static int64_t array_bytes(const insitu_array *array, int64_t count)
+{
+    return array->data ? count * session_type_size(array->type) : 0;
+}
+
+static int64_t mesh_bytes(const insitu_mesh *m)
+{
+    int64_t bytes = 0;
+    for (int axis = 0; axis < 3; axis++) bytes += array_bytes(&m->coordinates[axis], m->vertex_count);
+    bytes += array_bytes(&m->vertex_ids, m->vertex_count);
+    bytes += array_bytes(&m->cell_types, m->cell_count);
+    bytes += array_bytes(&m->face_offsets, m->face_count + 1);
+    bytes += array_bytes(&m->face_connectivity, m->face_connectivity_count);
+    bytes += array_bytes(&m->connectivity, m->connectivity_count);
+    bytes += array_bytes(&m->offsets, m->offsets.data ? m->cell_count + 1 : 0);
+    return bytes + array_bytes(&m->ghosts, m->cell_count);
+}
+
+static bool is_field_in_use(const session_mesh *mesh, int field)
+{
+    for (int i = 0; i < mesh->scalar_count; i++)
+        if (mesh->scalars[i].field == field) return true;
+    return false;
+}
+
+static void report_field(session_report *out, const session_mesh *mesh, int index)
+{
+    const insitu_field *field = &mesh->fields[index].given;
+    if (is_field_in_use(mesh, index))
+        out->numbers.bytes_borrowed += array_bytes(&field->values, field->count) * field->component_count;
+    else if (out->numbers.images)
+        session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", mesh->name, field->name);
+}
+
+static void report_scalar(session_report *out, const session_mesh *mesh, const session_scalar *scalar)
+{
+    const char *name = mesh->fields[scalar->field].given.name;
+    if (scalar->pairs) out->numbers.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
+    if (scalar->vertex_values) {
+        const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof(double);
+        out->numbers.bytes_copied += bytes;
+        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" recentred from cells to vertices: %lld bytes",
+                         mesh->name, name, (long long)bytes);
+    }
+    if (scalar->is_used && scalar->wants_ranges && scalar->unusable)
+        session_text_add(&out->warnings, "mesh \"%s\": %lld cells are not drawn: values of field \"%s\" are not finite",
+                         mesh->name, (long long)scalar->unusable, name);
+}
+
+static void report_mesh(session_report *out, const session_mesh *mesh)
+{
+    insitu_report *report = &out->numbers;
+    int64_t unusable = 0;
+    report->cells += mesh->given.cell_count;
+    report->bytes_borrowed += mesh_bytes(&mesh->given);
+    if (!mesh->is_check_stale) {
+        report->cells_ghost += mesh->ghost_count;
+        report->cells_inverted += mesh->inverted_count;
+        report->cells_flat += mesh->flat_count;
+    }
+    if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
+    for (int i = 0; i < mesh->field_count; i++) report_field(out, mesh, i);
+    for (int i = 0; i < mesh->scalar_count; i++) {
+        const session_scalar *scalar = &mesh->scalars[i];
+        report_scalar(out, mesh, scalar);
+        if (scalar->is_used && scalar->wants_ranges && scalar->unusable > unusable) unusable = scalar->unusable;
+    }
+    report->cells_unusable += unusable;
+    if (report->images && !mesh->is_needed)
+        session_text_add(&out->left_out, "mesh \"%s\" is in no picture: no tree is built", mesh->name);
+    if (report->images && mesh->is_needed && mesh->is_partial)
+        session_text_add(
+            &out->left_out, "mesh \"%s\": %lld of %lld cells show nothing in this step: the tree is without them",
+            mesh->name, (long long)(mesh->drawn_count - mesh->tree.cell_count), (long long)mesh->drawn_count);
+}
+
+void session_summarize(const session_meshes *meshes, const mmbvh *parent, size_t picture_bytes,
+                       const char *scene_warning, session_report *out)
+{
+    insitu_report *report = &out->numbers;
+    if (scene_warning) session_text_add(&out->warnings, "the scene file's last edit was not taken: %s", scene_warning);
+    const char *isa = render_isa_warning();
+    session_warn(out, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "%s", isa);
+    for (int i = 0; i < meshes->count; i++) report_mesh(out, meshes->items[i]);
+    report->bytes_trees += mmbvh_bytes(parent);
+    report->bytes_pictures = (int64_t)picture_bytes;
+    session_report_end(out);
+}

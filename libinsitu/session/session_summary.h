@@ -1,0 +1,13 @@
+/* The end of a step's report. */
+#ifndef SESSION_SUMMARY_H
+#define SESSION_SUMMARY_H
+
+#include "session_mesh.h"
+#include "session_report.h"
+
+/* Add up what the meshes, their trees, the tree over these (parent) and the last picture hold and leave out.
+ * scene_warning: NULL, or why the scene file's last edit was not taken. Local. */
+void session_summarize(const session_meshes *meshes, const mmbvh *parent, size_t picture_bytes,
+                       const char *scene_warning, session_report *out);
+
+#endif

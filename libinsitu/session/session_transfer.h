@@ -1,0 +1,20 @@
+/* Transfer functions, as the renderer takes them. */
+#ifndef SESSION_TRANSFER_H
+#define SESSION_TRANSFER_H
+
+#include "error.h"
+#include "render.h"
+#include "scene.h"
+
+typedef struct session_transfer {
+    render_transfer transfer; /* points into this */
+    double opacity_values[RENDER_MAX_OPACITY_POINTS];
+    float opacities[RENDER_MAX_OPACITY_POINTS];
+} session_transfer;
+
+/* Of a colour map over [low, high] (low > high: there are no values), and the opacity of the volume, NULL: of a
+ * surface. half_diagonal: of the global bounds. Local. */
+insitu_status session_make_transfer(double half_diagonal, scene_colour_map map, double low, double high,
+                                    const scene_volume *volume, session_transfer *out, base_error *error);
+
+#endif

@@ -1,0 +1,14 @@
+/* Meshes whose vertices seem to be in another order than VTK's. */
+#ifndef SESSION_VERTEX_ORDER_H
+#define SESSION_VERTEX_ORDER_H
+
+#include "session_catalogue.h"
+#include "session_mesh.h"
+#include "session_report.h"
+
+/* Warn of meshes most of whose cells, over all ranks, have no volume, are left-handed, or cross themselves.
+ * Collective. */
+insitu_status session_check_vertex_order(const session_meshes *meshes, const session_catalogue *catalogue,
+                                         MPI_Comm comm, session_report *report, base_error *error);
+
+#endif
