@@ -1,17 +1,18 @@
 #!/bin/sh
-# house_headers.sh ROOT CC: every header of the core compiles alone, on plain vectors: it includes what it uses.
+# house_headers.sh ROOT CC [FLAG...]: every header of the core compiles alone, on plain vectors: it includes what it uses.
 set -eu
 cd "$1"
 cc=$2
+shift 2
 place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
-folders=$(find libinsitu/base libinsitu/include mmbvh render -type d | sed 's/^/-I/')
+folders=$(find libinsitu mmbvh render compositing -type d | sed 's/^/-I/')
 failures=0 headers=0
-for header in $(find libinsitu/base mmbvh render -name '*.h' | LC_ALL=C sort); do
+for header in $(find libinsitu/base libinsitu/session mmbvh render compositing -name '*.h' | LC_ALL=C sort); do
     headers=$((headers + 1))
     printf '#include "%s"\n' "${header##*/}" >"$place/alone.c"
     # shellcheck disable=SC2086 # a list
-    if ! "$cc" -std=gnu11 -fsyntax-only -DSIMD_PLAIN -Wall -Wextra -Werror -Wno-psabi -Wno-unused-function $folders "$place/alone.c" \
+    if ! "$cc" -std=gnu11 -fsyntax-only -DSIMD_PLAIN -Wall -Wextra -Werror -Wno-psabi -Wno-unused-function $folders "$@" "$place/alone.c" \
         >"$place/said" 2>&1; then
         echo "$header does not compile alone:"
         head -n 5 "$place/said"

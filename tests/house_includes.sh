@@ -60,7 +60,11 @@ BEGIN {
     allowed["render"] = " surface volume find" allowed["find"]
     allowed["compositing"] = " base public "
     allowed["scene"] = " render base public "
-    allowed["session"] = " scene render render_face compositing mmbvh base public "
+    allowed["common"] = " base public "
+    allowed["meshes"] = " common mmbvh base public "
+    allowed["plan"] = " meshes scene render render_face common mmbvh base public "
+    allowed["pictures"] = " plan compositing" allowed["plan"]
+    allowed["session"] = " pictures" allowed["pictures"]
     allowed["adaptor_headers"] = " public "
     allowed["adaptors"] = " adaptor_headers public "
     allowed["tools"] = " adaptor_headers public "

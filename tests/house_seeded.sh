@@ -65,6 +65,11 @@ planted render/volume/seeded.h '#include "kernel_roots.h"' 'volume must not incl
 planted render/volume/seeded.h '#include "render_frame.h"' 'no file of the tree is called render_frame.h'
 planted libinsitu/session/seeded.c '#include "kernel_types.h"' 'session must not include kernel_types.h of rays'
 planted libinsitu/session/seeded.c '#include <vtkPoints.h>' 'session includes vtkPoints.h'
+planted libinsitu/session/common/seeded.h '#include "session_mesh.h"' 'common must not include session_mesh.h of meshes'
+planted libinsitu/session/meshes/seeded.h '#include "session_plan.h"' 'meshes must not include session_plan.h of plan'
+planted libinsitu/session/meshes/seeded.c '#include "scene.h"' 'meshes must not include scene.h of scene'
+planted libinsitu/session/plan/seeded.c '#include "session_frame.h"' 'plan must not include session_frame.h of pictures'
+planted libinsitu/session/pictures/seeded.c '#include "session.h"' 'pictures must not include session.h of session'
 planted libinsitu/session/scene/seeded.c '#include "session.h"' 'scene must not include session.h of session'
 planted libinsitu/session/scene/seeded.h '#include <mpi.h>' 'scene knows no MPI'
 planted libinsitu/session/scene/seeded.h '#include "mmbvh.h"' 'scene must not include mmbvh.h of mmbvh'
@@ -81,7 +86,8 @@ refuses 'wrong place' sh "$here/house_includes.sh" "$place/tree"
 
 headers_tree() {
     rm -rf "$place/headers"
-    mkdir -p "$place/headers/libinsitu/base" "$place/headers/libinsitu/include" "$place/headers/mmbvh" "$place/headers/render"
+    mkdir -p "$place/headers/libinsitu/base" "$place/headers/libinsitu/session" "$place/headers/mmbvh" "$place/headers/render" \
+        "$place/headers/compositing"
 }
 headers_tree
 refuses 'no header was found' sh "$here/house_headers.sh" "$place/headers" "$cc"

@@ -215,9 +215,9 @@ static bool has_full_tree(const session_mesh *mesh)
     return mesh->has_tree && !mesh->is_partial && !mesh->is_topology_stale;
 }
 
-static bool wants_partial(const tree_update *u, const session_mesh *mesh)
+static bool wants_partial(const tree_update *u, const session_mesh *mesh, uint64_t *key)
 {
-    if (u->choice == SCENE_TREE_FULL || !session_has_candidates(mesh)) return false;
+    if (u->choice == SCENE_TREE_FULL || !session_find_candidates(mesh, key)) return false;
     if (u->choice == SCENE_TREE_PARTIAL) return true;
     return !has_full_tree(mesh) && mesh->rent < full_price(u, mesh);
 }
@@ -231,9 +231,9 @@ static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
     return mesh->candidates_key == key;
 }
 
-static insitu_status update_partial(const tree_update *u, session_mesh *mesh, base_error *error)
+/* key: of the candidates. */
+static insitu_status update_partial(const tree_update *u, session_mesh *mesh, uint64_t key, base_error *error)
 {
-    const uint64_t key = session_candidates_key(mesh);
     if (is_partial_fresh(mesh, key)) return INSITU_OK;
     const double start = MPI_Wtime();
     mmbvh_selection selection;
@@ -261,7 +261,9 @@ static insitu_status update_full(const tree_update *u, session_mesh *mesh, base_
 
 static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_error *error)
 {
-    const insitu_status status = wants_partial(u, mesh) ? update_partial(u, mesh, error) : update_full(u, mesh, error);
+    uint64_t key;
+    const insitu_status status =
+        wants_partial(u, mesh, &key) ? update_partial(u, mesh, key, error) : update_full(u, mesh, error);
     return status ? status : refit_ranges(u, mesh, error);
 }
 

@@ -92,24 +92,18 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
 
 /* ---- which cells have them ------------------------------------------------------------------------------------ */
 
-bool session_has_candidates(const session_mesh *mesh)
+bool session_find_candidates(const session_mesh *mesh, uint64_t *key)
 {
-    for (int i = 0; i < mesh->scalar_count; i++)
-        if (mesh->scalars[i].wants_ranges && mesh->scalars[i].needs_all) return false;
-    return true;
-}
-
-uint64_t session_candidates_key(const session_mesh *mesh)
-{
-    uint64_t key = SESSION_HASH_BEGIN;
+    *key = SESSION_HASH_BEGIN;
     for (int i = 0; i < mesh->scalar_count; i++) {
         const session_scalar *s = &mesh->scalars[i];
         if (!s->wants_ranges) continue;
+        if (s->needs_all) return false;
         const int names[4] = {s->field, s->component, s->is_recentred, s->interval_count};
-        session_hash_bytes(&key, names, sizeof names);
-        session_hash_bytes(&key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);
+        session_hash_bytes(key, names, sizeof names);
+        session_hash_bytes(key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);
     }
-    return key;
+    return true;
 }
 
 insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error)

@@ -21,24 +21,8 @@ typedef struct canvas {
     double *sum; /* NULL: there is one frame */
 } canvas;
 
-/* A picture's memory stays for the next one, unless it is more than this: fresh pages cost as much as filling them. */
+/* A picture's memory stays for the next one, unless it is more than this. */
 enum { kept_bytes = 64 << 20 };
-
-void session_drop_picture(session_picture *picture)
-{
-    base_free(picture->pixels);
-    picture->pixels = NULL;
-    picture->bytes = 0;
-}
-
-static float *reuse_pixels(session_picture *picture, size_t bytes)
-{
-    if (picture->bytes >= bytes) return picture->pixels;
-    session_drop_picture(picture);
-    picture->pixels = base_alloc(bytes);
-    picture->bytes = picture->pixels ? bytes : 0;
-    return picture->pixels;
-}
 
 static void canvas_free(canvas *c, session_picture *picture)
 {
@@ -62,7 +46,7 @@ static insitu_status canvas_create(const scene_image *image, int rank, session_p
     out->frame.width = image->width;
     out->frame.height = image->height;
     if (rank != 0) return INSITU_OK;
-    out->frame.rgba = reuse_pixels(picture, bytes);
+    out->frame.rgba = session_reserve_picture(picture, bytes);
     if (wants_depth(image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
     if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
     if (!out->frame.rgba || (is_summed && !out->sum))

@@ -10,10 +10,9 @@
  * of the global bounds. False where memory ran out. Local. */
 bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count, double half_diagonal);
 
-/* Do values alone tell which cells can be seen? Else any may be. */
-bool session_has_candidates(const session_mesh *mesh);
-/* A hash of all that decides on the candidates but the values: the scalars and their intervals. */
-uint64_t session_candidates_key(const session_mesh *mesh);
+/* False where values alone do not tell which cells can be seen: any may be. Else *key is a hash of all that decides on
+ * the candidates but the values: the scalars and their intervals. */
+bool session_find_candidates(const session_mesh *mesh, uint64_t *key);
 /* Select the candidates. Sets the scalars' counts of unusable cells. Parallel. Local. */
 insitu_status session_select_candidates(session_mesh *mesh, int threads, mmbvh_selection *out, base_error *error);
 

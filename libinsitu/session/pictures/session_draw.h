@@ -3,18 +3,11 @@
 #define SESSION_DRAW_H
 
 #include "session_mesh.h"
+#include "session_picture.h"
 #include "session_plan.h"
 #include "session_report.h"
 #include "session_space.h"
 #include "session_team.h"
-
-/* Rank 0: memory of the last picture, for the next one. */
-typedef struct session_picture {
-    float *pixels;
-    size_t bytes;
-} session_picture;
-
-void session_drop_picture(session_picture *picture);
 
 /* What images are drawn of. */
 typedef struct session_drawing {
