@@ -41,50 +41,37 @@ static void use_common_kernels(int level, session_report *report)
                          cpu_isa_name((cpu_isa)level), cpu_isa_name((cpu_isa)render_isa_level()));
 }
 
-/* The phases that bring what is known of the meshes up to date. */
-static insitu_status survey_meshes(insitu_session *s, const session_changes *changes, base_error *error)
-{
-    const double start = MPI_Wtime();
-    insitu_status status = INSITU_OK;
-    if (changes->of_cells) status = session_check_meshes(&s->meshes, &s->team, error);
-    if (!status && changes->of_cells) status = session_update_space(&s->space, &s->meshes, s->team.comm, error);
-    if (!status && changes->of_names)
-        status = session_update_catalogue(&s->catalogue, &s->meshes, &s->team, changes->are_names_shared, error);
-    if (!status && (changes->of_cells || changes->of_names))
-        status = session_check_vertex_order(&s->meshes, &s->catalogue, s->team.comm, &s->report, error);
-    s->report.numbers.prepare_ms += milliseconds_since(start);
-    return status;
-}
-
-/* The phases from what the plan names to trees over it. */
-static insitu_status prepare_meshes(insitu_session *s, const session_plan *plan, base_error *error)
-{
-    const double start = MPI_Wtime();
-    insitu_status status = session_recentre(plan, &s->meshes, &s->team, s->space.extent.half_diagonal, error);
-    s->report.numbers.prepare_ms += milliseconds_since(start);
-    if (status) return status;
-    session_compare_checksums(&s->meshes, s->team.threads, &s->report);
-    status = session_update_trees(&s->trees, &s->meshes, &s->space, s->scene_file.scene.tree, &s->team,
-                                  &s->report.numbers, error);
-    return status ? status : session_check_isovalues(plan, &s->meshes, &s->team, &s->report, error);
-}
-
-/* The phases of a step in which an image is due. Nothing is computed but what the plan names. */
+/* The phases of a step in which an image is due. What the plan does not name is not computed. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, base_error *error)
 {
-    const session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, changes->cycle, &s->catalogue,
-                                      &s->space.extent};
-    const session_drawing drawing = {&s->team,         s->scene_file.path, changes->cycle, &s->meshes,
-                                     &s->trees.parent, &s->space,          &s->report};
+    const double start = MPI_Wtime();
+    const session_team *team = &s->team;
+    const session_extent *extent = &s->space.extent;
+    const session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, changes->cycle, &s->catalogue, extent};
+    const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
+                                     &s->space, &s->report};
     session_plan plan = {0};
-    insitu_status status = survey_meshes(s, changes, error);
-    if (!status) status = session_make_plan(&basis, &s->meshes, s->team.comm, &s->report, &plan, error);
-    if (!status) status = prepare_meshes(s, &plan, error);
+    insitu_status status = INSITU_OK;
+    if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
+    if (changes->of_cells && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
+    if (changes->of_names && !status)
+        status = session_update_catalogue(&s->catalogue, &s->meshes, team, changes->are_names_shared, error);
+    if ((changes->of_cells || changes->of_names) && !status)
+        status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+    if (!status) status = session_make_plan(&basis, &s->meshes, team->comm, &s->report, &plan, error);
+    if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
+    s->report.numbers.prepare_ms = milliseconds_since(start);
+    if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
+    if (!status)
+        status =
+            session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
+    if (!status) status = session_check_isovalues(&plan, &s->meshes, team, &s->report, error);
     if (!status) status = session_draw_images(&drawing, &plan, &s->picture, error);
     session_plan_free(&plan);
     return status;
 }
 
+/* The phases of every step, then those above. */
 static insitu_status step(insitu_session *s, int64_t cycle, double time, const session_guard *guard, base_error *error)
 {
     session_changes changes;

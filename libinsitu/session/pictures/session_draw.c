@@ -6,7 +6,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
-#include "session_cell_cache.h"
+#include "session_active_cells.h"
 #include "session_frame.h"
 #include "session_image.h"
 #include "session_layers.h"
@@ -97,7 +97,7 @@ static render_job make_job(const session_drawing *d, const scene_image *image, c
                         .parent = layers->part_count > 1 ? d->parent : NULL,
                         .surfaces = layers->surfaces,
                         .surface_count = image->isosurface_count,
-                        .active = layers->kept,
+                        .active = layers->active,
                         .volumes = layers->volumes,
                         .volume_count = image->volume_count,
                         .lights = view->lights,
@@ -193,8 +193,8 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
-/* kept: NULL, or for the image's frames to fill and to draw from. */
-static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *kept,
+/* active: NULL, or for the image's frames to fill and to draw from. */
+static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
                                 session_picture *picture, base_error *error)
 {
     const session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal};
@@ -204,7 +204,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     insitu_status status = session_make_view(d->space, d->scene_path, image, d->team, d->report, &view, error);
     if (!status) status = session_make_layers(&basis, image, &layers, error);
     if (status) return status;
-    layers.kept = kept;
+    layers.active = active;
     canvas_create(image, d->team->rank, picture, &canvas, error);
     status = session_agree(d->team->comm, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
@@ -217,25 +217,26 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     return status;
 }
 
-/* The step's cell cache, made for the first image that shares one; without memory nothing is cached. */
-static render_active_cells *cache_for(const session_plan *plan, const scene_image *image, render_active_cells **kept)
+/* The step's active cells, made for the first image that shares them; without memory they are not stored. */
+static render_active_cells *active_cells_for(const session_plan *plan, const scene_image *image,
+                                             render_active_cells **active)
 {
-    if (!session_cell_cache_pays(plan, image)) return NULL;
-    if (!*kept) *kept = render_active_cells_create();
-    return *kept;
+    if (!session_active_cells_pay(plan, image)) return NULL;
+    if (!*active) *active = render_active_cells_create();
+    return *active;
 }
 
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, session_picture *picture,
                                   base_error *error)
 {
     base_error first = plan->refusal;
-    render_active_cells *kept = NULL;
+    render_active_cells *active = NULL;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
-        draw_image(d, plan->images[i], cache_for(plan, plan->images[i], &kept), picture, &reason);
+        draw_image(d, plan->images[i], active_cells_for(plan, plan->images[i], &active), picture, &reason);
         if (first.status == INSITU_OK) first = reason;
     }
-    render_active_cells_free(kept);
+    render_active_cells_free(active);
     if (first.status) *error = first;
     return error->status;
 }

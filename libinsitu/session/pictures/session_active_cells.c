@@ -1,7 +1,7 @@
 /* Isosurfaces are compared as the scene writes them: one that is the same by other words ("0" of a field of one
- * component) is drawn as if it were another, which costs time alone. Whether a mesh's arrays can be cached the
+ * component) is drawn as if it were another, which costs time alone. Whether a mesh's arrays can be stored the
  * renderer decides, at no cost. */
-#include "session_cell_cache.h"
+#include "session_active_cells.h"
 
 #include <string.h>
 
@@ -9,7 +9,7 @@
 enum { LEAST_FRAMES = 3 };
 
 /* As the renderer has it (render.h). */
-static bool can_be_cached(const scene_isosurface *layer)
+static bool can_be_stored(const scene_isosurface *layer)
 {
     return layer->opacity >= 1 && !layer->has_colour_by && layer->normals == SCENE_GRADIENT;
 }
@@ -31,15 +31,15 @@ static bool is_same(const scene_isosurface *a, const scene_isosurface *b)
 static bool has_same(const scene_image *image, const scene_isosurface *layer)
 {
     for (int i = 0; i < image->isosurface_count; i++)
-        if (can_be_cached(&image->isosurfaces[i]) && is_same(&image->isosurfaces[i], layer)) return true;
+        if (can_be_stored(&image->isosurfaces[i]) && is_same(&image->isosurfaces[i], layer)) return true;
     return false;
 }
 
-bool session_cell_cache_pays(const session_plan *plan, const scene_image *image)
+bool session_active_cells_pay(const session_plan *plan, const scene_image *image)
 {
     for (int i = 0; i < image->isosurface_count; i++) {
         int64_t frames = 0;
-        if (!can_be_cached(&image->isosurfaces[i])) continue;
+        if (!can_be_stored(&image->isosurfaces[i])) continue;
         for (int n = 0; n < plan->image_count; n++)
             if (has_same(plan->images[n], &image->isosurfaces[i])) frames += plan->images[n]->frames;
         if (frames >= LEAST_FRAMES) return true;

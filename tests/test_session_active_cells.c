@@ -1,4 +1,4 @@
-/* Images of one step that draw the same isosurface share its kept cells: the same pictures as each alone, and the
+/* Images of one step that draw the same isosurface share its active cells: the same pictures as each alone, and the
  * memory is there while they are drawn and gone after the step. */
 #include <math.h>
 #include <stdio.h>
@@ -7,7 +7,7 @@
 
 #include "memory.h"
 #include "session.h"
-#include "session_cell_cache.h"
+#include "session_active_cells.h"
 #include "test_session_fixture.h"
 
 enum { IMAGES = 3, TET_BYTES = 64, HEX_BYTES = 128, MOST_BYTES = 64 << 20, SIDE = 10 };
@@ -19,8 +19,9 @@ static const double isovalues[2] = {0.1, -0.4};
 #define SURFACE(more) "{isosurface: {field: f, values: [0.1, -0.4]" more "}}"
 #define VOLUME "{volume: {field: f, range: [-1, 1]}}"
 
-/* Images of these layers and frames, NULL at the end; how many of them, from the first on, keep cells: a bit each. */
-static unsigned keeping(const char *const *layers, const int *frames)
+/* Images of these layers and frames, NULL at the end; how many of them, from the first on, store active cells: a bit
+ * each. */
+static unsigned storing(const char *const *layers, const int *frames)
 {
     char text[4096] = "images:\n";
     const scene_image *images[8];
@@ -34,27 +35,27 @@ static unsigned keeping(const char *const *layers, const int *frames)
     if (scene_parse(text, strlen(text), "scene.yaml", &s, &error) != INSITU_OK) fail_msg("%s", error.message);
     for (int i = 0; i < s.image_count; i++) images[i] = &s.images[i];
     const session_plan plan = {.image_count = s.image_count, .images = images};
-    for (int i = 0; i < s.image_count; i++) bits |= (unsigned)session_cell_cache_pays(&plan, images[i]) << i;
+    for (int i = 0; i < s.image_count; i++) bits |= (unsigned)session_active_cells_pay(&plan, images[i]) << i;
     scene_free(&s);
     return bits;
 }
 
-#define KEEPING(...) keeping((const char *const[]){__VA_ARGS__, NULL}, NULL)
+#define STORING(...) storing((const char *const[]){__VA_ARGS__, NULL}, NULL)
 
-static void images_of_one_isosurface_keep_its_cells(void **context)
+static void images_of_one_isosurface_store_its_active_cells(void **context)
 {
     (void)context;
-    everywhere(KEEPING(SURFACE("")) == 0);
-    everywhere(KEEPING(SURFACE(""), SURFACE("")) == 0); /* filling costs more than it saves of one */
-    everywhere(KEEPING(SURFACE(""), SURFACE(""), SURFACE("")) == 7);
-    everywhere(KEEPING(SURFACE(""), VOLUME, SURFACE("") ", " VOLUME, SURFACE("")) == 13);
-    everywhere(KEEPING(SURFACE(", colours: [[1, 0, 0]]"), SURFACE(", material: {specular: 0}"), SURFACE("")) == 7);
+    everywhere(STORING(SURFACE("")) == 0);
+    everywhere(STORING(SURFACE(""), SURFACE("")) == 0); /* filling costs more than it saves of one */
+    everywhere(STORING(SURFACE(""), SURFACE(""), SURFACE("")) == 7);
+    everywhere(STORING(SURFACE(""), VOLUME, SURFACE("") ", " VOLUME, SURFACE("")) == 13);
+    everywhere(STORING(SURFACE(", colours: [[1, 0, 0]]"), SURFACE(", material: {specular: 0}"), SURFACE("")) == 7);
     /* Frames count as images do. */
-    everywhere(keeping((const char *const[]){SURFACE("") ", " VOLUME, NULL}, (const int[]){2}) == 0);
-    everywhere(keeping((const char *const[]){SURFACE("") ", " VOLUME, NULL}, (const int[]){3}) == 1);
-    everywhere(keeping((const char *const[]){SURFACE("") ", " VOLUME, SURFACE(""), NULL}, (const int[]){2, 1}) == 3);
-    /* One that is shared makes the image keep. */
-    everywhere(KEEPING(SURFACE("") ", {isosurface: {field: g, values: [1]}}", SURFACE(""), SURFACE("")) == 7);
+    everywhere(storing((const char *const[]){SURFACE("") ", " VOLUME, NULL}, (const int[]){2}) == 0);
+    everywhere(storing((const char *const[]){SURFACE("") ", " VOLUME, NULL}, (const int[]){3}) == 1);
+    everywhere(storing((const char *const[]){SURFACE("") ", " VOLUME, SURFACE(""), NULL}, (const int[]){2, 1}) == 3);
+    /* One that is shared makes the image store. */
+    everywhere(STORING(SURFACE("") ", {isosurface: {field: g, values: [1]}}", SURFACE(""), SURFACE("")) == 7);
 }
 
 /* The first three images share theirs; the fourth has another. */
@@ -71,17 +72,17 @@ static void images_of_another_isosurface_do_not_pay(void **context)
                                          VOLUME};
     (void)context;
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
-        everywhere(KEEPING(SURFACE(""), SURFACE(""), SURFACE(""), others[i]) == 7);
-        everywhere(KEEPING(others[i], SURFACE(""), others[i], SURFACE("")) == 0);
+        everywhere(STORING(SURFACE(""), SURFACE(""), SURFACE(""), others[i]) == 7);
+        everywhere(STORING(others[i], SURFACE(""), others[i], SURFACE("")) == 0);
     }
-    /* What is not kept is not shared, however often it is drawn. */
+    /* What is not stored is not shared, however often it is drawn. */
     for (size_t i = 4; i < sizeof others / sizeof others[0]; i++)
-        if (i != 6) everywhere(KEEPING(others[i], others[i], others[i]) == 0);
+        if (i != 6) everywhere(STORING(others[i], others[i], others[i]) == 0);
 }
 
 /* ---- steps ---------------------------------------------------------------------------------------------------- */
 
-/* This rank's part in the arrays that are kept: float32 and int32, of one cell type. */
+/* This rank's part in the arrays whose cells are stored: float32 and int32, of one cell type. */
 typedef struct plain_input {
     session_input whole;
     float *coordinates, *values;
@@ -114,8 +115,8 @@ static void plain_free(plain_input *in)
     input_free(&in->whole);
 }
 
-/* What this rank's cells that some isovalue crosses take when they are kept. */
-static int64_t kept_bytes(const plain_input *in)
+/* What this rank's cells that some isovalue crosses take when they are stored. */
+static int64_t stored_bytes(const plain_input *in)
 {
     const test_mesh *part = &in->whole.part;
     int64_t crossed = 0;
@@ -178,7 +179,7 @@ static void assert_same_picture(const caught_picture *a, const caught_picture *b
 }
 
 /* Three images at once, and one after the other in sessions of their own. */
-static void compare_with_images_alone(const plain_input *in, const char *layers, int64_t kept)
+static void compare_with_images_alone(const plain_input *in, const char *layers, int64_t stored)
 {
     int64_t shared[IMAGES] = {0}, alone[IMAGES] = {0};
     forget_pictures();
@@ -187,10 +188,10 @@ static void compare_with_images_alone(const plain_input *in, const char *layers,
     if (own_rank > 0) return;
     assert_int_equal(caught_count, 2 * IMAGES);
     for (int n = 0; n < IMAGES; n++) {
-        /* Where cells are kept there is room for more; where not, three images' plan is all that is held. */
+        /* Where cells are stored there is room for more; where not, three images' plan is all that is held. */
         const int64_t more = shared[n] - alone[n];
-        if (more < kept || more > (kept ? MOST_BYTES : 0) + 4096)
-            fail_msg("image %d: %lld bytes more than alone, expected %lld", n, (long long)more, (long long)kept);
+        if (more < stored || more > (stored ? MOST_BYTES : 0) + 4096)
+            fail_msg("image %d: %lld bytes more than alone, expected %lld", n, (long long)more, (long long)stored);
         assert_same_picture(&caught[n], &caught[IMAGES + n]);
     }
 }
@@ -203,10 +204,10 @@ static void three_images_draw_what_each_does_alone(void **context)
         const int64_t held = base_memory_held();
         plain_input in;
         plain_create(&in, kinds[kind]);
-        const int64_t kept = kept_bytes(&in);
-        everywhere(kept > 8192);
-        compare_with_images_alone(&in, SURFACE(""), kept);
-        compare_with_images_alone(&in, SURFACE("") ", " VOLUME, kept);
+        const int64_t stored = stored_bytes(&in);
+        everywhere(stored > 8192);
+        compare_with_images_alone(&in, SURFACE(""), stored);
+        compare_with_images_alone(&in, SURFACE("") ", " VOLUME, stored);
         compare_with_images_alone(&in, SURFACE(", opacity: 0.5"), 0);
         plain_free(&in);
         forget_pictures();
@@ -225,7 +226,7 @@ static void memory_is_back_after_an_error(void **context)
     forget_pictures();
     draw_images(&in, 0, IMAGES, SURFACE(""), "i1.exr", bytes);
     everywhere(caught_count == (own_rank == 0 ? 2 : 0));
-    everywhere(own_rank > 0 || (bytes[0] >= kept_bytes(&in) && bytes[1] >= kept_bytes(&in)));
+    everywhere(own_rank > 0 || (bytes[0] >= stored_bytes(&in) && bytes[1] >= stored_bytes(&in)));
     forget_pictures();
     plain_free(&in);
     everywhere(base_memory_held() == held);
@@ -260,7 +261,7 @@ static void steps_do_not_share(void **context)
 
 static int run(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(images_of_one_isosurface_keep_its_cells),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(images_of_one_isosurface_store_its_active_cells),
                                        cmocka_unit_test(images_of_another_isosurface_do_not_pay),
                                        cmocka_unit_test(three_images_draw_what_each_does_alone),
                                        cmocka_unit_test(memory_is_back_after_an_error),
