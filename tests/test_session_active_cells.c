@@ -7,7 +7,7 @@
 
 #include "memory.h"
 #include "session.h"
-#include "session_active_cells.h"
+#include "session_draw.h"
 #include "test_session_fixture.h"
 
 enum { IMAGES = 3, TET_BYTES = 64, HEX_BYTES = 128, MOST_BYTES = 64 << 20, SIDE = 10 };

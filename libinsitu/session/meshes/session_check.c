@@ -8,12 +8,187 @@
 
 #include <omp.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "memory.h"
 #include "session_agree.h"
-#include "session_faces.h"
 #include "session_tally.h"
+
+/* ---- polyhedra -----------------------------------------------------------------------------------------------
+ *
+ * The faces of a polyhedron are faces, and together they bound something. A ray that goes into a cell must come out:
+ * along every edge of the faces exactly two of them meet. The edges are sorted, so that those of a pair stand side by
+ * side; an edge from a vertex to itself bounds nothing and is left out. */
+
+typedef struct face_edge {
+    int64_t low, high, face;
+} face_edge;
+
+/* Room that grows with the cells: one for each thread, zeroed at first. */
+typedef struct face_room {
+    face_edge *edges;
+    int64_t capacity;
+} face_room;
+
+typedef enum face_fault {
+    FACES_GOOD,
+    FACES_NO_MEMORY,
+    FACES_TOO_FEW,       /* a cell of less than 4 faces */
+    FACE_BAD_INDEX,      /* no such face */
+    FACE_BAD_OFFSETS,    /* outside face_connectivity, or falling */
+    FACE_TOO_SMALL,      /* less than 3 vertices */
+    FACE_BAD_VERTEX,     /* no such vertex */
+    FACE_BAD_COORDINATE, /* not finite; not looked at in ghosts */
+    FACES_OPEN           /* an edge that is not one of exactly two faces */
+} face_fault;
+
+typedef struct face_place {
+    int64_t count; /* of the cell's faces */
+    int64_t face;  /* index as it stands in the connectivity */
+    int64_t first, next;
+    int64_t vertex, other; /* at fault; the ends of an edge */
+    int sharing;           /* faces that have the edge */
+    double position[3];
+} face_place;
+
+static void free_room(face_room *room)
+{
+    base_free(room->edges);
+    *room = (face_room){0};
+}
+
+static bool make_room(face_room *room, int64_t count)
+{
+    if (count <= room->capacity) return true;
+    const int64_t capacity = count + count / 2 + 64;
+    face_edge *edges = base_realloc(room->edges, (size_t)capacity * sizeof *edges);
+    if (!edges) return false;
+    room->edges = edges;
+    room->capacity = capacity;
+    return true;
+}
+
+static bool is_finite_vertex(const grid *g, int64_t vertex, double position[3])
+{
+    grid_vertex(g, vertex, position);
+    return isfinite(position[0]) && isfinite(position[1]) && isfinite(position[2]);
+}
+
+static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_place *place)
+{
+    const grid *g = &mesh->cells;
+    if (place->face < 0 || place->face >= g->face_count) return FACE_BAD_INDEX;
+    grid_face_vertices(g, place->face, &place->first, &place->next);
+    if (place->first < 0 || place->next < place->first || place->next > mesh->given.face_connectivity_count)
+        return FACE_BAD_OFFSETS;
+    if (place->next - place->first < 3) return FACE_TOO_SMALL;
+    for (int64_t i = place->first; i < place->next; i++) {
+        place->vertex = grid_array_index(&g->face_connectivity, i);
+        if (place->vertex < 0 || place->vertex >= g->vertex_count) return FACE_BAD_VERTEX;
+        if (!is_ghost && !is_finite_vertex(g, place->vertex, place->position)) return FACE_BAD_COORDINATE;
+    }
+    return FACES_GOOD;
+}
+
+static int64_t add_edges(const grid *g, const face_place *place, face_edge *edges, int64_t count)
+{
+    int64_t from = grid_array_index(&g->face_connectivity, place->next - 1);
+    for (int64_t i = place->first; i < place->next; i++) {
+        const int64_t to = grid_array_index(&g->face_connectivity, i);
+        if (from != to) edges[count++] = (face_edge){from < to ? from : to, from < to ? to : from, place->face};
+        from = to;
+    }
+    return count;
+}
+
+static int compare_edges(const void *left, const void *right)
+{
+    const face_edge *a = left, *b = right;
+    if (a->low != b->low) return a->low < b->low ? -1 : 1;
+    if (a->high != b->high) return a->high < b->high ? -1 : 1;
+    return a->face < b->face ? -1 : a->face > b->face;
+}
+
+static face_fault check_edges(face_edge *edges, int64_t count, face_place *place)
+{
+    if (count) qsort(edges, (size_t)count, sizeof *edges, compare_edges);
+    for (int64_t i = 0; i < count; i += 2) {
+        int64_t end = i;
+        while (end < count && edges[end].low == edges[i].low && edges[end].high == edges[i].high) end++;
+        if (end - i == 2 && edges[i].face != edges[i + 1].face) continue;
+        place->face = edges[i].face;
+        place->vertex = edges[i].low;
+        place->other = edges[i].high;
+        place->sharing = end - i < 1000 ? (int)(end - i) : 1000;
+        return FACES_OPEN;
+    }
+    return FACES_GOOD;
+}
+
+static face_fault check_faces(const session_mesh *mesh, int64_t cell, face_room *room, face_place *place)
+{
+    const grid *g = &mesh->cells;
+    int64_t first, end, edges = 0;
+    grid_cell_faces(g, cell, &first, &end);
+    place->count = end - first;
+    if (place->count < 4) return FACES_TOO_FEW;
+    for (int64_t i = first; i < end; i++) {
+        place->face = grid_array_index(&g->connectivity, i);
+        const face_fault fault = check_face(mesh, grid_is_ghost(g, cell), place);
+        if (fault) return fault;
+        if (!make_room(room, edges + place->next - place->first)) return FACES_NO_MEMORY;
+        edges = add_edges(g, place, room->edges, edges);
+    }
+    return check_edges(room->edges, edges, place);
+}
+
+static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face_fault fault, const face_place *place,
+                                    base_error *error)
+{
+    const char *name = mesh->name;
+    const long long at = cell, face = place->face, vertex = place->vertex;
+    switch (fault) {
+    case FACES_NO_MEMORY:
+        return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory to check cell %lld", name, at);
+    case FACES_TOO_FEW:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polyhedron): %lld faces, a closed surface has at least 4", name, at,
+                         (long long)place->count);
+    case FACE_BAD_INDEX:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polyhedron): face index %lld is outside 0..%lld", name, at, face,
+                         (long long)mesh->given.face_count - 1);
+    case FACE_BAD_OFFSETS:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polyhedron): face %lld: offsets %lld and %lld do not rise within "
+                         "0..%lld",
+                         name, at, face, (long long)place->first, (long long)place->next,
+                         (long long)mesh->given.face_connectivity_count);
+    case FACE_TOO_SMALL:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polyhedron): face %lld has %lld vertices, at least 3 are needed",
+                         name, at, face, (long long)(place->next - place->first));
+    case FACE_BAD_VERTEX:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex index %lld is outside 0..%lld", name,
+                         at, face, vertex, (long long)mesh->given.vertex_count - 1);
+    case FACE_BAD_COORDINATE:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex %lld has a coordinate that is not "
+                         "finite: (%g, %g, %g)",
+                         name, at, face, vertex, place->position[0], place->position[1], place->position[2]);
+    case FACES_OPEN:
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polyhedron): face %lld: the edge from vertex %lld to %lld occurs %d "
+                         "times, not once in each of two faces: the surface is not closed",
+                         name, at, face, vertex, (long long)place->other, place->sharing);
+    case FACES_GOOD: break;
+    }
+    return INSITU_OK;
+}
+
+/* ---- cells of any type ---------------------------------------------------------------------------------------- */
 
 enum { BLOCK_CELLS = 4096 };
 
@@ -47,7 +222,7 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     place->next = grid_array_index(&g->offsets, cell + 1);
     if (place->first < 0 || place->next > mesh->given.connectivity_count || place->next < place->first)
         return BAD_OFFSETS;
-    place->fault_of_faces = session_check_faces(mesh, cell, room, &place->faces);
+    place->fault_of_faces = check_faces(mesh, cell, room, &place->faces);
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
 }
 
@@ -125,11 +300,11 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     fault_place place = {0};
     face_room room = {0};
     const cell_fault fault = check_cell(mesh, cell, &room, &place);
-    session_faces_free(&room);
+    free_room(&room);
     const long long at = cell, vertex = place.vertex;
     const char *type = type_name(place.type);
     switch (fault) {
-    case BAD_FACES: return session_describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
+    case BAD_FACES: return describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
     case BAD_TYPE:
         if (place.type == GRID_POLYHEDRON)
             return base_fail(error, INSITU_ERROR_MESH,
@@ -149,7 +324,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
                          mesh->name, at, type, vertex, place.position[0], place.position[1], place.position[2]);
     case CELL_GOOD: break;
     }
-    return session_describe_faces(mesh, cell, FACES_NO_MEMORY, &place.faces, error);
+    return describe_faces(mesh, cell, FACES_NO_MEMORY, &place.faces, error);
 }
 
 /* Cells of any layout, one by one. */
@@ -181,7 +356,7 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
             const int64_t bad = run ? run(mesh, begin, end, &mine) : check_each(mesh, begin, end, &room, &mine);
             if (bad < end) first_bad = bad;
         }
-        session_faces_free(&room);
+        free_room(&room);
 #pragma omp critical(session_check_tally)
         tally_merge(tally, &mine);
     }

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "mmbvh_fetch.h"
-#include "session_faces.h"
+#include "session_polyhedron.h"
 
 mesh_tally tally_empty(void)
 {

@@ -20,6 +20,11 @@ typedef struct session_drawing {
     session_report *report;
 } session_drawing;
 
+/* Is an isosurface of the image drawn so often in this step, by this and others of the plan's images or frame by frame,
+ * that storing its active cells pays (render.h: render_active_cells)? Looks at the scene alone: the same on every rank.
+ */
+bool session_active_cells_pay(const session_plan *plan, const scene_image *image);
+
 /* Draw and write the plan's images. One that fails is left out; the first reason, the plan's refusal before all others,
  * is the error. Collective. */
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, session_picture *picture,

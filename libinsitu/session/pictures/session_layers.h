@@ -16,7 +16,7 @@ typedef struct session_layers {
     session_transfer *transfers; /* of surfaces, then of volumes */
     grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
     mmbvh_ranges *ranges;        /* as the fields */
-    render_active_cells *active; /* the step's (session_active_cells.h), for the caller to set; NULL: none are stored */
+    render_active_cells *active; /* the step's (session_draw.h), for the caller to set; NULL: none are stored */
 } session_layers;
 
 /* What layers are made of. */

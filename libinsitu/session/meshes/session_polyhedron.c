@@ -1,0 +1,140 @@
+/* The mean size of cells, which steps are in, comes of volumes. So a volume is of the cell's geometry alone: another
+ * rank may list a face from another vertex on or the other way round, and faces in another order. What is left is
+ * rounding, which the mean size is rid of (session_space.c). */
+#include "session_polyhedron.h"
+
+#include <string.h>
+
+typedef struct cell_frame {
+    double mean[3]; /* of the vertices, each as often as faces have it */
+    double least[3];
+    double box; /* volume */
+} cell_frame;
+
+static bool comes_before(const double a[3], const double b[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (a[axis] != b[axis]) return a[axis] < b[axis];
+    return false;
+}
+
+typedef struct frame_sums {
+    double sum[3], lower[3], upper[3];
+    double count;
+} frame_sums;
+
+/* A vertex beside itself is one. */
+static void add_face(const grid *g, int64_t face, frame_sums *sums, double least[3])
+{
+    int64_t from, to;
+    grid_face_vertices(g, face, &from, &to);
+    int64_t before = grid_array_index(&g->face_connectivity, to - 1);
+    for (int64_t i = from; i < to; i++) {
+        double p[3];
+        const int64_t vertex = grid_array_index(&g->face_connectivity, i);
+        if (vertex == before) continue;
+        before = vertex;
+        grid_vertex(g, vertex, p);
+        if (comes_before(p, least)) memcpy(least, p, sizeof p);
+        for (int axis = 0; axis < 3; axis++) {
+            sums->sum[axis] += p[axis];
+            sums->lower[axis] = p[axis] < sums->lower[axis] ? p[axis] : sums->lower[axis];
+            sums->upper[axis] = p[axis] > sums->upper[axis] ? p[axis] : sums->upper[axis];
+        }
+        sums->count++;
+    }
+}
+
+static cell_frame frame_of(const grid *g, int64_t cell)
+{
+    cell_frame frame = {.least = {INFINITY, INFINITY, INFINITY}, .box = 1};
+    frame_sums sums = {.lower = {INFINITY, INFINITY, INFINITY}, .upper = {-INFINITY, -INFINITY, -INFINITY}};
+    int64_t first, end;
+    grid_cell_faces(g, cell, &first, &end);
+    for (int64_t i = first; i < end; i++) add_face(g, grid_array_index(&g->connectivity, i), &sums, frame.least);
+    if (sums.count == 0) return (cell_frame){0};
+    for (int axis = 0; axis < 3; axis++) {
+        frame.mean[axis] = sums.sum[axis] / sums.count;
+        frame.box *= sums.upper[axis] - sums.lower[axis];
+    }
+    return frame;
+}
+
+static double tet_volume(const double *a, const double *b, const double *c)
+{
+    return fabs(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                a[2] * (b[0] * c[1] - b[1] * c[0])) /
+           6;
+}
+
+static void corner_from(const grid *g, int64_t entry, const double mean[3], double out[3])
+{
+    grid_vertex(g, grid_array_index(&g->face_connectivity, entry), out);
+    for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
+}
+
+/* Of the tet on a triangle with a corner of the cell, all relative to the mean. */
+static double volume_from(const double origin[3], double corners[3][3])
+{
+    double d[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int axis = 0; axis < 3; axis++) d[i][axis] = corners[i][axis] - origin[axis];
+    return tet_volume(d[0], d[1], d[2]);
+}
+
+/* The entry of a face's least vertex, from which its canonical triangles fan out. Where a face passes it twice, either
+ * will do: the fan has the same triangles, and some of no area. */
+static int64_t least_entry(const grid *g, int64_t from, int64_t to)
+{
+    int64_t least = from;
+    double position[3], p[3];
+    grid_vertex(g, grid_array_index(&g->face_connectivity, from), position);
+    for (int64_t i = from + 1; i < to; i++) {
+        grid_vertex(g, grid_array_index(&g->face_connectivity, i), p);
+        if (!comes_before(p, position)) continue;
+        memcpy(position, p, sizeof p);
+        least = i;
+    }
+    return least;
+}
+
+/* Of tets: all with the mean, and all with a corner of the cell. */
+typedef struct volume_sums {
+    int64_t triangles;
+    double from_mean, from_corner;
+} volume_sums;
+
+static void add_fan(const grid *g, int64_t face, const double mean[3], const double origin[3], volume_sums *sums)
+{
+    int64_t from, to;
+    double corners[3][3];
+    grid_face_vertices(g, face, &from, &to);
+    const int64_t least = least_entry(g, from, to), count = to - from;
+    corner_from(g, least, mean, corners[0]);
+    corner_from(g, from + (least - from + 1) % count, mean, corners[1]);
+    for (int64_t k = 2; k < count; k++, sums->triangles++) {
+        corner_from(g, from + (least - from + k) % count, mean, corners[2]);
+        sums->from_mean += tet_volume(corners[0], corners[1], corners[2]);
+        sums->from_corner += volume_from(origin, corners);
+        memcpy(corners[1], corners[2], sizeof corners[2]);
+    }
+}
+
+/* What rounding may leave of a triangle's tet with a corner of the same plane, of the cell's box. With u = 2^-53: an
+ * edge is of three differences, each off by u of the box's side (the mean, whatever it is, drops out), a determinant's
+ * six products of three edges by 9 u more, 2 u and 3 u of sums and products: 6 times 14 u, over 6. 32 u leaves room for
+ * the sum over triangles, which are few beside 1 / u, the box's own roundings and squares of u. */
+static const double flat_share = 0x1p-48;
+
+double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)
+{
+    int64_t first, end;
+    double origin[3];
+    volume_sums sums = {0};
+    const cell_frame frame = frame_of(g, cell);
+    for (int axis = 0; axis < 3; axis++) origin[axis] = frame.least[axis] - frame.mean[axis];
+    grid_cell_faces(g, cell, &first, &end);
+    for (int64_t i = first; i < end; i++) add_fan(g, grid_array_index(&g->connectivity, i), frame.mean, origin, &sums);
+    *is_flat = sums.from_corner <= flat_share * (double)sums.triangles * frame.box;
+    return *is_flat ? 0 : sums.from_mean;
+}
