@@ -1,5 +1,5 @@
-/* Trees over the cells that show: the same pictures, bit for bit, as of full trees, whatever changes on the way, and
- * the choice between the two. */
+/* Trees over the candidates, the cells that can show: the same pictures, bit for bit, as of full trees, whatever
+ * changes on the way, and the choice between the two. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

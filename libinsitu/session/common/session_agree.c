@@ -1,5 +1,5 @@
-/* Why all of one mind: a rank that returned early would leave the others waiting in their next collective call. So
- * a phase is left by all ranks or by none. The price is one reduction of an integer where nothing failed. */
+/* A rank that returned early would leave the others waiting in their next collective call. So all ranks leave a phase,
+ * or none does. The price is one reduction of an integer where nothing failed. */
 #include "session_agree.h"
 
 #include <stdio.h>

@@ -1,4 +1,4 @@
-/* What was told is kept as hashes of what it was about. */
+/* A warning that was told is remembered as a hash of what it is about. */
 #include "session_report.h"
 
 #include <stdarg.h>

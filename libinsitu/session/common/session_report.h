@@ -1,8 +1,8 @@
 /* The report of a step while it is written: its numbers, its lists of words, and which warnings were told.
  *
- * Warnings are of what is drawn as asked, but hardly as meant. All but WARNING_ISA are the same on every rank: they are
- * made of what ranks share. A warning is told in the first step that it is true of, and again when it has ceased to be
- * true in between, or the scene was edited. */
+ * A warning says that something is drawn as asked but hardly as meant. All but WARNING_ISA are the same on every rank,
+ * because they are found from what ranks share. A warning is told in the first step in which it holds. It is told again
+ * if it has not held in between, or if the scene was edited. */
 #ifndef SESSION_REPORT_H
 #define SESSION_REPORT_H
 
@@ -40,15 +40,15 @@ void session_report_end(session_report *report);
 void session_report_free(session_report *report);
 
 typedef enum session_warning_kind {
-    WARNING_ORDER,    /* of vertices, as far as volumes tell */
-    WARNING_ISOVALUE, /* outside of its field */
-    WARNING_VIEW,     /* of nothing */
-    WARNING_GREY,     /* a surface without the field that colours it */
-    WARNING_OVERLAP,
-    WARNING_ISA /* of this rank's environment */
+    WARNING_ORDER,    /* the vertices of cells are in another order than VTK's, as far as volumes tell */
+    WARNING_ISOVALUE, /* an isovalue lies outside of its field */
+    WARNING_VIEW,     /* a camera sees no cell */
+    WARNING_GREY,     /* a surface has not the field that colours it */
+    WARNING_OVERLAP,  /* cells overlap in some pixels */
+    WARNING_ISA       /* INSITU_ISA of this rank's environment is not taken */
 } session_warning_kind;
 
-/* What a warning is about: two warnings are one if all of this is the same. */
+/* What a warning is about. Two warnings are the same if all of this is. */
 typedef struct session_warning {
     session_warning_kind kind;
     const char *image, *mesh; /* NULL: of none */

@@ -17,7 +17,7 @@ static bool is_outside(double value, const field_range *range)
     return value < range->low || value > -range->minus_high;
 }
 
-/* Of what the trees hold, which is all that shows. */
+/* Takes the range at the root of the tree, which holds all that shows. */
 static void take_root(const session_mesh *mesh, const session_scalar *scalar, field_range *range)
 {
     if (!mesh->is_needed || !mesh->has_tree || mesh->tree.node_count == 0) return;
@@ -104,7 +104,7 @@ static bool find_news(const session_report *report, planned_surface *surfaces, i
     return is_any;
 }
 
-/* Where the trees hold values on both sides nothing more is asked; else, once, what all cells have. */
+/* An isovalue within the range of the trees is right. Else the range of all cells is found, once, and decides. */
 static void warn_of_values(session_report *report, const planned_surface *s)
 {
     const double low = s->range.low, high = -s->range.minus_high;

@@ -7,7 +7,7 @@
 #include "session_report.h"
 #include "session_space.h"
 
-/* Cell values that a layer wants at vertices; one item a mesh, field and component. */
+/* Cell values that a layer wants at vertices. There is one item for each mesh, field and component. */
 typedef struct session_recentring {
     const session_catalogue_mesh *mesh;
     const char *field;
