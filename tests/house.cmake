@@ -4,7 +4,7 @@ list(TRANSFORM MPI_C_INCLUDE_DIRS PREPEND -I OUTPUT_VARIABLE house_mpi)
 add_test(NAME house_headers_compile_alone
   COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_headers.sh ${PROJECT_SOURCE_DIR} ${CMAKE_C_COMPILER} ${house_mpi}
   ${CYAML_CFLAGS} ${YAML_CFLAGS})
-set_tests_properties(house_headers_compile_alone PROPERTIES TIMEOUT 120)
+set_tests_properties(house_headers_compile_alone PROPERTIES TIMEOUT 180)
 add_test(NAME house_library_shows_insitu_only
   COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_library.sh $<TARGET_FILE:insitu>)
 add_test(NAME house_kernels_show_their_table_only
