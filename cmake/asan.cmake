@@ -1,5 +1,5 @@
 # Read by the preset "asan" right after project(): AddressSanitizer and UndefinedBehaviorSanitizer for all that follows.
-add_compile_options(-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all)
+add_compile_options(-O1 -g1 -fno-var-tracking -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all)
 add_link_options(-fsanitize=address,undefined)
 
 # Open MPI unloads its plugins before the process ends. LeakSanitizer then finds memory of theirs whose stack leads into
