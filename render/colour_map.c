@@ -1,24 +1,57 @@
-/* The tables are made from little on first use. viridis and inferno (van der Walt and Smith's) go through their key
- * colours by monotone cubics in sRGB, which keeps lightness rising between keys as it rises at them; cool_to_warm
- * is Moreland's formula in Msh, the polar form of CIELAB, whose middle stays neutral without a visible edge. */
+/* The tables are made on first use. Most are published as tables (colour_tables.c). ColorBrewer's go through their key
+ * colours by straight lines in sRGB, as matplotlib draws them; cool_to_warm is Moreland's formula in Msh, the polar
+ * form of CIELAB, whose middle stays neutral without a visible edge. */
 #include "colour_map.h"
 
 #include <math.h>
 #include <pthread.h>
 #include <string.h>
 
-enum { table_size = 256, viridis_keys = 20, inferno_keys = 10, max_keys = 20 };
+#include "colour_tables.h"
 
-typedef float colour_table[table_size][3];
+enum { most_keys = 11 };
 
-static colour_table viridis, inferno, cool_to_warm, grey;
+typedef float colour_table[COLOUR_TABLE_SIZE][3];
 
-static const unsigned viridis_colours[viridis_keys] = {
-    0x440154, 0x481568, 0x482677, 0x453781, 0x3f4788, 0x39558c, 0x32648e, 0x2d718e, 0x287d8e, 0x238a8d,
-    0x1f968b, 0x20a386, 0x29af7f, 0x3cbc75, 0x56c667, 0x74d055, 0x94d840, 0xb8de29, 0xdce318, 0xfde725};
+/* Specifications by Cynthia Brewer, colorbrewer.org (Apache-2.0; NOTICE has the words): their longest palettes. */
+typedef struct brewer_palette {
+    const char *name;
+    int key_count;
+    unsigned keys[most_keys];
+} brewer_palette;
 
-static const unsigned inferno_colours[inferno_keys] = {0x000004, 0x1b0c42, 0x4b0c6b, 0x781c6d, 0xa52c60,
-                                                       0xcf4446, 0xed6925, 0xfb9a06, 0xf7d03c, 0xfcffa4};
+/* clang-format off */
+static const brewer_palette palettes[] = {
+    {"greys", 9, {0xffffff, 0xf0f0f0, 0xd9d9d9, 0xbdbdbd, 0x969696, 0x737373, 0x525252, 0x252525, 0x000000}},
+    {"blues", 9, {0xf7fbff, 0xdeebf7, 0xc6dbef, 0x9ecae1, 0x6baed6, 0x4292c6, 0x2171b5, 0x08519c, 0x08306b}},
+    {"greens", 9, {0xf7fcf5, 0xe5f5e0, 0xc7e9c0, 0xa1d99b, 0x74c476, 0x41ab5d, 0x238b45, 0x006d2c, 0x00441b}},
+    {"oranges", 9, {0xfff5eb, 0xfee6ce, 0xfdd0a2, 0xfdae6b, 0xfd8d3c, 0xf16913, 0xd94801, 0xa63603, 0x7f2704}},
+    {"purples", 9, {0xfcfbfd, 0xefedf5, 0xdadaeb, 0xbcbddc, 0x9e9ac8, 0x807dba, 0x6a51a3, 0x54278f, 0x3f007d}},
+    {"reds", 9, {0xfff5f0, 0xfee0d2, 0xfcbba1, 0xfc9272, 0xfb6a4a, 0xef3b2c, 0xcb181d, 0xa50f15, 0x67000d}},
+    {"yellow_green_blue", 9,
+     {0xffffd9, 0xedf8b1, 0xc7e9b4, 0x7fcdbb, 0x41b6c4, 0x1d91c0, 0x225ea8, 0x253494, 0x081d58}},
+    {"yellow_orange_red", 9,
+     {0xffffcc, 0xffeda0, 0xfed976, 0xfeb24c, 0xfd8d3c, 0xfc4e2a, 0xe31a1c, 0xbd0026, 0x800026}},
+    {"red_blue", 11,
+     {0x67001f, 0xb2182b, 0xd6604d, 0xf4a582, 0xfddbc7, 0xf7f7f7, 0xd1e5f0, 0x92c5de, 0x4393c3, 0x2166ac, 0x053061}},
+    {"red_yellow_blue", 11,
+     {0xa50026, 0xd73027, 0xf46d43, 0xfdae61, 0xfee090, 0xffffbf, 0xe0f3f8, 0xabd9e9, 0x74add1, 0x4575b4, 0x313695}},
+    {"red_yellow_green", 11,
+     {0xa50026, 0xd73027, 0xf46d43, 0xfdae61, 0xfee08b, 0xffffbf, 0xd9ef8b, 0xa6d96a, 0x66bd63, 0x1a9850, 0x006837}},
+    {"spectral", 11,
+     {0x9e0142, 0xd53e4f, 0xf46d43, 0xfdae61, 0xfee08b, 0xffffbf, 0xe6f598, 0xabdda4, 0x66c2a5, 0x3288bd, 0x5e4fa2}},
+    {"brown_teal", 11,
+     {0x543005, 0x8c510a, 0xbf812d, 0xdfc27d, 0xf6e8c3, 0xf5f5f5, 0xc7eae5, 0x80cdc1, 0x35978f, 0x01665e, 0x003c30}},
+    {"orange_purple", 11,
+     {0x7f3b08, 0xb35806, 0xe08214, 0xfdb863, 0xfee0b6, 0xf7f7f7, 0xd8daeb, 0xb2abd2, 0x8073ac, 0x542788, 0x2d004b}},
+    {"purple_green", 11,
+     {0x40004b, 0x762a83, 0x9970ab, 0xc2a5cf, 0xe7d4e8, 0xf7f7f7, 0xd9f0d3, 0xa6dba0, 0x5aae61, 0x1b7837, 0x00441b}},
+};
+/* clang-format on */
+
+#define NAME(word, name) name,
+static const char *const names[COLOUR_MAP_COUNT] = {COLOUR_MAPS(NAME)};
+static colour_table tables[COLOUR_MAP_COUNT];
 
 static double linear_from_srgb(double s)
 {
@@ -40,33 +73,27 @@ float colour_srgb_from_linear(float linear)
     return (float)srgb_from_linear(linear);
 }
 
-/* Fritsch and Carlson's slopes in Brodlie's form, unit spacing: zero at an extremum, else the harmonic mean. */
-static void monotone_slopes(const double *y, int count, double *slopes)
+static void fill_published(colour_table table, const uint64_t *codes)
 {
-    slopes[0] = y[1] - y[0];
-    slopes[count - 1] = y[count - 1] - y[count - 2];
-    for (int i = 1; i < count - 1; i++) {
-        const double before = y[i] - y[i - 1], after = y[i + 1] - y[i];
-        slopes[i] = before * after > 0 ? 2 * before * after / (before + after) : 0;
-    }
+    for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
+        for (int c = 0; c < 3; c++)
+            table[i][c] = (float)linear_from_srgb((double)(codes[i] >> (32 - 16 * c) & 65535) / 65535);
 }
 
-static double hermite(const double *y, const double *slopes, int count, double x)
+static double channel_of(unsigned colour, int channel)
 {
-    const int i = x >= count - 1 ? count - 2 : (int)x;
-    const double t = x - i, u = 1 - t;
-    return u * u * ((1 + 2 * t) * y[i] + t * slopes[i]) + t * t * ((1 + 2 * u) * y[i + 1] - u * slopes[i + 1]);
+    return (colour >> (16 - 8 * channel) & 255) / 255.0;
 }
 
-static void fill_from_keys(colour_table table, const unsigned *colours, int count)
+static void fill_palette(colour_table table, const brewer_palette *palette)
 {
-    for (int channel = 0; channel < 3; channel++) {
-        double keys[max_keys], slopes[max_keys];
-        for (int i = 0; i < count; i++) keys[i] = (colours[i] >> (16 - 8 * channel) & 255) / 255.0;
-        monotone_slopes(keys, count, slopes);
-        for (int i = 0; i < table_size; i++) {
-            const double x = (double)i * (count - 1) / (table_size - 1);
-            table[i][channel] = (float)linear_from_srgb(hermite(keys, slopes, count, x));
+    const int last = palette->key_count - 1;
+    for (int i = 0; i < COLOUR_TABLE_SIZE; i++) {
+        const double x = (double)(i * last) / (COLOUR_TABLE_SIZE - 1);
+        const int key = x < last ? (int)x : last - 1;
+        for (int c = 0; c < 3; c++) {
+            const double low = channel_of(palette->keys[key], c), high = channel_of(palette->keys[key + 1], c);
+            table[i][c] = (float)linear_from_srgb(low + (x - key) * (high - low));
         }
     }
 }
@@ -98,8 +125,7 @@ static msh msh_from_srgb(unsigned colour)
     double f[3];
     for (int row = 0; row < 3; row++) {
         double sum = 0;
-        for (int c = 0; c < 3; c++)
-            sum += xyz_from_rgb[row][c] * linear_from_srgb((colour >> (16 - 8 * c) & 255) / 255.0);
+        for (int c = 0; c < 3; c++) sum += xyz_from_rgb[row][c] * linear_from_srgb(channel_of(colour, c));
         f[row] = lab_curve(sum / white_xyz[row]);
     }
     const double lightness = 116 * f[1] - 16, a = 500 * (f[0] - f[1]), b = 200 * (f[1] - f[2]);
@@ -132,8 +158,8 @@ static void fill_diverging(colour_table table, unsigned low, unsigned high)
 {
     const double middle_m = 88; /* above both ends' */
     const msh ends[2] = {msh_from_srgb(low), msh_from_srgb(high)};
-    for (int i = 0; i < table_size; i++) {
-        const double x = (double)i / (table_size - 1);
+    for (int i = 0; i < COLOUR_TABLE_SIZE; i++) {
+        const double x = (double)i / (COLOUR_TABLE_SIZE - 1);
         const msh end = ends[x > 0.5];
         const double t = fabs(2 * x - 1); /* 1 at the end, 0 in the middle */
         const double hue = middle_hue(end, middle_m);
@@ -141,30 +167,48 @@ static void fill_diverging(colour_table table, unsigned low, unsigned high)
     }
 }
 
+static void fill_grey(colour_table table)
+{
+    for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
+        for (int c = 0; c < 3; c++) table[i][c] = (float)linear_from_srgb((double)i / (COLOUR_TABLE_SIZE - 1));
+}
+
+static const brewer_palette *find_palette(const char *name)
+{
+    for (size_t i = 0; i < sizeof palettes / sizeof *palettes; i++)
+        if (strcmp(name, palettes[i].name) == 0) return &palettes[i];
+    return NULL;
+}
+
 static void fill_tables(void)
 {
-    fill_from_keys(viridis, viridis_colours, viridis_keys);
-    fill_from_keys(inferno, inferno_colours, inferno_keys);
-    fill_diverging(cool_to_warm, 0x3b4cc0, 0xb40426);
-    for (int i = 0; i < table_size; i++) {
-        for (int c = 0; c < 3; c++) grey[i][c] = (float)linear_from_srgb((double)i / (table_size - 1));
+    for (int map = 0; map < COLOUR_MAP_COUNT; map++) {
+        const uint64_t *published = colour_published_table(names[map]);
+        const brewer_palette *palette = find_palette(names[map]);
+        if (published)
+            fill_published(tables[map], published);
+        else if (palette)
+            fill_palette(tables[map], palette);
+        else if (map == COLOUR_MAP_COOL_TO_WARM)
+            fill_diverging(tables[map], 0x3b4cc0, 0xb40426);
+        else
+            fill_grey(tables[map]);
     }
 }
 
 const float *colour_map_table(const char *name, int *colour_count)
 {
-    static const struct {
-        const char *name;
-        const float *table;
-    } maps[] = {{"viridis", viridis[0]}, {"inferno", inferno[0]}, {"cool_to_warm", cool_to_warm[0]}, {"grey", grey[0]}};
     static pthread_once_t once = PTHREAD_ONCE_INIT;
-
     pthread_once(&once, fill_tables);
-    for (size_t i = 0; i < sizeof maps / sizeof *maps; i++) {
-        if (strcmp(name, maps[i].name) == 0) {
-            *colour_count = table_size;
-            return maps[i].table;
-        }
+    for (int map = 0; map < COLOUR_MAP_COUNT; map++) {
+        if (strcmp(name, names[map]) != 0) continue;
+        *colour_count = COLOUR_TABLE_SIZE;
+        return tables[map][0];
     }
     return NULL;
+}
+
+const char *colour_map_name(colour_map map)
+{
+    return names[map];
 }

@@ -1,9 +1,40 @@
-/* Named colour maps as tables of linear RGB. */
+/* The built-in colour maps, by name. */
 #ifndef RENDER_COLOUR_MAP_H
 #define RENDER_COLOUR_MAP_H
 
-/* The table (colour_count × 3 floats, linear light, static) of "viridis", "inferno", "cool_to_warm" or "grey", or NULL.
- */
+/* Every map: the word of its constant, and its name. */
+#define COLOUR_MAPS(X)                                                                                                 \
+    X(VIRIDIS, "viridis")                                                                                              \
+    X(PLASMA, "plasma")                                                                                                \
+    X(INFERNO, "inferno")                                                                                              \
+    X(MAGMA, "magma")                                                                                                  \
+    X(CIVIDIS, "cividis")                                                                                              \
+    X(TURBO, "turbo")                                                                                                  \
+    X(BATLOW, "batlow")                                                                                                \
+    X(GREY, "grey")                                                                                                    \
+    X(GREYS, "greys")                                                                                                  \
+    X(BLUES, "blues")                                                                                                  \
+    X(GREENS, "greens")                                                                                                \
+    X(ORANGES, "oranges")                                                                                              \
+    X(PURPLES, "purples")                                                                                              \
+    X(REDS, "reds")                                                                                                    \
+    X(YELLOW_GREEN_BLUE, "yellow_green_blue")                                                                          \
+    X(YELLOW_ORANGE_RED, "yellow_orange_red")                                                                          \
+    X(COOL_TO_WARM, "cool_to_warm")                                                                                    \
+    X(RED_BLUE, "red_blue")                                                                                            \
+    X(RED_YELLOW_BLUE, "red_yellow_blue")                                                                              \
+    X(RED_YELLOW_GREEN, "red_yellow_green")                                                                            \
+    X(SPECTRAL, "spectral")                                                                                            \
+    X(BROWN_TEAL, "brown_teal")                                                                                        \
+    X(ORANGE_PURPLE, "orange_purple")                                                                                  \
+    X(PURPLE_GREEN, "purple_green")
+
+#define COLOUR_MAP_CONSTANT(word, name) COLOUR_MAP_##word,
+typedef enum colour_map { COLOUR_MAPS(COLOUR_MAP_CONSTANT) COLOUR_MAP_COUNT } colour_map;
+
+const char *colour_map_name(colour_map map);
+
+/* The map's table (colour_count × 3 floats, linear light, evenly spaced, static), or NULL where none has this name. */
 const float *colour_map_table(const char *name, int *colour_count);
 
 /* One sRGB component in [0, 1] to linear light, and back. */

@@ -112,6 +112,16 @@ static void check_vector(const double v[3], double x, double y, double z)
     assert_near(v[2], z, 1e-15);
 }
 
+/* The whole table, to the bit. */
+static void check_built_in(const scene_colour_map *map, const char *name)
+{
+    int count = 0;
+    const float *table = colour_map_table(name, &count);
+    assert_string_equal(map->name, name);
+    assert_int_equal(map->count, count);
+    assert_memory_equal(map->colours, table, (size_t)count * 3 * sizeof *table);
+}
+
 static void check_colour(const float c[3], double r, double g, double b)
 {
     assert_near(c[0], r, COLOUR_TOLERANCE);
@@ -207,8 +217,9 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
     assert_true(scene_field_is_on(&first->field, "anything"));
     assert_true(first->field.at_vertices && second->field.at_vertices && second->colour_by.at_vertices);
-    assert_int_equal(second->colour_map, SCENE_INFERNO);
-    assert_true(second->colour_range.is_fixed && second->colour_range.low == 0 && second->colour_range.high == 1);
+    check_built_in(&second->colour_map, "inferno");
+    assert_true(second->colour_map.range.is_fixed);
+    assert_true(second->colour_map.range.low == 0 && second->colour_map.range.high == 1);
     scene_free(&s);
 }
 
@@ -223,8 +234,9 @@ static void scene_volume_keys_are_read(void **state)
     const scene_volume *volume = &s.images[0].volumes[0];
     assert_string_equal(volume->field.name, "temperature");
     assert_int_equal(volume->field.component, 1);
-    assert_int_equal(volume->colour_map, SCENE_COOL_TO_WARM);
-    assert_true(volume->range.is_fixed && volume->range.low == -2 && volume->range.high == 3);
+    check_built_in(&volume->colour_map, "cool_to_warm");
+    const scene_range *range = &volume->colour_map.range;
+    assert_true(range->is_fixed && range->low == -2 && range->high == 3);
     assert_true(volume->unit_distance == 0.1);
     assert_true(volume->field.at_vertices && !s.images[1].volumes[0].field.at_vertices);
     assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 27);
@@ -318,13 +330,13 @@ static void scene_layer_defaults_hold(void **state)
     assert_true(surface->opacity == 1 && surface->root_steps == 2);
     assert_true(surface->material.ambient == 0.15F && surface->material.diffuse == 0.75F);
     assert_true(surface->material.specular == 0.25F && surface->material.shininess == 32);
-    assert_int_equal(surface[1].colour_map, SCENE_VIRIDIS);
-    assert_false(surface[1].colour_range.is_fixed);
+    check_built_in(&surface[1].colour_map, "viridis");
+    assert_false(surface[1].colour_map.range.is_fixed);
     assert_memory_not_equal(surface[0].colours, surface[0].colours + 3, 3 * sizeof(float));
     assert_memory_not_equal(surface[0].colours, surface[1].colours, 3 * sizeof(float));
     const scene_volume *volume = &s.images[0].volumes[0];
-    assert_int_equal(volume->colour_map, SCENE_VIRIDIS);
-    assert_false(volume->range.is_fixed);
+    check_built_in(&volume->colour_map, "viridis");
+    assert_false(volume->colour_map.range.is_fixed);
     assert_true(volume->unit_distance == 0 && volume->opacity_count == 2);
     assert_true(volume->opacity[0].at == 0 && volume->opacity[0].opacity == 0);
     assert_true(volume->opacity[1].at == 1 && volume->opacity[1].opacity == 0.9F);
@@ -483,7 +495,7 @@ static const struct bad_file {
     {10,
      "      - isosurface: {field: f, values: [1], colour_by: {field: g, map: jet}}",
      10,
-     {"\"jet\"", "viridis, inferno"}},
+     {"\"jet\"", "viridis, plasma, inferno"}},
     {10, "      - isosurface: {field: f, values: [1], colour_by: {field: g, range: [1, 1]}}", 10, {"does not rise"}},
     {10, "      - isosurface: {field: f, values: [1], component: w}", 10, {"component: \"w\"", "magnitude, x, y, z"}},
     {10, "      - isosurface: {field: f, values: [1], component: -1}", 10, {"component: \"-1\"", "magnitude"}},

@@ -95,16 +95,15 @@ static insitu_status data_range(const session_layer_basis *basis, const scene_fi
     return status;
 }
 
-static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field, scene_colour_map map,
-                                   const scene_range *range, const scene_volume *volume, session_transfer *out,
+static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
+                                   const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
 {
-    double low = range->low, high = range->high;
-    if (!range->is_fixed) {
-        const insitu_status status = data_range(basis, field, &low, &high, error);
-        if (status) return status;
-    }
-    return session_make_transfer(basis->half_diagonal, map, low, high, volume, out, error);
+    double low = map->range.low, high = map->range.high;
+    insitu_status status = INSITU_OK;
+    if (!map->range.is_fixed) status = data_range(basis, field, &low, &high, error);
+    if (!status) session_make_transfer(basis->half_diagonal, map, low, high, volume, out);
+    return status;
 }
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
@@ -125,8 +124,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
     if (!layer->has_colour_by) return INSITU_OK;
     out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, false);
     out->colour_map = &layers->transfers[index].transfer;
-    return make_transfer(basis, &layer->colour_by, layer->colour_map, &layer->colour_range, NULL,
-                         &layers->transfers[index], error);
+    return make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[index], error);
 }
 
 static insitu_status fill_volume(const session_layer_basis *basis, const scene_image *image, int index,
@@ -137,7 +135,7 @@ static insitu_status fill_volume(const session_layer_basis *basis, const scene_i
     layers->volumes[index] = (render_volume_layer){
         .field = place_field(basis->meshes, layers, 2 * image->isosurface_count + index, &layer->field, true),
         .transfer = &transfer->transfer};
-    return make_transfer(basis, &layer->field, layer->colour_map, &layer->range, layer, transfer, error);
+    return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
 
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,

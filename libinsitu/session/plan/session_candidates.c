@@ -35,16 +35,15 @@ static bool add_surface(session_scalar *scalar, const scene_isosurface *layer)
 
 static bool add_volume(session_scalar *scalar, const scene_volume *layer, double half_diagonal)
 {
-    const scene_range *range = &layer->range;
+    const scene_range *range = &layer->colour_map.range;
     session_transfer t;
     mmbvh_interval intervals[RENDER_MAX_INTERVALS];
-    base_error error = {0};
     /* A range from the data is known when all ranks have told theirs. */
-    if (!range->is_fixed ||
-        session_make_transfer(half_diagonal, layer->colour_map, range->low, range->high, layer, &t, &error)) {
+    if (!range->is_fixed) {
         scalar->needs_all = true;
         return true;
     }
+    session_make_transfer(half_diagonal, &layer->colour_map, range->low, range->high, layer, &t);
     return add_intervals(scalar, intervals, render_visible_intervals(&t.transfer, intervals));
 }
 

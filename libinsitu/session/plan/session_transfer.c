@@ -3,19 +3,6 @@
 #include <float.h>
 #include <math.h>
 
-#include "colour_map.h"
-
-static const char *map_name(scene_colour_map map)
-{
-    switch (map) {
-    case SCENE_VIRIDIS: return "viridis";
-    case SCENE_INFERNO: return "inferno";
-    case SCENE_COOL_TO_WARM: return "cool_to_warm";
-    case SCENE_GREY: return "grey";
-    }
-    return "viridis";
-}
-
 /* A constant field has its value in the middle of a range that float32 numbers can tell from nothing. */
 static void widen(double *low, double *high)
 {
@@ -30,18 +17,18 @@ static void widen(double *low, double *high)
     *high = middle + 0.5 * least;
 }
 
-insitu_status session_make_transfer(double half_diagonal, scene_colour_map map, double low, double high,
-                                    const scene_volume *volume, session_transfer *out, base_error *error)
+void session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
+                           const scene_volume *volume, session_transfer *out)
 {
     render_transfer *t = &out->transfer;
     *out = (session_transfer){0};
     widen(&low, &high);
     t->low = low;
     t->high = high;
-    t->colours = colour_map_table(map_name(map), &t->colour_count);
-    if (!t->colours) return base_fail(error, INSITU_ERROR_INTERNAL, "no colour map is called %s", map_name(map));
+    t->colours = map->colours;
+    t->colour_count = map->count;
     t->unit_distance = 1;
-    if (!volume) return INSITU_OK;
+    if (!volume) return;
     t->opacity_count = volume->opacity_count;
     for (int i = 0; i < volume->opacity_count; i++) {
         out->opacity_values[i] = low + volume->opacity[i].at * (high - low);
@@ -51,5 +38,4 @@ insitu_status session_make_transfer(double half_diagonal, scene_colour_map map, 
     t->opacities = out->opacities;
     t->unit_distance = volume->unit_distance > 0 ? volume->unit_distance : half_diagonal / 10;
     if (!(t->unit_distance > 0)) t->unit_distance = 1;
-    return INSITU_OK;
 }

@@ -2,7 +2,6 @@
 #ifndef SESSION_TRANSFER_H
 #define SESSION_TRANSFER_H
 
-#include "error.h"
 #include "render.h"
 #include "scene.h"
 
@@ -12,9 +11,9 @@ typedef struct session_transfer {
     float opacities[RENDER_MAX_OPACITY_POINTS];
 } session_transfer;
 
-/* Of a colour map over [low, high] (low > high: there are no values), and the opacity of the volume, NULL: of a
- * surface. half_diagonal: of the global bounds. Local. */
-insitu_status session_make_transfer(double half_diagonal, scene_colour_map map, double low, double high,
-                                    const scene_volume *volume, session_transfer *out, base_error *error);
+/* out points into the map. Of a colour map over [low, high] (low > high: there are no values), and the opacity of the
+ * volume, NULL: of a surface. half_diagonal: of the global bounds. Local. */
+void session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
+                           const scene_volume *volume, session_transfer *out);
 
 #endif

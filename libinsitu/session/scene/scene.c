@@ -227,6 +227,12 @@ static void free_field(scene_field *field)
     base_free(field->name);
 }
 
+static void free_colour_map(scene_colour_map *map)
+{
+    base_free(map->name);
+    base_free(map->colours);
+}
+
 static void free_image(scene_image *image)
 {
     for (int i = 0; i < image->isosurface_count; i++) {
@@ -235,10 +241,12 @@ static void free_image(scene_image *image)
         free_field(&surface->colour_by);
         base_free(surface->values);
         base_free(surface->colours);
+        free_colour_map(&surface->colour_map);
     }
     for (int i = 0; i < image->volume_count; i++) {
         free_field(&image->volumes[i].field);
         base_free(image->volumes[i].opacity);
+        free_colour_map(&image->volumes[i].colour_map);
     }
     for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);
     base_free(image->name);

@@ -10,7 +10,6 @@
 
 typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
 typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
-typedef enum scene_colour_map { SCENE_VIRIDIS, SCENE_INFERNO, SCENE_COOL_TO_WARM, SCENE_GREY } scene_colour_map;
 
 /* Which scalar of a field: the magnitude, or component n. Default: component 0 of a field of one, else magnitude. */
 enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
@@ -36,6 +35,15 @@ typedef struct scene_range {
     double low, high;
 } scene_range;
 
+/* How a value becomes a colour. Its place is (value - low) / (high - low), [low, high] being the range; places below 0
+ * and above 1 have the colours of 0 and 1. The colour of a place is that of the table, linear between entries. */
+typedef struct scene_colour_map {
+    char *name;     /* of a built-in map */
+    int count;      /* >= 2 */
+    float *colours; /* count × 3, linear light, evenly spaced over the places from 0 to 1 */
+    scene_range range;
+} scene_colour_map;
+
 typedef struct scene_opacity_point {
     double at;     /* 0 .. 1 of the range; never falling, two the same make a step */
     float opacity; /* 0 .. 1, per unit_distance */
@@ -56,7 +64,6 @@ typedef struct scene_isosurface {
     bool has_colour_by;
     scene_field colour_by;
     scene_colour_map colour_map;
-    scene_range colour_range;
     float opacity;
     scene_material material;
     scene_root roots; /* robust by default */
@@ -68,7 +75,6 @@ typedef struct scene_isosurface {
 typedef struct scene_volume {
     scene_field field;
     scene_colour_map colour_map;
-    scene_range range;
     int opacity_count; /* 1 .. 32 */
     scene_opacity_point *opacity;
     double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */

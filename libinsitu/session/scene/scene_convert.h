@@ -20,6 +20,15 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
 insitu_status scene_convert_outputs(const scene_document *d, const char *path, const scene_file_image *in,
                                     scene_image *out);
 
+/* The keys that say how values become colours, of a mapping that has them. */
+typedef struct scene_file_colour_map {
+    const int *map;      /* colour_map */
+    const double *range; /* 2 */
+} scene_file_colour_map;
+
+insitu_status scene_convert_colour_map(const scene_document *d, const char *path, const scene_file_colour_map *in,
+                                       scene_colour_map *out);
+
 /* Refuse two outputs that would be one file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);
 

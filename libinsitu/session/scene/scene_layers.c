@@ -71,14 +71,6 @@ static insitu_status convert_field(const scene_document *d, const char *layer, c
     return status ? status : convert_component(d, path, component, &out->component);
 }
 
-static insitu_status convert_range(const scene_document *d, const char *path, const double *in, scene_range *out)
-{
-    if (!in) return INSITU_OK;
-    *out = (scene_range){true, in[0], in[1]};
-    if (in[0] < in[1]) return INSITU_OK;
-    return scene_bad(d, path, "range", "[%g, %g] does not rise, expected [low, high] with low < high", in[0], in[1]);
-}
-
 static insitu_status convert_values(const scene_document *d, const char *path, const scene_file_isosurface *in,
                                     scene_isosurface *out)
 {
@@ -127,9 +119,9 @@ static insitu_status convert_colour_by(const scene_document *d, const char *path
     char colour_by_path[SCENE_PATH_SIZE];
     snprintf(colour_by_path, sizeof colour_by_path, "%s.colour_by", path);
     out->has_colour_by = true;
-    out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
     out->colour_by.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
-    insitu_status status = convert_range(d, colour_by_path, in->range, &out->colour_range);
+    const scene_file_colour_map map = {in->map, in->range};
+    insitu_status status = scene_convert_colour_map(d, colour_by_path, &map, &out->colour_map);
     if (status == INSITU_OK) status = convert_field(d, path, colour_by_path, in->field, in->component, &out->colour_by);
     return status;
 }
@@ -196,11 +188,11 @@ static insitu_status convert_opacity(const scene_document *d, const char *path, 
 static insitu_status convert_volume(const scene_document *d, const char *path, const scene_file_volume *in,
                                     scene_volume *out)
 {
-    out->colour_map = in->map ? (scene_colour_map)*in->map : SCENE_VIRIDIS;
     out->unit_distance = in->unit_distance ? *in->unit_distance : 0;
     out->field.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
-    if (status == INSITU_OK) status = convert_range(d, path, in->range, &out->range);
+    const scene_file_colour_map map = {in->map, in->range};
+    if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &map, &out->colour_map);
     if (status == INSITU_OK) status = convert_opacity(d, path, in, out);
     return status;
 }

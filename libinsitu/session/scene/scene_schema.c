@@ -2,6 +2,7 @@
  * error messages and docs/scene.md all come from these lists, so that none can fall behind the others. */
 #include "scene_schema.h"
 
+#include "colour_map.h"
 #include "scene.h"
 
 #define REQUIRED CYAML_FLAG_DEFAULT
@@ -30,8 +31,8 @@ static const cyaml_schema_value_t whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEF
 static const cyaml_schema_value_t colour = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 3)};
 static const cyaml_schema_value_t opacity_point = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 2)};
 
-static const cyaml_strval_t map_words[] = {
-    {"viridis", SCENE_VIRIDIS}, {"inferno", SCENE_INFERNO}, {"cool_to_warm", SCENE_COOL_TO_WARM}, {"grey", SCENE_GREY}};
+#define MAP_WORD(word, name) {name, COLOUR_MAP_##word},
+static const cyaml_strval_t map_words[] = {COLOUR_MAPS(MAP_WORD)};
 static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
 static const cyaml_strval_t root_words[] = {{"neubauer", SCENE_NEUBAUER}, {"robust", SCENE_ROBUST}};
 static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}};

@@ -35,7 +35,7 @@ typedef struct scene_file_material {
 typedef struct scene_file_colour_by {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
-    int *map;         /* scene_colour_map */
+    int *map;         /* colour_map */
     double *range;    /* 2 */
 } scene_file_colour_by;
 
@@ -58,7 +58,7 @@ typedef struct scene_file_isosurface {
 typedef struct scene_file_volume {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
-    int *map;         /* scene_colour_map */
+    int *map;         /* colour_map */
     double *range;    /* 2 */
     double (*opacity)[2];
     int opacity_count;
