@@ -68,6 +68,7 @@ typedef struct render_transfer {
 } render_transfer;
 
 enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 16, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
+enum { RENDER_MAX_GROUP = 64 };
 enum { RENDER_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
 
 typedef struct render_light {
@@ -144,7 +145,7 @@ typedef enum render_traversal {
  * are made with separate_samples alone: without it several volumes are sampled. */
 typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integration;
 
-/* What segments that are mixed may be off by where no max_error is given. */
+/* Error allowed to mixed segments where no max_error is given. */
 #define RENDER_MIXING_ERROR 1e-4
 
 /* The cells that isosurfaces cross, kept side by side for other pictures of the same cells and values: what a picture
@@ -156,7 +157,7 @@ typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integ
 typedef struct render_active_cells render_active_cells;
 render_active_cells *render_active_cells_create(void); /* NULL: no memory */
 void render_active_cells_free(render_active_cells *active);
-/* To be called before the next frame where a mesh's cells, coordinates or values have changed. */
+/* Call this before the next frame where a mesh's cells, coordinates or values have changed. */
 void render_active_cells_clear(render_active_cells *active);
 int64_t render_active_cells_bytes(const render_active_cells *active);
 
@@ -180,8 +181,8 @@ typedef struct render_job {
                          off by more, in linear light; 0: into parts no longer than step */
     double extent;    /* with max_error: no way through the cells of all ranks is longer, scene units; the same on all
                          ranks, so that all cut alike. 0: of this rank's */
-    int sample_group; /* samples of a ray looked up together, 1 .. 64: N of the sample position packets (thesis, 4.4.1)
-                       */
+    int sample_group; /* samples of a ray looked up together, 1 .. RENDER_MAX_GROUP: N of the thesis's sample position
+                         packets (4.4.1) */
     bool jitter;      /* offset of a ray's first sample hashed from pixel and frame; else 1/2 */
     int frame;        /* 0 .. : which of the accumulated frames this is */
     bool is_alone;    /* no other rank holds cells: all samples of a ray may go into one fragment */

@@ -64,8 +64,6 @@ static const char every_key[] = "threads: 3\n"
                                 "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
                                 "          opacity: 0.5\n"
                                 "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
-                                "          root_steps: 5\n"
-                                "          roots: neubauer\n"
                                 "          normals: differences\n"
                                 "          difference: 0.25\n"
                                 "      - volume:\n"
@@ -81,7 +79,7 @@ static const char every_key[] = "threads: 3\n"
                                 "          {field: q, values: [7], mesh: air, interpolate: vertex, colour_by:\n"
                                 "           {field: speed, component: 2, map: inferno, range: [0, 1],\n"
                                 "            interpolate: vertex}}\n"
-                                "    sampling: {step_cells: 0.25, group: 8, jitter: false, frames: 4,\n"
+                                "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
                                 "               max_seconds: 10, method: segments}\n"
                                 "    outputs:\n"
                                 "      - path: \"out/{name}_{cycle:06}.png\"\n"
@@ -146,7 +144,6 @@ static void scene_image_keys_are_read(void **state)
     check_colour(image->background, 0.5 * linear(0.5), 0.5 * linear(0.25), 0.5);
     assert_true(image->background[3] == 0.5F);
     assert_true(image->step == 0 && image->step_cells == 0.25);
-    assert_int_equal(image->sample_group, 8);
     assert_false(image->jitter);
     assert_int_equal(image->frames, 4);
     assert_true(image->max_seconds == 10 && s.images[1].max_seconds == 3600);
@@ -205,14 +202,13 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(first->opacity == 0.5F);
     assert_true(first->material.ambient == 0.1F && first->material.diffuse == 0.2F);
     assert_true(first->material.specular == 0.3F && first->material.shininess == 40);
-    assert_int_equal(first->root_steps, 5);
-    assert_true(first->roots == SCENE_NEUBAUER && first->normals == SCENE_DIFFERENCES && first->difference == 0.25);
-    assert_true(second->roots == SCENE_ROBUST && second->normals == SCENE_GRADIENT && second->difference == 1);
+    assert_true(first->normals == SCENE_DIFFERENCES && first->difference == 0.25);
+    assert_true(second->normals == SCENE_GRADIENT && second->difference == 1);
     assert_false(first->has_colour_by);
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");
     assert_int_equal(second->colour_by.component, 2);
-    assert_int_equal(second->colour_by.line, 35);
+    assert_int_equal(second->colour_by.line, 33);
     assert_true(second->field.mesh_count == 1 && second->colour_by.mesh_count == 1 && first->field.mesh_count == 0);
     assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
     assert_true(scene_field_is_on(&first->field, "anything"));
@@ -239,7 +235,7 @@ static void scene_volume_keys_are_read(void **state)
     assert_true(range->is_fixed && range->low == -2 && range->high == 3);
     assert_true(volume->unit_distance == 0.1);
     assert_true(volume->field.at_vertices && !s.images[1].volumes[0].field.at_vertices);
-    assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 27);
+    assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 25);
     assert_true(scene_field_is_on(&volume->field, "air") && scene_field_is_on(&volume->field, "sea/12/3"));
     assert_false(scene_field_is_on(&volume->field, "se") || scene_field_is_on(&volume->field, "sea2"));
     assert_int_equal(volume->opacity_count, 4);
@@ -259,7 +255,7 @@ static void scene_image_defaults_hold(void **state)
     assert_true(image->width == 1280 && image->height == 720 && image->every == 1);
     check_colour(image->background, linear(0.08), linear(0.09), linear(0.11));
     assert_true(image->background[3] == 1);
-    assert_true(image->step == 0 && image->step_cells == 0.5 && image->sample_group == 64);
+    assert_true(image->step == 0 && image->step_cells == 0.5);
     assert_true(image->jitter && image->frames == 1);
     assert_true(image->method == SCENE_SEGMENTS && image->max_error == 0.01);
     assert_true(image->camera.is_automatic && image->camera.angle == 40 && image->camera.zoom == 1);
@@ -296,13 +292,12 @@ static void sampling_is_by_what_is_said(void **state)
         {"{method: segments, max_error: 1e-3}", 1, SCENE_SEGMENTS, 1e-3},
         {"{max_error: 1e-3}", 1, SCENE_SEGMENTS, 1e-3},
         {"{max_error: 1e-3}", 2, SCENE_SEGMENTS, 1e-3},
-        {"{max_error: 1e-3, frames: 4, jitter: false, group: 8}", 1, SCENE_SEGMENTS, 1e-3},
+        {"{max_error: 1e-3, frames: 4, jitter: false}", 1, SCENE_SEGMENTS, 1e-3},
         {"{method: segments, step_cells: 0.25}", 1, SCENE_SEGMENTS, 0},
         {"{step: 0.1}", 1, SCENE_SAMPLES, 0},
         {"{step_cells: 0.25}", 1, SCENE_SAMPLES, 0},
         {"{jitter: true}", 1, SCENE_SAMPLES, 0},
         {"{frames: 1}", 1, SCENE_SAMPLES, 0},
-        {"{group: 64}", 1, SCENE_SAMPLES, 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char text[512] = "images:\n- name: a\n  layers:\n  - isosurface: {field: p, values: [1]}\n";
@@ -327,7 +322,7 @@ static void scene_layer_defaults_hold(void **state)
     parse_good(fewest_keys, &s);
     const scene_isosurface *surface = &s.images[0].isosurfaces[0];
     assert_int_equal(surface->field.component, SCENE_COMPONENT_DEFAULT);
-    assert_true(surface->opacity == 1 && surface->root_steps == 2);
+    assert_true(surface->opacity == 1);
     assert_true(surface->material.ambient == 0.15F && surface->material.diffuse == 0.75F);
     assert_true(surface->material.specular == 0.25F && surface->material.shininess == 32);
     check_built_in(&surface[1].colour_map, "viridis");
@@ -500,8 +495,14 @@ static const struct bad_file {
     {10, "      - isosurface: {field: f, values: [1], component: w}", 10, {"component: \"w\"", "magnitude, x, y, z"}},
     {10, "      - isosurface: {field: f, values: [1], component: -1}", 10, {"component: \"-1\"", "magnitude"}},
     {10, "      - isosurface: {field: f, values: [1], opacity: 1.5}", 10, {"opacity: \"1.5\"", "from 0 to 1"}},
-    {10, "      - isosurface: {field: f, values: [1], root_steps: 65}", 10, {"root_steps: \"65\"", "from 0 to 64"}},
-    {10, "      - isosurface: {field: f, values: [1], roots: newton}", 10, {"roots: \"newton\"", "neubauer, robust"}},
+    {10,
+     "      - isosurface: {field: f, values: [1], root_steps: 2}",
+     10,
+     {"the key \"root_steps\" is gone", "polished"}},
+    {10,
+     "      - isosurface: {field: f, values: [1], roots: robust}",
+     10,
+     {"the key \"roots\" is gone", "no crossing"}},
     {10, "      - isosurface: {field: f, values: [1], difference: 0}", 10, {"difference: \"0\"", "above 0"}},
     {10, "      - isosurface: {field: f, values: [1], material: {shine: 1}}", 10, {"material: the key \"shine\""}},
     {10, "      - isosurface: {field: f, values: [1], material: {shininess: 0}}", 10, {"material.shininess: \"0\""}},
@@ -531,7 +532,7 @@ static const struct bad_file {
     {12, "    sampling: {step: 0}", 12, {"sampling.step: \"0\"", "above 0 and at most 1e+30"}},
     {12, "    sampling: {step: 1e300}", 12, {"sampling.step: \"1e300\"", "above 0 and at most 1e+30"}},
     {12, "    sampling: {max_seconds: 0}", 12, {"sampling.max_seconds: \"0\"", "from 1 to 1000000000"}},
-    {12, "    sampling: {group: 65}", 12, {"sampling.group: \"65\"", "from 1 to 64"}},
+    {12, "    sampling: {group: 64}", 12, {"the key \"group\" is gone", "never changed an image"}},
     {12, "    sampling: {jitter: maybe}", 12, {"sampling.jitter: \"maybe\"", "true or false"}},
     {12, "    sampling: {frames: 4097}", 12, {"sampling.frames: \"4097\"", "from 1 to 4096"}},
     {14, "      - path: a.jpg", 14, {"outputs[0].path: \"a.jpg\"", ".png or .exr"}},

@@ -56,8 +56,8 @@ static void look_at_both(int most[2])
 
 static const char *const layers[] = {
     "isosurface: {field: f, values: [0.1, 0.5]}",
-    "isosurface: {field: f, values: [0.1], roots: neubauer, normals: differences, opacity: 0.5}",
-    "volume: {field: f}\n    sampling: {method: samples, group: 64}",
+    "isosurface: {field: f, values: [0.1], normals: differences, opacity: 0.5}",
+    "volume: {field: f}\n    sampling: {method: samples}",
     "volume: {field: f}\n    sampling: {method: segments}",
     "volume: {field: f, opacity: [[0, 0], [0.5, 0], [0.5, 1], [1, 1]]}\n    sampling: {max_error: 0.01}",
     "volume: {field: f}\n      - volume: {field: f, map: grey}\n      - isosurface: {field: f, values: [0.3]}",

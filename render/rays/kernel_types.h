@@ -13,7 +13,7 @@
 enum {
     KERNEL_TILE = 16,
     KERNEL_BLOCK = 4, /* pixels along its side */
-    KERNEL_MAX_GROUP = 64,
+    KERNEL_MAX_GROUP = RENDER_MAX_GROUP,
     KERNEL_MAX_INTERVALS = RENDER_MAX_INTERVALS,
     KERNEL_ACTIVE_FLOATS = 4 /* of a vertex */
 };
@@ -46,7 +46,7 @@ typedef struct kernel_surface {
     double value_scale;       /* a power of two that brings the field's range near 1: for differences */
 } kernel_surface;
 
-/* Where a cell's surface of an isovalue, or its volume, may show: its depths, and pixels, ends included. */
+/* A cell whose surface of an isovalue, or whose volume, may be seen: its depths, and pixels, ends included. */
 typedef struct kernel_candidate {
     uint32_t cell;
     uint32_t source; /* part * RENDER_MAX_ISOVALUES + index into the frame's isovalues; of a volume: part */
@@ -54,8 +54,8 @@ typedef struct kernel_candidate {
     uint16_t x0, x1, y0, y1;
 } kernel_candidate;
 
-/* The same for one tile: a bit a block; and the first and last column, first and last row of pixels, from the low bits
- * on. */
+/* A candidate in one tile: a bit a block; and the first and last column, first and last row of pixels, from the low
+ * bits on. */
 typedef struct kernel_tile_candidate {
     float near;
     union {
@@ -163,7 +163,7 @@ typedef struct kernel_thread {
     bool (*reserve)(fragment_list *list, int64_t more);
     bool out_of_memory;
     int64_t map_failures;
-    /* Of the tile: render_polyhedra.h; NULL where no mesh has any. */
+    /* The tile's polyhedra (render_polyhedra.h); NULL where no mesh has any. */
     struct polyhedron_store *polyhedra;
     struct polyhedron *(*find_polyhedron)(struct polyhedron_store *store, const grid *g, const grid_field *field,
                                           int part, int layer, uint32_t index);
@@ -172,14 +172,14 @@ typedef struct kernel_thread {
     double (*now)(void);
 } kernel_thread;
 
-/* What one instruction set's object exports. */
+/* The functions that one instruction set's object exports. */
 typedef struct kernel_table {
     int width;
     size_t memory_bytes;
     void (*begin)(kernel_thread *thread); /* ready the thread's memory for a frame */
     /* Trace the tile of pixels whose upper left one is (x0, y0). */
     void (*trace_tile)(const kernel_frame *frame, kernel_thread *thread, int x0, int y0);
-    /* What may show of the subtree is added to the list; grow() makes room for more, or the list full. */
+    /* Adds the subtree's candidates to the list; grow() makes room for more, or the list full. */
     void (*find_candidates)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                             kernel_candidate_list *list, bool (*grow)(kernel_candidate_list *list));
     /* Keep what the surface's isovalues cross of the subtree, whether or not it shows in the picture. */

@@ -107,7 +107,7 @@ static render_job make_job(const session_drawing *d, const scene_image *image, c
                         .max_error = image->max_error,
                         .extent = 2 * d->space->extent.half_diagonal,
                         .step = view->step,
-                        .sample_group = image->sample_group,
+                        .sample_group = RENDER_MAX_GROUP,
                         .jitter = image->jitter,
                         .is_alone = d->space->extent.rank_count <= 1,
                         .threads = d->team->threads};
@@ -217,7 +217,7 @@ static bool are_same_meshes(const scene_field *a, const scene_field *b)
 static bool is_same(const scene_isosurface *a, const scene_isosurface *b)
 {
     return are_same_meshes(&a->field, &b->field) && strcmp(a->field.name, b->field.name) == 0 &&
-           a->field.component == b->field.component && a->roots == b->roots && a->value_count == b->value_count &&
+           a->field.component == b->field.component && a->value_count == b->value_count &&
            memcmp(a->values, b->values, (size_t)a->value_count * sizeof *a->values) == 0;
 }
 

@@ -117,8 +117,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .colours = layer->colours,
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
-                                  .root = layer->roots == SCENE_ROBUST ? RENDER_ROBUST : RENDER_NEUBAUER,
-                                  .root_steps = layer->root_steps,
+                                  .root = RENDER_ROBUST,
                                   .normal = layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES : RENDER_GRADIENT,
                                   .difference = layer->difference};
     if (!layer->has_colour_by) return INSITU_OK;

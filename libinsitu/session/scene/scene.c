@@ -105,7 +105,7 @@ static void convert_background(const scene_file_image *in, float background[4])
  * how samples are to be taken. */
 static bool is_unsaid(const scene_file_sampling *in)
 {
-    return !in->method && !in->max_error && !in->step && !in->step_cells && !in->group && !in->jitter && !in->frames;
+    return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
 }
 
 /* One volume is drawn to an error: samples are cheaper, but noise of what error they leave nobody knows. Several are
@@ -126,7 +126,6 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     choose_method(in, out);
     out->step = in->step ? *in->step : 0;
     out->step_cells = in->step_cells ? *in->step_cells : 0.5;
-    out->sample_group = in->group ? *in->group : 64;
     out->jitter = in->jitter ? *in->jitter : true;
     out->frames = in->frames ? *in->frames : 1;
     out->max_seconds = in->max_seconds ? *in->max_seconds : 3600;

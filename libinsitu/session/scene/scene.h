@@ -53,7 +53,6 @@ typedef struct scene_material {
     float ambient, diffuse, specular, shininess;
 } scene_material;
 
-typedef enum scene_root { SCENE_NEUBAUER, SCENE_ROBUST } scene_root;
 typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES } scene_normal;
 
 typedef struct scene_isosurface {
@@ -66,8 +65,6 @@ typedef struct scene_isosurface {
     scene_colour_map colour_map;
     float opacity;
     scene_material material;
-    scene_root roots; /* robust by default */
-    int root_steps;   /* of Neubauer's method, 0 .. 64; 2 by default */
     scene_normal normals;
     double difference; /* in cell sizes, > 0; 1 by default */
 } scene_isosurface;
@@ -118,7 +115,6 @@ typedef struct scene_image {
     double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */
     double step;                  /* sample distance in scene units; 0: by step_cells */
     double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
-    int sample_group;             /* 1 .. 64; 64 by default */
     bool jitter;                  /* true by default */
     int frames;                   /* accumulated; 1 by default, 1 .. 4096 */
     double max_seconds;           /* that samples may take by estimate; 3600 by default */

@@ -332,6 +332,17 @@ static insitu_status bad_key(const scene_document *d, const char *path, const ya
                      line_of(name), path, *path ? ": " : "", quoted, fault, expected);
 }
 
+/* Why a key that earlier scenes had is no longer there; NULL where it never was. */
+static const char *why_gone(const char *key)
+{
+    static const char *const gone[][2] = {{"roots", "gone (no crossing in a cell is missed any more)"},
+                                          {"root_steps", "gone (roots are polished until they stay)"},
+                                          {"group", "gone (it never changed an image)"}};
+    for (size_t i = 0; i < sizeof gone / sizeof gone[0]; i++)
+        if (strcmp(key, gone[i][0]) == 0) return gone[i][1];
+    return NULL;
+}
+
 static insitu_status check_pair(const scene_document *d, const char *path, const yaml_node_pair_t *pair,
                                 const scene_mapping *mapping, unsigned *seen)
 {
@@ -341,7 +352,10 @@ static insitu_status check_pair(const scene_document *d, const char *path, const
            (name->type != YAML_SCALAR_NODE || strcmp(text_of(name), mapping->fields[i].key) != 0)) {
         i++;
     }
-    if (!mapping->fields[i].key) return bad_key(d, path, name, mapping, "unknown");
+    if (!mapping->fields[i].key) {
+        const char *fault = name->type == YAML_SCALAR_NODE ? why_gone(text_of(name)) : NULL;
+        return bad_key(d, path, name, mapping, fault ? fault : "unknown");
+    }
     if (*seen & 1u << i) return bad_key(d, path, name, mapping, "given twice");
     *seen |= 1u << i;
     char value_path[path_size];

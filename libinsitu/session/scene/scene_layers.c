@@ -144,8 +144,6 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
 {
     out->opacity = given_or(in->opacity, 1);
     out->material = convert_material(in->material);
-    out->roots = in->roots ? (scene_root)*in->roots : SCENE_ROBUST;
-    out->root_steps = in->root_steps ? *in->root_steps : 2;
     out->normals = in->normals ? (scene_normal)*in->normals : SCENE_GRADIENT;
     out->difference = in->difference ? *in->difference : 1;
     out->field.at_vertices = true;

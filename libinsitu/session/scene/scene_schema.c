@@ -34,7 +34,6 @@ static const cyaml_schema_value_t opacity_point = {CYAML_VALUE_SEQUENCE_FIXED(CY
 #define MAP_WORD(word, name) {name, COLOUR_MAP_##word},
 static const cyaml_strval_t map_words[] = {COLOUR_MAPS(MAP_WORD)};
 static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
-static const cyaml_strval_t root_words[] = {{"neubauer", SCENE_NEUBAUER}, {"robust", SCENE_ROBUST}};
 static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}};
 static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"vertex", SCENE_BY_VERTEX}};
 static const cyaml_strval_t tree_words[] = {
@@ -142,13 +141,6 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_isosurface, material, material_fields),                 \
       .help = "How the surfaces take light.", .by_default = "a slight gloss", .child = &material_mapping)              \
-    X(CHOICE("roots", scene_file_isosurface, roots, root_words),                                                       \
-      .help = "How the surface is found in a cell along a ray: `robust` misses none of its crossings; `neubauer` is "  \
-              "the method of so many `root_steps`, which sees no surface that a ray enters and leaves in one cell.",   \
-      .by_default = "`robust`")                                                                                        \
-    X(CYAML_FIELD_INT_PTR("root_steps", OPTIONAL, scene_file_isosurface, root_steps),                                  \
-      .help = "Steps of the root search in a cell by `neubauer` after it has been bracketed.", .by_default = "`2`",    \
-      .low = 0, .high = 64)                                                                                            \
     X(CHOICE("normals", scene_file_isosurface, normals, normal_words),                                                 \
       .help = "What light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, or "      \
               "central `differences` about the hit, smoother and slower, over the cells of one rank.",                 \
@@ -211,9 +203,6 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
           "Distance between samples in mean cell sizes (a cell's size is the cube root of its volume; the mean is "    \
           "rounded by up to 1.6e-4, so that no partition shows in it). Smaller is finer and slower.",                  \
       .by_default = "`0.5`", .low = 0, .is_low_excluded = true, .high = 1000)                                          \
-    X(CYAML_FIELD_INT_PTR("group", OPTIONAL, scene_file_sampling, group),                                              \
-      .help = "Samples of a ray that are looked up together. Changes the speed, not the image.", .by_default = "`64`", \
-      .low = 1, .high = 64)                                                                                            \
     X(CYAML_FIELD_BOOL_PTR("jitter", OPTIONAL, scene_file_sampling, jitter),                                           \
       .help = "Shift each pixel's samples by a part of a step of its own: fine noise instead of rings.",               \
       .by_default = "`true`")                                                                                          \
@@ -288,9 +277,9 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, 64),                           \
       .help =                                                                                                          \
           "The images to draw. Three frames or more of a step that show the same isosurface, opaque, in one colour a " \
-          "value, normals by gradient and robust roots, share the work of finding its cells, where these are tets or " \
-          "hexes in arrays of float32 and int32 and the images have most of a rank's mesh in view: 64 bytes a "        \
-          "crossed tet and 128 a hex, at most 64 MiB a rank, are held while the step is drawn.",                       \
+          "value, normals by gradient, share the work of finding its cells, where these are tets or hexes in arrays "  \
+          "of float32 and int32 and the images have most of a rank's mesh in view: 64 bytes a crossed tet and 128 a "  \
+          "hex, at most 64 MiB a rank, are held while the step is drawn.",                                             \
       .child = &image_mapping)
 static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};
 static const scene_key top_keys[] = {TOP_KEYS(AS_KEY)};

@@ -49,8 +49,6 @@ typedef struct scene_file_isosurface {
     scene_file_colour_by *colour_by;
     double *opacity;
     scene_file_material *material;
-    int *roots; /* scene_root */
-    int *root_steps;
     int *normals; /* scene_normal */
     double *difference;
 } scene_file_isosurface;
@@ -74,7 +72,6 @@ typedef struct scene_file_sampling {
     int *method; /* scene_sampling_method */
     double *max_error;
     double *step, *step_cells;
-    int *group;
     bool *jitter;
     int *frames;
     double *max_seconds;
