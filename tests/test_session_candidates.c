@@ -29,11 +29,10 @@ static insitu_session *open_tree(scene_tree tree, const char *scene)
     return session;
 }
 
-/* A step of the one and of the other: is the picture the same? */
-static void step_same(insitu_session *full, insitu_session *other, const session_input *in, int64_t cycle)
+/* A step of the one and of the other, which have their meshes: is the picture the same? */
+static void step_both(insitu_session *full, insitu_session *other, int64_t cycle)
 {
     forget_pictures();
-    everywhere(hand_over(full, in) == INSITU_OK && hand_over(other, in) == INSITU_OK);
     told_everywhere(full, insitu_step(full, cycle, 0), INSITU_OK, "");
     told_everywhere(other, insitu_step(other, cycle, 0), INSITU_OK, "");
     if (own_rank == 0) {
@@ -47,6 +46,12 @@ static void step_same(insitu_session *full, insitu_session *other, const session
         assert_true(sum > 1);
     }
     everywhere(insitu_last_report(full)->cells_unusable == insitu_last_report(other)->cells_unusable);
+}
+
+static void step_same(insitu_session *full, insitu_session *other, const session_input *in, int64_t cycle)
+{
+    everywhere(hand_over(full, in) == INSITU_OK && hand_over(other, in) == INSITU_OK);
+    step_both(full, other, cycle);
 }
 
 /* Cells in the trees of all ranks. */
@@ -181,12 +186,42 @@ static void full_trees_are_built_where_most_cells_show(void **context)
     input_free(&in);
 }
 
+/* A ray's way through a tree built along a curve costs more than through one by the surface area heuristic. */
+static double tree_cost(const insitu_session *session)
+{
+    return mmbvh_cost(&session->meshes.items[0]->tree, &(mmbvh_options){.threads = 1});
+}
+
+/* Two sessions, of which one is told that nothing has changed: its first tree, by the heuristic, stays. The other's is
+ * built anew at each step, along a curve from the second on, and by the heuristic again after one that stayed. The
+ * pictures are the same throughout. */
+static void trees_of_one_step_are_built_fast(void **context)
+{
+    (void)context;
+    session_input in;
+    const char *scene = write_scene(IMAGE(SURFACE));
+    input_create(&in, TEST_TETS, 10, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *still = open_tree(SCENE_TREE_FULL, scene), *moving = open_tree(SCENE_TREE_FULL, scene);
+    static const bool is_anew[] = {true, true, true, false, true}, is_fast[] = {false, true, true, true, false};
+    for (int step = 0; step < 5; step++) {
+        in.mesh.changed = step ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_ALL;
+        everywhere(hand_over(still, &in) == INSITU_OK);
+        in.mesh.changed = is_anew[step] ? INSITU_CHANGED_ALL : INSITU_CHANGED_NOTHING;
+        everywhere(hand_over(moving, &in) == INSITU_OK);
+        step_both(still, moving, step);
+        everywhere(in.part.cell_count < 100 || (tree_cost(moving) != tree_cost(still)) == is_fast[step]);
+    }
+    insitu_destroy(&still);
+    insitu_destroy(&moving);
+    input_free(&in);
+}
+
 static int run(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(partial_trees_draw_what_full_ones_do),
-                                       cmocka_unit_test(partial_trees_are_of_the_cells_that_show),
-                                       cmocka_unit_test(standing_cells_get_a_full_tree),
-                                       cmocka_unit_test(full_trees_are_built_where_most_cells_show)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(partial_trees_draw_what_full_ones_do), cmocka_unit_test(trees_of_one_step_are_built_fast),
+        cmocka_unit_test(partial_trees_are_of_the_cells_that_show), cmocka_unit_test(standing_cells_get_a_full_tree),
+        cmocka_unit_test(full_trees_are_built_where_most_cells_show)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

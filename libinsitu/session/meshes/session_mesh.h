@@ -61,6 +61,7 @@ typedef struct session_mesh {
     mmbvh tree;
     bool is_partial; /* the tree is over the candidates of candidates_key, while nothing changes */
     uint64_t candidates_key;
+    int full_tree_steps; /* that the full tree of now, or the last one, has served; 0: there was none yet */
     double rent; /* seconds spent on partial trees since the cells last changed, beyond what a full one would cost */
     int scalar_count;
     session_scalar *scalars;
