@@ -2,7 +2,7 @@
 
 #include "render.h"
 
-/* Of vectors so long or short, too, that their squares are not to be had. */
+/* hypot() serves vectors whose squares overflow or underflow too. */
 static double length3(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);

@@ -26,7 +26,7 @@ static double now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* What most tiles make at most: beyond that they leave their piece. */
+/* Most tiles make no more fragments than this; those that do leave their piece. */
 enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 
 /* Where fragments go: into each writer's piece of a list, or to a taker, tile by tile. */

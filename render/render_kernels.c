@@ -24,7 +24,7 @@
 #include "render.h"
 #include "simd.h"
 
-/* What a thread holds from tile to tile. */
+/* The memory that a thread keeps from tile to tile. */
 typedef struct kernel_memory {
     kernel_cell_cache packet_cells;
     kernel_poly polys[KERNEL_CACHE_CELLS]; /* of the cells in the same places */
@@ -70,7 +70,7 @@ static void trace_packet(const kernel_frame *f, const kernel_tile *tile, kernel_
     if (f->volume_count) trace_packet_volumes(&p, &hits, first_fragment);
 }
 
-/* Is one of the pixels of the rectangle to be traced? */
+/* Tells whether one of the rectangle's pixels is to be traced. */
 static bool is_wanted(const render_job *job, int x0, int y0, int columns, int rows)
 {
     const int x1 = x0 + columns, y1 = y0 + rows;

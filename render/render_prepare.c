@@ -224,7 +224,7 @@ static double scene_reach(const render_job *job)
  * opacity of 1 they were off by 3.4e-5 at most. */
 static const double double_error = 2e-4;
 
-/* Of max_error an eighth goes to the colours' table, and four fifths to the field (docs/error_budget.md): half of them
+/* An eighth of max_error goes to the colours' table, and four fifths to the field (docs/error_budget.md): half of these
  * over the length of the ray, half over what is absorbed. Segments that are mixed with others take a half of that for
  * their mixing. */
 static insitu_status prepare_segments(kernel_frame *f, base_error *error)

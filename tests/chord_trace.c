@@ -136,9 +136,9 @@ static void chord_trace(const kernel_frame *f, kernel_thread *thread, chord_rays
         kernel_packet p;
         chord_state state = {rays, first};
         chord_packet(&p, f, &tile, thread, rays, first);
+        const kernel_descent descent = {NULL, p.t_near, &p.t_far, chord_leaf, &state};
         for (int part = 0; part < f->job->part_count; part++)
-            kernel_traverse(&p, f->job->parts[part].tree, NULL, NULL, p.active, p.t_near, &p.t_far, part, chord_leaf,
-                            &state);
+            kernel_traverse(&p, f->job->parts[part].tree, NULL, &descent, p.active, part);
     }
 }
 

@@ -97,11 +97,12 @@ SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_spot *a, const 
         {a->x * b->y - b->x * a->y, b->depth * a->y - a->depth * b->y, a->depth * b->x - b->depth * a->x}};
 }
 
-/* ij, jk and ik: the edges of the face; radius: no ray's |u| and |v| are more. */
-SIMD_INLINE void kernel_double_sums(const kernel_double_spot *i, const kernel_double_spot *j,
-                                    const kernel_double_spot *k, const kernel_affine *ij, const kernel_affine *jk,
-                                    const kernel_affine *ik, double radius, kernel_double_face *out)
+/* The sums of a face of kernel_tet_face, from the tet's vertices and edges. No ray's |u| and |v| exceed radius. */
+SIMD_INLINE void kernel_double_sums(const kernel_double_spot *spots, const kernel_affine *edges,
+                                    const signed char *face, double radius, kernel_double_face *out)
 {
+    const kernel_double_spot *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
+    const kernel_affine *ij = &edges[face[3]], *jk = &edges[face[4]], *ik = &edges[face[5]];
     for (int n = 0; n < 3; n++) {
         out->depth.c[n] = (jk->c[n] * i->t - ik->c[n] * j->t) + ij->c[n] * k->t;
         out->value.c[n] = (jk->c[n] * i->value - ik->c[n] * j->value) + ij->c[n] * k->value;
@@ -131,11 +132,8 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
     }
     for (int n = 0; n < KERNEL_TET_EDGES; n++)
         edges[n] = kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]]);
-    for (int n = 0; n < 4; n++) {
-        const signed char *face = kernel_tet_face[n];
-        kernel_double_sums(&spots[face[0]], &spots[face[1]], &spots[face[2]], &edges[face[3]], &edges[face[4]],
-                           &edges[face[5]], (double)tile->radius, &out->faces[n]);
-    }
+    for (int n = 0; n < 4; n++)
+        kernel_double_sums(spots, edges, kernel_tet_face[n], (double)tile->radius, &out->faces[n]);
 }
 
 /* ---- rays in it ---- */

@@ -147,7 +147,7 @@ SIMD_INLINE void kernel_weights_mend(const kernel_packet *p, float least, vm hit
     const vm weak = kernel_weak(hit, weight, kernel_triangle_least(p, i, j, k));
     vf ij = w->ij, jk = w->jk, ik = w->ik;
     if (!vm_any(weak)) return;
-    kernel_triangle_mend(p, i, j, k, weak, &ij, &jk, &ik);
+    kernel_triangle_mend(p, (const kernel_spot[3]){i, j, k}, weak, &ij, &jk, &ik);
     *w = kernel_weights_of(w->i, w->j, w->k, ij, jk, ik);
 }
 
@@ -161,11 +161,23 @@ SIMD_INLINE vf kernel_weigh_depth(const kernel_weights *w, const float *z)
     return kernel_weigh(w, z[w->i], z[w->j], z[w->k]);
 }
 
-SIMD_INLINE void kernel_triangle_values(const kernel_cell *c, const kernel_shape *shape, const kernel_weights *w,
-                                        bool has_colour, kernel_crossing *out)
+/* A search for the crossings of a cell's faces: whose rays, and what all of the faces share. */
+typedef struct kernel_face_search {
+    const kernel_packet *packet;
+    const kernel_cell *cell;
+    const kernel_shape *shape;
+    const kernel_projected *projected;
+    const kernel_edges *edges;
+    vm rays;
+    bool has_colour;
+} kernel_face_search;
+
+SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_crossing *out)
 {
+    const kernel_cell *c = s->cell;
+    const kernel_shape *shape = s->shape;
     out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
-    out->w = has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
+    out->w = s->has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
     for (int a = 0; a < 3; a++)
         out->r[a] = kernel_weigh(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
 }
@@ -187,15 +199,17 @@ SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, con
 
 /* The crossing of a quad's patch. The isoparametric map has the same patch there, so that the field inside the cells on
  * both sides goes on to the same value. */
-SIMD_INLINE void kernel_quad_values(const kernel_cell *c, const kernel_shape *shape, const int corner[4],
-                                    const kernel_quad_place *at, bool has_colour, kernel_crossing *out)
+SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_place *at,
+                                    kernel_crossing *out)
 {
+    const kernel_cell *c = s->cell;
+    const kernel_shape *shape = s->shape;
     vf f[4], g[4];
-    for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(has_colour ? c->g[corner[i]] : 0);
+    for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(s->has_colour ? c->g[corner[i]] : 0);
     out->mask = at->mask;
     out->t = at->t;
     out->v = kernel_bilinear(f, at->s, at->r);
-    out->w = has_colour ? kernel_bilinear(g, at->s, at->r) : vf_set(0);
+    out->w = s->has_colour ? kernel_bilinear(g, at->s, at->r) : vf_set(0);
     for (int a = 0; a < 3; a++) {
         const float base = shape->corners[corner[0]][a];
         out->r[a] =
@@ -221,45 +235,43 @@ SIMD_INLINE vm kernel_triangle(const kernel_edges *edges, vm rays, const int ijk
     return kernel_inside(rays, edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]], edges->e[ijk[0]][ijk[2]]);
 }
 
-/* The crossing of such a triangle; false where no ray has any. */
-SIMD_INLINE bool kernel_triangle_crossing(const kernel_packet *p, const kernel_cell *c, const kernel_shape *shape,
-                                          const kernel_edges *edges, vm rays, const int corners[3], bool has_colour,
-                                          kernel_crossing *out)
+/* Finds the crossing of three of the cell's vertices; false where no ray has any. */
+SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int corners[3], kernel_crossing *out)
 {
+    const kernel_cell *c = s->cell;
+    const kernel_edges *edges = s->edges;
     int ijk[3];
     kernel_triangle_order(c, corners, ijk);
-    const vm hit = kernel_triangle(edges, rays, ijk);
+    const vm hit = kernel_triangle(edges, s->rays, ijk);
     if (!vm_any(hit)) return false;
     kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]],
                                          edges->e[ijk[0]][ijk[2]]);
-    kernel_weights_mend(p, c->least[0], hit, kernel_cell_spot(c, w.i), kernel_cell_spot(c, w.j),
+    kernel_weights_mend(s->packet, c->least[0], hit, kernel_cell_spot(c, w.i), kernel_cell_spot(c, w.j),
                         kernel_cell_spot(c, w.k), &w);
     out->mask = hit;
     out->t = kernel_weigh_depth(&w, c->z);
-    kernel_triangle_values(c, shape, &w, has_colour, out);
+    kernel_triangle_values(s, &w, out);
     return true;
 }
 
-/* Of a quad that is a triangle. */
-static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_packet *p, const kernel_cell *c,
-                                                                      const kernel_shape *shape,
-                                                                      const kernel_edges *edges, vm rays,
-                                                                      const int corner[4], bool has_colour,
+/* As below, for a quad that has collapsed to a triangle. */
+static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
                                                                       kernel_crossing *out)
 {
     int n = 0;
     for (int half = 0; half < 2; half++) {
         const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
-        n += kernel_triangle_crossing(p, c, shape, edges, rays, corners, has_colour, &out[n]);
+        n += kernel_triangle_crossing(s, corners, &out[n]);
     }
     return n;
 }
 
-/* How many crossings there are, 0 to 2; each ray's are in one of them or in both. */
-SIMD_INLINE int kernel_quad_crossings(const kernel_packet *p, const kernel_cell *c, const kernel_shape *shape,
-                                      const kernel_projected *q, const kernel_edges *edges, vm rays,
-                                      const int corner[4], bool has_colour, kernel_crossing *out)
+/* Finds the crossings of a quad and returns how many there are, 0 to 2; each ray's are in one of them or in both. */
+SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_crossing *out)
 {
+    const kernel_cell *c = s->cell;
+    const kernel_edges *edges = s->edges;
+    const vm rays = s->rays;
     kernel_quad quad;
     kernel_quad_place places[2];
     vm once = vm_none();
@@ -275,11 +287,10 @@ SIMD_INLINE int kernel_quad_crossings(const kernel_packet *p, const kernel_cell 
     quad.e32 = kernel_corner_edge(c, edges, corner[3], corner[2]);
     const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
     if (!vm_any(vm_or(once, twice))) return 0;
-    if (kernel_quad_collapses(c, corner))
-        return kernel_collapsed_crossings(p, c, shape, edges, rays, corner, has_colour, out);
-    kernel_quad_take(q, c->z, corner, &quad);
+    if (kernel_quad_collapses(c, corner)) return kernel_collapsed_crossings(s, corner, out);
+    kernel_quad_take(s->projected, c->z, corner, &quad);
     const int n = kernel_quad_places(&quad, once, twice, places);
-    for (int i = 0; i < n; i++) kernel_quad_values(c, shape, corner, &places[i], has_colour, &out[i]);
+    for (int i = 0; i < n; i++) kernel_quad_values(s, corner, &places[i], &out[i]);
     return n;
 }
 
@@ -290,6 +301,7 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
     const kernel_shape *shape = kernel_cell_shape(c->type);
     kernel_projected q;
     kernel_edges edges;
+    const kernel_face_search s = {p, c, shape, &q, &edges, rays, has_colour};
     for (int i = 0; i < c->count; i++) {
         q.x[i] = kernel_project_x(p, kernel_cell_spot(c, i));
         q.y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
@@ -301,13 +313,13 @@ SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell 
         const signed char *loop = shape->faces[face].vertices;
         if (shape->faces[face].count == 3) {
             const int corners[3] = {loop[0], loop[1], loop[2]};
-            n += kernel_triangle_crossing(p, c, shape, &edges, rays, corners, has_colour, &out[n]);
+            n += kernel_triangle_crossing(&s, corners, &out[n]);
             continue;
         }
         int corner[4];
         kernel_quad_corners(c, loop, corner);
         kernel_poly_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
-        n += kernel_quad_crossings(p, c, shape, &q, &edges, rays, corner, has_colour, &out[n]);
+        n += kernel_quad_crossings(&s, corner, &out[n]);
     }
     return n;
 }

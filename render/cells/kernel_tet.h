@@ -91,13 +91,21 @@ SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, 
     if (__builtin_expect(vm_any(vm_not(vf_lt(vf_set(c->doubt), least))), 0)) kernel_tet_edges_exactly(p, c, e);
 }
 
+/* The faces' vertices and edges. */
+static const signed char kernel_tet_face[4][6] = {
+    {0, 1, 2, 0, 3, 1}, {0, 1, 3, 0, 4, 2}, {0, 2, 3, 1, 5, 2}, {1, 2, 3, 3, 5, 4}};
+
 /* A crossed triangle's sums (kernel_line.h). */
 typedef struct kernel_sums {
     vf depth, value, colour, weight;
 } kernel_sums;
 
-SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, int i, int j, int k, vf ij, vf jk, vf ik, bool has_colour)
+/* face: a row of kernel_tet_face. */
+SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, const signed char *face, const vf e[KERNEL_TET_EDGES],
+                                        bool has_colour)
 {
+    const int i = face[0], j = face[1], k = face[2];
+    const vf ij = e[face[3]], jk = e[face[4]], ik = e[face[5]];
     return (kernel_sums){kernel_weigh_value(ij, jk, ik, c->z[i], c->z[j], c->z[k]),
                          kernel_weigh_value(ij, jk, ik, c->f[i], c->f[j], c->f[k]),
                          has_colour ? kernel_weigh_value(ij, jk, ik, c->g[i], c->g[j], c->g[k]) : vf_set(0),
@@ -110,21 +118,17 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* The faces' vertices and edges. */
-static const signed char kernel_tet_face[4][6] = {
-    {0, 1, 2, 0, 3, 1}, {0, 1, 3, 0, 4, 2}, {0, 2, 3, 1, 5, 2}, {1, 2, 3, 3, 5, 4}};
-
 /* Where a ray goes in and out, in whichever order. */
 typedef struct kernel_ends {
     kernel_sums a, b;
 } kernel_ends;
 
-/* Of the faces that each ray crosses (which of them, but the last), the first and the last. */
-SIMD_INLINE kernel_ends kernel_tet_choose(vm m012, vm m013, vm m023, vm m123, const kernel_sums *s012,
-                                          const kernel_sums *s013, const kernel_sums *s023, const kernel_sums *s123)
+/* Takes the first and the last of the faces that each ray crosses. */
+SIMD_INLINE kernel_ends kernel_tet_choose(const vm hit[4], const kernel_sums sums[4])
 {
-    const kernel_sums a = kernel_sums_select(m013, s013, s023), b = kernel_sums_select(m023, s023, s013);
-    return (kernel_ends){kernel_sums_select(m012, s012, &a), kernel_sums_select(m123, s123, &b)};
+    const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
+    const kernel_sums b = kernel_sums_select(hit[2], &sums[2], &sums[1]);
+    return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
 }
 
 /* With the edges of faces projected on rays where their weights are not good enough. */
@@ -135,15 +139,18 @@ kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf 
     vm hit[4];
     for (int n = 0; n < 4; n++) {
         const signed char *f = kernel_tet_face[n];
-        vf ij = e[f[3]], jk = e[f[4]], ik = e[f[5]];
-        hit[n] = kernel_inside(rays, ij, jk, ik);
-        const vm weak = kernel_weak(hit[n], kernel_weight(ij, jk, ik), c->least[n]);
-        if (vm_any(weak))
-            kernel_triangle_mend(p, kernel_cell_spot(c, f[0]), kernel_cell_spot(c, f[1]), kernel_cell_spot(c, f[2]),
-                                 weak, &ij, &jk, &ik);
-        sums[n] = kernel_tet_sums(c, f[0], f[1], f[2], ij, jk, ik, has_colour);
+        vf own[KERNEL_TET_EDGES];
+        memcpy(own, e, sizeof own);
+        hit[n] = kernel_inside(rays, e[f[3]], e[f[4]], e[f[5]]);
+        const vm weak = kernel_weak(hit[n], kernel_weight(e[f[3]], e[f[4]], e[f[5]]), c->least[n]);
+        if (vm_any(weak)) {
+            const kernel_spot ijk[3] = {kernel_cell_spot(c, f[0]), kernel_cell_spot(c, f[1]),
+                                        kernel_cell_spot(c, f[2])};
+            kernel_triangle_mend(p, ijk, weak, &own[f[3]], &own[f[4]], &own[f[5]]);
+        }
+        sums[n] = kernel_tet_sums(c, f, own, has_colour);
     }
-    return kernel_tet_choose(hit[0], hit[1], hit[2], hit[3], &sums[0], &sums[1], &sums[2], &sums[3]);
+    return kernel_tet_choose(hit, sums);
 }
 
 /* Which rays cross which of the faces, in kernel_tet_face's order. */
@@ -163,20 +170,20 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
 {
     vf e[KERNEL_TET_EDGES];
     kernel_tet_edges(p, c, e);
-    const vm m012 = kernel_inside(rays, e[0], e[3], e[1]), m013 = kernel_inside(rays, e[0], e[4], e[2]);
-    const vm m023 = kernel_inside(rays, e[1], e[5], e[2]), m123 = kernel_inside(rays, e[3], e[5], e[4]);
-    out->mask = vm_or(vm_or(m012, m013), vm_or(m023, m123));
+    const vm hit[4] = {kernel_inside(rays, e[0], e[3], e[1]), kernel_inside(rays, e[0], e[4], e[2]),
+                       kernel_inside(rays, e[1], e[5], e[2]), kernel_inside(rays, e[3], e[5], e[4])};
+    out->mask = vm_or(vm_or(hit[0], hit[1]), vm_or(hit[2], hit[3]));
     out->t_in = out->t_out = out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
     if (!vm_any(out->mask)) return;
-    const kernel_sums s012 = kernel_tet_sums(c, 0, 1, 2, e[0], e[3], e[1], has_colour);
-    const kernel_sums s013 = kernel_tet_sums(c, 0, 1, 3, e[0], e[4], e[2], has_colour);
-    const kernel_sums s023 = kernel_tet_sums(c, 0, 2, 3, e[1], e[5], e[2], has_colour);
-    const kernel_sums s123 = kernel_tet_sums(c, 1, 2, 3, e[3], e[5], e[4], has_colour);
-    kernel_ends ends = kernel_tet_choose(m012, m013, m023, m123, &s012, &s013, &s023, &s123);
+    const kernel_sums sums[4] = {
+        kernel_tet_sums(c, kernel_tet_face[0], e, has_colour), kernel_tet_sums(c, kernel_tet_face[1], e, has_colour),
+        kernel_tet_sums(c, kernel_tet_face[2], e, has_colour), kernel_tet_sums(c, kernel_tet_face[3], e, has_colour)};
+    kernel_ends ends = kernel_tet_choose(hit, sums);
     if (p->is_pencil) {
+        const float *least = c->least;
         const vm weak =
-            vm_or(vm_or(kernel_weak(m012, s012.weight, c->least[0]), kernel_weak(m013, s013.weight, c->least[1])),
-                  vm_or(kernel_weak(m023, s023.weight, c->least[2]), kernel_weak(m123, s123.weight, c->least[3])));
+            vm_or(vm_or(kernel_weak(hit[0], sums[0].weight, least[0]), kernel_weak(hit[1], sums[1].weight, least[1])),
+                  vm_or(kernel_weak(hit[2], sums[2].weight, least[2]), kernel_weak(hit[3], sums[3].weight, least[3])));
         if (__builtin_expect(vm_any(weak), 0)) ends = kernel_tet_mend(p, c, rays, e, has_colour);
     }
     const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;

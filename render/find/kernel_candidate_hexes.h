@@ -170,7 +170,7 @@ SIMD_INLINE void kernel_hex_lanes_fetch(const kernel_finder *s, kernel_hex_lanes
     for (int i = 0; i < 8; i++) l->f[i] *= vf_from_bits(power);
 }
 
-/* One of those that wait, from the mesh or as it is kept: then its number is none of the mesh's. */
+/* Fetches a pending hex, from the mesh or from its active record; a record's number is not the mesh's. */
 static void kernel_hex_fetch(kernel_finder *s, int n)
 {
     const kernel_packed *p = &s->packed;
@@ -183,7 +183,7 @@ static void kernel_hex_fetch(kernel_finder *s, int n)
     for (int i = 0; i < 8; i++) kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
 }
 
-/* Where those that wait show. */
+/* Finds where the pending hexes may be seen. */
 static __attribute__((noinline)) void kernel_find_crossed_hexes(kernel_finder *s)
 {
     kernel_crossed_hexes *h = &s->hexes;
@@ -205,7 +205,7 @@ static __attribute__((noinline)) void kernel_find_crossed_hexes(kernel_finder *s
     h->count = 0;
 }
 
-/* Those of the lanes, which the isovalue crosses, wait. */
+/* Makes the hexes of these lanes, which the isovalue crosses, pending. */
 SIMD_INLINE void kernel_crossed_hexes_add(kernel_finder *s, int value, unsigned lanes)
 {
     kernel_crossed_hexes *h = &s->hexes;

@@ -150,7 +150,7 @@ SIMD_INLINE void kernel_packed_value(kernel_finder *s, const vf v[4], kernel_tet
     }
     usual = vm_and(usual, vf_lt(vf_set(1e-30f), size));
     const unsigned all = (1u << s->tets.count) - 1, crossed = vm_bits(vm_and(negative, positive)) & all;
-    /* Of no usual size, or not numbers: one by one. */
+    /* Values too large, too small or NaN for lanes are handled one by one. */
     const unsigned good = crossed & vm_bits(usual);
     if (good) {
         kernel_tet_ends e;
@@ -164,7 +164,7 @@ SIMD_INLINE void kernel_packed_value(kernel_finder *s, const vf v[4], kernel_tet
     }
 }
 
-/* The same of all that shows of them in the volume. */
+/* As above, for all that a volume shows of them. */
 SIMD_INLINE void kernel_packed_volume(kernel_finder *s, const vf v[4], const kernel_tet_lanes *l)
 {
     vm usual = vm_all_lanes();

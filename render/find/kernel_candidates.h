@@ -29,7 +29,7 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Those that wait for their vertices. */
+/* Finds the candidates among the cells that wait for their vertices. */
 static void kernel_find_pending(kernel_finder *s)
 {
     if (s->writer)
@@ -132,8 +132,8 @@ SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tre
     return kernel_blocks_of(sides) && !(placement.far < s->t_near);
 }
 
-/* Those of the entries whose values and whose boxes show. About half of them do by their values, which no branch
- * foresees. */
+/* Chooses the entries whose values show and whose boxes are in view. Values decide about half of them, which no branch
+ * predicts. */
 SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, const mmbvh_ranges *ranges,
                                      kernel_front *front, const int64_t *entries, int count)
 {
@@ -199,7 +199,7 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
     kernel_find_rest(s);
 }
 
-/* What is crossed of the subtree, if it is of a mesh that can be kept. */
+/* Makes records of the subtree's active cells, if its mesh allows it. */
 static void kernel_activate_subtree(kernel_finder *s, int64_t root)
 {
     kernel_active_writer *k = s->writer;
@@ -208,7 +208,7 @@ static void kernel_activate_subtree(kernel_finder *s, int64_t root)
     if (!k->is_refused) kernel_find_candidates(s, root);
 }
 
-/* What shows of so many records that are kept, from the first on. */
+/* Finds the candidates among count active records, from the first on. */
 static void kernel_find_active(kernel_finder *s, int64_t first, int64_t count)
 {
     const int vertices = s->packed.is_hexes ? 8 : 4;

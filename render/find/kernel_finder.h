@@ -26,7 +26,7 @@ typedef struct kernel_tets {
     int32_t packed[8][SIMD_WIDTH]; /* the vertices of a packed mesh, instead; or of hexes */
 } kernel_tets;
 
-/* Of a packed mesh's cells of so many vertices, lanes from count on are as the first. */
+/* Fills the lanes from count on with the first, for a packed mesh's cells of so many vertices. */
 SIMD_INLINE void kernel_tets_fill(kernel_tets *t, int vertices)
 {
     for (int n = t->count; n < SIMD_WIDTH; n++)
@@ -149,8 +149,8 @@ SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, in
     return true;
 }
 
-/* Of a cell whose surface has these depths and columns and rows, relative to the axis of view, size the largest depth
- * of anything in it. Where some of it is near the eye's plane or behind it, it may be anywhere. */
+/* Adds a cell whose surface has these depths, columns and rows, relative to the axis of view. size is the largest depth
+ * of anything in it. A cell that is partly near the eye's plane or behind it may be anywhere in the picture. */
 SIMD_INLINE bool kernel_extents_candidate(const kernel_finder *s, kernel_extent depth, float size,
                                           kernel_extent columns, kernel_extent rows, kernel_candidate *out)
 {
@@ -344,7 +344,7 @@ static void kernel_find_volume(kernel_finder *s)
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* What of the fetched cell shows. */
+/* Adds the parts of the fetched cell that may be seen. */
 static void kernel_find_cell(kernel_finder *s)
 {
     if (!s->cell.is_finite) return;

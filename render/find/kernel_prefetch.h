@@ -11,7 +11,7 @@ SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, 
     for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
-/* Of cells of one type: others are not foreseen. */
+/* Prefetches a cell's indices where all cells have one type; elsewhere their place is not known beforehand. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     const int vertices = grid_type_vertices(g->cell_type);

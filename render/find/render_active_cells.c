@@ -87,7 +87,7 @@ static int by_place(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* What threads left of their last blocks is filled from the end. Returns how many floats there are. */
+/* Fills the rest of threads' last blocks with records from the end. Returns how many floats there are. */
 static int64_t close_gaps(const kernel_room *room, kernel_active_writer *writers, int threads)
 {
     float *top = room->floats + room->taken * BLOCK;
@@ -182,7 +182,7 @@ static bool is_in_view(const kernel_frame *frame, const mmbvh *tree)
     return inside >= POINTS * 3 / 4;
 }
 
-/* Is all that the tiles ask of the layer's cells in records? (kernel_tile_candidates.h) */
+/* Tells whether records hold all that tiles ask of the layer's cells (kernel_tile_candidates.h). */
 static bool can_keep(const kernel_frame *frame, int surface, int part)
 {
     const kernel_surface *s = &frame->surfaces[surface];

@@ -16,7 +16,7 @@ enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS, BLOCK
 
 /* ---- subtrees ------------------------------------------------------------------------------------------------- */
 
-/* Those of all surfaces, or of the volume. */
+/* Cuts the trees of all surfaces, or of the volume, into subtrees. */
 static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *list)
 {
     const render_job *job = f->job;
@@ -170,7 +170,7 @@ static void run(search *s, kernel_thread *thread_of, int threads)
     }
 }
 
-/* What the search has found, or NULL. */
+/* Returns the candidates that the search found, or NULL. */
 static kernel_tile_candidate *find(kernel_frame *frame, bool is_volume, kernel_thread *thread_of, int threads,
                                    uint32_t **starts)
 {

@@ -7,7 +7,7 @@
 /* Fill frame->shown, which render_candidates_free() frees; thread_of is one state a thread. Where more cells show than
  * pay, or there is no memory for them, it stays NULL, and tiles go down the trees themselves. */
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
-/* The same of the only volume's cells, as frame->volume_candidates. */
+/* As above, for the only volume's cells: fills frame->volume_candidates. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);
 void render_candidates_free(kernel_frame *frame);
 

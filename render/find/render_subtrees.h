@@ -9,9 +9,9 @@ typedef struct render_subtrees {
     int64_t count;
 } render_subtrees;
 
-/* With room for so many trees; false where there is no memory. */
+/* Begins a list with room for so many trees. Returns false where there is no memory. */
 bool render_subtrees_begin(render_subtrees *list, int64_t trees);
-/* Those of a part's tree for a surface (-1: the volume); or what is kept of its cells, in pieces. */
+/* Adds the subtrees of a part's tree for a surface (-1: the volume), or pieces of its active records. */
 void render_subtrees_add(render_subtrees *list, const kernel_frame *frame, int surface, int part);
 
 #endif

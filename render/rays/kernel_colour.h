@@ -136,9 +136,13 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
     for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
 }
 
+/* A fragment a ray; a ray's kind is what is added to the kind that all of them have. */
+typedef struct kernel_fragments {
+    vf t_in, t_out, colour[3], transmittance, kind;
+} kernel_fragments;
+
 /* Write the fragments of the rays in mask. */
-SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const vf kinds, vf t_in, vf t_out,
-                             const vf colour[3], vf transmittance)
+SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const kernel_fragments *f)
 {
     unsigned bits = vm_bits(mask);
     fragment_list *list = p->thread->out;
@@ -148,11 +152,11 @@ SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const vf 
         return;
     }
     float a[7][SIMD_WIDTH];
-    vf_store(a[0], t_in);
-    vf_store(a[1], t_out);
-    for (int i = 0; i < 3; i++) vf_store(a[2 + i], colour[i]);
-    vf_store(a[5], transmittance);
-    vf_store(a[6], kinds);
+    vf_store(a[0], f->t_in);
+    vf_store(a[1], f->t_out);
+    for (int i = 0; i < 3; i++) vf_store(a[2 + i], f->colour[i]);
+    vf_store(a[5], f->transmittance);
+    vf_store(a[6], f->kind);
     while (bits) {
         const int lane = __builtin_ctz(bits);
         bits &= bits - 1;

@@ -15,7 +15,7 @@ SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float lo
     return false;
 }
 
-/* The same of cells, a lane each, of four values. */
+/* As above, for cells of four values, a cell a lane. */
 SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf v[4])
 {
     const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3]));

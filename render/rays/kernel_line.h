@@ -62,7 +62,7 @@ SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *til
     return 2 * (x > y ? x : y) + 5 * tile->radius * depth;
 }
 
-/* Of the edge from a to b, a before b in the order; sizes as above. */
+/* Makes the line of the edge from a to b, a before b in the order; sizes as above. */
 SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
                                             float size_b)
 {
@@ -79,7 +79,7 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a
  */
 #define KERNEL_WEIGHT_ERROR 2.4e-7f
 
-/* Of an edge: by how much its function may err, d above, and its extent, those across for a quarter. */
+/* By how much an edge's function may err, d above, and its extent, the distances across for a quarter. */
 typedef struct kernel_blur {
     float error, extent;
 } kernel_blur;
@@ -200,7 +200,7 @@ static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, 
     return e;
 }
 
-/* To the exact sign of what is projected. */
+/* Returns the edge function, with the exact sign for the projected points. */
 SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
 {
     const vf e = vf_diff_of_products(ax, by, bx, ay);
@@ -242,8 +242,8 @@ SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
     return vm_and(rays, vm_sign(~(a ^ b) & (a ^ c)));
 }
 
-/* Where a crossed triangle is crossed: the sums of its vertices' depths or values, weighted by their opposite edges and
- * not yet divided by the sum of the weights. A sum has the sign that all its terms have. */
+/* Sums the depths or values of a crossed triangle's vertices, weighted by their opposite edges and not yet divided by
+ * the sum of the weights. A sum has the sign that all its terms have. */
 SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k)
 {
     return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
@@ -268,19 +268,19 @@ static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_
     return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
 }
 
-/* Whose weights of a triangle that they cross are not good enough? */
+/* Returns the rays whose weights of a triangle that they cross are not good enough. */
 SIMD_INLINE vm kernel_weak(vm hit, vf weight, float least)
 {
     return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
 }
 
 /* The triangle's edge functions, projected on these rays. */
-static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_packet *p, kernel_spot i, kernel_spot j,
-                                                                 kernel_spot k, vm weak, vf *ij, vf *jk, vf *ik)
+static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_packet *p, const kernel_spot ijk[3],
+                                                                 vm weak, vf *ij, vf *jk, vf *ik)
 {
-    const vf ax = kernel_project_x(p, i), ay = kernel_project_y(p, i);
-    const vf bx = kernel_project_x(p, j), by = kernel_project_y(p, j);
-    const vf cx = kernel_project_x(p, k), cy = kernel_project_y(p, k);
+    const vf ax = kernel_project_x(p, ijk[0]), ay = kernel_project_y(p, ijk[0]);
+    const vf bx = kernel_project_x(p, ijk[1]), by = kernel_project_y(p, ijk[1]);
+    const vf cx = kernel_project_x(p, ijk[2]), cy = kernel_project_y(p, ijk[2]);
     *ij = vf_select(weak, kernel_edge_between(ax, ay, bx, by), *ij);
     *jk = vf_select(weak, kernel_edge_between(bx, by, cx, cy), *jk);
     *ik = vf_select(weak, kernel_edge_between(ax, ay, cx, cy), *ik);

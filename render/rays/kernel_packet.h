@@ -49,7 +49,7 @@ typedef struct kernel_packet {
     uint32_t pixel[SIMD_WIDTH];
     /* camera space direction to the eye, for shading: unit length; where has_view */
     vf view[3];
-    /* What follows is set up where rays of the packet go down trees on their own (kernel_packet_complete()).
+    /* The rest is set up where rays of the packet go down trees on their own (kernel_packet_complete()).
      * Tree space: planes are met at t = plane * inverse - shift */
     vf inverse[3], shift[3];
     float pad; /* boxes are widened by it: more than all rounding in the box test */
@@ -85,7 +85,7 @@ static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, i
     tile->radius = (float)(0.5 * KERNEL_TILE * widest);
 }
 
-/* What a slope is multiplied by to make the origin at Z = 0. */
+/* Returns the factor that turns a slope into the origin at Z = 0. */
 static inline double kernel_reach(const kernel_frame *f)
 {
     return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
@@ -228,7 +228,7 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
-/* What rays need in cells: the tile's rays must be there. */
+/* Sets up what rays need in cells. The tile's rays must be there. */
 static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
 {
@@ -257,7 +257,7 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     p->t_far = vf_set(INFINITY);
 }
 
-/* What rays need beside that to go down trees on their own, and for volumes. */
+/* Sets up what rays need besides to go down trees on their own, and for volumes. */
 static inline void kernel_packet_complete(kernel_packet *p)
 {
     const kernel_frame *f = p->frame;

@@ -84,7 +84,7 @@ typedef struct kernel_pieces {
     /* Bins of equal width from bin_low, to find a value's piece by: the piece at the bin's begin, as a number. */
     kernel_real bin_low, bin_inverse;
     kernel_real bin_first[KERNEL_PIECE_BINS];
-    /* Of the bounds' bins: also from bin_low; below and above the bins the function is constant. */
+    /* The bounds' bins begin at bin_low too; below and above the bins the function is constant. */
     float bound_inverse;
     kernel_bound bounds[KERNEL_BOUND_BINS];
     /* There is a ramp so narrow that its ends' rounding shows: they have rests, and values near it are to have them. */

@@ -60,8 +60,9 @@ SIMD_INLINE void kernel_spmd_push(kernel_spmd *s, const kernel_packet *p, const 
 }
 
 static void kernel_traverse_spmd(kernel_packet *p, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                 const kernel_interest *interest, vm rays, int part, kernel_leaf *leaf, void *state)
+                                 const kernel_descent *d, vm rays, int part)
 {
+    const kernel_interest *interest = d->interest;
     kernel_spmd s;
     if (!tree->node_count || !kernel_node_shows(interest, ranges, 0)) return;
     for (int i = 0; i < SIMD_WIDTH; i++) {
@@ -78,7 +79,7 @@ static void kernel_traverse_spmd(kernel_packet *p, const mmbvh *tree, const mmbv
             for (int i = first + 1; count && i < SIMD_WIDTH; i++) same |= (unsigned)(s.node[i] == node) << i & bits;
             bits &= ~same;
             if (count)
-                leaf(p, state, part, tree->cells + mmbvh_node_ref(tree, node), count, vm_from_bits(same));
+                d->leaf(p, d->state, part, tree->cells + mmbvh_node_ref(tree, node), count, vm_from_bits(same));
             else
                 kernel_spmd_push(&s, p, tree, ranges, interest, first);
         }
@@ -86,14 +87,12 @@ static void kernel_traverse_spmd(kernel_packet *p, const mmbvh *tree, const mmbv
 }
 
 /* Parts are tried in turn: a tree over them is for packets. */
-SIMD_INLINE void kernel_trace_parts_spmd(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                         kernel_leaf *leaf, void *state)
+SIMD_INLINE void kernel_trace_parts_spmd(kernel_packet *p, const render_field *field, const kernel_descent *d)
 {
     const render_job *job = p->frame->job;
     for (int part = 0; part < job->part_count; part++)
         if (field->ranges[part].low)
-            kernel_traverse_spmd(p, job->parts[part].tree, &field->ranges[part], interest, p->active, part, leaf,
-                                 state);
+            kernel_traverse_spmd(p, job->parts[part].tree, &field->ranges[part], d, p->active, part);
 }
 
 #endif

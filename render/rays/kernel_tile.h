@@ -87,7 +87,7 @@ static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f,
     b->centre_y = tile->centre_y;
 }
 
-/* Those of the picture: what lies in its first block lies in it. */
+/* The picture's borders: what lies in its first block lies in the picture. */
 static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame *f)
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
@@ -197,7 +197,7 @@ SIMD_INLINE void kernel_sides_add(kernel_sides *s, int v, vf low, vf high)
     s->above |= vm_bits(vf_le(vf_set(0), high)) << v * SIMD_WIDTH;
 }
 
-/* How a body lies: the blocks it may meet, its least and greatest depth, and its place along the tile's direction. */
+/* A body's placement: the blocks it may meet, its least and greatest depth, and its place along the tile's axis. */
 typedef struct kernel_placement {
     unsigned blocks;
     float near, far, along;

@@ -27,7 +27,7 @@ SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const 
     placement = kernel_box_placement(&t->tree_planes, tree, node);
     placement.blocks &= placement.far < t->t_near ? 0 : blocks;
     if (placement.blocks) {
-        /* What comes next of it, if it is an inner node or a leaf. */
+        /* Prefetches what an inner node or a leaf needs next. */
         const int64_t ref = mmbvh_node_ref(tree, node);
         if (mmbvh_node_count(tree, node))
             __builtin_prefetch(tree->cells + ref);

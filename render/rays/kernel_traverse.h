@@ -14,7 +14,7 @@
 /* Called with the rays that meet a leaf's box. */
 typedef void kernel_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays);
 
-/* Is the right child nearer than the left, seen along the packet? */
+/* Tells whether the right child is nearer than the left, seen along the packet. */
 SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, int64_t left)
 {
     float lower[2][4], upper[2][4], along = 0;
@@ -24,23 +24,30 @@ SIMD_INLINE bool kernel_right_first(const kernel_packet *p, const mmbvh *tree, i
     return along < 0;
 }
 
-/* Meet every leaf of the tree that shows and that a ray of rays enters between t_low and *t_high, which leaf() may
- * lower. interest NULL: everything shows (parent trees). */
+/* A descent: leaf() gets every leaf that shows and that a ray enters between t_low and *t_high, which it may lower. */
+typedef struct kernel_descent {
+    const kernel_interest *interest; /* NULL: everything shows */
+    vf t_low;
+    const vf *t_high;
+    kernel_leaf *leaf;
+    void *state; /* for leaf() */
+} kernel_descent;
+
 SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbvh_ranges *ranges,
-                                 const kernel_interest *interest, vm rays, vf t_low, const vf *t_high, int part,
-                                 kernel_leaf *leaf, void *state)
+                                 const kernel_descent *d, vm rays, int part)
 {
+    const kernel_interest *interest = d->interest;
     int64_t stack[MMBVH_MAX_DEPTH];
     int top = 0;
     if (tree->node_count && (!interest || kernel_node_shows(interest, ranges, 0))) stack[top++] = 0;
     while (top) {
         const int64_t node = stack[--top];
-        vf t_in = t_low, t_out = *t_high;
+        vf t_in = d->t_low, t_out = *d->t_high;
         const vm met = vm_and(rays, kernel_box(p, tree, node, &t_in, &t_out));
         if (!vm_any(met)) continue;
         const int count = mmbvh_node_count(tree, node);
         if (count) {
-            leaf(p, state, part, tree->cells + mmbvh_node_ref(tree, node), count, met);
+            d->leaf(p, d->state, part, tree->cells + mmbvh_node_ref(tree, node), count, met);
             continue;
         }
         const int64_t left = mmbvh_node_ref(tree, node);
@@ -54,11 +61,7 @@ SIMD_INLINE void kernel_traverse(kernel_packet *p, const mmbvh *tree, const mmbv
 /* A tree over meshes: its leaves name meshes, which are traversed in their turn. */
 typedef struct kernel_parent_state {
     const render_field *field;
-    const kernel_interest *interest;
-    vf t_low;
-    const vf *t_high;
-    kernel_leaf *leaf;
-    void *state;
+    kernel_descent descent;
 } kernel_parent_state;
 
 static void kernel_parent_leaf(kernel_packet *p, void *opaque_state, int unused, const uint32_t *parts, int count,
@@ -68,25 +71,23 @@ static void kernel_parent_leaf(kernel_packet *p, void *opaque_state, int unused,
     (void)unused;
     for (int n = 0; n < count; n++) {
         const int part = (int)parts[n];
-        if (!s->field->ranges[part].low) continue;
-        kernel_traverse(p, p->frame->job->parts[part].tree, &s->field->ranges[part], s->interest, rays, s->t_low,
-                        s->t_high, part, s->leaf, s->state);
+        if (s->field->ranges[part].low)
+            kernel_traverse(p, p->frame->job->parts[part].tree, &s->field->ranges[part], &s->descent, rays, part);
     }
 }
 
-SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field, const kernel_interest *interest,
-                                    vf t_low, const vf *t_high, kernel_leaf *leaf, void *state)
+SIMD_INLINE void kernel_trace_parts(kernel_packet *p, const render_field *field, const kernel_descent *d)
 {
     const render_job *job = p->frame->job;
     if (job->parent) {
-        kernel_parent_state parent = {field, interest, t_low, t_high, leaf, state};
-        kernel_traverse(p, job->parent, NULL, NULL, p->active, t_low, t_high, 0, kernel_parent_leaf, &parent);
+        kernel_parent_state state = {field, *d};
+        const kernel_descent parent = {NULL, d->t_low, d->t_high, kernel_parent_leaf, &state};
+        kernel_traverse(p, job->parent, NULL, &parent, p->active, 0);
         return;
     }
     for (int part = 0; part < job->part_count; part++)
         if (field->ranges[part].low)
-            kernel_traverse(p, job->parts[part].tree, &field->ranges[part], interest, p->active, t_low, t_high, part,
-                            leaf, state);
+            kernel_traverse(p, job->parts[part].tree, &field->ranges[part], d, p->active, part);
 }
 
 #endif

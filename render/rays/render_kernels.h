@@ -4,7 +4,7 @@
 
 #include "kernel_types.h"
 
-/* Of the calling thread: for the whole of a frame they are asked for on the one that draws it. */
+/* The calling thread's choice: the thread that draws a frame asks once for all of it. */
 const kernel_table *render_kernels(void);
 
 #endif

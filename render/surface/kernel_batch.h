@@ -248,7 +248,7 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
         any_weak = vm_or(any_weak, weak[n]);
     }
     if (__builtin_expect(vm_any(any_weak), 0)) kernel_batch_mend(b, tile, r, e, weak, sums);
-    const kernel_ends ends = kernel_tet_choose(hit[0], hit[1], hit[2], hit[3], &sums[0], &sums[1], &sums[2], &sums[3]);
+    const kernel_ends ends = kernel_tet_choose(hit, sums);
     const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
     const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
     const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;

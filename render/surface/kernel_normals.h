@@ -104,19 +104,21 @@ SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm r
     probe->z = t + offset * forward;
     probe->found = vm_none();
     probe->sample = zero;
-    kernel_trace_parts(&points, &probe->surface->layer->field, NULL, zero, &zero, kernel_probe_leaf, probe);
+    const kernel_descent descent = {NULL, zero, &zero, kernel_probe_leaf, probe};
+    kernel_trace_parts(&points, &probe->surface->layer->field, &descent);
     return probe->found;
 }
 
 /* Replace the cells' gradients in normal (camera axes) on the rays of hit by differences over reach before and behind:
- * one-sided where one sample is in no cell; not where both of an axis are, nor where there is no reach. layer: the
- * surface's number. */
-SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int layer, int value, vm hit, vf t,
-                                    vf reach, vf normal[3])
+ * one-sided where one sample is in no cell; not where both of an axis are, nor where there is no reach. s: one of
+ * the frame's. */
+SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
+                                    vf normal[3])
 {
     const kernel_frame *f = p->frame;
-    kernel_probe probe = {
-        .surface = s, .layer = f->surface_count + f->volume_count + layer, .isovalue = s->layer->values[value]};
+    kernel_probe probe = {.surface = s,
+                          .layer = f->surface_count + f->volume_count + (int)(s - f->surfaces),
+                          .isovalue = s->layer->values[value]};
     vf g[3];
     hit = vm_and(hit, vf_lt(vf_set(0), reach));
     vm whole = hit;

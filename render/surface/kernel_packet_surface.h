@@ -74,21 +74,20 @@ SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
         kernel_surface_state state = {
             .surface = &f->surfaces[n], .layer = n, .hits = hits, .is_opaque = n < f->opaque_count};
         const render_field *field = &f->surfaces[n].layer->field;
-        const kernel_interest *interest = &f->surfaces[n].interest;
+        const kernel_descent descent = {&f->surfaces[n].interest, p->t_near, &p->t_far, kernel_surface_leaf, &state};
         if (f->job->traversal == RENDER_SPMD)
-            kernel_trace_parts_spmd(p, field, interest, kernel_surface_leaf, &state);
+            kernel_trace_parts_spmd(p, field, &descent);
         else
-            kernel_trace_parts(p, field, interest, p->t_near, &p->t_far, kernel_surface_leaf, &state);
+            kernel_trace_parts(p, field, &descent);
     }
 }
 
 /* Normals by differences of the nearest opaque hits of a surface. */
-SIMD_INLINE void kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, int layer, vm rays,
-                                           kernel_hits *hits)
+SIMD_INLINE void kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
     for (int value = 0; value < s->layer->value_count; value++) {
         const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
-        if (vm_any(mine)) kernel_differences(p, s, layer, value, mine, p->t_far, hits->reach, hits->normal);
+        if (vm_any(mine)) kernel_differences(p, s, value, mine, p->t_far, hits->reach, hits->normal);
     }
 }
 
@@ -101,11 +100,12 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         const vm mine = vm_and(vf_le(first, hits->kind), vf_lt(hits->kind, first + (float)s->layer->value_count));
         const vm write = vm_and(hits->found, mine);
         if (!vm_any(write)) continue;
-        if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, n, write, hits);
-        vf colour[3] = {hits->colour[0], hits->colour[1], hits->colour[2]};
+        if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, write, hits);
+        kernel_fragments lit = {
+            p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
         kernel_packet_view(p);
-        kernel_shade(p, &s->layer->material, hits->normal, colour);
-        kernel_emit(p, write, 0, hits->kind, p->t_far, p->t_far, colour, vf_set(0));
+        kernel_shade(p, &s->layer->material, hits->normal, lit.colour);
+        kernel_emit(p, write, 0, &lit);
     }
 }
 

@@ -268,11 +268,11 @@ static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, ker
 static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
                                      vm rays, kernel_passage *r, vm hit, const kernel_walk *walk)
 {
-    vf normal[3];
+    kernel_hit_places at = {.t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
     kernel_passage_segments(c, rays, r);
-    kernel_polyhedron_normal(p, c, r, hit, walk->t, normal);
-    kernel_accept(p, state, NULL, value, hit, walk->t, normal, walk->w);
+    kernel_polyhedron_normal(p, c, r, hit, walk->t, at.normal);
+    kernel_accept(p, state, NULL, value, hit, &at);
 }
 
 /* The crossings of a stay. An opaque surface's first before the eye is the ray's last. */

@@ -70,19 +70,25 @@ SIMD_INLINE void kernel_limits_spread(const kernel_bounds *b, kernel_limits *out
     out->is_monotone = b->is_monotone ? vm_all_lanes() : vm_none();
 }
 
+/* The straight way between two points of the map, and the product of the map at each. */
+typedef struct kernel_chord {
+    const kernel_point *from, *to;
+    kernel_product m[2];
+    vf move[3];
+} kernel_chord;
+
 /* Deviation of the chord from the line in Y: the largest of |e1|, |e2|, and of the derivative's coefficients / 3. */
-SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, const kernel_point *from,
-                                   const kernel_point *to, const kernel_product m[2], const vf move[3], vf *size,
-                                   vf *slope)
+SIMD_INLINE void kernel_chord_bend(bool is_pyramid, const kernel_limits *b, const kernel_chord *c, vf *size, vf *slope)
 {
+    const vf *from = c->from->r, *to = c->to->r;
     vf first = vf_set(0), second = first, between = first;
     for (int i = 0; i < 3; i++) {
         vf g0[3], g1[3];
-        kernel_gradient_of(b->bent[i], is_pyramid, &m[0], from->r, g0);
-        kernel_gradient_of(b->bent[i], is_pyramid, &m[1], to->r, g1);
-        const vf rise = kernel_value_of(b->bent[i], is_pyramid, &m[1], to->r) -
-                        kernel_value_of(b->bent[i], is_pyramid, &m[0], from->r);
-        const vf e1 = (kernel_dot(g0, move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, move)) * (1.0f / 3);
+        kernel_gradient_of(b->bent[i], is_pyramid, &c->m[0], from, g0);
+        kernel_gradient_of(b->bent[i], is_pyramid, &c->m[1], to, g1);
+        const vf rise = kernel_value_of(b->bent[i], is_pyramid, &c->m[1], to) -
+                        kernel_value_of(b->bent[i], is_pyramid, &c->m[0], from);
+        const vf e1 = (kernel_dot(g0, c->move) - rise) * (1.0f / 3), e2 = (rise - kernel_dot(g1, c->move)) * (1.0f / 3);
         first += e1 * e1;
         second += e2 * e2;
         between += (e2 - e1) * (e2 - e1);
@@ -97,12 +103,13 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kerne
                                         const kernel_point *to, vf gap, vf side)
 {
     const bool is_pyramid = map->is_pyramid;
-    const kernel_product m[2] = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)};
-    vf move[3], g0[3], g1[3], bend, bend_slope;
+    kernel_chord chord = {
+        .from = from, .to = to, .m = {kernel_product_at(is_pyramid, from->r), kernel_product_at(is_pyramid, to->r)}};
+    vf *move = chord.move, g0[3], g1[3], bend, bend_slope;
     for (int a = 0; a < 3; a++) move[a] = to->r[a] - from->r[a];
-    kernel_gradient_of(map->field, is_pyramid, &m[0], from->r, g0);
-    kernel_gradient_of(map->field, is_pyramid, &m[1], to->r, g1);
-    kernel_chord_bend(is_pyramid, b, from, to, m, move, &bend, &bend_slope);
+    kernel_gradient_of(map->field, is_pyramid, &chord.m[0], from->r, g0);
+    kernel_gradient_of(map->field, is_pyramid, &chord.m[1], to->r, g1);
+    kernel_chord_bend(is_pyramid, b, &chord, &bend, &bend_slope);
     const vf d0 = kernel_dot(g0, move), d1 = kernel_dot(g1, move), rise = to->value - from->value;
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
@@ -402,12 +409,20 @@ SIMD_INLINE void kernel_residuals(const kernel_rays *rays, const kernel_map_lane
     }
 }
 
-/* A step of Newton's method on the four equations X(r) = ray(t), F(r) = 0 at once, from how far these are off; t is
- * kept within the bracket. Returns who has not come to its end. */
+/* How far a place is off the four equations X(r) = ray(t), F(r) = 0, and the product of the map there. */
+typedef struct kernel_residual {
+    kernel_product m;
+    vf off[3], value;
+} kernel_residual;
+
+/* A step of Newton's method on the four equations at once; t is kept within the bracket. Returns who has not come to
+ * its end. */
 SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lanes *map, const kernel_point *low,
-                                  const kernel_point *high, vm wanted, const kernel_product *m, const vf off[3],
-                                  vf field, kernel_point *out)
+                                  const kernel_point *high, vm wanted, const kernel_residual *residual,
+                                  kernel_point *out)
 {
+    const kernel_product *m = &residual->m;
+    const vf *off = residual->off;
     const vf zero = vf_set(0);
     kernel_jacobian j;
     vf gradient[3], step[3], speed[3], largest = zero;
@@ -419,7 +434,7 @@ SIMD_INLINE vm kernel_polish_step(const kernel_rays *rays, const kernel_map_lane
         step[a] = ((j.cross[0][a] * off[0] + j.cross[1][a] * off[1]) + j.cross[2][a] * off[2]) * inverse;
         speed[a] = ((j.cross[0][a] * rays->slope_x + j.cross[1][a] * rays->slope_y) + j.cross[2][a]) * inverse;
     }
-    const vf value = field + kernel_dot(gradient, step), rate = kernel_dot(gradient, speed);
+    const vf value = residual->value + kernel_dot(gradient, step), rate = kernel_dot(gradient, speed);
     const vf move = vf_select(vf_eq(rate, zero), zero, -(value / rate));
     const vf t = vf_clamp(out->t + move, low->t, high->t);
     for (int a = 0; a < 3; a++) {
@@ -439,25 +454,27 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
     const vf zero = vf_set(0), fall = low->value - high->value;
     const vf along = vf_clamp(vf_select(vf_eq(fall, zero), zero, low->value / fall), zero, vf_set(1));
     vm open = wanted;
-    vf off[3], value;
+    kernel_residual residual;
     out->t = low->t + along * (high->t - low->t);
     out->value = zero;
     for (int a = 0; a < 3; a++) out->r[a] = low->r[a] + along * (high->r[a] - low->r[a]);
     for (int n = 0; n < KERNEL_POLISH_STEPS && vm_any(open); n++) {
-        const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
+        const kernel_product *m = &residual.m;
         vf target[3];
+        residual.m = kernel_product_at(map->is_pyramid, out->r);
         kernel_rays_at(rays, map, out->t, target);
-        for (int a = 0; a < 3; a++) off[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, &m, out->r);
-        value = kernel_value_of(map->field, map->is_pyramid, &m, out->r);
-        open = kernel_polish_step(rays, map, low, high, open, &m, off, value, out);
+        for (int a = 0; a < 3; a++)
+            residual.off[a] = target[a] - kernel_value_of(map->position[a], map->is_pyramid, m, out->r);
+        residual.value = kernel_value_of(map->field, map->is_pyramid, m, out->r);
+        open = kernel_polish_step(rays, map, low, high, open, &residual, out);
     }
     const vm close = vm_andnot(wanted, open);
     if (vm_any(close)) {
-        const kernel_product m = kernel_product_at(map->is_pyramid, out->r);
         kernel_point last = *out;
-        kernel_residuals(rays, map, out, off, &value);
+        residual.m = kernel_product_at(map->is_pyramid, out->r);
+        kernel_residuals(rays, map, out, residual.off, &residual.value);
         /* At a double root the field's slope is rounding, and a step by it leads away. */
-        const vm away = kernel_polish_step(rays, map, low, high, close, &m, off, value, &last);
+        const vm away = kernel_polish_step(rays, map, low, high, close, &residual, &last);
         kernel_place_move(vm_andnot(close, away), &last, out);
     }
     return open;

@@ -55,27 +55,33 @@ SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
-    vf lit[3] = {colour[0], colour[1], colour[2]};
+    kernel_fragments lit = {t, t, {colour[0], colour[1], colour[2]}, vf_set(0), vf_set(0)};
     kernel_packet_view(p);
-    kernel_shade(p, &s->layer->material, normal, lit);
-    kernel_emit(p, tied, s->first_kind + (uint32_t)value, vf_set(0), t, t, lit, vf_set(0));
+    kernel_shade(p, &s->layer->material, normal, lit.colour);
+    kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
-/* Hits at depth t: kept where the nearest, or written at once where the surface is transparent. */
+/* Where rays hit: the depth, a vector along the normal, and the value that the surface is coloured by. */
+typedef struct kernel_hit_places {
+    vf t, normal[3], w;
+} kernel_hit_places;
+
+/* Takes hits: the nearest are kept; those of a transparent surface are written at once. */
 SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
-                               vf t, vf normal[3], vf w)
+                               kernel_hit_places *at)
 {
     const kernel_surface *s = state->surface;
     kernel_hits *hits = state->hits;
-    vf colour[3];
+    const vf t = at->t;
+    vf *normal = at->normal, colour[3];
     const bool by_differences = s->layer->normal == RENDER_DIFFERENCES;
     /* Polyhedra (no cell given) have their own gradient always. */
     const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
-    kernel_base_colour(s, value, w, colour);
+    kernel_base_colour(s, value, at->w, colour);
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
         if (__builtin_expect(vm_any(tied), 0)) {
-            if (by_differences) kernel_differences(p, s, state->layer, value, tied, t, reach, normal);
+            if (by_differences) kernel_differences(p, s, value, tied, t, reach, normal);
             kernel_emit_tied(p, s, value, tied, t, normal, colour);
             hit = vm_andnot(hit, tied);
         }
@@ -90,11 +96,13 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
         return;
     }
-    if (by_differences) kernel_differences(p, s, state->layer, value, hit, t, reach, normal);
+    if (by_differences) kernel_differences(p, s, value, hit, t, reach, normal);
     kernel_packet_view(p);
     kernel_shade(p, &s->layer->material, normal, colour);
-    for (int a = 0; a < 3; a++) colour[a] *= s->layer->opacity;
-    kernel_emit(p, hit, s->first_kind + (uint32_t)value, vf_set(0), t, t, colour, vf_set(1 - s->layer->opacity));
+    const float opacity = s->layer->opacity;
+    const kernel_fragments f = {
+        t, t, {colour[0] * opacity, colour[1] * opacity, colour[2] * opacity}, vf_set(1 - opacity), vf_set(0)};
+    kernel_emit(p, hit, s->first_kind + (uint32_t)value, &f);
     kernel_hits_cut(hits, hit, t);
 }
 
@@ -152,14 +160,14 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
     const vm hit = kernel_visible(p, change, t);
     if (!vm_any(hit)) return;
-    vf normal[3], w = vf_set(0);
-    kernel_tet_normal(p, c, normal);
+    kernel_hit_places at = {.t = t, .w = vf_set(0)};
+    kernel_tet_normal(p, c, at.normal);
     if (has_colour) {
         const vf length = i.t_out - i.t_in;
         const vf along = vf_select(vf_lt(vf_set(0), length), (t - i.t_in) / length, vf_set(0));
-        w = i.w_in + along * (i.w_out - i.w_in);
+        at.w = i.w_in + along * (i.w_out - i.w_in);
     }
-    kernel_accept(p, state, c, value, hit, t, normal, w);
+    kernel_accept(p, state, c, value, hit, &at);
 }
 
 /* What is set up once for a cell and isovalue, for all packets of a tile: beside each place of the cache. */
@@ -201,11 +209,11 @@ SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state,
 {
     const vm hit = kernel_visible(p, found, at->t);
     if (!vm_any(hit)) return hit;
-    vf normal[3], w = vf_set(0);
-    kernel_map_normal(&poly->map, at->r, normal);
-    kernel_unshear(p, normal);
-    if (state->surface->layer->colour_map) w = kernel_map_value(&poly->map, &poly->map.colour, at->r);
-    kernel_accept(p, state, c, poly->value, hit, at->t, normal, w);
+    kernel_hit_places places = {.t = at->t, .w = vf_set(0)};
+    kernel_map_normal(&poly->map, at->r, places.normal);
+    kernel_unshear(p, places.normal);
+    if (state->surface->layer->colour_map) places.w = kernel_map_value(&poly->map, &poly->map.colour, at->r);
+    kernel_accept(p, state, c, poly->value, hit, &places);
     return hit;
 }
 

@@ -292,13 +292,14 @@ static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, c
 
 /* From the subinterval's begin to its end, in so many equal subintervals as mixing asks for. */
 static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
-                                    const kernel_knot *to, double v0, double v1, double subdivisions)
+                                    const kernel_knot *to, const double values[2], double subdivisions)
 {
     float begin = (float)from->t;
     for (int n = 1; n <= (int)subdivisions; n++) {
         const double before = (n - 1) / subdivisions, after = n / subdivisions;
         const float end = n < (int)subdivisions ? (float)kernel_between(from->t, to->t, after) : (float)to->t;
-        const double in = kernel_between(v0, v1, before), out = kernel_between(v0, v1, after);
+        const double in = kernel_between(values[0], values[1], before);
+        const double out = kernel_between(values[0], values[1], after);
         const kernel_run run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
                                 .v_in = vf_set((float)in),
                                 .v_out = vf_set((float)out),
@@ -331,8 +332,8 @@ static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, 
                               s->most * fmin(change * s->colour_slope, contrast));
         const double subdivisions =
             sqrt(fmin(moved / (double)h->state->mixing, KERNEL_MAX_SUBDIVISIONS * KERNEL_MAX_SUBDIVISIONS));
-        kernel_subinterval_emit(p, h, lane, from, &sub->end, (double)v[0] + rest[0], (double)v[1] + rest[1],
-                                fmax(ceil(subdivisions), 1));
+        const double sums[2] = {(double)v[0] + rest[0], (double)v[1] + rest[1]};
+        kernel_subinterval_emit(p, h, lane, from, &sub->end, sums, fmax(ceil(subdivisions), 1));
         return;
     }
     const kernel_interval i = {.t_in = vf_set((float)from->t),

@@ -70,7 +70,8 @@ SIMD_INLINE void kernel_span_segments(kernel_packet *p, kernel_segment_state *st
     s.before = kernel_span_value(p, span, rays, t0);
     s.last = kernel_span_value(p, span, rays, t1);
     vm halved;
-    s.count = kernel_span_subdivisions(p, state, span, rays, t0, t1, s.before, s.last, &halved);
+    const kernel_interval stretch = {.t_in = t0, .t_out = t1, .v_in = s.before, .v_out = s.last};
+    s.count = kernel_span_subdivisions(p, state, span, rays, &stretch, &halved);
     if (__builtin_expect(vm_any(halved), 0)) {
         kernel_span_bisect(p, state, span, halved, t0, t1);
         rays = vm_andnot(rays, halved);

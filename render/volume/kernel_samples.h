@@ -82,7 +82,7 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
                                                                const kernel_interval *cell, vm mask, vf t, vf value)
 {
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
-    const vf zero = vf_set(0), clear[3] = {zero, zero, zero};
+    const vf zero = vf_set(0);
     vf absorbed, colour[3];
     const vf left = kernel_transmittance(kernel_opacity(transfer, value), transfer->exponent, &absorbed);
     kernel_table_colour(transfer, value, colour);
@@ -91,15 +91,18 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     if (!p->frame->job->separate_samples) {
         mask = vm_and(mask, vf_lt(t, state->samples->marked));
         state->samples->marked = vf_select(mask, t, state->samples->marked);
-        kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, clear, vf_set(1));
-        kernel_emit(p, mask, FRAGMENT_VOLUME, zero, t, t, colour, left);
+        const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), zero};
+        const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, zero};
+        kernel_emit(p, mask, FRAGMENT_VOLUME, &clear);
+        kernel_emit(p, mask, FRAGMENT_VOLUME, &sample);
         return;
     }
     const vf error = vf_max(vf_abs(t), vf_set(1)) * KERNEL_FACE_ERROR;
     const vf early = vf_select(vf_lt(t - cell->t_in, error), vf_set(FRAGMENT_EARLY), zero);
     const vf late = vf_select(vf_lt(cell->t_out - t, error), vf_set(FRAGMENT_LATE), zero);
     const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)state->volume;
-    kernel_emit(p, mask, kind, early + late, t, t, colour, left);
+    const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, early + late};
+    kernel_emit(p, mask, kind, &sample);
 }
 
 /* A sample that another cell owns too stays the other's. */

@@ -179,8 +179,8 @@ SIMD_INLINE void kernel_trace_apart(kernel_packet *p)
     for (int v = 0; v < f->volume_count; v++) {
         kernel_segment_state state = {&list, &f->pieces[v], v, f->allowance, f->mixing, f->reach[v]};
         list.per_t = f->volumes[v].exponent / p->sample_step;
-        kernel_trace_parts(p, &f->job->volumes[v].field, &f->volumes[v].interest, p->t_near, &p->t_far,
-                           kernel_segment_leaf, &state);
+        const kernel_descent descent = {&f->volumes[v].interest, p->t_near, &p->t_far, kernel_segment_leaf, &state};
+        kernel_trace_parts(p, &f->job->volumes[v].field, &descent);
     }
 }
 
@@ -204,8 +204,9 @@ SIMD_INLINE void kernel_trace_window(kernel_packet *p, kernel_segment_state *sta
 {
     kernel_segments *list = state->list;
     kernel_segments_begin(list, p->t_far);
-    kernel_trace_parts(p, &p->frame->job->volumes[0].field, &p->frame->volumes[0].interest, list->t_begin, &list->t_end,
-                       kernel_segment_leaf, state);
+    const kernel_descent descent = {&p->frame->volumes[0].interest, list->t_begin, &list->t_end, kernel_segment_leaf,
+                                    state};
+    kernel_trace_parts(p, &p->frame->job->volumes[0].field, &descent);
 }
 
 /* first_fragment: where the packet's own fragments, of surfaces so far, begin in the thread's list. */

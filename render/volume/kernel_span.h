@@ -107,17 +107,17 @@ SIMD_INLINE vm kernel_span_steps(const kernel_segment_state *state, const kernel
  */
 #define KERNEL_VALUE_ROUNDING 1e-6f
 
-/* Into how many subintervals, as a real number, to cut the stretch from t0 to t1, with values v0 and v1 there, and how
- * far its field is off the line between them. By error: the deviation from the line at a quarter, the half and three
+/* Into how many subintervals, as a real number, to cut the stretch, and how far its field is off the line between the
+ * values at its ends. By error: the deviation from the line at a quarter, the half and three
  * quarters, half as much again (the three see 7/8 of a cubic's), goes as the square of a subinterval, and its mean is
  * two thirds of it. Allowed is the stretch's share of the ray's length and of its absorption, 1 - exp(-depth) >= depth
  * / (1 + depth), with the opacity as the least of the extinction. Where a step of the opacity is among the values no
  * number is enough, nor where a steep ramp is among them and asks for too many, nor where a narrow one is in which the
  * values' rounding alone would take an eighth of what is allowed. */
 SIMD_INLINE vf kernel_span_curved(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span, vm rays,
-                                  vf t0, vf t1, vf v0, vf v1, vf *deviation)
+                                  const kernel_interval *stretch, vf *deviation)
 {
-    const vf length = t1 - t0;
+    const vf t0 = stretch->t_in, length = stretch->t_out - t0, v0 = stretch->v_in, v1 = stretch->v_out;
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
     vf off = vf_set(0), opacity = 0.5f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
     for (int quarter = 1; quarter < 4; quarter++) {
@@ -161,18 +161,19 @@ SIMD_INLINE vf kernel_span_mixed(const kernel_segment_state *state, const kernel
 
 /* How many equal subintervals; halved: the rays for which no number is enough. */
 SIMD_INLINE vf kernel_span_subdivisions(kernel_packet *p, const kernel_segment_state *state, const kernel_span *span,
-                                        vm rays, vf t0, vf t1, vf v0, vf v1, vm *halved)
+                                        vm rays, const kernel_interval *stretch, vm *halved)
 {
-    const vf length = t1 - t0, most = vf_set(KERNEL_MAX_SUBDIVISIONS);
+    const vf length = stretch->t_out - stretch->t_in, most = vf_set(KERNEL_MAX_SUBDIVISIONS);
+    const vf v0 = stretch->v_in, v1 = stretch->v_out;
     vf subdivisions = vf_set(1), off = vf_set(0);
     *halved = vm_none();
     if (span->map && state->allowance > 0) {
-        subdivisions = kernel_span_curved(p, state, span, rays, t0, t1, v0, v1, &off);
+        subdivisions = kernel_span_curved(p, state, span, rays, stretch, &off);
         *halved = vm_and(rays, vf_lt(most, subdivisions));
     } else if (span->map) {
         subdivisions = length / p->sample_step;
         if (span->step_count && state->mixing > 0) {
-            const vf wanted = kernel_span_curved(p, state, span, rays, t0, t1, v0, v1, &off);
+            const vf wanted = kernel_span_curved(p, state, span, rays, stretch, &off);
             *halved = vm_and(rays, vf_lt(most, wanted));
         }
     } else if (span->step_count && state->mixing > 0) {
@@ -224,8 +225,9 @@ static void kernel_emit_segment(kernel_packet *p, const kernel_segment_state *st
         const vm cut = vm_and(open, vm_and(vf_le(light.transmittance, black),
                                            vm_and(vf_lt(begin, t_in + (t_out - t_in) * middle), vf_lt(middle, to))));
         const vm put = vm_andnot(open, cut);
-        kernel_emit(p, vm_and(put, vf_lt(light.transmittance, one)), FRAGMENT_VOLUME, vf_set(0), begin, end,
-                    light.colour, light.transmittance);
+        const kernel_fragments segment = {
+            begin, end, {light.colour[0], light.colour[1], light.colour[2]}, light.transmittance, vf_set(0)};
+        kernel_emit(p, vm_and(put, vf_lt(light.transmittance, one)), FRAGMENT_VOLUME, &segment);
         depth += vf_select(put, light.depth, vf_set(0));
         open = vm_andnot(open, vm_and(put, vm_or(vf_eq(to, one), vf_lt(vf_set(KERNEL_DARK_DEPTH), depth))));
         from = vf_select(put, to, from);

@@ -71,8 +71,9 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
 {
     const vm closing = vm_and(b->open, mask);
     if (!vm_any(closing)) return;
-    kernel_emit(p, vm_and(closing, vf_lt(b->transmittance, vf_set(1))), FRAGMENT_VOLUME, vf_set(0), b->t_first,
-                b->t_last, b->colour, b->transmittance);
+    const kernel_fragments ended = {
+        b->t_first, b->t_last, {b->colour[0], b->colour[1], b->colour[2]}, b->transmittance, vf_set(0)};
+    kernel_emit(p, vm_and(closing, vf_lt(b->transmittance, vf_set(1))), FRAGMENT_VOLUME, &ended);
     b->open = vm_andnot(b->open, closing);
 }
 
@@ -191,8 +192,8 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
         for (int v = 0; v < f->volume_count; v++) {
             for (int n = 0; n < s.count; n++) s.value[v][n] = nothing;
             kernel_volume_state state = {v, &s};
-            kernel_trace_parts(p, &f->job->volumes[v].field, &f->volumes[v].interest, t_first, &t_end,
-                               kernel_volume_leaf, &state);
+            const kernel_descent descent = {&f->volumes[v].interest, t_first, &t_end, kernel_volume_leaf, &state};
+            kernel_trace_parts(p, &f->job->volumes[v].field, &descent);
         }
         p->active = active;
         if (!f->job->separate_samples) kernel_blend_window(p, &b, &s, hits);
