@@ -91,7 +91,7 @@ insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float ba
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* From what owners found in their pixels (NULL: no memory for it) to what all know. */
+/* Tells all ranks the pixels in which owners found overlaps. found is NULL on a rank that has no memory for them. */
 static insitu_status share_overlaps(MPI_Comm comm, const comp_layout *layout, unsigned char *found,
                                     comp_overlaps *overlaps, base_error *error)
 {

@@ -30,10 +30,10 @@ int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
  * +infinity. Local; the whole rule of merging is here. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
 
-/* Of a pixel's fragments as comp_merge_pixel() left them: does one begin, in front of what is opaque, where a volume
- * fragment has not ended? Two volume fragments that hold the same t overlap; so do a volume's that holds a surface's t,
- * unless it begins there, and that surface. What ends before it begins, being shorter than rounding, does not, nor do
- * samples on their own (fragment.h) of two volumes, or of two cells at their common face. Local. */
+/* Tells whether a pixel's fragments, as comp_merge_pixel() left them, overlap in front of what is opaque. Two volume
+ * fragments that hold the same t overlap. A volume's fragment that holds a surface's t overlaps that surface, unless it
+ * begins there. A fragment that ends before it begins, being shorter than rounding, overlaps nothing, nor do samples on
+ * their own (fragment.h) of two volumes, or of two cells at their common face. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {

@@ -107,7 +107,7 @@ static bool is_sample(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_in == f->t_out;
 }
 
-/* How many samples at the place of the first follow each other? 1 where it is none. */
+/* Counts the samples that follow each other at the place of the first; 1 where that is no sample. */
 static int64_t samples_at(const fragment *sorted, int64_t count)
 {
     int64_t n = 1;
@@ -115,8 +115,9 @@ static int64_t samples_at(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Of samples at one place, sorted: those that count. Of two of one volume, one at its cell's end and the other at its
- * cell's begin, the cells are neighbours whose common face rounding has in two places: the first is left out. */
+/* Goes through the samples at one place, sorted, that count. Where one of a volume stands at its cell's end and the
+ * next of that volume at its cell's begin, the cells are neighbours, and rounding has put their common face in two
+ * places: the first is left out. */
 typedef struct sample_pass {
     uint32_t layer;
     int64_t begun; /* at their cells' begin, and no other left out for them yet */
@@ -136,7 +137,7 @@ static bool does_count(sample_pass *pass, const fragment *sample)
     return true;
 }
 
-/* Are two of one volume? */
+/* Tells whether two of the samples belong to one volume. */
 static bool are_of_overlaps(const fragment *samples, int64_t count)
 {
     sample_pass pass = {0};
@@ -196,7 +197,7 @@ static bool has_length(const fragment *f)
 /* The depth of what lets nothing through. */
 static const double opaque_depth = 1e6;
 
-/* What the fragments, all begun at from, do from there to the next cut. */
+/* Blends the fragments, which all begin at from, from there to the next cut. */
 static void blend_mixed(blend *b, const fragment *items, int64_t count, float from, float to)
 {
     double colour[3] = {0, 0, 0}, depth = 0;
@@ -245,7 +246,7 @@ static int64_t blend_run(blend *b, const fragment *sorted, int64_t count)
     }
 }
 
-/* As below, of one fragment alone: most pixels. */
+/* As below, for a pixel of one fragment, which most pixels are. */
 static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
 {
     for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];

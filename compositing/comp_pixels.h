@@ -7,7 +7,7 @@
 #include "fragment.h"
 #include "image.h"
 
-/* As it travels to rank 0. */
+/* A finished pixel, as it travels to rank 0. */
 typedef struct comp_pixel {
     uint32_t pixel;
     float depth;
@@ -22,7 +22,7 @@ typedef struct comp_pixel_list {
 /* Has the image pixels, as many as fragments can name? */
 insitu_status comp_check_size(const image *out, base_error *error);
 
-/* To a set that other threads add to. */
+/* Adds the pixel to a set that other threads add to at the same time. */
 void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 
 /* Every pixel of out becomes background, without depth. Local. */

@@ -28,7 +28,7 @@ static inline uint32_t comp_layout_index(const comp_layout *layout, uint32_t pix
     return (((pixel >> layout->run_shift) / layout->ranks) << layout->run_shift) + within;
 }
 
-/* How many pixels rank owns. */
+/* Counts the pixels that rank owns. */
 uint32_t comp_layout_owned(const comp_layout *layout, int rank);
 
 #endif

@@ -17,7 +17,7 @@
 #include "comp_pixels.h"
 #include "memory.h"
 
-/* As the renderer's tiles are; larger ones are right too. */
+/* The renderer's tiles have this size; larger ones are right too, but slower. */
 enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
 
 /* A block that grows and forgets what it held. */
@@ -103,8 +103,8 @@ static void clear(const comp_tiles *tiles, const pixel_area *area)
         }
 }
 
-/* Of a tile in which there is nothing: past the caches, which need not read what is written over, nor drop for it what
- * tiles to come want. */
+/* Fills a tile in which there is nothing. The stores go past the caches: these need not read what is written over, nor
+ * drop for it what later tiles want. */
 static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
 {
 #if defined(__SSE2__)
@@ -164,7 +164,7 @@ static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64
     if (tiles->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
 }
 
-/* Where no pixel has two; false: one has, and what was stored is to be stored anew. */
+/* Stores a tile whose pixels have one fragment each. Returns false where a pixel has two: all must be stored anew. */
 static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;

@@ -24,8 +24,8 @@ insitu_status comp_tiles_begin(comp_tiles *tiles, const float background[4], int
  * fragments, to the bit. Tiles lie in out, and do not overlap. */
 bool comp_tiles_take(void *tiles, int thread, const pixel_area *area, fragment *items, int64_t count);
 
-/* What was taken, and the time it took the slowest thread, go to statistics; overlaps may be NULL, else becomes the
- * pixels that were found. */
+/* Ends the tiles. statistics gets the number of fragments taken and the time of the slowest thread; overlaps, which may
+ * be NULL, gets the pixels that were found. */
 void comp_tiles_end(comp_tiles *tiles, comp_overlaps *overlaps, comp_statistics *statistics);
 
 #endif

@@ -36,7 +36,7 @@ static void face_area(const double p[4][3], int size, double area[3])
     for (int i = 0; i < 3; ++i) area[i] *= 0.5;
 }
 
-/* Of the cone from the origin. */
+/* Returns the volume of the cone from the origin to the face. */
 static double face_volume(const double p[4][3], int size)
 {
     if (size == 3) return determinant(p[0], p[1], p[2]) / 6;

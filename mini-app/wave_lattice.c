@@ -97,7 +97,7 @@ static bool neighbour_wants_split(const wave_lattice *lattice, const int ijk[3],
 
 static int cut_tets(const int64_t v[8], wave_cell *cells)
 {
-    /* From corner 0 to corner 6 along the axes in each of six orders; odd orders are mirrored. */
+    /* Each path goes from corner 0 to corner 6 along the axes, in one of six orders; odd orders are mirrored. */
     static const int8_t path[6][2] = {{1, 2}, {3, 7}, {4, 5}, {2, 3}, {7, 4}, {5, 1}};
     for (int t = 0; t < 6; ++t) {
         cells[t] = (wave_cell){WAVE_TYPE_TET, {v[0], v[path[t][0]], v[path[t][1]], v[6]}};

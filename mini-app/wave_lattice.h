@@ -39,7 +39,7 @@ int wave_lattice_cells(const wave_lattice *lattice, int64_t cube, wave_cell cell
 /* The type of all cells, or 0 where they are mixed. */
 uint8_t wave_lattice_uniform_type(const wave_lattice *lattice);
 
-/* Where in the lattice a vertex is; false for a cube's centre vertex, with the cube's ijk. */
+/* Finds a vertex's place in the lattice. Returns false, and the cube's ijk, for a vertex at a cube's centre. */
 bool wave_lattice_vertex_ijk(const wave_lattice *lattice, int64_t vertex, int ijk[3]);
 void wave_lattice_vertex(const wave_lattice *lattice, int64_t vertex, double xyz[3]);
 

@@ -34,7 +34,7 @@ wave_medium wave_medium_uniform(double speed, double density);
 
 uint8_t wave_medium_layer(const wave_medium *medium, double z);
 
-/* In the third layer, off the middle; strong enough for a pressure of 1 at a distance of 0.5. */
+/* A source in the third layer, off the middle, whose pressure is 1 at a distance of 0.5. */
 wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *medium);
 
 double wave_source_rate(const wave_source *source, double time);

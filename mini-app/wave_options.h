@@ -23,7 +23,7 @@ typedef struct wave_options {
     bool help;
 } wave_options;
 
-/* The same result on every rank, as every rank has the same arguments. False with a message (one line, no newline). */
+/* Every rank has the same arguments, and so gets the same result. False with a message (one line, no newline). */
 bool wave_options_parse(int argc, char **argv, wave_options *options, char *message, int message_size);
 
 const char *wave_options_help(void);

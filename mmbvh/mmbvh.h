@@ -74,7 +74,7 @@ static inline int mmbvh_node_count(const mmbvh *tree, int64_t index)
     return tree->compact ? (int)(tree->compact[index].link & 7) : (int)tree->nodes[index].count;
 }
 
-/* Of a leaf: its first entry in cells; of an inner node: its left child's index, the right one follows. */
+/* Returns a leaf's first entry in cells, or the index of an inner node's left child, which the right one follows. */
 static inline int64_t mmbvh_node_ref(const mmbvh *tree, int64_t index)
 {
     return tree->compact ? (int64_t)(tree->compact[index].link >> 3) : (int64_t)tree->nodes[index].ref;
@@ -114,7 +114,7 @@ typedef struct mmbvh_interval {
     float low, high;
 } mmbvh_interval;
 
-/* What is to be seen of a field: cells whose range, rounded to float, meets one of the intervals. */
+/* The part of a field that can be seen: cells whose range, rounded to float, meets one of the intervals. */
 typedef struct mmbvh_wish {
     const grid_field *field;
     int interval_count;

@@ -56,7 +56,7 @@ static inline void add(bins *b, const uint16_t offsets[3], item i)
     }
 }
 
-/* From lane 3, which is then 0, to the bins' counts. */
+/* Moves the counts from lane 3, which is 0 afterwards, to the bins. */
 static void keep_counts(bins *b, int count)
 {
     for (int i = 0; i < count; i++) {
@@ -119,7 +119,7 @@ static inline void grow(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
     *counts += *(const ivec4 *)b->of[bin].counts;
 }
 
-/* Of the axes' best; without a branch, as nothing tells which axis it will be. */
+/* Takes the best of the three axes, without a branch, as nothing tells which it will be. */
 static bin_split least(vec4 costs, ivec4 borders)
 {
     float cost = costs[0];

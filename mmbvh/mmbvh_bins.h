@@ -17,7 +17,7 @@ enum {
     BINS_STRIDE = 7      /* one of so many tells where to split as well as all of them */
 };
 
-/* From twice the centroid, less TOP, to a bin on each axis; for two items at a time, lanes 4 to 6 are as 0 to 2. */
+/* Maps twice the centroid, less TOP, to a bin on each axis. Lanes 4 to 6 repeat 0 to 2, for two items at a time. */
 typedef struct bin_mapping {
     ulanes origin;
     lanes factor;
@@ -46,7 +46,7 @@ typedef struct bins {
 void bins_clear(bins *b, int count);
 void bins_merge(bins *b, const bins *other, int count);
 
-/* How many items of a node one stands for. */
+/* Returns how many items of a node one sampled item stands for. */
 static inline int64_t bins_stride(int64_t count)
 {
     return count < BINS_SAMPLED ? 1 : BINS_STRIDE;
@@ -61,8 +61,8 @@ bin_split bins_choose(const bins *b, const bin_mapping *m);
 /* No plane between the items costs less. */
 float bins_least_cost(const item *items, int64_t count);
 
-/* Whether count items are better parted at this cost than kept in a leaf: two boxes to test against the cells. More
- * than a leaf can hold always are. */
+/* Tells whether splitting count items at this cost, which adds two boxes to test, is better than a leaf. Items that do
+ * not fit in a leaf are always split. */
 static inline bool bins_worth_splitting(float cost, int64_t count, lanes bounds)
 {
     return count > MMBVH_MAX_LEAF || cost < (float)(count - 2) * item_half_area(bounds);

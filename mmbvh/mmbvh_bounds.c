@@ -125,7 +125,7 @@ static inline float float_at(const char *p)
     return *(const float *)(const void *)p;
 }
 
-/* Of floats, four at a time; what is not a number is passed over. */
+/* Finds the span of floats, four at a time. NaN is passed over. */
 MMBVH_INLINE void span_of_floats(const char *data, const int64_t stride, int64_t count, float *least, float *most)
 {
     enum { LANES = 4 };
@@ -215,8 +215,8 @@ static int list_block(const item *items, int64_t count, uint32_t cells[BOUNDS_BL
     return n;
 }
 
-/* From floats in the source's coordinates to steps. The origin is a float too: the difference of a coordinate and one
- * near it is exact, and of one far from it off by a 2^24th of itself. */
+/* Maps floats in the source's coordinates to steps. The origin is a float too: its difference from a coordinate near
+ * it is exact, and from one far away off by a 2^24th of itself. */
 typedef struct span_mapping {
     vec4 origin;
     vec4 factor;
@@ -232,7 +232,7 @@ static span_mapping span_mapping_make(const bounds_source *source, const item_gr
     return m;
 }
 
-/* To the nearest step; what is not a number to 0. */
+/* Rounds to the nearest step; NaN becomes 0. */
 static inline ivec4 steps_of(const span_mapping *m, vec4 x)
 {
     const vec4 steps = (x - m->origin) * m->factor + 0.5f;

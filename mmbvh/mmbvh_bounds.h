@@ -9,7 +9,7 @@
 /* The boxes of so many cells, in the source's own coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
-/* The same as floats, where the coordinates are. */
+/* As above, for coordinates that are floats. */
 typedef void bounds_read_spans(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans);
 
 /* box grows by so many cells. As many after soon, if not NULL, will be asked for later. */
@@ -33,7 +33,7 @@ enum { BOUNDS_BLOCK = 64 }; /* boxes that are read at a time */
 bounds_source bounds_source_make(const grid *g, const float *lower, const float *upper, int64_t count,
                                  const double origin[3], double scale);
 
-/* From the source's coordinates to the tree's, without rounding outward. */
+/* Takes a box from the source's coordinates to the tree's, without rounding outward. */
 static inline void bounds_transform(const bounds_source *source, fetch_box *box)
 {
     for (int axis = 0; axis < 3; axis++) {

@@ -18,7 +18,7 @@ enum {
     PARALLEL_MIN = 8 * CHUNK_MIN /* fewer items: a task of their own keeps a thread busy long enough */
 };
 
-/* What is known of a node before it is split. */
+/* A node before it is split. */
 typedef struct branch_node {
     item_set set;
     item_grid grid; /* that the items are in steps of */
@@ -157,7 +157,7 @@ static void halve(splitting *s)
     for (int64_t i = 0; i < s->count; i++) item_set_add(&s->sides[i >= s->left_count], s->items[i]);
 }
 
-/* By a part of the items, unless that finds no plane. */
+/* Chooses the plane from a sample of the items, or from all where the sample has none. */
 static void choose(splitting *s, const branch_builder *builder)
 {
     s->mapping = bin_mapping_make(s->node.set.centroids, s->count);

@@ -16,7 +16,7 @@
 
 enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 
-/* What a build holds until it ends. */
+/* The memory and counters that a build holds until it ends. */
 typedef struct build {
     bounds_source source;
     const uint32_t *selected; /* cells of the grid, none of them a ghost; NULL: all that are none */

@@ -178,7 +178,7 @@ static insitu_status check_inner(walk *w, int64_t index)
 
 static insitu_status check_nodes(walk *w)
 {
-    /* Of every pair on the way down, the right one waits. */
+    /* The right child of every pair on the way down waits here. */
     struct {
         int64_t index;
         int depth;

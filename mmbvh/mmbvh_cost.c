@@ -16,7 +16,7 @@ double cost_half_area(const float lower[3], const float upper[3])
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* What a ray that meets the node tests in it, by how likely it is to meet it. */
+/* Sums the tests that a ray makes in each node it meets, weighted by the chance that it meets the node. */
 static double cost_of_nodes(const mmbvh *tree, int64_t begin, int64_t end, double root_area)
 {
     double sum = 0;

@@ -11,8 +11,8 @@
 
 #define MMBVH_INLINE static inline __attribute__((always_inline))
 
-/* How a cell's vertices are found: all cells are tets one after the other, or hexes, all of one type, or each says its
- * own. */
+/* How a cell's vertices are found. Cells may all be tets, one after the other, or all hexes, or all of another type, or
+ * each has a type of its own. */
 typedef enum fetch_shape { FETCH_TETS, FETCH_HEXES, FETCH_UNIFORM, FETCH_BY_CELL, FETCH_SHAPES } fetch_shape;
 
 static inline fetch_shape fetch_grid_shape(const grid *g)
@@ -28,7 +28,7 @@ MMBVH_INLINE int64_t fetch_index(const grid_array *a, int64_t i, const bool wide
     return wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
 }
 
-/* Of an array of floats or doubles. */
+/* Reads a number of an array of floats or doubles. */
 MMBVH_INLINE double fetch_number(const grid_array *a, int64_t i, const bool wide)
 {
     const char *p = a->data + i * a->stride;
@@ -42,14 +42,14 @@ MMBVH_INLINE int fetch_vertex_count(const grid *g, int64_t cell, const fetch_sha
     return grid_type_vertices(shape == FETCH_UNIFORM ? g->cell_type : grid_cell_type(g, cell));
 }
 
-/* Where a cell's vertices begin in the connectivity. */
+/* Returns where a cell's vertices begin in the connectivity. */
 MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const fetch_shape shape)
 {
     return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
 }
 
-/* Of a pass over cells in the mesh's order: the connectivity that later ones will ask for. What a core asks for by
- * itself, regular as it is, comes too late. */
+/* Prefetches, in a pass over cells in the mesh's order, the connectivity that later cells will ask for. The core's own
+ * prefetching comes too late, regular as the pass is. */
 MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape shape)
 {
     enum { AHEAD = 512 }; /* entries */
@@ -57,13 +57,13 @@ MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape sha
     __builtin_prefetch(g->connectivity.data + soon * g->connectivity.stride);
 }
 
-/* Are an axis's numbers, or a field's, one after the other? A stride that is a constant is part of an address. */
+/* Tells whether an array's numbers follow each other: a constant stride becomes part of an address. */
 static inline bool fetch_is_packed(const grid_array *a)
 {
     return a->stride == (a->is_wide ? (int64_t)sizeof(double) : (int64_t)sizeof(float));
 }
 
-/* Where the values of a cell's vertices are; of fewer than eight the last one's again. */
+/* Finds where the values of a cell's vertices are. The last one is repeated up to eight. */
 MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                const bool wide_index, const int64_t stride, const char *out[GRID_MAX_CELL_VERTICES])
 {
@@ -92,7 +92,7 @@ typedef struct fetch_doubles {
     vec2 low, high;
 } fetch_doubles;
 
-/* Of a cell's values that are doubles. Are all finite? */
+/* Reads a cell's values, which are doubles, and tells whether all are finite. */
 MMBVH_INLINE bool fetch_cell_doubles(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                      const bool wide_index, const bool is_packed, fetch_doubles *out)
 {
@@ -124,7 +124,7 @@ MMBVH_INLINE fetch_range fetch_doubles_range(const fetch_doubles *v, bool is_fin
                          v->high[0] > v->high[1] ? v->high[0] : v->high[1], is_finite};
 }
 
-/* Of any cell and any field. */
+/* Finds the range of any cell and any field. */
 static inline fetch_range fetch_any_cell_range(const grid *g, const grid_field *field, int64_t cell)
 {
     fetch_range range = {INFINITY, -INFINITY, grid_has_own_value(field, cell)};
@@ -191,7 +191,7 @@ static inline fetch_box fetch_span_box(const fetch_span *span)
     return box;
 }
 
-/* Where a vertex's coordinates are: the axes' arrays have one stride. */
+/* Returns where a vertex's coordinates are, in arrays whose axes have one stride. */
 MMBVH_INLINE const char *fetch_vertex(const grid *g, int64_t entry, const bool wide_index)
 {
     return g->coordinates[0].data + fetch_index(&g->connectivity, entry, wide_index) * g->coordinates[0].stride;
@@ -253,7 +253,8 @@ MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t 
     fetch_box_unite(box, &floats);
 }
 
-/* To a node's coordinates, outward: rounding is monotonic, so the box of the rounded is the rounded box. */
+/* Rounds a box outward to a node's coordinates. Rounding is monotonic, so the box of rounded points is the rounded box.
+ */
 MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], double scale, float *lower,
                                   float *upper)
 {
@@ -263,7 +264,7 @@ MMBVH_INLINE void fetch_box_round(const fetch_box *box, const double origin[3], 
     }
 }
 
-/* The same of a box of floats: the same bits. Lanes 3 may hold anything. */
+/* As above, to the same bits, for a box of floats. Lane 3 may hold anything. */
 MMBVH_INLINE void fetch_span_round(const fetch_span *span, const double origin[3], double scale, vec4 *lower,
                                    vec4 *upper)
 {
@@ -272,8 +273,8 @@ MMBVH_INLINE void fetch_span_round(const fetch_span *span, const double origin[3
     *upper = vec4_xyz(0.0f - vec4_place_down(span->upper, from, -scale));
 }
 
-/* Where the coordinates are not all floats or all doubles, or not of one stride, or cells may be polyhedra,
- * fetch_box_cells() will not do. */
+/* Tells whether fetch_box_cells() serves: all coordinates are floats or all are doubles, of one stride, and no cell is
+ * a polyhedron. */
 static inline bool fetch_is_plain(const grid *g)
 {
     if (grid_has_faces(g)) return false;
@@ -322,7 +323,7 @@ static inline void fetch_box_any_cell(fetch_box *box, const grid *g, int64_t cel
     }
 /* clang-format on */
 
-/* The same of floats alone; the table is by [shape][wide_index]. */
+/* As above, for floats alone: a table by [shape][wide_index]. */
 #define FETCH_FLOAT_INSTANCES(DEFINE, prefix) FETCH_EACH_SHAPE(FETCH_FLOAT_SHAPE_INSTANCES, DEFINE, prefix)
 
 #define FETCH_FLOAT_SHAPE_INSTANCES(DEFINE, prefix, shape)                                                             \

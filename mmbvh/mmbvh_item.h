@@ -78,7 +78,7 @@ static inline item_set item_set_of(const item *items, int64_t count)
     return set;
 }
 
-/* Of a box, in steps: lanes 0 to 2. */
+/* Returns a box's extent in steps, in lanes 0 to 2. */
 static inline lanes item_extent(lanes box)
 {
     return (lanes)((ulanes)box + (ulanes)lanes_swap(box) - (ulanes)lanes_set1(ITEM_TOP)); /* an empty one's wraps */

@@ -81,7 +81,7 @@ static inline uint64_t code_of_steps(const morton_coder *coder, const int32_t st
     return code;
 }
 
-/* Of a cell whose box's centre is this, in the source's coordinates. */
+/* Returns the code of a cell whose box has this centre, in the source's coordinates. */
 static inline uint64_t code_of(const bounds_source *source, const morton_coder *coder, const double centre[3])
 {
     int32_t steps[3];
@@ -93,7 +93,7 @@ static inline uint64_t code_of(const bounds_source *source, const morton_coder *
     return code_of_steps(coder, steps);
 }
 
-/* From the sum of a box's corners, floats in the source's coordinates, to steps. */
+/* Maps the sum of a box's corners, floats in the source's coordinates, to steps. */
 typedef struct sum_mapping {
     vec4 origin, factor, most;
 } sum_mapping;
@@ -109,7 +109,7 @@ static sum_mapping sum_mapping_make(const bounds_source *source, const morton_co
     return m;
 }
 
-/* What is not a number goes to 0. */
+/* NaN goes to 0. */
 static inline uint64_t code_of_span(const sum_mapping *m, const morton_coder *coder, const fetch_span *span)
 {
     const vec4 place = ((span->lower + span->upper) * 0.5f - m->origin) * m->factor;
@@ -170,8 +170,8 @@ void morton_place(const bounds_source *source, const morton_coder *coder, uint64
 
 /* ---- sorting ---------------------------------------------------------------------------------------------------- */
 
-/* By the highest digit first: a mesh's neighbours are mostly neighbours in its numbering too, so their keys leave by
- * few streams, and what goes to one digit fits a core's cache, where it is sorted to the end. */
+/* Keys are sorted by their highest digit first. Neighbours in a mesh are mostly neighbours in its numbering too, so
+ * their keys leave by few streams, and the keys of one digit fit a core's cache, where they are sorted to the end. */
 typedef struct digit_counts {
     int64_t of[SORT_CHUNKS_MAX][DIGITS];
 } digit_counts;
@@ -198,7 +198,7 @@ static void count_digits(const sorting *s, const uint64_t *keys, int64_t count, 
     }
 }
 
-/* From how many to where they begin. */
+/* Turns the digits' counts into where each digit begins. */
 static void sum_digits(const sorting *s, int64_t starts[DIGITS + 1])
 {
     int64_t sum = 0;
@@ -261,7 +261,7 @@ static void sort_alone(uint64_t *from, uint64_t *other, int64_t count, bool to_o
     }
 }
 
-/* The same by all threads; top: how many bits differ at most. */
+/* As above, by all threads. Keys differ in the top lowest bits at most. */
 static void sort_together(const sorting *s, uint64_t *from, uint64_t *other, int64_t count, int top, bool to_other)
 {
     int64_t starts[DIGITS + 1];
@@ -298,7 +298,7 @@ bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int
 
 /* ---- the tree --------------------------------------------------------------------------------------------------- */
 
-/* How many of so many ascending keys, two or more, lie below the change of their highest bit that changes. */
+/* Counts the keys, of two or more in ascending order, that lie below the change of the highest bit that changes. */
 static int64_t split_of(const uint64_t *keys, int64_t count)
 {
     const int bit = bits_of(keys[0] ^ keys[count - 1]) - 1;

@@ -25,7 +25,7 @@ void morton_coder_init(morton_coder *coder, const double lower[3], const double 
 void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
                   fetch_box *exact);
 
-/* To ascending order, with as much room in other. False: out of memory. */
+/* Sorts keys in ascending order. other has as much room as keys. Returns false where memory runs out. */
 bool morton_sort(const morton_coder *coder, uint64_t *keys, uint64_t *other, int64_t count, int threads);
 
 /* The tree over ascending keys. NULL where an allocation failed. */

@@ -18,7 +18,7 @@ static int64_t run_all(const sweep *s, int64_t first, int64_t end)
     return s->then ? run_all(s->then, first, end) : sum;
 }
 
-/* Where what is below the right one of a pair begins. */
+/* Returns where the nodes below the right one of a pair begin. */
 static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
 {
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
@@ -33,7 +33,7 @@ static int64_t sweep_runs(const sweep *s, int64_t first, int64_t end)
     return left + right + run_all(s, first, first + 2);
 }
 
-/* The same by tasks of at most RUN_MAX nodes, then the pair itself. */
+/* As above, by tasks of at most RUN_MAX nodes, and then the pair itself. */
 static int64_t sweep_below(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= RUN_MAX) return sweep_runs(s, first, end);

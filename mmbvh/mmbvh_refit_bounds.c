@@ -37,7 +37,7 @@ sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source)
     return s;
 }
 
-/* Of all the tree's cells, in the source's coordinates. */
+/* Finds the bounds of all the tree's cells, in the source's coordinates. */
 static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, int threads)
 {
     fetch_box all;

@@ -52,8 +52,8 @@ MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading ho
     return span;
 }
 
-/* Of a cell whose connectivity has been asked for before: a vertex, near which the others are. Tets come in such
- * numbers to a vertex that theirs are there already. */
+/* Prefetches one vertex of a cell whose connectivity was asked for before; the others are near it. So many tets share a
+ * vertex that theirs are in the cache already. */
 MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const reading how)
 {
     const grid *g = s->source->g;

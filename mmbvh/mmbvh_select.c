@@ -25,7 +25,7 @@ struct selector {
     uint64_t *bits;
 };
 
-/* Of a cell: are its values finite, and does their range meet an interval? */
+/* Whether a cell's values are finite, and whether their range meets an interval. */
 typedef struct finding {
     bool is_finite, meets;
 } finding;

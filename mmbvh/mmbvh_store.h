@@ -17,7 +17,8 @@ static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int
 /* The grid of a compact layout, over a box that must be finite. */
 mmbvh_grid store_grid(const float lower[3], const float upper[3]);
 
-/* Where the quick way rounds the wrong way: a step further at a time. False where the grid ends before. */
+/* Serves where the quick way rounds inward: goes outward one step at a time. Returns false where the grid ends before.
+ */
 bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
 
 /* Lanes 0 to 2 to the nearest of what the grid has outside the box; lane 3 must be 0. False where it does not reach so
@@ -51,7 +52,7 @@ static inline void store_reference(const mmbvh *tree, int64_t index, vec4 lower,
     }
 }
 
-/* To the node, outward. False where the compact layout's grid does not hold the box. */
+/* Stores a box in the node, rounded outward. Returns false where the compact layout's grid does not hold it. */
 static inline bool store_box(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
 {
     if (tree->compact) return store_compact(tree, index, lower, upper);

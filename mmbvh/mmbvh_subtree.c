@@ -28,7 +28,7 @@ typedef struct subtree {
     bins bins;
 } subtree;
 
-/* By a part of the items if they are many, unless that finds no plane. */
+/* Chooses the plane from a sample where there are many items, or from all where the sample has none. */
 static bin_split choose(subtree *s, lanes centroids, const item *items, int64_t count, bin_mapping *mapping)
 {
     *mapping = bin_mapping_make(centroids, count);

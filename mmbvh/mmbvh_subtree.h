@@ -6,7 +6,7 @@
 #include "mmbvh_bounds.h"
 #include "mmbvh_topology.h"
 
-/* Is the grid too coarse for items of these bounds? */
+/* Tells whether the grid is too coarse for items of these bounds. */
 bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid);
 
 /* The grid over the bounds, which are in steps of grid. */

@@ -35,7 +35,7 @@ int64_t sweep_tree(const sweep *s, int threads);
 /* The sweep that writes ranges of field (NULL: infinite ones). */
 sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges);
 
-/* The same for a parent tree: ranges by mesh, low and high. */
+/* As above, for a parent tree. ranges has a low and a high value for each mesh. */
 sweep sweep_of_box_ranges(const mmbvh *tree, const float *ranges);
 
 /* The sweep that writes the bounds. */
@@ -44,14 +44,14 @@ sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source);
 /* Makes a sweep of bounds read cells by runs, if their coordinates are floats. */
 void sweep_bounds_as_floats(sweep *bounds);
 
-/* Are its values floats, at the vertices? */
+/* Tells whether the values are floats at the vertices. */
 bool sweep_reads_floats(const sweep *ranges);
 
 /* Both sweeps' work for a grid's cells in one, so that a cell is read once; ranges as sweep_of_ranges() made it for the
  * same tree. Where either cannot be read as floats it is one after the other. */
 sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
 
-/* How many threads options ask for. */
+/* Returns how many threads options ask for. */
 int sweep_threads(const mmbvh_options *options);
 
 /* ---- the ranges that sweeps write ------------------------------------------------------------------------------- */

@@ -15,8 +15,8 @@ enum {
     TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32 /* from here on halves: 2^32 cells end within the depth allowed */
 };
 
-/* Of a subtree's node: 3 low bits are a leaf's count, the others its first cell or an inner node's left child, counted
- * from where the subtree begins. */
+/* A subtree's node. The 3 low bits are a leaf's count; the others are its first cell, or an inner node's left child,
+ * counted from where the subtree begins. */
 typedef uint32_t topology_link;
 
 static inline topology_link topology_leaf(int64_t first, int64_t count)
@@ -50,7 +50,7 @@ typedef struct topology {
     int64_t link_count;
 } topology;
 
-/* What the tasks of a build share. */
+/* The data that the tasks of a build share. */
 typedef struct topology_build {
     int threads;
     topology_scratch *scratch; /* by thread */
@@ -64,12 +64,13 @@ void topology_end(topology_build *build);
 /* NULL: out of memory, and the build has failed. */
 topology *topology_new(topology_build *build, int64_t first, int64_t count);
 
-/* What the thread has in its scratch becomes the subtree under t. */
+/* Makes the contents of the thread's scratch the subtree under t. */
 void topology_keep(topology_build *build, topology *t, const topology_scratch *scratch, topology_link root);
 
 int64_t topology_node_count(const topology *t);
 
-/* To the nodes of tree, numbered depth first by pairs, root first; gives back the links' memory as it goes. */
+/* Writes the nodes of tree, numbered depth first by pairs, the root first, and gives the links' memory back on the way.
+ */
 void topology_write(topology *t, const mmbvh *tree, int threads);
 
 /* NULL is fine. */

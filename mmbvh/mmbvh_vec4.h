@@ -145,7 +145,7 @@ static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
 #endif
 }
 
-/* Is any lane's sign bit set? */
+/* Tells whether any lane's sign bit is set. */
 static inline bool vec4_any(ivec4 a)
 {
 #if defined(__SSE2__)
@@ -155,7 +155,7 @@ static inline bool vec4_any(ivec4 a)
 #endif
 }
 
-/* Are all lanes' sign bits set? */
+/* Tells whether all lanes' sign bits are set. */
 static inline bool vec4_all(ivec4 a)
 {
 #if defined(__SSE2__)

@@ -19,7 +19,7 @@ std::string why_not_data(const std::string &path);
 /* The endings that are read, for help texts: ".vtu .pvtu ...". */
 std::string known_endings();
 
-/* Whether files of this ending hold time steps inside, or name files that are steps. */
+/* Tells whether files of this ending hold time steps, or name files that are steps. */
 bool may_hold_steps(const std::string &path);
 
 class data_file
@@ -27,13 +27,13 @@ class data_file
   public:
     virtual ~data_file() = default;
 
-    /* Of the steps inside; empty where the file has none. */
+    /* The times of the steps inside; empty where the file has none. */
     virtual const std::vector<double> &times() const = 0;
 
     /* The file that step is read from, as a person would name it. */
     virtual std::string step_path(size_t step) const = 0;
 
-    /* Into how many pieces a step can be read apart; 1 for most. Throws as read() does. */
+    /* The number of pieces that a step can be read in; 1 for most files. Throws as read() does. */
     virtual int pieces(size_t step) = 0;
 
     /* One step (0 where there are none inside), and of it piece `piece` of `pieces`, with 0 of 1 for all. Throws

@@ -186,7 +186,7 @@ void walk_variable(const std::string &path, encoding how, const geometry &parts,
     if (!has_values) in.refuse("is cut short: a part has no values");
 }
 
-/* What a line of the case names. */
+/* A file that a line of the case names. */
 struct named_file {
     std::string pattern; // with '*' for the step's number
     int components = 0;  // 0: geometry

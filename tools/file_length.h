@@ -10,7 +10,7 @@ namespace render_tool
 /* Throw std::runtime_error where the file is shorter than it says or ends within a line of text. */
 void check_length(const std::string &path);
 
-/* Whether a .vtu is whole and says of all its pieces that they have neither points nor cells. */
+/* Tells whether a .vtu is whole and declares all its pieces to have neither points nor cells. */
 bool is_empty_vtu(const std::string &path);
 
 } // namespace render_tool

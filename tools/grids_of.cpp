@@ -36,7 +36,7 @@ namespace
 
 using dimensions = std::array<int, 3>; // points along i, j and k
 
-/* Those of a grid of three dimensions; false for any other data. */
+/* Gets the dimensions of a grid of three dimensions; false for any other data. */
 bool get_dimensions(vtkDataSet *data, dimensions &d)
 {
     if (auto *image = vtkImageData::SafeDownCast(data))

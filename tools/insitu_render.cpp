@@ -211,7 +211,7 @@ void draw_step(const world &w, step_source &source, stage &on, size_t index, run
         report = on.set(part.data);
     });
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
-    /* Of all ranks one time, whichever of them read a part without it. */
+    /* All ranks take one time, whichever of them read a part without it. */
     MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
     std::string warnings = check_cells(w, report, name) + report.warnings + "\n";
     const insitu_report &done = on.step(source.cycle(index), part.time);

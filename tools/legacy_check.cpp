@@ -142,7 +142,7 @@ class walker
         }
     }
 
-    /* What goes with the section just begun; false where nothing behind it can be followed. */
+    /* Skips the data of the section just begun. Returns false where nothing behind it can be followed. */
     bool skip_section()
     {
         const std::string name = word(0);

@@ -85,7 +85,7 @@ void check_named(vtkXMLDataElement *element, const std::string &path)
     for (int i = 0; i < element->GetNumberOfNestedElements(); i++) check_named(element->GetNestedElement(i), path);
 }
 
-/* Whether file number `index` of `count` is for reader `piece` of `pieces`. */
+/* Tells whether file number `index` of `count` is for reader `piece` of `pieces`. */
 bool is_file_of_piece(size_t index, size_t count, int piece, int pieces)
 {
     return static_cast<int>(index * static_cast<size_t>(pieces) / count) == piece;

@@ -103,7 +103,7 @@ OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
     return spec;
 }
 
-/* Of so many bytes, the least first. */
+/* Reads a number of so many bytes, the least significant first. */
 std::uint64_t number_at(const std::vector<unsigned char> &file, std::size_t at, int bytes)
 {
     std::uint64_t number = 0;
@@ -131,7 +131,7 @@ bool has_all_rows(const std::vector<unsigned char> &file, int height)
     return true;
 }
 
-/* Of memory that C libraries lacked their words tell, if anything does. */
+/* Throws. That a C library lacked memory is told by its words alone. */
 [[noreturn]] void fail_with(std::string what)
 {
     for (const char *words : {"memory", "bad_alloc"})
@@ -154,8 +154,8 @@ void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixe
     if (!output->close() || output->has_error()) fail_with(output->geterror());
 }
 
-/* What is large is allocated first, so that the reserve is left to what OpenImageIO and the libraries below it allocate
- * beside: tables that they fill at the first picture, a few rows, and the compressors' room. */
+/* Large blocks are allocated first, so that the reserve is left to OpenImageIO and the libraries below it: for the
+ * tables that they fill at the first picture, a few rows, and the compressors' room. */
 void write_pixels(const insitu_image &image, const layout &l, const void *pixels, const std::string &path)
 {
     enum { ROWS = 128, TABLES = 16 << 20, ADDED = 1 << 20 };

@@ -125,7 +125,7 @@ int64_t bytes_of(const array_view &view)
     return view.tuple_count * view.component_count * type_size(view.type);
 }
 
-/* Whether the elements are of a type that is only laid out in a way that cannot be borrowed. */
+/* Tells whether the elements have a type that the library knows, in a layout that cannot be borrowed. */
 bool is_known_type(vtkDataArray *array)
 {
     const int type = array->GetDataType();

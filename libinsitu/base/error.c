@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* How many bytes of a control character stand at text, 0 for what is none: of ASCII, or of the second such block of
- * Latin 1, in UTF-8. */
+/* Returns how many bytes the control character at text has, 0 where there is none. Control characters are those of
+ * ASCII, and those of Latin 1's second block in UTF-8. */
 static size_t control_bytes(const unsigned char *text)
 {
     if (text[0] < ' ' || text[0] == 0x7f) return 1;

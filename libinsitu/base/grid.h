@@ -199,7 +199,7 @@ static inline double grid_field_value(const grid_field *f, int64_t i)
     return sqrt(sum);
 }
 
-/* Is the cell's own value finite, where the values at vertices were made of such? */
+/* Tells whether the cell's own value is finite, where the values at vertices were made from cells' values. */
 static inline bool grid_has_own_value(const grid_field *f, int64_t cell)
 {
     return !f->own || isfinite(grid_field_value(f->own, cell));
