@@ -101,11 +101,10 @@ typedef struct kernel_sums {
 } kernel_sums;
 
 /* face: a row of kernel_tet_face. */
-SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, const signed char *face, const vf e[KERNEL_TET_EDGES],
+SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, const signed char *face, vf ij, vf jk, vf ik,
                                         bool has_colour)
 {
     const int i = face[0], j = face[1], k = face[2];
-    const vf ij = e[face[3]], jk = e[face[4]], ik = e[face[5]];
     return (kernel_sums){kernel_weigh_value(ij, jk, ik, c->z[i], c->z[j], c->z[k]),
                          kernel_weigh_value(ij, jk, ik, c->f[i], c->f[j], c->f[k]),
                          has_colour ? kernel_weigh_value(ij, jk, ik, c->g[i], c->g[j], c->g[k]) : vf_set(0),
@@ -139,16 +138,15 @@ kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf 
     vm hit[4];
     for (int n = 0; n < 4; n++) {
         const signed char *f = kernel_tet_face[n];
-        vf own[KERNEL_TET_EDGES];
-        memcpy(own, e, sizeof own);
-        hit[n] = kernel_inside(rays, e[f[3]], e[f[4]], e[f[5]]);
-        const vm weak = kernel_weak(hit[n], kernel_weight(e[f[3]], e[f[4]], e[f[5]]), c->least[n]);
+        vf ij = e[f[3]], jk = e[f[4]], ik = e[f[5]];
+        hit[n] = kernel_inside(rays, ij, jk, ik);
+        const vm weak = kernel_weak(hit[n], kernel_weight(ij, jk, ik), c->least[n]);
         if (vm_any(weak)) {
             const kernel_spot ijk[3] = {kernel_cell_spot(c, f[0]), kernel_cell_spot(c, f[1]),
                                         kernel_cell_spot(c, f[2])};
-            kernel_triangle_mend(p, ijk, weak, &own[f[3]], &own[f[4]], &own[f[5]]);
+            kernel_triangle_mend(p, ijk, weak, &ij, &jk, &ik);
         }
-        sums[n] = kernel_tet_sums(c, f, own, has_colour);
+        sums[n] = kernel_tet_sums(c, f, ij, jk, ik, has_colour);
     }
     return kernel_tet_choose(hit, sums);
 }
@@ -175,9 +173,10 @@ SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *
     out->mask = vm_or(vm_or(hit[0], hit[1]), vm_or(hit[2], hit[3]));
     out->t_in = out->t_out = out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
     if (!vm_any(out->mask)) return;
-    const kernel_sums sums[4] = {
-        kernel_tet_sums(c, kernel_tet_face[0], e, has_colour), kernel_tet_sums(c, kernel_tet_face[1], e, has_colour),
-        kernel_tet_sums(c, kernel_tet_face[2], e, has_colour), kernel_tet_sums(c, kernel_tet_face[3], e, has_colour)};
+    const kernel_sums sums[4] = {kernel_tet_sums(c, kernel_tet_face[0], e[0], e[3], e[1], has_colour),
+                                 kernel_tet_sums(c, kernel_tet_face[1], e[0], e[4], e[2], has_colour),
+                                 kernel_tet_sums(c, kernel_tet_face[2], e[1], e[5], e[2], has_colour),
+                                 kernel_tet_sums(c, kernel_tet_face[3], e[3], e[5], e[4], has_colour)};
     kernel_ends ends = kernel_tet_choose(hit, sums);
     if (p->is_pencil) {
         const float *least = c->least;
