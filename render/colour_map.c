@@ -3,10 +3,10 @@
  * form of CIELAB, whose middle stays neutral without a visible edge. */
 #include "colour_map.h"
 
-#include <math.h>
 #include <pthread.h>
 #include <string.h>
 
+#include "colour_space.h"
 #include "colour_tables.h"
 
 enum { most_keys = 11 };
@@ -53,31 +53,21 @@ static const brewer_palette palettes[] = {
 static const char *const names[COLOUR_MAP_COUNT] = {COLOUR_MAPS(NAME)};
 static colour_table tables[COLOUR_MAP_COUNT];
 
-static double linear_from_srgb(double s)
-{
-    return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
-}
-
-static double srgb_from_linear(double l)
-{
-    return l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055;
-}
-
 float colour_linear_from_srgb(float srgb)
 {
-    return (float)linear_from_srgb(srgb);
+    return (float)colour_linear_of(srgb);
 }
 
 float colour_srgb_from_linear(float linear)
 {
-    return (float)srgb_from_linear(linear);
+    return (float)colour_srgb_of(linear);
 }
 
 static void fill_published(colour_table table, const uint64_t *codes)
 {
     for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
         for (int c = 0; c < 3; c++)
-            table[i][c] = (float)linear_from_srgb((double)(codes[i] >> (32 - 16 * c) & 65535) / 65535);
+            table[i][c] = (float)colour_linear_of((double)(codes[i] >> (32 - 16 * c) & 65535) / 65535);
 }
 
 static double channel_of(unsigned colour, int channel)
@@ -93,84 +83,24 @@ static void fill_palette(colour_table table, const brewer_palette *palette)
         const int key = x < last ? (int)x : last - 1;
         for (int c = 0; c < 3; c++) {
             const double low = channel_of(palette->keys[key], c), high = channel_of(palette->keys[key + 1], c);
-            table[i][c] = (float)linear_from_srgb(low + (x - key) * (high - low));
+            table[i][c] = (float)colour_linear_of(low + (x - key) * (high - low));
         }
     }
 }
 
-/* sRGB's primaries and white D65: linear RGB to XYZ over the white point, and its inverse. */
-static const double xyz_from_rgb[3][3] = {
-    {0.4124564, 0.3575761, 0.1804375}, {0.2126729, 0.7151522, 0.0721750}, {0.0193339, 0.1191920, 0.9503041}};
-static const double rgb_from_xyz[3][3] = {
-    {3.2404542, -1.5371385, -0.4985314}, {-0.9692660, 1.8760108, 0.0415560}, {0.0556434, -0.2040259, 1.0572252}};
-static const double white_xyz[3] = {0.95047, 1.0, 1.08883};
-
-static double lab_curve(double t)
-{
-    return t > 216.0 / 24389 ? cbrt(t) : (24389.0 / 27 * t + 16) / 116;
-}
-
-static double lab_curve_inverse(double f)
-{
-    return f > 6.0 / 29 ? f * f * f : (116 * f - 16) * 27 / 24389;
-}
-
-/* m: distance from black, s: angle from the grey axis, h: hue. */
-typedef struct msh {
-    double m, s, h;
-} msh;
-
-static msh msh_from_srgb(unsigned colour)
-{
-    double f[3];
-    for (int row = 0; row < 3; row++) {
-        double sum = 0;
-        for (int c = 0; c < 3; c++) sum += xyz_from_rgb[row][c] * linear_from_srgb(channel_of(colour, c));
-        f[row] = lab_curve(sum / white_xyz[row]);
-    }
-    const double lightness = 116 * f[1] - 16, a = 500 * (f[0] - f[1]), b = 200 * (f[1] - f[2]);
-    const double m = sqrt(lightness * lightness + a * a + b * b);
-    return (msh){m, acos(lightness / m), atan2(b, a)};
-}
-
-static void linear_from_msh(msh colour, float rgb[3])
-{
-    const double lightness = colour.m * cos(colour.s);
-    const double a = colour.m * sin(colour.s) * cos(colour.h), b = colour.m * sin(colour.s) * sin(colour.h);
-    const double fy = (lightness + 16) / 116;
-    const double f[3] = {fy + a / 500, fy, fy - b / 200};
-    double xyz[3];
-    for (int i = 0; i < 3; i++) xyz[i] = white_xyz[i] * lab_curve_inverse(f[i]);
-    for (int i = 0; i < 3; i++) {
-        const double l = rgb_from_xyz[i][0] * xyz[0] + rgb_from_xyz[i][1] * xyz[1] + rgb_from_xyz[i][2] * xyz[2];
-        rgb[i] = (float)fmin(1, fmax(0, l));
-    }
-}
-
-/* The hue that the neutral middle takes on the side of a saturated end, so that the way there does not turn in hue. */
-static double middle_hue(msh end, double middle_m)
-{
-    const double spin = end.s * sqrt(middle_m * middle_m - end.m * end.m) / (end.m * sin(end.s));
-    return end.h > -acos(-1.0) / 3 ? end.h + spin : end.h - spin;
-}
-
+/* Between two saturated ends: through a neutral middle, as light as colour_between() makes it. */
 static void fill_diverging(colour_table table, unsigned low, unsigned high)
 {
-    const double middle_m = 88; /* above both ends' */
-    const msh ends[2] = {msh_from_srgb(low), msh_from_srgb(high)};
-    for (int i = 0; i < COLOUR_TABLE_SIZE; i++) {
-        const double x = (double)i / (COLOUR_TABLE_SIZE - 1);
-        const msh end = ends[x > 0.5];
-        const double t = fabs(2 * x - 1); /* 1 at the end, 0 in the middle */
-        const double hue = middle_hue(end, middle_m);
-        linear_from_msh((msh){middle_m + t * (end.m - middle_m), t * end.s, hue + t * (end.h - hue)}, table[i]);
-    }
+    double ends[2][3];
+    for (int c = 0; c < 3; c++) ends[0][c] = channel_of(low, c), ends[1][c] = channel_of(high, c);
+    for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
+        colour_between(COLOUR_DIVERGING, ends[0], ends[1], (double)i / (COLOUR_TABLE_SIZE - 1), table[i]);
 }
 
 static void fill_grey(colour_table table)
 {
     for (int i = 0; i < COLOUR_TABLE_SIZE; i++)
-        for (int c = 0; c < 3; c++) table[i][c] = (float)linear_from_srgb((double)i / (COLOUR_TABLE_SIZE - 1));
+        for (int c = 0; c < 3; c++) table[i][c] = (float)colour_linear_of((double)i / (COLOUR_TABLE_SIZE - 1));
 }
 
 static const brewer_palette *find_palette(const char *name)

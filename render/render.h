@@ -54,14 +54,31 @@ typedef struct render_space {
     double depth_origin; /* z at which t = 0 */
 } render_space;
 
-/* Colour and opacity of a value: colours are a table of linear RGB, evenly spaced over [low, high], interpolated
- * linearly, clamped outside; opacity is piecewise linear through points of rising value (two of the same value make a
- * step), constant outside. Opacity is per unit_distance: extinction = -ln(1 - opacity) / unit_distance. */
+/* How values are spaced along a colour table: by value; by the logarithm, low > 0; or by render_scaled(). */
+typedef enum render_scale { RENDER_LINEAR, RENDER_LOG, RENDER_SYMLOG } render_scale;
+
+/* The scale's function s, which never falls, and its inverse. RENDER_LOG: ln value, -infinity where value <= 0.
+ * RENDER_SYMLOG: value / threshold up to the threshold > 0, on both sides of 0; 1 + ln(value / threshold) beyond, and
+ * the same mirrored, so that neither s nor its slope jumps. */
+double render_scaled(render_scale scale, double threshold, double value);
+double render_unscaled(render_scale scale, double threshold, double scaled);
+
+/* Colour and opacity of a value. A value's place is (s(value) - s(low)) / (s(high) - s(low)), s being the scale.
+ * Colours are a table of linear RGB, evenly spaced over the places from 0 to 1, interpolated linearly by place (in
+ * volumes with a scale, by value between entries), clamped outside. Opacity is piecewise linear through points of
+ * rising value (two of the same value make a step), constant outside. Opacity is per unit_distance: extinction = -ln(1
+ * - opacity) / unit_distance. */
 typedef struct render_transfer {
     double low, high;
     int colour_count;     /* >= 2 */
     const float *colours; /* colour_count × 3 */
-    int opacity_count;    /* 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, which have none */
+    render_scale scale;
+    double threshold; /* of RENDER_SYMLOG, > 0 */
+    bool is_banded;   /* surfaces only: the colours are those of bands of equal width, not interpolated; 1 will do */
+    const float
+        *outside;      /* surfaces only: 3 × 3, the colours below low, above high, and of what is not a number; NULL:
+                          those of low and high, and RENDER_NO_COLOUR. Values within RENDER_END of an end belong to it */
+    int opacity_count; /* 1 .. RENDER_MAX_OPACITY_POINTS; 0 for surfaces, which have none */
     const double *opacity_values;
     const float *opacities;
     double unit_distance; /* scene units, > 0 */
@@ -119,6 +136,9 @@ typedef struct render_volume_layer {
     render_field field;
     const render_transfer *transfer;
 } render_volume_layer;
+
+/* Of a colour table's length: what the rounding of a value at an end of the range may come to. */
+#define RENDER_END 4e-6f
 
 /* Linear grey of surfaces where their colour field is not a number: what a scene's colour of 0.6 is in float. */
 #define RENDER_NO_COLOUR 0.318546802f

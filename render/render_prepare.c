@@ -11,6 +11,7 @@
 #include "mmbvh.h"
 #include "render.h"
 #include "render_pieces.h"
+#include "render_scale.h"
 
 static float below(double v)
 {
@@ -72,19 +73,36 @@ static void prepare_visible(kernel_interest *interest, const render_transfer *t)
     }
 }
 
+static void prepare_scale(kernel_transfer *out, const render_transfer *t)
+{
+    const double low = render_scaled(t->scale, t->threshold, t->low);
+    const double high = render_scaled(t->scale, t->threshold, t->high);
+    const double slope = high > low ? 1 / (high - low) : 1;
+    /* Logarithms are counted from a value below low by more than RENDER_END of the table, so that what is less still is
+     * seen to be below. */
+    const double least = t->scale == RENDER_LOG ? t->low / 2 : t->threshold;
+    const double begin = t->scale == RENDER_LOG ? log(least) : 0;
+    out->scale = (kernel_scale){.kind = t->scale,
+                                .threshold = (float)(least * out->inverse_width),
+                                .inverse = (float)(1 / (least * out->inverse_width)),
+                                .slope = (float)slope,
+                                .shift = (float)((begin - low) * slope)};
+}
+
 static void prepare_transfer(kernel_transfer *out, const render_transfer *t, double step)
 {
-    const double width = t->high - t->low;
-    out->low = t->low;
-    out->inverse_width = width > 0 ? 1 / width : 1;
+    render_transfer_domain(t, &out->low, &out->inverse_width);
     out->colours = t->colours;
     out->colour_count = t->colour_count;
+    out->is_banded = t->is_banded;
+    out->outside = t->outside;
+    if (t->scale != RENDER_LINEAR) prepare_scale(out, t);
     if (!t->opacity_count) return;
     out->ramp_count = t->opacity_count - 1;
     out->base_opacity = t->opacities[0];
     for (int i = 0; i < out->ramp_count; i++) {
         const double along = (t->opacity_values[i + 1] - t->opacity_values[i]) * out->inverse_width;
-        out->ramp_start[i] = (float)((t->opacity_values[i] - t->low) * out->inverse_width);
+        out->ramp_start[i] = (float)((t->opacity_values[i] - out->low) * out->inverse_width);
         out->ramp_inverse[i] = along > 1e-38 ? (float)(1 / along) : 3e38f;
         out->ramp_rise[i] = t->opacities[i + 1] - t->opacities[i];
     }

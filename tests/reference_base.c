@@ -27,13 +27,33 @@ double reference_opacity(const render_transfer *t, double value)
     return (double)t->opacities[last];
 }
 
+/* The scale's function, by its definition. */
+static double scaled(const render_transfer *t, double value)
+{
+    const double size = fabs(value) / t->threshold;
+    if (t->scale == RENDER_LOG) return value > 0 ? log10(value) : -INFINITY;
+    if (t->scale == RENDER_SYMLOG && size > 1) return (value < 0 ? -1 : 1) * (1 + log10(size) / log10(exp(1)));
+    return t->scale == RENDER_SYMLOG ? value / t->threshold : value;
+}
+
+double reference_place(const render_transfer *t, double value)
+{
+    const double low = scaled(t, t->low), range = scaled(t, t->high) - low;
+    return range > 0 ? (scaled(t, value) - low) / range : 0;
+}
+
 void reference_colour(const render_transfer *t, double value, double colour[3])
 {
-    const double range = t->high - t->low, x = range > 0 ? (value - t->low) / range : 0;
-    const double place = fmin(fmax(x, 0), 1) * (t->colour_count - 1);
-    const int i = place >= t->colour_count - 1 ? t->colour_count - 2 : (int)place;
+    const double x = reference_place(t, value);
+    const double place = fmin(fmax(x, 0), 1) * (t->colour_count - (t->is_banded ? 0 : 1));
+    const bool is_last = place >= t->colour_count - 1;
+    const int i = t->is_banded ? (int)fmin(place, t->colour_count - 1) : is_last ? t->colour_count - 2 : (int)place;
     for (int c = 0; c < 3; c++) {
-        const double low = (double)t->colours[3 * i + c], high = (double)t->colours[3 * i + 3 + c];
+        const double low = (double)t->colours[3 * i + c];
+        const double high = t->is_banded ? low : (double)t->colours[3 * i + 3 + c];
         colour[c] = low + (place - i) * (high - low);
+        if (t->outside && x < -(double)RENDER_END) colour[c] = (double)t->outside[c];
+        if (t->outside && x > 1 + (double)RENDER_END) colour[c] = (double)t->outside[3 + c];
+        if (isnan(value)) colour[c] = t->outside ? (double)t->outside[6 + c] : (double)RENDER_NO_COLOUR;
     }
 }

@@ -325,9 +325,7 @@ static void surface_colour(trace *t, const placed_cell *c, const render_surface_
     if (!layer->colour_map) return;
     double values[REFERENCE_MAX_VERTICES];
     grid_cell_values(&layer->colour_field.fields[c->part_index], c->index, c->vertices, c->cell.count, values);
-    const double value = value_along(t, c, values, z);
-    reference_colour(layer->colour_map, value, colour);
-    for (int k = 0; k < 3 && isnan(value); k++) colour[k] = (double)RENDER_NO_COLOUR;
+    reference_colour(layer->colour_map, value_along(t, c, values, z), colour);
 }
 
 static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surface_layer *layer, int value_index,

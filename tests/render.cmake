@@ -30,6 +30,10 @@ set_tests_properties(reference PROPERTIES TIMEOUT 60)
 add_test(NAME render COMMAND test_render)
 set_tests_properties(render PROPERTIES TIMEOUT 180)
 
+insitu_render_program(test_colour_scales)
+add_test(NAME colour_scales COMMAND test_colour_scales)
+set_tests_properties(colour_scales PROPERTIES TIMEOUT 60)
+
 insitu_render_program(test_render_invariance)
 add_test(NAME render_invariance COMMAND test_render_invariance)
 set_tests_properties(render_invariance PROPERTIES TIMEOUT 120)

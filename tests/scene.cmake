@@ -4,6 +4,11 @@ target_link_libraries(test_scene PRIVATE insitu_flags insitu_internal PkgConfig:
 add_test(NAME scene COMMAND test_scene ${PROJECT_SOURCE_DIR}/examples)
 set_tests_properties(scene PROPERTIES TIMEOUT 60)
 
+add_executable(test_scene_colour test_scene_colour.c)
+target_link_libraries(test_scene_colour PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME scene_colour COMMAND test_scene_colour)
+set_tests_properties(scene_colour PROPERTIES TIMEOUT 60)
+
 add_executable(scene_reference scene_reference.c)
 target_link_libraries(scene_reference PRIVATE insitu_flags insitu_internal)
 add_test(NAME scene_reference_is_in_step COMMAND scene_reference ${PROJECT_SOURCE_DIR}/docs/scene.md)

@@ -54,6 +54,12 @@ static void print_mapping(FILE *to, const scene_mapping *mapping, const char *pa
                 key->by_default ? key->by_default : "**required**", key->help);
     }
     for (int i = 0; mapping->fields[i].key; i++) {
+        for (int form = 0; form < mapping->keys[i].form_count; form++) {
+            char below[256];
+            snprintf(below, sizeof below, "%s.%s", path, mapping->fields[i].key);
+            if (mapping->keys[i].forms[form].key.child)
+                print_mapping(to, mapping->keys[i].forms[form].key.child, below);
+        }
         if (!mapping->keys[i].child) continue;
         char below[256];
         const bool is_list = mapping->fields[i].value.type == CYAML_SEQUENCE;

@@ -36,7 +36,7 @@ static void assert_near(double value, double expected, double tolerance)
 static insitu_status parse(const char *text, scene *s, base_error *error)
 {
     *error = (base_error){.status = INSITU_OK};
-    return scene_parse(text, strlen(text), "scene.yaml", s, error);
+    return scene_parse(text, strlen(text), "scene.yaml", NULL, s, error);
 }
 
 static void parse_good(const char *text, scene *s)
@@ -91,7 +91,14 @@ static const char every_key[] = "threads: 3\n"
                                 "    sampling: {step: 0.125}\n"
                                 "    outputs: [{path: b.png, bits: 8}]\n"
                                 "  - name: third\n"
-                                "    layers: [{volume: {field: p}}, {volume: {field: q}}]\n"
+                                "    layers:\n"
+                                "      - volume: {field: p}\n"
+                                "      - volume: {field: q}\n"
+                                "      - isosurface:\n"
+                                "          {field: q, values: [7], colour_by: {field: p, reversed: true, discrete: 5,\n"
+                                "           map: {colours: [[0, 0, 0], [1, 0, 0], [1, 1, 1]], at: [0, 0.25, 1]},\n"
+                                "           scale: symlog, threshold: 0.5, below: [0, 0, 1], above: [0, 1, 0],\n"
+                                "           nan: [1, 0, 1]}}\n"
                                 "    sampling: {max_error: 1e-3}\n"
                                 "    outputs: [{path: c.png}]\n";
 
@@ -360,7 +367,7 @@ static void check_example(const char *folder, const char *name)
     fclose(file);
     scene s;
     base_error error = {.status = INSITU_OK};
-    if (scene_parse(text, size, path, &s, &error) != INSITU_OK) fail_msg("%s", error.message);
+    if (scene_parse(text, size, path, NULL, &s, &error) != INSITU_OK) fail_msg("%s", error.message);
     scene_free(&s);
 }
 
@@ -617,9 +624,9 @@ static void scene_huge_file_is_refused(void **state)
     memcpy(text, fewest_keys, sizeof fewest_keys - 1);
     scene s;
     base_error error = {.status = INSITU_OK};
-    assert_int_equal(scene_parse(text, size, "scene.yaml", &s, &error), INSITU_ERROR_SCENE);
+    assert_int_equal(scene_parse(text, size, "scene.yaml", NULL, &s, &error), INSITU_ERROR_SCENE);
     assert_non_null(strstr(error.message, "1048577 bytes"));
-    assert_int_equal(scene_parse(text, size - 1, "scene.yaml", &s, NULL), INSITU_OK);
+    assert_int_equal(scene_parse(text, size - 1, "scene.yaml", NULL, &s, NULL), INSITU_OK);
     scene_free(&s);
     test_free(text);
 }
@@ -632,7 +639,7 @@ static void scene_truncated_files_end_well(void **state)
     for (size_t size = 0; size < sizeof every_key; size++) {
         scene s;
         base_error error = {.status = INSITU_OK};
-        const insitu_status status = scene_parse(every_key, size, "scene.yaml", &s, &error);
+        const insitu_status status = scene_parse(every_key, size, "scene.yaml", NULL, &s, &error);
         assert_true((status == INSITU_OK) == (error.message[0] == '\0'));
         scene_free(&s);
     }

@@ -32,7 +32,7 @@ static unsigned storing(const char *const *layers, const int *frames)
         snprintf(text + strlen(text), sizeof text - strlen(text),
                  "  - {name: i%d, layers: [%s], sampling: {frames: %d}, outputs: [{path: p%d.png}]}\n", i, layers[i],
                  frames ? frames[i] : 1, i);
-    if (scene_parse(text, strlen(text), "scene.yaml", &s, &error) != INSITU_OK) fail_msg("%s", error.message);
+    if (scene_parse(text, strlen(text), "scene.yaml", NULL, &s, &error) != INSITU_OK) fail_msg("%s", error.message);
     for (int i = 0; i < s.image_count; i++) images[i] = &s.images[i];
     const session_plan plan = {.image_count = s.image_count, .images = images};
     for (int i = 0; i < s.image_count; i++) bits |= (unsigned)session_active_cells_pay(&plan, images[i]) << i;

@@ -57,6 +57,20 @@ static insitu_status read_file(const char *path, scene_file_text *text, base_err
     return status;
 }
 
+/* For the files that a scene names. */
+static insitu_status read_attachment(const char *path, char **text, int64_t *size, base_error *error)
+{
+    scene_file_text file = {0};
+    const insitu_status status = read_file(path, &file, error);
+    if (status == INSITU_OK) {
+        *text = file.data;
+        *size = file.size;
+    } else {
+        base_free(file.data);
+    }
+    return status;
+}
+
 /* Rank 0's bytes to all; *data is allocated on the others. Collective. */
 static insitu_status share_bytes(const session_team *team, char **data, int64_t *size, base_error *error)
 {
@@ -71,14 +85,43 @@ static insitu_status share_bytes(const session_team *team, char **data, int64_t 
     return session_mpi(error, MPI_Bcast(*data, (int)*size, MPI_CHAR, 0, team->comm), "MPI_Bcast");
 }
 
+/* The files that rank 0's scene names, to all. Collective. */
+static insitu_status share_attachments(const session_team *team, scene_attachments *files, base_error *error)
+{
+    int count = files->count;
+    insitu_status status = session_mpi(error, MPI_Bcast(&count, 1, MPI_INT, 0, team->comm), "MPI_Bcast");
+    if (status || count == 0) return status;
+    if (team->rank != 0) {
+        files->items = base_calloc((size_t)count, sizeof *files->items);
+        if (files->items)
+            files->count = count;
+        else
+            session_no_memory(error, count * (int64_t)sizeof *files->items, "files of the scene");
+    }
+    status = session_agree(team->comm, error);
+    for (int i = 0; i < count && !status; i++) {
+        scene_attachment *file = &files->items[i];
+        int64_t length = team->rank == 0 ? (int64_t)strlen(file->path) + 1 : 0;
+        status = share_bytes(team, &file->path, &length, error);
+        if (!status) status = share_bytes(team, &file->text, &file->size, error);
+    }
+    return status;
+}
+
+/* Rank 0 parses first, and reads what files the scene names; all others parse what it read. */
 static insitu_status parse_shared(const char *path, const session_team *team, scene_file_text *text, scene *out,
                                   base_error *error)
 {
-    insitu_status status = share_bytes(team, &text->data, &text->size, error);
-    if (status) return status;
     scene parsed = {0};
-    scene_parse(text->data, (size_t)text->size, path, &parsed, error);
-    status = session_agree_as_is(team->comm, error);
+    scene_attachments files = {.read = read_attachment};
+    if (team->rank == 0) scene_parse(text->data, (size_t)text->size, path, &files, &parsed, error);
+    files.read = NULL;
+    insitu_status status = session_agree_as_is(team->comm, error);
+    if (!status) status = share_bytes(team, &text->data, &text->size, error);
+    if (!status) status = share_attachments(team, &files, error);
+    if (!status && team->rank != 0) scene_parse(text->data, (size_t)text->size, path, &files, &parsed, error);
+    if (!status) status = session_agree_as_is(team->comm, error);
+    scene_attachments_free(&files);
     if (status == INSITU_OK)
         *out = parsed;
     else

@@ -71,10 +71,25 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
     return vf_select(small, 1.0f - series, power);
 }
 
+/* The place in the colour table, by a scale that is not linear: render_scaled(), to 3e-7 of its value. */
+static __attribute__((noinline)) vf kernel_scaled_place(const kernel_scale *s, vf x)
+{
+    const vf threshold = vf_set(s->threshold), size = vf_max(vf_abs(x), threshold);
+    const vf above = vf_log2(size * s->inverse) * 0.69314718f;
+    if (s->kind == RENDER_LOG) return vf_select(vf_lt(threshold, x), above, vf_set(0)) * s->slope + s->shift;
+    const vf beyond = vf_select(vf_lt(x, vf_set(0)), -1.0f - above, 1.0f + above);
+    return vf_select(vf_lt(threshold, vf_abs(x)), beyond, x * s->inverse) * s->slope + s->shift;
+}
+
+SIMD_INLINE vf kernel_colour_place(const kernel_transfer *t, vf x)
+{
+    return t->scale.kind == RENDER_LINEAR ? x : kernel_scaled_place(&t->scale, x);
+}
+
 /* x in the transfer's domain; NaN gives the colour at 0. */
 SIMD_INLINE void kernel_table_colour(const kernel_transfer *t, vf x, vf out[3])
 {
-    const vf place = vf_clamp(x, vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
+    const vf place = vf_clamp(kernel_colour_place(t, x), vf_set(0), vf_set(1)) * (float)(t->colour_count - 1);
     const vf whole = vf_min(vf_floor(place), vf_set((float)(t->colour_count - 2)));
     const vf part = place - whole;
     const vi index = vi_from_vf(whole) * 3;

@@ -24,12 +24,24 @@ typedef struct kernel_interest {
     float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
 } kernel_interest;
 
-/* A transfer function in its own domain, where [low, high] is [0, 1]: opacity is the first point's plus a sum of ramps
- * (a ramp of infinite slope is a step). */
+/* What places in a colour table are by where its scale is not linear: a value's s times slope, plus shift. */
+typedef struct kernel_scale {
+    render_scale kind;
+    float threshold; /* below it s is linear (symlog), or no more than at it (log) */
+    float inverse;   /* 1 / threshold */
+    float slope, shift;
+} kernel_scale;
+
+/* A transfer function in its own domain, where low is 0 and 1 / inverse_width is 1: the range [low, high], or, with a
+ * scale, what lies between 0 and the end that is farther from it, so that small values keep their digits. Opacity is
+ * the first point's plus a sum of ramps (a ramp of infinite slope is a step). */
 typedef struct kernel_transfer {
     double low, inverse_width; /* value -> domain */
     const float *colours;
     int colour_count;
+    kernel_scale scale;
+    bool is_banded;
+    const float *outside; /* 3 × 3, NULL: none */
     int ramp_count;
     float base_opacity;
     float ramp_start[RENDER_MAX_OPACITY_POINTS], ramp_inverse[RENDER_MAX_OPACITY_POINTS];

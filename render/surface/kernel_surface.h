@@ -34,8 +34,32 @@ typedef struct kernel_surface_state {
     bool is_opaque;
 } kernel_surface_state;
 
+/* Of bands, and with colours of their own for what is outside of the range. */
+static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
+{
+    const vf place = kernel_colour_place(t, w), one = vf_set(1), zero = vf_set(0);
+    if (t->is_banded) {
+        const vf band = vf_floor(vf_clamp(place, zero, one) * (float)t->colour_count);
+        const vi index = vi_from_vf(vf_min(band, vf_set((float)(t->colour_count - 1)))) * 3;
+        vf_gather_pair(t->colours, index, &out[0], &out[1]);
+        out[2] = vf_gather(t->colours + 2, index);
+    } else {
+        kernel_table_colour(t, w, out);
+    }
+    const vm below = vf_lt(place, vf_set(-RENDER_END)), above = vf_lt(vf_set(1 + RENDER_END), place), is = vf_eq(w, w);
+    for (int a = 0; a < 3; a++) {
+        if (t->outside) out[a] = vf_select(below, vf_set(t->outside[a]), out[a]);
+        if (t->outside) out[a] = vf_select(above, vf_set(t->outside[3 + a]), out[a]);
+        out[a] = vf_select(is, out[a], vf_set(t->outside ? t->outside[6 + a] : RENDER_NO_COLOUR));
+    }
+}
+
 SIMD_INLINE void kernel_base_colour(const kernel_surface *s, int value, vf w, vf out[3])
 {
+    if (s->layer->colour_map && (s->colour.is_banded || s->colour.outside)) {
+        kernel_marked_colour(&s->colour, w, out);
+        return;
+    }
     if (s->layer->colour_map) {
         kernel_table_colour(&s->colour, w, out);
         for (int a = 0; a < 3; a++) out[a] = vf_select(vf_eq(w, w), out[a], vf_set(RENDER_NO_COLOUR));

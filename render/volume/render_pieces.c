@@ -12,6 +12,7 @@
 #include "kernel_pieces.h"
 #include "memory.h"
 #include "render.h"
+#include "render_scale.h"
 
 /* Far outside of every domain, and finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;
@@ -44,29 +45,32 @@ static bool is_straight(const render_transfer *t, int from, int to, double toler
     return true;
 }
 
-/* The entry that follows i, as far on as the line allows. Long tables are tried piecewise: this is quadratic. */
+/* The entry that follows i, as far on as the line allows, by places that are even. Long tables are tried piecewise:
+ * this is quadratic. */
 static int next_entry(const render_transfer *t, int i, double tolerance)
 {
     enum { FARTHEST = 256 };
     int next = i + 1;
+    if (t->scale != RENDER_LINEAR) return next;
     while (next + 1 < t->colour_count && next - i < FARTHEST && is_straight(t, i, next + 1, tolerance)) next++;
     return next;
 }
 
-static double domain_of(const render_transfer *t, double value)
-{
-    const double width = t->high - t->low, x = (value - t->low) * (width > 0 ? 1 / width : 1);
-    return x < -1e18 ? -1e18 : x > 1e18 ? 1e18 : x;
-}
+/* A colour of the table that is kept, and where it is in the domain. */
+typedef struct kept_entry {
+    int index;
+    double place;
+} kept_entry;
 
 /* Places in the domain, sorted, no two the same; entries gets the colours of the table that are kept. */
-static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, int *entries)
+static int collect_cuts(const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
     int count = 0, active = 0;
-    for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance)) entries[active++] = i;
-    entries[active++] = t->colour_count - 1;
-    for (int i = 0; i < active; i++) cuts[count++] = (kernel_real)((double)entries[i] / (t->colour_count - 1));
-    for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)domain_of(t, t->opacity_values[i]);
+    for (int i = 0; i < t->colour_count - 1; i = next_entry(t, i, tolerance))
+        entries[active++] = (kept_entry){i, render_entry_place(t, i)};
+    entries[active++] = (kept_entry){t->colour_count - 1, render_entry_place(t, t->colour_count - 1)};
+    for (int i = 0; i < active; i++) cuts[count++] = (kernel_real)entries[i].place;
+    for (int i = 0; i < t->opacity_count; i++) cuts[count++] = (kernel_real)render_domain_of(t, t->opacity_values[i]);
     qsort(cuts, (size_t)count, sizeof *cuts, compare_cuts);
     int unique = 1;
     for (int i = 1; i < count; i++)
@@ -77,7 +81,7 @@ static int collect_cuts(const render_transfer *t, double tolerance, kernel_real 
 static double opacity_slope(const render_transfer *t, int i)
 {
     return ((double)t->opacities[i + 1] - (double)t->opacities[i]) /
-           (domain_of(t, t->opacity_values[i + 1]) - domain_of(t, t->opacity_values[i]));
+           (render_domain_of(t, t->opacity_values[i + 1]) - render_domain_of(t, t->opacity_values[i]));
 }
 
 /* Opacity at x and its slope, on the stretch that holds middle. */
@@ -85,25 +89,26 @@ static double opacity_on(const render_transfer *t, double middle, double x, doub
 {
     int i = 0;
     *slope = 0;
-    while (i < t->opacity_count && domain_of(t, t->opacity_values[i]) <= middle) i++;
+    while (i < t->opacity_count && render_domain_of(t, t->opacity_values[i]) <= middle) i++;
     if (i == 0) return (double)t->opacities[0];
     if (i == t->opacity_count) return (double)t->opacities[i - 1];
     *slope = opacity_slope(t, i - 1);
-    const double a = (double)t->opacities[i - 1] + (x - domain_of(t, t->opacity_values[i - 1])) * *slope;
+    const double a = (double)t->opacities[i - 1] + (x - render_domain_of(t, t->opacity_values[i - 1])) * *slope;
     return a < 0 ? 0 : a > 1 ? 1 : a;
 }
 
-static void set_colours(const render_transfer *t, const int *entries, double middle, double x, kernel_piece *piece)
+static void set_colours(const render_transfer *t, const kept_entry *entries, double middle, double x,
+                        kernel_piece *piece)
 {
     const int last = t->colour_count - 1;
     int k = 0;
-    while (entries[k + 1] < last && (double)entries[k + 1] / last <= middle) k++;
-    const double begin = (double)entries[k] / last, end = (double)entries[k + 1] / last;
-    const bool is_outside = middle < 0 || middle > 1;
+    while (entries[k + 1].index < last && entries[k + 1].place <= middle) k++;
+    const double begin = entries[k].place, end = entries[k + 1].place;
+    const bool is_before = k == 0 && middle < begin, is_behind = entries[k + 1].index == last && middle > end;
     for (int c = 0; c < 3; c++) {
-        const double low = colour_at(t, entries[k], c), high = colour_at(t, entries[k + 1], c);
-        const double slope = is_outside ? 0 : (high - low) / (end - begin);
-        const double colour = middle < 0 ? low : middle > 1 ? high : low + (x - begin) * slope;
+        const double low = colour_at(t, entries[k].index, c), high = colour_at(t, entries[k + 1].index, c);
+        const double slope = is_before || is_behind ? 0 : (high - low) / (end - begin);
+        const double colour = is_before ? low : is_behind ? high : low + (x - begin) * slope;
         piece->entry[KERNEL_PIECE_COLOUR + c] = (kernel_real)colour;
         piece->entry[KERNEL_PIECE_COLOUR_SLOPE + c] = (kernel_real)slope;
     }
@@ -114,7 +119,7 @@ static const double narrow_width = 0.01;
 
 static bool is_narrow(const render_transfer *t, int i)
 {
-    const double width = domain_of(t, t->opacity_values[i + 1]) - domain_of(t, t->opacity_values[i]);
+    const double width = render_domain_of(t, t->opacity_values[i + 1]) - render_domain_of(t, t->opacity_values[i]);
     return 0 < width && width < narrow_width && t->opacities[i] != t->opacities[i + 1];
 }
 
@@ -125,7 +130,7 @@ static double cut_exactly(const render_transfer *t, kernel_real cut)
     double out = (double)cut;
     int count = 0;
     for (int i = 0; i < t->opacity_count; i++) {
-        const double at = domain_of(t, t->opacity_values[i]);
+        const double at = render_domain_of(t, t->opacity_values[i]);
         if ((kernel_real)at != cut) continue;
         count++;
         if ((i > 0 && is_narrow(t, i - 1)) || (i + 1 < t->opacity_count && is_narrow(t, i))) out = at;
@@ -133,7 +138,7 @@ static double cut_exactly(const render_transfer *t, kernel_real cut)
     return count == 1 ? out : (double)cut;
 }
 
-static void set_piece(const render_transfer *t, const int *entries, kernel_real low, kernel_real high,
+static void set_piece(const render_transfer *t, const kept_entry *entries, kernel_real low, kernel_real high,
                       kernel_piece *piece)
 {
     const double begin = cut_exactly(t, low), end = cut_exactly(t, high), middle = 0.5 * (begin + end);
@@ -217,9 +222,10 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
 {
     int last;
     for (int i = 0; i < t->opacity_count; i = last + 1) {
-        const double at = domain_of(t, t->opacity_values[i]);
+        const double at = render_domain_of(t, t->opacity_values[i]);
         last = i;
-        while (last + 1 < t->opacity_count && (kernel_real)domain_of(t, t->opacity_values[last + 1]) == (kernel_real)at)
+        while (last + 1 < t->opacity_count &&
+               (kernel_real)render_domain_of(t, t->opacity_values[last + 1]) == (kernel_real)at)
             last++;
         if (t->opacities[i] != t->opacities[last])
             out->steps[out->step_count++] = (kernel_step){at, (float)(kernel_real)at};
@@ -233,7 +239,8 @@ static const double steep_width = 1.0 / 64;
 static void fill_steep(kernel_pieces *out, const render_transfer *t)
 {
     for (int i = 0; i + 1 < t->opacity_count; i++) {
-        const double low = domain_of(t, t->opacity_values[i]), high = domain_of(t, t->opacity_values[i + 1]);
+        const double low = render_domain_of(t, t->opacity_values[i]),
+                     high = render_domain_of(t, t->opacity_values[i + 1]);
         if (!(low < high && high - low < steep_width && t->opacities[i] != t->opacities[i + 1])) continue;
         out->steep[out->steep_count++] = (kernel_steep){(float)low, (float)high, is_narrow(t, i)};
         out->has_rests = out->has_rests || is_narrow(t, i);
@@ -252,7 +259,7 @@ static void fill_bounds(kernel_pieces *out, const render_transfer *t)
     out->contrast = high - low;
 }
 
-static void fill(kernel_pieces *out, const render_transfer *t, double tolerance, kernel_real *cuts, int *entries)
+static void fill(kernel_pieces *out, const render_transfer *t, double tolerance, kernel_real *cuts, kept_entry *entries)
 {
     const int count = collect_cuts(t, tolerance > rounding ? tolerance : rounding, cuts, entries);
     out->count = count + 1;
@@ -273,7 +280,7 @@ insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, 
     const size_t most = (size_t)t->colour_count + (size_t)t->opacity_count;
     memset(out, 0, sizeof *out);
     kernel_real *cuts = base_calloc(most, sizeof *cuts);
-    int *entries = base_calloc((size_t)t->colour_count, sizeof *entries);
+    kept_entry *entries = base_calloc((size_t)t->colour_count, sizeof *entries);
     out->pieces = base_calloc(most + 1, sizeof *out->pieces);
     const bool has_room = cuts && entries && out->pieces;
     if (has_room) fill(out, t, tolerance, cuts, entries);

@@ -9,6 +9,7 @@
 #include "memory.h"
 #include "render.h"
 #include "render_pieces.h"
+#include "render_scale.h"
 
 enum { LEAST_BINS = 1024, MOST_BINS = 32768, CHANNELS = 4, COLOUR_LEVELS = 1023 };
 
@@ -174,10 +175,34 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
     return 0.5 * change;
 }
 
+/* The same where entries are not even: the sharpest bend as often as the closest two are, and that to or from a
+ * constant colour at an end is one of them, as the ends need not be at 0 and 1. */
+static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
+{
+    double bend = 0, closest = 1;
+    for (int c = 0; c < 3; c++) {
+        double slope = 0;
+        for (int i = 0; i < t->colour_count; i++) {
+            const bool is_last = i == t->colour_count - 1;
+            const double width = is_last ? 1 : render_entry_place(t, i + 1) - render_entry_place(t, i);
+            const double change = is_last ? 0 : (double)t->colours[3 * i + 3 + c] - (double)t->colours[3 * i + c];
+            bend = fmax(bend, fabs(change / width - slope));
+            closest = fmin(closest, width);
+            slope = change / width;
+        }
+    }
+    out->bend_square = (float)fmin(bend / (6 * closest), 1e30);
+    out->bend = (float)fmin(bend / 4, 1e30);
+}
+
 /* Where the table's colours bend, and by how much. */
 static void fill_bends(kernel_preintegral *out, const render_transfer *t)
 {
     const int last = t->colour_count - 1;
+    if (t->scale != RENDER_LINEAR) {
+        fill_uneven_bends(out, t);
+        return;
+    }
     double inner = 0, ends = 0;
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < last; i++) {

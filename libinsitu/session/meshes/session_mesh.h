@@ -14,6 +14,12 @@ typedef struct session_field {
     base_error problem; /* of the last insitu_set_field() */
 } session_field;
 
+/* low > high: there are no values. */
+typedef struct session_extremes {
+    bool is_known;
+    double low, high;
+} session_extremes;
+
 /* One scalar of a field as a layer uses it: a component or the magnitude, as it is or recentred to vertices. */
 typedef struct session_scalar {
     int field;     /* in the mesh's fields */
@@ -34,8 +40,8 @@ typedef struct session_scalar {
     float *pairs;        /* NULL until computed */
     bool are_ranges_stale;
     int64_t unusable;
-    bool is_extent_known;
-    double low, high; /* over drawn cells all of whose values are finite; low > high: there are none */
+    session_extremes extremes; /* over drawn cells all of whose values are finite */
+    session_extremes positive; /* low: over those of them whose values are positive */
 } session_scalar;
 
 /* One rank's part of a mesh. */

@@ -23,6 +23,7 @@ static bool allocate_layers(const session_meshes *meshes, const scene_image *ima
     out->surfaces = base_calloc(surfaces, sizeof *out->surfaces);
     out->volumes = base_calloc(volumes, sizeof *out->volumes);
     out->transfers = base_calloc(surfaces + volumes, sizeof *out->transfers);
+    if (out->transfers) out->transfer_count = image->isosurface_count + image->volume_count;
     out->fields = base_calloc(fields, sizeof *out->fields);
     out->ranges = base_calloc(fields, sizeof *out->ranges);
     return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->ranges;
@@ -30,6 +31,7 @@ static bool allocate_layers(const session_meshes *meshes, const scene_image *ima
 
 void session_layers_free(session_layers *layers)
 {
+    for (int i = 0; i < layers->transfer_count; i++) session_transfer_free(&layers->transfers[i]);
     base_free(layers->parts);
     base_free(layers->surfaces);
     base_free(layers->volumes);
@@ -74,9 +76,9 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     return out;
 }
 
-/* Least and greatest value of a field over all ranks' drawn cells. Collective. */
-static insitu_status data_range(const session_layer_basis *basis, const scene_field *field, double *low, double *high,
-                                base_error *error)
+/* Least and greatest value of a field over all ranks' drawn cells (session_scalars.h). Collective. */
+static insitu_status data_range(const session_layer_basis *basis, const scene_field *field, bool is_positive,
+                                double *low, double *high, base_error *error)
 {
     double mine[2] = {INFINITY, INFINITY}, all[2];
     for (int i = 0; i < basis->meshes->count; i++) {
@@ -84,7 +86,7 @@ static insitu_status data_range(const session_layer_basis *basis, const scene_fi
         session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
         if (!scalar) continue;
         double least, most;
-        session_scalar_extent(mesh, scalar, basis->team->threads, &least, &most);
+        session_scalar_extent(mesh, scalar, basis->team->threads, is_positive, &least, &most);
         mine[0] = fmin(mine[0], least);
         mine[1] = fmin(mine[1], -most);
     }
@@ -101,9 +103,11 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
 {
     double low = map->range.low, high = map->range.high;
     insitu_status status = INSITU_OK;
-    if (!map->range.is_fixed) status = data_range(basis, field, &low, &high, error);
-    if (!status) session_make_transfer(basis->half_diagonal, map, low, high, volume, out);
-    return status;
+    if (!map->range.is_fixed) status = data_range(basis, field, map->scale == SCENE_LOG, &low, &high, error);
+    if (status) return status;
+    if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
+        session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
+    return session_takes_memory(map, volume) ? session_agree(basis->team->comm, error) : INSITU_OK;
 }
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,

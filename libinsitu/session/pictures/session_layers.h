@@ -9,7 +9,7 @@
 #include "session_transfer.h"
 
 typedef struct session_layers {
-    int part_count;
+    int part_count, transfer_count;
     render_part *parts;
     render_surface_layer *surfaces;
     render_volume_layer *volumes;

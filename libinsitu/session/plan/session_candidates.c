@@ -43,8 +43,10 @@ static bool add_volume(session_scalar *scalar, const scene_volume *layer, double
         scalar->needs_all = true;
         return true;
     }
-    session_make_transfer(half_diagonal, &layer->colour_map, range->low, range->high, layer, &t);
-    return add_intervals(scalar, intervals, render_visible_intervals(&t.transfer, intervals));
+    if (!session_make_transfer(half_diagonal, &layer->colour_map, range->low, range->high, layer, &t)) return false;
+    const bool is_added = add_intervals(scalar, intervals, render_visible_intervals(&t.transfer, intervals));
+    session_transfer_free(&t);
+    return is_added;
 }
 
 static bool mark_surface(session_mesh *mesh, const scene_isosurface *layer)

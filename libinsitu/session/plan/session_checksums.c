@@ -87,7 +87,7 @@ static void compare(const session_mesh *mesh, session_scalar *scalar, int thread
     scalar->has_checksum = true;
     scalar->checksum = checksum;
     scalar->are_ranges_stale = true;
-    scalar->is_extent_known = false;
+    scalar->extremes.is_known = scalar->positive.is_known = false;
 }
 
 void session_compare_checksums(const session_meshes *meshes, int threads, session_report *report)

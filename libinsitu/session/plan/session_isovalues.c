@@ -29,7 +29,7 @@ static void take_root(const session_mesh *mesh, const session_scalar *scalar, fi
 static void take_extent(const session_mesh *mesh, session_scalar *scalar, int threads, field_range *range)
 {
     double low, high;
-    session_scalar_extent(mesh, scalar, threads, &low, &high);
+    session_scalar_extent(mesh, scalar, threads, false, &low, &high);
     range->low = fmin(range->low, low);
     range->minus_high = fmin(range->minus_high, -high);
 }

@@ -98,7 +98,7 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
-static void find_extent(const grid *g, const grid_field *field, int threads, double *low, double *high)
+static session_extremes find_extent(const grid *g, const grid_field *field, int threads, bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
@@ -106,20 +106,20 @@ static void find_extent(const grid *g, const grid_field *field, int threads, dou
         if (!grid_is_drawn(g, cell)) continue;
         const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
         if (!of_cell.is_finite) continue;
-        least = fmin(least, of_cell.low);
+        if (!is_positive || of_cell.low > 0) least = fmin(least, of_cell.low);
         most = fmax(most, of_cell.high);
     }
-    *low = least;
-    *high = most;
+    return (session_extremes){true, least, most};
 }
 
-void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, double *low, double *high)
+void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int threads, bool is_positive, double *low,
+                           double *high)
 {
-    if (!scalar->is_extent_known) {
+    session_extremes *known = is_positive ? &scalar->positive : &scalar->extremes;
+    if (!known->is_known) {
         const grid_field field = session_scalar_field(mesh, scalar);
-        find_extent(&mesh->cells, &field, threads, &scalar->low, &scalar->high);
-        scalar->is_extent_known = true;
+        *known = find_extent(&mesh->cells, &field, threads, is_positive);
     }
-    *low = scalar->low;
-    *high = scalar->high;
+    *low = known->low;
+    *high = known->high;
 }

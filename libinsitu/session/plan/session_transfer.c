@@ -1,41 +1,183 @@
+/* A surface is coloured by the map as it is. A volume is integrated over transfer functions that are linear between
+ * points of value, so what else a map may be is made of that: bands of a table in which each has 16 entries, so that
+ * they change within 1/16 of a band; colours outside of the range of one more entry at an end; and ramps of opacity
+ * that are straight along a scale of several pieces that are straight along the values. Those are cut where they are
+ * farthest off, until all 32 points are in use: a ramp over six decades is then off by less than 0.003 of its height.
+ */
 #include "session_transfer.h"
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
+
+#include "memory.h"
+
+enum { band_entries = 16 };
+
+/* A range may not be narrower, of its larger end: values are float32, relative to the range, or, with a scale, to its
+ * larger end, which then leaves 1e-4 of the map to rounding. */
+static const double narrowest_linear = 1e-6, narrowest_scaled = 1e-3, widest_log = 1e30;
+
+static render_scale scale_of(const scene_colour_map *map)
+{
+    switch (map->scale) {
+    case SCENE_LINEAR: return RENDER_LINEAR;
+    case SCENE_LOG: return RENDER_LOG;
+    case SCENE_SYMLOG: return RENDER_SYMLOG;
+    }
+    return RENDER_LINEAR;
+}
 
 /* A constant field has its value in the middle of a range that float32 numbers can tell from nothing. */
-static void widen(double *low, double *high)
+void session_usable_range(const scene_colour_map *map, double *low, double *high)
 {
-    if (*low > *high) {
-        *low = 0;
-        *high = 1;
+    const bool is_log = map->scale == SCENE_LOG;
+    if (is_log && *high > 0 && *low > *high) *low = *high / 1000;
+    if (*low > *high || (is_log && !(*high > 0))) {
+        *low = is_log ? 1 : 0;
+        *high = is_log ? 10 : 1;
     }
-    const double least = fmax(1e-6 * fmax(fabs(*low), fabs(*high)), FLT_MIN);
+    if (is_log) *low = fmax(*low, *high / widest_log);
+    const double narrowest = map->scale == SCENE_LINEAR ? narrowest_linear : narrowest_scaled;
+    const double least = fmax(narrowest * fmax(fabs(*low), fabs(*high)), FLT_MIN);
     if (*high - *low >= least) return;
     const double middle = 0.5 * *low + 0.5 * *high;
     *low = middle - 0.5 * least;
     *high = middle + 0.5 * least;
 }
 
-void session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
-                           const scene_volume *volume, session_transfer *out)
+/* ---- colours --------------------------------------------------------------------------------------------------- */
+
+static double value_at(const render_transfer *t, double place)
+{
+    if (t->scale == RENDER_LINEAR) return t->low + place * (t->high - t->low);
+    const double low = render_scaled(t->scale, t->threshold, t->low);
+    const double high = render_scaled(t->scale, t->threshold, t->high);
+    return render_unscaled(t->scale, t->threshold, low + place * (high - low));
+}
+
+static void copy_colour(float *to, const float *from)
+{
+    memcpy(to, from, 3 * sizeof *to);
+}
+
+bool session_takes_memory(const scene_colour_map *map, const scene_volume *volume)
+{
+    return volume && (map->is_banded || map->has_below || map->has_above);
+}
+
+/* Bands and what is outside as a table. */
+static bool expand_table(const scene_colour_map *map, session_transfer *out)
 {
     render_transfer *t = &out->transfer;
-    *out = (session_transfer){0};
-    widen(&low, &high);
-    t->low = low;
-    t->high = high;
-    t->colours = map->colours;
-    t->colour_count = map->count;
-    t->unit_distance = 1;
-    if (!volume) return;
-    t->opacity_count = volume->opacity_count;
-    for (int i = 0; i < volume->opacity_count; i++) {
-        out->opacity_values[i] = low + volume->opacity[i].at * (high - low);
-        out->opacities[i] = volume->opacity[i].opacity;
+    const int repeated = map->is_banded ? band_entries : 1, inner = map->count * repeated;
+    const int count = inner + map->has_below + map->has_above;
+    out->table = base_alloc((size_t)count * 3 * sizeof *out->table);
+    if (!out->table) return false;
+    float *entry = out->table;
+    if (map->has_below) copy_colour(entry, map->outside[0]), entry += 3;
+    for (int i = 0; i < inner; i++, entry += 3) copy_colour(entry, map->colours + 3 * (size_t)(i / repeated));
+    if (map->has_above) copy_colour(entry, map->outside[1]);
+    const double low = value_at(t, map->has_below ? -1.0 / (inner - 1) : 0);
+    const double high = value_at(t, map->has_above ? 1 + 1.0 / (inner - 1) : 1);
+    if (map->has_below) t->low = low;
+    if (map->has_above) t->high = high;
+    t->colours = out->table;
+    t->colour_count = count;
+    return true;
+}
+
+/* ---- opacity --------------------------------------------------------------------------------------------------- */
+
+typedef struct opacity_points {
+    int count;
+    scene_opacity_point items[RENDER_MAX_OPACITY_POINTS];
+} opacity_points;
+
+/* By how much the straight way by value between two points is off that by place, at most, looked at in 15 places. */
+static double chord_error(const render_transfer *t, const scene_opacity_point *a, const scene_opacity_point *b)
+{
+    enum { PARTS = 16 };
+    const double low = value_at(t, a->at), high = value_at(t, b->at);
+    double most = 0;
+    if (!(low < high) || a->opacity == b->opacity) return 0;
+    for (int i = 1; i < PARTS; i++) {
+        const double share = (double)i / PARTS, value = value_at(t, a->at + share * (b->at - a->at));
+        most = fmax(most, fabs((value - low) / (high - low) - share));
+    }
+    return most * fabs((double)b->opacity - (double)a->opacity);
+}
+
+static int worst_chord(const render_transfer *t, const opacity_points *points, double *error)
+{
+    int worst = 0;
+    *error = 0;
+    for (int i = 0; i + 1 < points->count; i++) {
+        const double of_this = chord_error(t, &points->items[i], &points->items[i + 1]);
+        if (!(of_this > *error)) continue;
+        *error = of_this;
+        worst = i;
+    }
+    return worst;
+}
+
+/* Cut the ramps that bend along the values until they do not, or there are no more points. */
+static void cut_ramps(const render_transfer *t, opacity_points *points)
+{
+    static const double good_enough = 1e-4;
+    while (points->count < RENDER_MAX_OPACITY_POINTS) {
+        double error;
+        const int i = worst_chord(t, points, &error);
+        if (error <= good_enough) return;
+        const scene_opacity_point *a = &points->items[i], *b = a + 1;
+        const scene_opacity_point middle = {0.5 * (a->at + b->at), 0.5F * (a->opacity + b->opacity)};
+        memmove(&points->items[i + 2], &points->items[i + 1], (size_t)(points->count - i - 1) * sizeof *points->items);
+        points->items[i + 1] = middle;
+        points->count++;
+    }
+}
+
+static void set_opacity(const scene_volume *volume, double half_diagonal, session_transfer *out)
+{
+    render_transfer *t = &out->transfer;
+    opacity_points points = {.count = volume->opacity_count};
+    memcpy(points.items, volume->opacity, (size_t)volume->opacity_count * sizeof *points.items);
+    if (t->scale != RENDER_LINEAR) cut_ramps(t, &points);
+    t->opacity_count = points.count;
+    for (int i = 0; i < points.count; i++) {
+        out->opacity_values[i] = value_at(t, points.items[i].at);
+        out->opacities[i] = points.items[i].opacity;
     }
     t->opacity_values = out->opacity_values;
     t->opacities = out->opacities;
     t->unit_distance = volume->unit_distance > 0 ? volume->unit_distance : half_diagonal / 10;
     if (!(t->unit_distance > 0)) t->unit_distance = 1;
+}
+
+/* ---- the whole ------------------------------------------------------------------------------------------------- */
+
+bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
+                           const scene_volume *volume, session_transfer *out)
+{
+    session_usable_range(map, &low, &high);
+    *out = (session_transfer){.transfer = {.low = low,
+                                           .high = high,
+                                           .colour_count = map->count,
+                                           .colours = map->colours,
+                                           .scale = scale_of(map),
+                                           .threshold = fmax(map->threshold, fmax(fabs(low), fabs(high)) / widest_log),
+                                           .unit_distance = 1}};
+    if (volume) {
+        set_opacity(volume, half_diagonal, out);
+        return !session_takes_memory(map, volume) || expand_table(map, out);
+    }
+    out->transfer.is_banded = map->is_banded;
+    if (map->has_below || map->has_above || map->has_nan) out->transfer.outside = map->outside[0];
+    return true;
+}
+
+void session_transfer_free(session_transfer *transfer)
+{
+    base_free(transfer->table);
+    transfer->table = NULL;
 }

@@ -9,11 +9,20 @@ typedef struct session_transfer {
     render_transfer transfer; /* points into this */
     double opacity_values[RENDER_MAX_OPACITY_POINTS];
     float opacities[RENDER_MAX_OPACITY_POINTS];
+    float *table; /* of its own; NULL: the map's */
 } session_transfer;
 
-/* out points into the map. Of a colour map over [low, high] (low > high: there are no values), and the opacity of the
- * volume, NULL: of a surface. half_diagonal: of the global bounds. Local. */
-void session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
+/* Of a colour map over [low, high] (low > high: there are no values), and the opacity of the volume, NULL: of a
+ * surface. half_diagonal: of the global bounds. Points into the map. False where memory ran out, with nothing to free.
+ * Local. */
+bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out);
+/* Whether it may run out: the same on all ranks. */
+bool session_takes_memory(const scene_colour_map *map, const scene_volume *volume);
+void session_transfer_free(session_transfer *transfer);
+
+/* The range that a map is drawn with where the data's is [low, high]: never empty, and of a logarithmic scale positive.
+ */
+void session_usable_range(const scene_colour_map *map, double *low, double *high);
 
 #endif

@@ -190,13 +190,14 @@ bool scene_field_is_on(const scene_field *field, const char *mesh)
 
 /* ---- the whole ---- */
 
-static insitu_status parse_in_c_locale(const char *text, size_t size, const char *file_name, scene *out,
-                                       base_error *error)
+static insitu_status parse_in_c_locale(const char *text, size_t size, const char *file_name,
+                                       scene_attachments *attachments, scene *out, base_error *error)
 {
     scene_document document;
     scene_file *file = NULL;
     insitu_status status = scene_document_open(&document, text, size, file_name, error);
     if (status != INSITU_OK) return status;
+    document.attachments = attachments;
     status = scene_document_check(&document);
     if (status == INSITU_OK) status = load_file(&document, text, size, &file);
     if (status == INSITU_OK) status = convert_file(&document, file, out);
@@ -205,18 +206,30 @@ static insitu_status parse_in_c_locale(const char *text, size_t size, const char
     return status;
 }
 
-insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene *out, base_error *error)
+insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene_attachments *attachments,
+                          scene *out, base_error *error)
 {
     base_error unheard = {.status = INSITU_OK};
     *out = (scene){0};
     const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
     if (!c_numbers) return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
     const locale_t before = uselocale(c_numbers);
-    const insitu_status status = parse_in_c_locale(text, size, file_name, out, error ? error : &unheard);
+    const insitu_status status = parse_in_c_locale(text, size, file_name, attachments, out, error ? error : &unheard);
     uselocale(before);
     freelocale(c_numbers);
     if (status != INSITU_OK) scene_free(out);
     return status;
+}
+
+void scene_attachments_free(scene_attachments *attachments)
+{
+    for (int i = 0; i < attachments->count; i++) {
+        base_free(attachments->items[i].path);
+        base_free(attachments->items[i].text);
+    }
+    base_free(attachments->items);
+    attachments->items = NULL;
+    attachments->count = 0;
 }
 
 static void free_field(scene_field *field)

@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "error.h"
 
@@ -35,14 +36,42 @@ typedef struct scene_range {
     double low, high;
 } scene_range;
 
-/* How a value becomes a colour. Its place is (value - low) / (high - low), [low, high] being the range; places below 0
- * and above 1 have the colours of 0 and 1. The colour of a place is that of the table, linear between entries. */
+/* How values are spaced along a colour map: as they are; by their logarithm; or, where they are of both signs, linear
+ * up to a threshold and by the logarithm beyond (render_scaled() of render.h, whose words these are). */
+typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
+
+/* How a value becomes a colour: the same for all layers. Its place is (s(value) - s(low)) / (s(high) - s(low)), s being
+ * the scale and [low, high] the range. Places below 0 and above 1 have the colours of 0 and 1, or those of outside. The
+ * colour of a place is that of the table: linear between entries, or, of bands, of entry floor(place × count). */
 typedef struct scene_colour_map {
-    char *name;     /* of a built-in map */
-    int count;      /* >= 2 */
-    float *colours; /* count × 3, linear light, evenly spaced over the places from 0 to 1 */
+    char *name;     /* of a built-in map or of one in a file; "" of a list */
+    int count;      /* >= 2; of bands >= 1 */
+    float *colours; /* count × 3, linear light, evenly spaced over the places from 0 to 1; reversed where asked for */
+    bool is_banded; /* the colours are those of bands of equal width */
+    scene_scale scale;
+    double threshold; /* of SCENE_SYMLOG, > 0 */
+    bool has_below, has_above;
+    float outside[3][3]; /* below, above (the map's ends where not given), and of what is not a number */
+    bool has_nan;
     scene_range range;
 } scene_colour_map;
+
+/* A file that the scene names, by the path that it is opened by. */
+typedef struct scene_attachment {
+    char *path, *text; /* text: size bytes, not ended */
+    int64_t size;
+} scene_attachment;
+
+/* Files that a scene is read with. One rank reads them while it parses, and they go to the others with the scene. */
+typedef struct scene_attachments {
+    /* Reads a whole file into *text, from base_alloc(); NULL: what is not in items is not to be had. */
+    insitu_status (*read)(const char *path, char **text, int64_t *size, base_error *error);
+    int count;
+    scene_attachment *items;
+} scene_attachments;
+
+enum { SCENE_MAX_ATTACHMENTS = 64 };
+void scene_attachments_free(scene_attachments *attachments);
 
 typedef struct scene_opacity_point {
     double at;     /* 0 .. 1 of the range; never falling, two the same make a step */
@@ -133,9 +162,11 @@ typedef struct scene {
     scene_image *images;
 } scene;
 
-/* Parse text (size bytes; file_name for messages). On an error *out is zeroed and the message reads
+/* Parse text (size bytes; file_name for messages, and paths in the scene are relative to its folder). attachments: NULL
+ * where the scene may name no file; those that are read are added. On an error *out is zeroed and the message reads
  * "file:line: key: what is wrong, what was expected". */
-insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene *out, base_error *error);
+insitu_status scene_parse(const char *text, size_t size, const char *file_name, scene_attachments *attachments,
+                          scene *out, base_error *error);
 
 void scene_free(scene *s);
 

@@ -1,33 +1,305 @@
-/* The keys that say how values become colours: one description for all layers. */
+/* The keys that say how values become colours: one description for all layers. A map becomes a table here, reversed and
+ * cut into bands where asked for, so that nobody else has to know where it came from. */
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "colour_map.h"
 #include "memory.h"
 #include "scene_convert.h"
 
-static insitu_status convert_range(const scene_document *d, const char *path, const double *in, scene_range *out)
+enum { path_size = SCENE_PATH_SIZE + 64 };
+
+__attribute__((format(printf, 2, 3))) static void set_path(char path[path_size], const char *format, ...)
 {
-    if (!in) return INSITU_OK;
-    *out = (scene_range){true, in[0], in[1]};
-    if (in[0] < in[1]) return INSITU_OK;
-    return scene_bad(d, path, "range", "[%g, %g] does not rise, expected [low, high] with low < high", in[0], in[1]);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(path, path_size, format, arguments);
+    va_end(arguments);
 }
 
-static insitu_status take_built_in(const scene_document *d, colour_map map, scene_colour_map *out)
+/* Up to how many digits below its high end a logarithmic range may go, by float32's exponents. */
+static const double widest_log_range = 1e30;
+
+/* ---- tables ---------------------------------------------------------------------------------------------------- */
+
+static insitu_status make_table(const scene_document *d, const char *name, int count, scene_colour_map *out)
 {
-    const char *name = colour_map_name(map);
-    const float *table = colour_map_table(name, &out->count);
-    const size_t bytes = (size_t)out->count * 3 * sizeof *out->colours;
+    out->count = count;
     out->name = base_strdup(name);
-    out->colours = base_alloc(bytes);
-    if (!out->name || !out->colours) return scene_no_memory(d);
-    memcpy(out->colours, table, bytes);
+    out->colours = base_alloc((size_t)count * 3 * sizeof *out->colours);
+    return out->name && out->colours ? INSITU_OK : scene_no_memory(d);
+}
+
+static insitu_status take_built_in(const scene_document *d, const char *name, scene_colour_map *out)
+{
+    int count = 0;
+    const float *table = colour_map_table(name, &count);
+    const insitu_status status = make_table(d, name, count, out);
+    if (status == INSITU_OK) memcpy(out->colours, table, (size_t)count * 3 * sizeof *table);
+    return status;
+}
+
+static insitu_status take_points(const scene_document *d, const scene_colour_points *points, const char *name,
+                                 scene_colour_map *out)
+{
+    const insitu_status status = make_table(d, name, colour_points_entries(points->items, points->count), out);
+    if (status == INSITU_OK) colour_points_fill(points->items, points->count, points->space, out->colours, out->count);
+    return status;
+}
+
+/* ---- lists ----------------------------------------------------------------------------------------------------- */
+
+static insitu_status read_places(const scene_document *d, const char *path, scene_colour_points *points)
+{
+    const int last = points->count - 1;
+    char key[path_size];
+    set_path(key, "%s.at", path);
+    const int count = scene_document_length(d, key);
+    if (count && count != points->count)
+        return scene_bad(d, key, "", "%d places for %d colours, expected one each", count, points->count);
+    for (int i = 0; i <= last; i++) {
+        colour_point *p = &points->items[i];
+        set_path(key, "%s.at[%d]", path, i);
+        p->at = count ? scene_document_number(d, key) : (double)i / last;
+        if (i > 0 && p->at < p[-1].at)
+            return scene_bad(d, key, "", "%g comes after %g, expected places that do not fall", p->at, p[-1].at);
+        if ((i == 0 && p->at != 0) || (i == last && p->at != 1))
+            return scene_bad(d, key, "", "%g is the %s place, expected %d", p->at, i ? "last" : "first", i > 0);
+    }
     return INSITU_OK;
+}
+
+static insitu_status take_list(const scene_document *d, const char *path, scene_colour_map *out)
+{
+    char key[path_size];
+    scene_colour_points points = {.space = COLOUR_RGB};
+    set_path(key, "%s.colours", path);
+    points.count = scene_document_length(d, key);
+    points.items = base_calloc((size_t)points.count, sizeof *points.items);
+    if (!points.items) return scene_no_memory(d);
+    for (int i = 0; i < points.count; i++)
+        for (int c = 0; c < 3; c++) {
+            set_path(key, "%s.colours[%d][%d]", path, i, c);
+            points.items[i].srgb[c] = scene_document_number(d, key);
+        }
+    insitu_status status = read_places(d, path, &points);
+    if (status == INSITU_OK) status = take_points(d, &points, "", out);
+    base_free(points.items);
+    return status;
+}
+
+/* ---- files ----------------------------------------------------------------------------------------------------- */
+
+/* A path in the scene is relative to the scene's folder. */
+static char *path_from_scene(const char *scene_path, const char *name)
+{
+    const char *slash = strrchr(scene_path, '/');
+    const size_t folder = slash && name[0] != '/' ? (size_t)(slash - scene_path) + 1 : 0;
+    char *path = base_alloc(folder + strlen(name) + 1);
+    if (!path) return NULL;
+    memcpy(path, scene_path, folder);
+    strcpy(path + folder, name);
+    return path;
+}
+
+static const scene_attachment *find_attachment(const scene_attachments *all, const char *path)
+{
+    for (int i = 0; i < all->count; i++)
+        if (strcmp(all->items[i].path, path) == 0) return &all->items[i];
+    return NULL;
+}
+
+/* Takes the path over. */
+static insitu_status read_attachment(const scene_document *d, const char *key, char *path)
+{
+    scene_attachments *all = d->attachments;
+    base_error reason = {.status = INSITU_OK};
+    scene_attachment *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
+    if (items) all->items = items;
+    insitu_status status = INSITU_OK;
+    if (!items)
+        status = scene_no_memory(d);
+    else if (!all->read || all->count == SCENE_MAX_ATTACHMENTS)
+        status = scene_bad(d, key, "", "\"%s\" cannot be read: at most %d files can", path, SCENE_MAX_ATTACHMENTS);
+    else
+        status = all->read(path, &items[all->count].text, &items[all->count].size, &reason);
+    if (status == INSITU_OK) {
+        items[all->count++].path = path;
+        return INSITU_OK;
+    }
+    base_free(path);
+    if (reason.status == INSITU_OK) return status;
+    if (status == INSITU_ERROR_MEMORY) return scene_no_memory(d);
+    return scene_bad(d, key, "", "%s", reason.message);
+}
+
+static insitu_status attach(const scene_document *d, const char *key, const char *name, const scene_attachment **out)
+{
+    static const scene_attachments none;
+    char *path = path_from_scene(d->file_name, name);
+    if (!path) return scene_no_memory(d);
+    *out = find_attachment(d->attachments ? d->attachments : &none, path);
+    if (*out) {
+        base_free(path);
+        return INSITU_OK;
+    }
+    if (!d->attachments) {
+        base_free(path);
+        return scene_bad(d, key, "", "\"%s\": no file can be read here", name);
+    }
+    const insitu_status status = read_attachment(d, key, path);
+    if (status == INSITU_OK) *out = &d->attachments->items[d->attachments->count - 1];
+    return status;
+}
+
+static insitu_status take_file(const scene_document *d, const char *path, scene_colour_map *out)
+{
+    char key[path_size], name_key[path_size];
+    const char *file = NULL, *name = NULL;
+    const scene_attachment *attachment = NULL;
+    scene_colour_points points = {0};
+    base_error reason = {.status = INSITU_OK};
+    set_path(key, "%s.file", path);
+    set_path(name_key, "%s.name", path);
+    scene_document_texts(d, key, &file, 1);
+    scene_document_texts(d, name_key, &name, 1);
+    insitu_status status = attach(d, key, file, &attachment);
+    if (status != INSITU_OK) return status;
+    status = scene_read_colour_file(attachment, file, name, &points, &reason);
+    if (status == INSITU_OK)
+        status = take_points(d, &points, name ? name : "", out);
+    else if (status == INSITU_ERROR_MEMORY)
+        status = scene_no_memory(d);
+    else
+        status = scene_bad(d, key, "", "%s", reason.message);
+    base_free(points.items);
+    return status;
+}
+
+/* ---- the map --------------------------------------------------------------------------------------------------- */
+
+static bool is_given(const scene_document *d, const char *path, const char *key)
+{
+    char whole[path_size];
+    set_path(whole, "%s.%s", path, key);
+    return scene_document_kind(d, whole) != SCENE_NOTHING;
+}
+
+static insitu_status convert_map(const scene_document *d, const char *parent, scene_colour_map *out)
+{
+    char path[path_size];
+    const char *name = "viridis";
+    set_path(path, "%s.map", parent);
+    if (scene_document_kind(d, path) != SCENE_MAPPING) {
+        scene_document_texts(d, path, &name, 1);
+        return take_built_in(d, name, out);
+    }
+    const bool has_list = is_given(d, path, "colours"), has_file = is_given(d, path, "file");
+    if (has_list == has_file)
+        return scene_bad(d, path, "", "holds %s, expected one of colours and file", has_list ? "both" : "neither");
+    if (has_file && is_given(d, path, "at"))
+        return scene_bad(d, path, "at", "given beside file, expected with colours");
+    if (has_list && is_given(d, path, "name"))
+        return scene_bad(d, path, "name", "given beside colours, expected with file");
+    return has_list ? take_list(d, path, out) : take_file(d, path, out);
+}
+
+static void reverse(scene_colour_map *map)
+{
+    for (int i = 0, j = map->count - 1; i < j; i++, j--) {
+        float kept[3];
+        memcpy(kept, map->colours + 3 * (size_t)i, sizeof kept);
+        memcpy(map->colours + 3 * (size_t)i, map->colours + 3 * (size_t)j, sizeof kept);
+        memcpy(map->colours + 3 * (size_t)j, kept, sizeof kept);
+    }
+}
+
+/* The table's colours at even places, ends included; of one band that in the middle. */
+static insitu_status cut_into_bands(const scene_document *d, int bands, scene_colour_map *map)
+{
+    float *colours = base_alloc((size_t)bands * 3 * sizeof *colours);
+    if (!colours) return scene_no_memory(d);
+    for (int band = 0; band < bands; band++) {
+        const double place = (bands > 1 ? (double)band / (bands - 1) : 0.5) * (map->count - 1);
+        const int entry = place >= map->count - 1 ? map->count - 2 : (int)place;
+        const float *low = map->colours + 3 * (size_t)entry, *high = low + 3;
+        for (int c = 0; c < 3; c++)
+            colours[3 * band + c] = (float)((double)low[c] + (place - entry) * ((double)high[c] - (double)low[c]));
+    }
+    base_free(map->colours);
+    map->colours = colours;
+    map->count = bands;
+    map->is_banded = true;
+    return INSITU_OK;
+}
+
+static void set_linear(float to[3], const double *srgb)
+{
+    for (int c = 0; c < 3; c++) to[c] = colour_linear_from_srgb((float)srgb[c]);
+}
+
+static void convert_outside(const scene_file_colour_map *in, scene_colour_map *out)
+{
+    static const double grey[3] = {0.6, 0.6, 0.6};
+    out->has_below = in->below != NULL;
+    out->has_above = in->above != NULL;
+    out->has_nan = in->nan != NULL;
+    memcpy(out->outside[0], out->colours, sizeof out->outside[0]);
+    memcpy(out->outside[1], out->colours + 3 * (size_t)(out->count - 1), sizeof out->outside[1]);
+    if (in->below) set_linear(out->outside[0], in->below);
+    if (in->above) set_linear(out->outside[1], in->above);
+    set_linear(out->outside[2], in->nan ? in->nan : grey);
+}
+
+/* ---- ranges and scales ----------------------------------------------------------------------------------------- */
+
+static insitu_status convert_range(const scene_document *d, const char *parent, scene_range *out)
+{
+    char path[path_size], key[path_size];
+    double ends[2];
+    set_path(path, "%s.range", parent);
+    if (scene_document_kind(d, path) == SCENE_NOTHING) return INSITU_OK;
+    for (int i = 0; i < 2; i++) {
+        set_path(key, "%s[%d]", path, i);
+        ends[i] = scene_document_number(d, key);
+    }
+    *out = (scene_range){true, ends[0], ends[1]};
+    if (ends[0] < ends[1]) return INSITU_OK;
+    return scene_bad(d, path, "", "[%g, %g] does not rise, expected [low, high] with low < high", ends[0], ends[1]);
+}
+
+static insitu_status check_fixed_range(const scene_document *d, const char *path, const scene_colour_map *map)
+{
+    const scene_range *r = &map->range;
+    if (map->scale == SCENE_LOG && !(r->low > 0))
+        return scene_bad(d, path, "range", "begins with %g, expected above 0 for scale: log", r->low);
+    if (map->scale == SCENE_LOG && r->high / r->low > widest_log_range)
+        return scene_bad(d, path, "range", "[%g, %g] is too wide for scale: log, expected a ratio of at most %g",
+                         r->low, r->high, widest_log_range);
+    return INSITU_OK;
+}
+
+static insitu_status convert_scale(const scene_document *d, const char *path, const scene_file_colour_map *in,
+                                   scene_colour_map *out)
+{
+    out->scale = in->scale ? (scene_scale)*in->scale : SCENE_LINEAR;
+    out->threshold = in->threshold ? *in->threshold : 0;
+    if (out->scale == SCENE_SYMLOG && !in->threshold)
+        return scene_bad(d, path, "threshold", "missing, expected a number above 0 for scale: symlog");
+    if (out->scale != SCENE_SYMLOG && in->threshold)
+        return scene_bad(d, path, "threshold", "given without scale: symlog, expected with it");
+    return out->range.is_fixed ? check_fixed_range(d, path, out) : INSITU_OK;
 }
 
 insitu_status scene_convert_colour_map(const scene_document *d, const char *path, const scene_file_colour_map *in,
                                        scene_colour_map *out)
 {
-    const insitu_status status = take_built_in(d, in->map ? (colour_map)*in->map : COLOUR_MAP_VIRIDIS, out);
-    return status ? status : convert_range(d, path, in->range, &out->range);
+    insitu_status status = convert_map(d, path, out);
+    if (status != INSITU_OK) return status;
+    if (in->reversed && *in->reversed) reverse(out);
+    if (in->discrete) status = cut_into_bands(d, *in->discrete, out);
+    if (status == INSITU_OK) convert_outside(in, out);
+    if (status == INSITU_OK) status = convert_range(d, path, &out->range);
+    return status == INSITU_OK ? convert_scale(d, path, in, out) : status;
 }

@@ -2,10 +2,18 @@
 #ifndef SCENE_SCENE_CONVERT_H
 #define SCENE_SCENE_CONVERT_H
 
+#include "colour_space.h"
 #include "scene.h"
 #include "scene_document.h"
 
 enum { SCENE_PATH_SIZE = 128 };
+
+/* Points that a colour map goes through. */
+typedef struct scene_colour_points {
+    int count;
+    colour_point *items;
+    colour_space space;
+} scene_colour_points;
 
 /* A new message-less failure for a block that could not be had. */
 insitu_status scene_no_memory(const scene_document *d);
@@ -20,14 +28,14 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
 insitu_status scene_convert_outputs(const scene_document *d, const char *path, const scene_file_image *in,
                                     scene_image *out);
 
-/* The keys that say how values become colours, of a mapping that has them. */
-typedef struct scene_file_colour_map {
-    const int *map;      /* colour_map */
-    const double *range; /* 2 */
-} scene_file_colour_map;
-
+/* The keys that say how values become colours, of the mapping at path. */
 insitu_status scene_convert_colour_map(const scene_document *d, const char *path, const scene_file_colour_map *in,
                                        scene_colour_map *out);
+
+/* The colours of a map in a file that ParaView may have written, as points in rising order (from base_alloc()).
+ * file_name: for messages, and name: which of its maps; NULL: its only one. */
+insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
+                                     scene_colour_points *out, base_error *error);
 
 /* Refuse two outputs that would be one file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);

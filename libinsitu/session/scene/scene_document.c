@@ -213,6 +213,30 @@ int scene_document_texts(const scene_document *d, const char *path, const char *
     return count;
 }
 
+scene_node scene_document_kind(const scene_document *d, const char *path)
+{
+    int line;
+    const yaml_node_t *node = find_node(d, path, &line);
+    if (!node) return SCENE_NOTHING;
+    return node->type == YAML_SCALAR_NODE     ? SCENE_SCALAR
+           : node->type == YAML_SEQUENCE_NODE ? SCENE_LIST
+                                              : SCENE_MAPPING;
+}
+
+int scene_document_length(const scene_document *d, const char *path)
+{
+    int line;
+    const yaml_node_t *node = find_node(d, path, &line);
+    return node && node->type == YAML_SEQUENCE_NODE ? item_count(node) : 0;
+}
+
+double scene_document_number(const scene_document *d, const char *path)
+{
+    int line;
+    const yaml_node_t *node = find_node(d, path, &line);
+    return node && node->type == YAML_SCALAR_NODE ? strtod(text_of(node), NULL) : 0;
+}
+
 insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
 {
     char path[path_size], what[sizeof d->error->message / 2];
@@ -320,6 +344,29 @@ static insitu_status check_names(const scene_document *d, const char *path, cons
     return is_right ? INSITU_OK : bad_value(d, path, node, value, key);
 }
 
+static bool takes(const cyaml_schema_value_t *value, const yaml_node_t *node)
+{
+    switch (value->type) {
+    case CYAML_MAPPING: return node->type == YAML_MAPPING_NODE;
+    case CYAML_SEQUENCE:
+    case CYAML_SEQUENCE_FIXED: return node->type == YAML_SEQUENCE_NODE;
+    default: return node->type == YAML_SCALAR_NODE;
+    }
+}
+
+/* The first of the forms that the node can be is the one that it is held against. */
+static insitu_status check_forms(const scene_document *d, const char *path, const yaml_node_t *node,
+                                 const cyaml_schema_value_t *value, const scene_key *key)
+{
+    for (int i = 0; i < key->form_count; i++) {
+        const scene_form *form = &key->forms[i];
+        if (!takes(&form->value, node)) continue;
+        if (node->type == YAML_SCALAR_NODE && !is_scalar_right(node, &form->value, &form->key)) break;
+        return check_value(d, path, node, &form->value, &form->key);
+    }
+    return bad_value(d, path, node, value, key);
+}
+
 static insitu_status bad_key(const scene_document *d, const char *path, const yaml_node_t *name,
                              const scene_mapping *mapping, const char *fault)
 {
@@ -390,7 +437,7 @@ static insitu_status check_value(const scene_document *d, const char *path, cons
         return check_mapping(d, path, node, key->child);
     case CYAML_SEQUENCE:
     case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key);
-    case CYAML_IGNORE: return check_names(d, path, node, value, key);
+    case CYAML_IGNORE: return (key->forms ? check_forms : check_names)(d, path, node, value, key);
     default: return is_scalar_right(node, value, key) ? INSITU_OK : bad_value(d, path, node, value, key);
     }
 }
@@ -451,6 +498,15 @@ static void append_list(char words[SCENE_WORDS_SIZE], const cyaml_schema_value_t
     append_range(words, key);
 }
 
+static void append_forms(char words[SCENE_WORDS_SIZE], const scene_key *key)
+{
+    for (int i = 0; i < key->form_count; i++) {
+        char form[SCENE_WORDS_SIZE];
+        scene_value_words(&key->forms[i].value, &key->forms[i].key, form);
+        append(words, "%s%s", i ? "; or " : "", form);
+    }
+}
+
 void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE])
 {
     words[0] = '\0';
@@ -467,6 +523,10 @@ void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, 
     case CYAML_STRING: append(words, "a text of %u to %u bytes", value->string.min, value->string.max); break;
     case CYAML_ENUM: append_choices(words, value); break;
     case CYAML_IGNORE:
+        if (key->forms) {
+            append_forms(words, key);
+            break;
+        }
         append(words, "a text of 1 to %d bytes or a list of 1 to %d of them", SCENE_NAME_BYTES, SCENE_MAX_NAMES);
         break;
     case CYAML_MAPPING: append_mapping(words, key->child); break;

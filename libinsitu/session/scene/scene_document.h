@@ -9,8 +9,9 @@
 #include "scene_schema.h"
 
 typedef struct scene_document {
-    const char *file_name; /* borrowed */
-    base_error *error;     /* borrowed; where messages go */
+    const char *file_name;                 /* borrowed */
+    base_error *error;                     /* borrowed; where messages go */
+    struct scene_attachments *attachments; /* borrowed; NULL: none may be named */
     yaml_document_t yaml;
 } scene_document;
 
@@ -32,12 +33,18 @@ int scene_document_line(const scene_document *d, const char *path);
  * at most `most` are filled in. 0: nothing stands there. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
+/* What stands at a path, and a number of it; a node that passed the check is what its key asks for. */
+typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
+scene_node scene_document_kind(const scene_document *d, const char *path);
+int scene_document_length(const scene_document *d, const char *path); /* of a list; 0: there is none */
+double scene_document_number(const scene_document *d, const char *path);
+
 /* Record "file:line: parent.key: ..." and return INSITU_ERROR_SCENE. key may be "", meaning the parent itself. */
 insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
 /* What may stand at a key, in words: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1". */
-enum { SCENE_WORDS_SIZE = 400 };
+enum { SCENE_WORDS_SIZE = 640 };
 void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
 
 #endif

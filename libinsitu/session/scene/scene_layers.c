@@ -8,7 +8,8 @@
 #include "colour_map.h"
 #include "memory.h"
 
-enum { max_isovalues = 16, max_volumes = 4 };
+/* most_scaled_points: others are put between them (session_transfer.c). */
+enum { max_isovalues = 16, max_volumes = 4, most_scaled_points = 8 };
 
 /* Neighbours in the cycle differ in hue and lightness both, and the first ones also to eyes that do not tell red
  * from green. */
@@ -120,8 +121,7 @@ static insitu_status convert_colour_by(const scene_document *d, const char *path
     snprintf(colour_by_path, sizeof colour_by_path, "%s.colour_by", path);
     out->has_colour_by = true;
     out->colour_by.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
-    const scene_file_colour_map map = {in->map, in->range};
-    insitu_status status = scene_convert_colour_map(d, colour_by_path, &map, &out->colour_map);
+    insitu_status status = scene_convert_colour_map(d, colour_by_path, &in->colours, &out->colour_map);
     if (status == INSITU_OK) status = convert_field(d, path, colour_by_path, in->field, in->component, &out->colour_by);
     return status;
 }
@@ -163,6 +163,9 @@ static insitu_status convert_opacity(const scene_document *d, const char *path, 
 {
     static const double ramp[2][2] = {{0, 0}, {1, 0.9}};
     const int count = in->opacity ? in->opacity_count : 2;
+    if (count > most_scaled_points && out->colour_map.scale != SCENE_LINEAR)
+        return scene_bad(d, path, "opacity", "%d points, expected at most %d beside scale: %s", count,
+                         most_scaled_points, out->colour_map.scale == SCENE_LOG ? "log" : "symlog");
     const double(*points)[2] = in->opacity ? (const double(*)[2])in->opacity : ramp;
     out->opacity = base_alloc((size_t)count * sizeof *out->opacity);
     if (!out->opacity) return scene_no_memory(d);
@@ -189,8 +192,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
     out->unit_distance = in->unit_distance ? *in->unit_distance : 0;
     out->field.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
-    const scene_file_colour_map map = {in->map, in->range};
-    if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &map, &out->colour_map);
+    if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &in->colours, &out->colour_map);
     if (status == INSITU_OK) status = convert_opacity(d, path, in, out);
     return status;
 }

@@ -33,6 +33,7 @@ static const cyaml_schema_value_t opacity_point = {CYAML_VALUE_SEQUENCE_FIXED(CY
 
 #define MAP_WORD(word, name) {name, COLOUR_MAP_##word},
 static const cyaml_strval_t map_words[] = {COLOUR_MAPS(MAP_WORD)};
+static const cyaml_strval_t scale_words[] = {{"linear", SCENE_LINEAR}, {"log", SCENE_LOG}, {"symlog", SCENE_SYMLOG}};
 static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
 static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}};
 static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"vertex", SCENE_BY_VERTEX}};
@@ -56,9 +57,67 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
     "How a field that has one value a cell is drawn: by the means of the cells at each vertex, on all ranks (8 bytes " \
     "a vertex are held). `cell` is refused: between cells of two values there is a face, not a surface of the value "  \
     "asked for."
-#define MAP_HELP "Colour map."
-#define RANGE_HELP "The values `[low, high]`, low < high, that the ends of the colour map stand for; clamped outside."
 #define RANGE_DEFAULT "from the data on the meshes of the layer, over all ranks, at each drawn step"
+
+/* A value of several forms, which is read from the document. */
+#define FORMS(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
+#define TAKES(list) .forms = (list), .form_count = (int)CYAML_ARRAY_LEN(list)
+
+static const scene_form colour_list_forms[] = {
+    {{CYAML_VALUE_SEQUENCE(CYAML_FLAG_DEFAULT, double, &colour, 2, 1024)}, {.low = 0, .high = 1}}};
+static const scene_form place_list_forms[] = {
+    {{CYAML_VALUE_SEQUENCE(CYAML_FLAG_DEFAULT, double, &number, 2, 1024)}, {.low = 0, .high = 1}}};
+static const scene_form path_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 1024)}, {0}}};
+static const scene_form name_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 255)}, {0}}};
+typedef struct no_members {
+    char unused;
+} no_members; /* libcyaml reads nothing of a mapping that stands for one of several forms */
+
+#define MAP_KEYS(X)                                                                                                    \
+    X(CYAML_FIELD_IGNORE("colours", OPTIONAL),                                                                         \
+      .help = "Colours `[red, green, blue]`, sRGB, between which the map is straight in sRGB. Not with `file`.",       \
+      .by_default = "none", TAKES(colour_list_forms))                                                                  \
+    X(CYAML_FIELD_IGNORE("at", OPTIONAL),                                                                              \
+      .help = "Where the colours are along the map: as many numbers, from 0 to 1, never falling, the first 0 and the " \
+              "last 1; two the same make a step, of a 1024th of the map.",                                             \
+      .by_default = "evenly spaced", TAKES(place_list_forms))                                                          \
+    X(CYAML_FIELD_IGNORE("file", OPTIONAL),                                                                            \
+      .help = "A file of colour maps as ParaView writes them (JSON, `RGBPoints`), relative to the scene's folder. It " \
+              "is read on rank 0, again when the scene is.",                                                           \
+      .by_default = "none", TAKES(path_forms))                                                                         \
+    X(CYAML_FIELD_IGNORE("name", OPTIONAL), .help = "The name of the map in the file. Needed where it holds several.", \
+      .by_default = "its only one", TAKES(name_forms))
+DEFINE_MAPPING(map, "map", MAP_KEYS);
+
+static const scene_form map_forms[] = {
+    {{CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, map_words, CYAML_ARRAY_LEN(map_words))}, {0}},
+    {{CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, no_members, map_fields)}, {.child = &map_mapping}}};
+static const scene_form range_forms[] = {{{CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 2)}, {0}}};
+
+/* The keys that say how values become colours, of any mapping that has a scene_file_colour_map called colours. */
+#define COLOUR_MAP_KEYS(X, type)                                                                                       \
+    X(FORMS("map"), .help = "Colour map: one that is built in, a list of colours, or one of a file.",                  \
+      .by_default = "`viridis`", TAKES(map_forms))                                                                     \
+    X(CYAML_FIELD_BOOL_PTR("reversed", OPTIONAL, type, colours.reversed), .help = "The map from its high end.",        \
+      .by_default = "`false`")                                                                                         \
+    X(CYAML_FIELD_INT_PTR("discrete", OPTIONAL, type, colours.discrete),                                               \
+      .help = "So many bands of equal width, each in one colour: those of the map at even places, ends included.",     \
+      .by_default = "smooth", .low = 1, .high = 64)                                                                    \
+    X(CHOICE("scale", type, colours.scale, scale_words),                                                               \
+      .help = "How values are spaced along the map: as they are, by their logarithm (values of 0 and less are below "  \
+              "the range), or by `symlog`, linear up to the `threshold` on both sides of 0 and logarithmic beyond: s " \
+              "= value / threshold there, and 1 + ln(value / threshold), mirrored.",                                   \
+      .by_default = "`linear`")                                                                                        \
+    X(CYAML_FIELD_FLOAT_PTR("threshold", OPTIONAL, type, colours.threshold),                                           \
+      .help = "Up to what size values are linear by `symlog`, which needs it.", .by_default = "none", .low = 0,        \
+      .is_low_excluded = true, .high = 1e300)                                                                          \
+    X(NUMBERS("below", type, colours.below, 3), .help = "Colour of values below the range, sRGB.",                     \
+      .by_default = "that of its low end", .low = 0, .high = 1)                                                        \
+    X(NUMBERS("above", type, colours.above, 3), .help = "Colour of values above the range, sRGB.",                     \
+      .by_default = "that of its high end", .low = 0, .high = 1)                                                       \
+    X(FORMS("range"),                                                                                                  \
+      .help = "The values `[low, high]`, low < high, that the ends of the colour map stand for; clamped outside.",     \
+      .by_default = RANGE_DEFAULT, TAKES(range_forms))
 
 #define AUTOMATIC_KEYS(X)                                                                                              \
     X(NUMBERS("direction", scene_file_automatic, direction, 3),                                                        \
@@ -116,8 +175,10 @@ DEFINE_MAPPING(material, "material", MATERIAL_KEYS);
       .by_default = COMPONENT_DEFAULT)                                                                                 \
     X(CHOICE("interpolate", scene_file_colour_by, interpolate, interpolation_words), .help = INTERPOLATE_HELP,         \
       .by_default = "`cell`")                                                                                          \
-    X(CHOICE("map", scene_file_colour_by, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                \
-    X(NUMBERS("range", scene_file_colour_by, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)
+    COLOUR_MAP_KEYS(X, scene_file_colour_by)                                                                           \
+    X(NUMBERS("nan", scene_file_colour_by, colours.nan, 3),                                                            \
+      .help = "Colour where the field is not a number, and on meshes that do not have it, sRGB.",                      \
+      .by_default = "grey, `[0.6, 0.6, 0.6]`", .low = 0, .high = 1)
 DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
 
 #define ISOSURFACE_KEYS(X)                                                                                             \
@@ -157,8 +218,7 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
     X(CHOICE("interpolate", scene_file_volume, interpolate, interpolation_words), .help = INTERPOLATE_HELP,            \
       .by_default = "`cell`")                                                                                          \
     X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
-    X(CHOICE("map", scene_file_volume, map, map_words), .help = MAP_HELP, .by_default = "`viridis`")                   \
-    X(NUMBERS("range", scene_file_volume, range, 2), .help = RANGE_HELP, .by_default = RANGE_DEFAULT)                  \
+    COLOUR_MAP_KEYS(X, scene_file_volume)                                                                              \
     X(CYAML_FIELD_SEQUENCE("opacity", POINTER, scene_file_volume, opacity, &opacity_point, 1, 32),                     \
       .help = "Points `[at, opacity]`, joined by straight lines: `at` 0 is the low end of the range and 1 the high "   \
               "end, never falling (twice the same makes a step); opacity is that of `unit_distance`.",                 \

@@ -32,11 +32,19 @@ typedef struct scene_file_material {
     double *ambient, *diffuse, *specular, *shininess;
 } scene_file_material;
 
+/* How values become colours; map and range, which have several forms, are read from the document. */
+typedef struct scene_file_colour_map {
+    bool *reversed;
+    int *discrete;
+    int *scale; /* scene_scale */
+    double *threshold;
+    double *below, *above, *nan; /* 3 */
+} scene_file_colour_map;
+
 typedef struct scene_file_colour_by {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
-    int *map;         /* colour_map */
-    double *range;    /* 2 */
+    scene_file_colour_map colours;
 } scene_file_colour_by;
 
 typedef struct scene_file_isosurface {
@@ -56,8 +64,7 @@ typedef struct scene_file_isosurface {
 typedef struct scene_file_volume {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
-    int *map;         /* colour_map */
-    double *range;    /* 2 */
+    scene_file_colour_map colours;
     double (*opacity)[2];
     int opacity_count;
     double *unit_distance;
@@ -115,7 +122,15 @@ typedef struct scene_key {
     bool is_low_excluded;
     bool is_high_excluded;
     const struct scene_mapping *child; /* of a mapping, or of a list of mappings */
+    const struct scene_form *forms;    /* of a value that may be of several types: one of each; else NULL */
+    int form_count;
 } scene_key;
+
+/* One of the forms that a value may have. */
+typedef struct scene_form {
+    cyaml_schema_value_t value;
+    scene_key key;
+} scene_form;
 
 typedef struct scene_mapping {
     const char *title;
@@ -125,8 +140,8 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* libcyaml has no word for "a name or a list of names": CYAML_IGNORE stands for that here, and the names are read from
- * the document (scene_document_texts()). */
+/* libcyaml has no word for "a name or a list of names", nor for values of several forms: CYAML_IGNORE stands for both
+ * here, and they are read from the document (scene_document_texts(), scene_document_kind()). */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64 };
 
 /* The mapping at the top of a file, of a scene_file, and libcyaml's view of the same. */

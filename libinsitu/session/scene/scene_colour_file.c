@@ -1,0 +1,174 @@
+/* Colour maps in files as ParaView exports them: a JSON list of mappings, or one mapping, each with RGBPoints (value,
+ * red, green and blue in turn), a Name and a ColorSpace. libyaml reads JSON, which YAML holds. The values are only
+ * relative: the first is the low end of a layer's range, and the last the high end. */
+#include <locale.h>
+#include <stdlib.h>
+#include <string.h>
+#include <yaml.h>
+
+#include "memory.h"
+#include "scene_convert.h"
+
+enum { max_points = 4096 };
+
+typedef struct colour_file {
+    const char *name; /* for messages */
+    yaml_document_t yaml;
+    base_error *error;
+} colour_file;
+
+static insitu_status bad_place(const colour_file *f, const yaml_node_t *node, const char *what)
+{
+    return base_fail(f->error, INSITU_ERROR_SCENE, "%.300s:%zu: %s", f->name, node->start_mark.line + 1, what);
+}
+
+static const yaml_node_t *node_of(const colour_file *f, int index)
+{
+    return yaml_document_get_node((yaml_document_t *)&f->yaml, index);
+}
+
+static int item_count(const yaml_node_t *list)
+{
+    return (int)(list->data.sequence.items.top - list->data.sequence.items.start);
+}
+
+static const char *text_of(const yaml_node_t *node)
+{
+    return node && node->type == YAML_SCALAR_NODE ? (const char *)node->data.scalar.value : "";
+}
+
+static const yaml_node_t *find_value(const colour_file *f, const yaml_node_t *mapping, const char *key)
+{
+    const yaml_node_pair_t *end = mapping->data.mapping.pairs.top;
+    for (const yaml_node_pair_t *p = mapping->data.mapping.pairs.start; p < end; p++)
+        if (strcmp(text_of(node_of(f, p->key)), key) == 0) return node_of(f, p->value);
+    return NULL;
+}
+
+static insitu_status read_number(const colour_file *f, const yaml_node_t *node, double *number)
+{
+    const char *text = text_of(node);
+    char *end;
+    *number = strtod(text, &end);
+    if (end != text && !*end && *number - *number == 0) return INSITU_OK;
+    return bad_place(f, node, "RGBPoints: not a number, expected numbers");
+}
+
+static insitu_status read_point(const colour_file *f, const yaml_node_t *list, int i, scene_colour_points *out)
+{
+    double numbers[4];
+    colour_point *p = &out->items[i];
+    const yaml_node_t *first = node_of(f, list->data.sequence.items.start[4 * (ptrdiff_t)i]);
+    for (int n = 0; n < 4; n++) {
+        const insitu_status status =
+            read_number(f, node_of(f, list->data.sequence.items.start[4 * i + n]), &numbers[n]);
+        if (status) return status;
+        if (n > 0 && !(numbers[n] >= 0 && numbers[n] <= 1))
+            return bad_place(f, first, "RGBPoints: a colour is outside of 0 to 1");
+    }
+    *p = (colour_point){numbers[0], {numbers[1], numbers[2], numbers[3]}};
+    if (i > 0 && p->at < p[-1].at) return bad_place(f, first, "RGBPoints: values fall, expected that they rise");
+    return INSITU_OK;
+}
+
+static insitu_status read_points(const colour_file *f, const yaml_node_t *list, scene_colour_points *out)
+{
+    const int numbers = list->type == YAML_SEQUENCE_NODE ? item_count(list) : 0;
+    if (numbers < 8 || numbers % 4 || numbers > 4 * max_points)
+        return bad_place(f, list, "RGBPoints: expected 2 to 4096 times four numbers: value, red, green, blue");
+    out->count = numbers / 4;
+    out->items = base_calloc((size_t)out->count, sizeof *out->items);
+    if (!out->items) return base_fail(f->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", f->name);
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < out->count && !status; i++) status = read_point(f, list, i, out);
+    if (!status && !(out->items[0].at < out->items[out->count - 1].at))
+        status = bad_place(f, list, "RGBPoints: all values are the same, expected that they rise");
+    return status;
+}
+
+static insitu_status read_space(const colour_file *f, const yaml_node_t *node, colour_space *space)
+{
+    static const struct {
+        const char *word;
+        colour_space space;
+    } words[] = {{"RGB", COLOUR_RGB},
+                 {"HSV", COLOUR_HSV},
+                 {"Lab", COLOUR_LAB},
+                 {"CIELAB", COLOUR_LAB},
+                 {"Diverging", COLOUR_DIVERGING},
+                 {"Step", COLOUR_STEP}};
+    *space = COLOUR_RGB;
+    if (!node) return INSITU_OK;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+        *space = words[i].space;
+        if (strcmp(text_of(node), words[i].word) == 0) return INSITU_OK;
+    }
+    return bad_place(f, node, "ColorSpace: expected one of RGB, HSV, Lab, CIELAB, Diverging and Step");
+}
+
+static insitu_status read_map(const colour_file *f, const yaml_node_t *mapping, scene_colour_points *out)
+{
+    const yaml_node_t *points = find_value(f, mapping, "RGBPoints");
+    if (!points) return bad_place(f, mapping, "the map has no RGBPoints, expected a list of value, red, green, blue");
+    const insitu_status status = read_space(f, find_value(f, mapping, "ColorSpace"), &out->space);
+    return status ? status : read_points(f, points, out);
+}
+
+static insitu_status refuse_name(const colour_file *f, const yaml_node_t *root, const char *name, int count)
+{
+    const char *first = text_of(find_value(f, node_of(f, root->data.sequence.items.start[0]), "Name"));
+    if (name)
+        return base_fail(f->error, INSITU_ERROR_SCENE,
+                         "%.300s: none of its %d colour maps is called \"%.100s\", "
+                         "expected a name as \"%.100s\"",
+                         f->name, count, name, first);
+    return base_fail(f->error, INSITU_ERROR_SCENE,
+                     "%.300s: holds %d colour maps, expected the name of one beside file, "
+                     "as \"%.100s\"",
+                     f->name, count, first);
+}
+
+static insitu_status find_map(const colour_file *f, const char *name, const yaml_node_t **out)
+{
+    const yaml_node_t *root = yaml_document_get_root_node((yaml_document_t *)&f->yaml);
+    if (!root) return base_fail(f->error, INSITU_ERROR_SCENE, "%.300s:1: is empty, expected a colour map", f->name);
+    const bool is_list = root->type == YAML_SEQUENCE_NODE;
+    const int count = is_list ? item_count(root) : 1;
+    for (int i = 0; i < count; i++) {
+        const yaml_node_t *map = is_list ? node_of(f, root->data.sequence.items.start[i]) : root;
+        if (map->type != YAML_MAPPING_NODE) return bad_place(f, map, "expected a colour map, a mapping with RGBPoints");
+        *out = map;
+        if (name ? strcmp(text_of(find_value(f, map, "Name")), name) == 0 : count == 1) return INSITU_OK;
+    }
+    if (count == 0) return bad_place(f, root, "holds no colour map");
+    if (is_list) return refuse_name(f, root, name, count);
+    return base_fail(f->error, INSITU_ERROR_SCENE,
+                     "%.300s: its colour map is not called \"%.100s\", expected \"%.100s\"", f->name, name,
+                     text_of(find_value(f, root, "Name")));
+}
+
+static insitu_status bad_syntax(const colour_file *f, const yaml_parser_t *parser)
+{
+    if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR)
+        return base_fail(f->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", f->name);
+    return base_fail(f->error, INSITU_ERROR_SCENE, "%.300s:%zu: not valid JSON: %.200s", f->name,
+                     parser->problem_mark.line + 1, parser->problem ? parser->problem : "unreadable");
+}
+
+insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
+                                     scene_colour_points *out, base_error *error)
+{
+    colour_file f = {.name = file_name, .error = error};
+    const yaml_node_t *map = NULL;
+    yaml_parser_t parser;
+    if (!yaml_parser_initialize(&parser))
+        return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", file_name);
+    yaml_parser_set_input_string(&parser, (const unsigned char *)file->text, (size_t)file->size);
+    insitu_status status = yaml_parser_load(&parser, &f.yaml) ? INSITU_OK : bad_syntax(&f, &parser);
+    yaml_parser_delete(&parser);
+    if (status) return status;
+    status = find_map(&f, name, &map);
+    if (!status) status = read_map(&f, map, out);
+    yaml_document_delete(&f.yaml);
+    return status;
+}

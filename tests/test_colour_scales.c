@@ -1,0 +1,268 @@
+/* Colours of values: surfaces where no light falls show the map's own colours, in closed form, by every scale, in
+ * bands, and outside of the range; volumes by logarithmic scales are the integral's. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "colour_map.h"
+#include "reference_base.h"
+#include "reference_integral.h"
+#include "test_render_fixture.h"
+
+static const float outside[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+static const float bands[] = {0.1F, 0.2F, 0.3F, 0.9F, 0.1F, 0.5F, 0.3F, 0.8F, 0.2F, 0.6F, 0.6F, 0.1F, 0.2F, 0.4F, 0.9F};
+
+typedef struct look {
+    const char *name;
+    double low, high;
+    render_scale scale;
+    double threshold;
+    bool is_banded, has_outside;
+} look;
+
+/* The colours' field goes from -1.4 to 1.6. */
+static const look looks[] = {
+    {"linear", -0.4, 0.7, RENDER_LINEAR, 0, false, false},
+    {"outside", -0.4, 0.7, RENDER_LINEAR, 0, false, true},
+    {"bands", -0.4, 0.7, RENDER_LINEAR, 0, true, false},
+    {"bands, outside", -0.4, 0.7, RENDER_LINEAR, 0, true, true},
+    {"log", 1e-3, 1, RENDER_LOG, 0, false, false},
+    {"log, outside", 1e-2, 1, RENDER_LOG, 0, false, true},
+    {"log, bands", 0.02, 1.5, RENDER_LOG, 0, true, true},
+    {"log, wide", 1e-30, 1, RENDER_LOG, 0, false, true},
+    {"symlog", -1, 0.5, RENDER_SYMLOG, 1e-2, false, false},
+    {"symlog, outside", -1, 0.5, RENDER_SYMLOG, 1e-3, false, true},
+    {"symlog, positive", 0.1, 1, RENDER_SYMLOG, 0.3, true, true},
+};
+enum { LOOKS = sizeof looks / sizeof *looks };
+
+static void set_look(render_transfer *t, const look *l)
+{
+    *t = (render_transfer){.low = l->low,
+                           .high = l->high,
+                           .colours = bands,
+                           .colour_count = 5,
+                           .scale = l->scale,
+                           .threshold = l->threshold,
+                           .is_banded = l->is_banded,
+                           .outside = l->has_outside ? outside : NULL,
+                           .unit_distance = 1};
+    if (!l->is_banded) t->colours = colour_map_table("viridis", &t->colour_count);
+}
+
+/* The value at the hit is that of its place: off by the rounding of the depth and of the cell's coordinates and values
+ * in float32, 4e-6 by which fixtures bound depths too, of lengths and values near 1. How far that may move a colour is
+ * seen at both its ends, and a leap in between (of bands, to what is outside) leaves the pixel out. */
+static const double value_error = 4e-6, colour_error = 3e-6;
+
+/* Returns whether the pixel counts. */
+static bool check_pixel(const render_transfer *t, double value, const float drawn[3], const char *what)
+{
+    double at[3], low[3], high[3];
+    reference_colour(t, value, at);
+    reference_colour(t, value - value_error, low);
+    reference_colour(t, value + value_error, high);
+    for (int c = 0; c < 3; c++) {
+        const double moved = fmax(fabs(low[c] - at[c]), fabs(high[c] - at[c]));
+        if (moved > 0.02) return false;
+        if (!(fabs((double)drawn[c] - at[c]) <= moved + colour_error))
+            fail_msg("%s: value %.9g: channel %d is %.9g, expected %.9g", what, value, c, (double)drawn[c], at[c]);
+    }
+    return true;
+}
+
+static void check_picture(const render_fixture *f, const render_transfer *t, const look *l)
+{
+    drawn_frame drawn;
+    const render_camera *camera = &f->job.camera;
+    int hits = 0, counted = 0;
+    fixture_draw(f, &drawn);
+    for (int pixel = 0; pixel < camera->width * camera->height; pixel++) {
+        double base[3], direction[3], p[3];
+        if (drawn.first[pixel] == drawn.first[pixel + 1]) continue;
+        const fragment *hit = &drawn.list.items[drawn.first[pixel]];
+        const double depth = fixture_depth(f, hit->t_in);
+        render_camera_ray(camera, pixel % camera->width, pixel / camera->width, base, direction);
+        for (int a = 0; a < 3; a++) p[a] = base[a] + depth * direction[a];
+        hits++;
+        counted += check_pixel(t, test_linear(p), hit->colour, l->name);
+    }
+    assert_true(hits > 300 && counted > 0.9 * hits);
+    drawn_free(&drawn);
+}
+
+static void surfaces_without_light_have_the_maps_colours(void **state)
+{
+    (void)state;
+    static const double values[] = {-0.2, 0.4};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        test_view colours;
+        render_fixture f;
+        test_mesh_lattice(kind, 4, 0.2, test_linear, &mesh);
+        test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
+        fixture_create_lattice(&f, kind, 4, 0.2, test_wave);
+        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        fixture_add_surface(&f, values, 2, 1);
+        f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
+        f.surfaces[0].colour_map = &f.transfer;
+        f.surfaces[0].material = (render_material){.ambient = 1};
+        for (int i = 0; i < LOOKS; i++) {
+            set_look(&f.transfer, &looks[i]);
+            for (int set = 0; set < fixture_set_count(); set++) {
+                fixture_use_set(set);
+                check_picture(&f, &f.transfer, &looks[i]);
+            }
+        }
+        test_view_free(&colours);
+        test_mesh_free(&mesh);
+        fixture_free(&f);
+    }
+}
+
+static double nothing(const double p[3])
+{
+    (void)p;
+    return (double)NAN;
+}
+
+static void what_is_not_a_number_has_its_colour(void **state)
+{
+    (void)state;
+    static const double values[] = {0.3};
+    test_mesh mesh;
+    test_view colours;
+    render_fixture f;
+    test_mesh_lattice(TEST_TETS, 4, 0.2, nothing, &mesh);
+    test_view_create(&mesh, (test_layout){.wide_coordinates = true, .wide_values = true}, &colours);
+    fixture_create_lattice(&f, TEST_TETS, 4, 0.2, test_wave);
+    fixture_add_surface(&f, values, 1, 1);
+    f.surfaces[0].colour_field = (render_field){&colours.field, f.ranges};
+    f.surfaces[0].colour_map = &f.transfer;
+    f.surfaces[0].material = (render_material){.ambient = 1};
+    for (int i = 0; i < LOOKS; i++) {
+        drawn_frame drawn;
+        const float grey[3] = {RENDER_NO_COLOUR, RENDER_NO_COLOUR, RENDER_NO_COLOUR};
+        set_look(&f.transfer, &looks[i]);
+        fixture_draw(&f, &drawn);
+        assert_true(drawn.list.count > 100);
+        for (int64_t n = 0; n < drawn.list.count; n++)
+            assert_memory_equal(drawn.list.items[n].colour, looks[i].has_outside ? outside + 6 : grey, sizeof grey);
+        drawn_free(&drawn);
+    }
+    test_view_free(&colours);
+    test_mesh_free(&mesh);
+    fixture_free(&f);
+}
+
+static void scales_and_their_inverses_agree(void **state)
+{
+    (void)state;
+    static const double values[] = {-1e6, -1, -1e-3, 0, 1e-9, 1e-3, 0.5, 2, 1e12};
+    for (int i = 0; i < 9; i++) {
+        const double v = values[i], s = render_scaled(RENDER_SYMLOG, 1e-3, v);
+        assert_true(fabs(render_unscaled(RENDER_SYMLOG, 1e-3, s) - v) <= 1e-14 * fabs(v));
+        assert_true(render_scaled(RENDER_SYMLOG, 1e-3, -v) == -s && render_scaled(RENDER_LINEAR, 0, v) == v);
+        if (v > 0) assert_true(fabs(render_unscaled(RENDER_LOG, 0, render_scaled(RENDER_LOG, 0, v)) - v) <= 1e-14 * v);
+    }
+    assert_true(render_scaled(RENDER_SYMLOG, 1e-3, 1e-3) == 1);
+    assert_true(render_scaled(RENDER_LOG, 0, 0) == (double)-INFINITY);
+}
+
+/* ---- volumes ---- */
+
+static double growing(const double p[3])
+{
+    return pow(10, 2 * test_linear(p)); /* 1.6e-3 to 1600 */
+}
+
+static void set_volume(render_fixture *f, const look *l, double values[3], render_transfer *t)
+{
+    static const float opacities[3] = {0, 0.7F, 0.2F};
+    fixture_set_volume(f, 0.4);
+    const double unit = f->transfer.unit_distance;
+    set_look(t, l);
+    t->opacity_count = 3;
+    t->opacity_values = values;
+    t->opacities = opacities;
+    t->unit_distance = unit;
+    f->volume.transfer = t;
+}
+
+static const look volume_looks[] = {
+    {"log", 1e-2, 1e2, RENDER_LOG, 0, false, false},
+    {"log, more than the data", 1e-3, 1e4, RENDER_LOG, 0, false, false},
+    {"symlog", -10, 1e3, RENDER_SYMLOG, 0.1, false, false},
+};
+
+/* By samples: as for other transfer functions, and what the rounding of a place, 3e-7 of the scale's value, moves the
+ * colour by: less than 1e-5. */
+static void sampled_volumes_are_the_reference(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        render_fixture f;
+        render_transfer t;
+        double values[3] = {0.05, 3, 90};
+        fixture_bounds bounds = fixture_usual_bounds;
+        bounds.colour += 1e-5;
+        fixture_create_lattice(&f, TEST_TETS, 4, 0.2, growing);
+        fixture_look(&f, CAMERA_OUTSIDE, 33, 29);
+        set_volume(&f, &volume_looks[i], values, &t);
+        fixture_compare(&f, &bounds, volume_looks[i].name);
+        fixture_free(&f);
+    }
+}
+
+/* By segments colours are straight between entries, of which there are 256: over 12 decades an entry is 0.11 of ln, and
+ * the chord is off by 0.11 / 8 of what neighbours differ by, 0.03: 4e-4. Beyond that tets are exact, others to
+ * max_error. */
+static void integrated_volumes_keep_their_error(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++)
+        for (int hexes = 0; hexes < 2; hexes++) {
+            render_fixture f;
+            render_transfer t;
+            drawn_frame drawn;
+            double values[3] = {0.05, 3, 90}, worst = 0;
+            const double allowed = 4e-4 + (hexes ? 0.01 : 1e-6);
+            fixture_create_lattice(&f, hexes ? TEST_HEXES : TEST_TETS, 4, 0.2, growing);
+            fixture_look(&f, CAMERA_OUTSIDE, 17, 15);
+            set_volume(&f, &volume_looks[i], values, &t);
+            f.job.integration = RENDER_SEGMENTS;
+            f.job.max_error = hexes ? 0.01 : 0;
+            reference_integral *scene = reference_integral_create(&f.job, 1e-8);
+            fixture_draw(&f, &drawn);
+            for (int pixel = 0; pixel < 17 * 15; pixel++) {
+                double truth[4];
+                reference_integral_trace(scene, pixel % 17, pixel / 17, fixture_background, NULL, 0, truth);
+                for (int c = 0; c < 4; c++)
+                    worst = test_worse(worst, fabs((double)drawn.picture.rgba[4 * pixel + c] - truth[c]));
+            }
+            fprintf(stderr, "%s, %s: off by %.2g\n", volume_looks[i].name, hexes ? "hexes" : "tets", worst);
+            assert_true(worst <= allowed);
+            reference_integral_free(scene);
+            drawn_free(&drawn);
+            fixture_free(&f);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scales_and_their_inverses_agree),
+        cmocka_unit_test(surfaces_without_light_have_the_maps_colours),
+        cmocka_unit_test(what_is_not_a_number_has_its_colour),
+        cmocka_unit_test(sampled_volumes_are_the_reference),
+        cmocka_unit_test(integrated_volumes_keep_their_error),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
