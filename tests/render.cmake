@@ -34,6 +34,10 @@ insitu_render_program(test_colour_scales)
 add_test(NAME colour_scales COMMAND test_colour_scales)
 set_tests_properties(colour_scales PROPERTIES TIMEOUT 60)
 
+insitu_render_program(test_slice)
+add_test(NAME slice COMMAND test_slice)
+set_tests_properties(slice PROPERTIES TIMEOUT 120)
+
 insitu_render_program(test_render_invariance)
 add_test(NAME render_invariance COMMAND test_render_invariance)
 set_tests_properties(render_invariance PROPERTIES TIMEOUT 120)

@@ -79,6 +79,9 @@ static const char every_key[] = "threads: 3\n"
                                 "          {field: q, values: [7], mesh: air, interpolate: vertex, colour_by:\n"
                                 "           {field: speed, component: 2, map: inferno, range: [0, 1],\n"
                                 "            interpolate: vertex}}\n"
+                                "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
+                                "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
+                                "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}]}\n"
                                 "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
                                 "               max_seconds: 10, method: segments}\n"
                                 "    outputs:\n"
@@ -322,6 +325,37 @@ static void sampling_is_by_what_is_said(void **state)
     }
 }
 
+/* A normal of any length, and of numbers whose squares are none. */
+static void slices_have_planes_of_unit_normals(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(
+        "images:\n- name: a\n  layers:\n"
+        "  - slice: {field: p, planes: [{normal: [3e200, 0, 4e200]}, {normal: [0, -1e-200, 0], point: [1, 2, 3],\n"
+        "            offset: -2}]}\n"
+        "  - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: plasma, range: [0, 2],\n"
+        "            opacity: 0.5, planes: [{normal: [1, 0, 0]}], material: {specular: 0}}\n"
+        "  outputs: [{path: a.png}]\n",
+        &s);
+    assert_int_equal(s.images[0].slice_count, 2);
+    const scene_slice *slice = s.images[0].slices;
+    assert_int_equal(slice[0].plane_count, 2);
+    check_vector(slice[0].planes[0].normal, 0.6, 0, 0.8);
+    assert_true(!slice[0].planes[0].has_point && slice[0].planes[0].offset == 0);
+    check_vector(slice[0].planes[1].normal, 0, -1, 0);
+    check_vector(slice[0].planes[1].point, 1, 2, 3);
+    assert_true(slice[0].planes[1].has_point && slice[0].planes[1].offset == -2);
+    check_built_in(&slice[0].colour_map, "viridis");
+    assert_true(slice[0].opacity == 1 && !slice[0].colour_map.range.is_fixed && !slice[0].field.at_vertices);
+    assert_true(slice[0].material.ambient == 1 && slice[0].material.diffuse == 0 && slice[0].material.specular == 0);
+    check_built_in(&slice[1].colour_map, "plasma");
+    assert_true(slice[1].opacity == 0.5F && slice[1].colour_map.range.high == 2 && slice[1].field.at_vertices);
+    assert_true(slice[1].field.component == 0 && slice[1].field.mesh_count == 1);
+    assert_true(slice[1].material.diffuse == 0.75F && slice[1].material.specular == 0);
+    scene_free(&s);
+}
+
 static void scene_layer_defaults_hold(void **state)
 {
     (void)state;
@@ -519,9 +553,35 @@ static const struct bad_file {
     {11, "      - volume: {field: f, mesh: {a: b}}", 11, {"volume.mesh: a mapping", "a list of 1 to 64 of them"}},
     {10, "      - isosurface: {field: f, values: [1], interpolate: cell}", 10, {"interpolate: cell is not", "vertex"}},
     {11, "      - volume: {field: f, interpolate: face}", 11, {"interpolate: \"face\"", "one of cell, vertex"}},
-    {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface and volume"}},
-    {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds both"}},
-    {11, "      - slice: {field: f}", 11, {"layers[1]: the key \"slice\" is unknown", "isosurface, volume"}},
+    {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface, volume and slice"}},
+    {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds more than one"}},
+    {11, "      - clips: {field: f}", 11, {"layers[1]: the key \"clips\" is unknown", "isosurface, volume, slice"}},
+    {11, "      - slice: {field: f}", 11, {"slice.planes: missing", "a list of 1 to 16 mappings"}},
+    {11, "      - slice: {planes: [{normal: [0, 0, 1]}]}", 11, {"slice.field: missing", "a text"}},
+    {11, "      - slice: {field: f, planes: []}", 11, {"slice.planes: a list of 0", "1 to 16"}},
+    {11, "      - slice: {field: f, planes: [{}]}", 11, {"planes[0].normal: missing", "a list of 3 numbers"}},
+    {11,
+     "      - slice:\n          field: f\n          planes:\n            - {normal: [1, 0, 0]}\n"
+     "            - {normal: [0, 0, 0]}",
+     15,
+     {"planes[1].normal: [0, 0, 0] has no direction", "any length but 0"}},
+    {11, "      - slice: {field: f, planes: [{normal: x}]}", 11, {"planes[0].normal: \"x\"", "a list of 3 numbers"}},
+    {11, "      - slice: {field: f, planes: [{normal: [0, 1]}]}", 11, {"normal: a list of 2", "a list of 3"}},
+    {11, "      - slice: {field: f, planes: [{normal: [0, 1, 0], point: 3}]}", 11, {"planes[0].point: \"3\""}},
+    {11,
+     "      - slice: {field: f, planes: [{normal: [0, 1, 0], at: 3}]}",
+     11,
+     {"the key \"at\" is unknown", "offset"}},
+    {11, "      - slice: {field: f, planes: [{normal: [0, 1, 0]}], opacity: 2}", 11, {"slice.opacity: \"2\""}},
+    {11,
+     "      - slice: {field: f, planes: [{normal: [0, 1, 0]}], range: [1, 0]}",
+     11,
+     {"slice.range", "does not rise"}},
+    {10,
+     "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15]}\n"
+     "      - slice: {field: f, planes: [{normal: [0, 0, 1]}]}",
+     11,
+     {"layers[1]: 17 isovalues and planes", "at most 16"}},
     {11, "      - " V "\n      - " V "\n      - " V "\n      - " V "\n      - " V, 15, {"5 volumes", "at most 4"}},
     {11, "      - volume: {field: f, range: [2, 1]}", 11, {"volume.range: [2, 1] does not rise", "low < high"}},
     {11, "      - volume: {field: f, opacity: [[0, 0], [0.5, 1], [0.4, 0]]}", 11, {"opacity[2]: 0.4 comes after 0.5"}},
@@ -755,6 +815,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_image_defaults_hold),
         cmocka_unit_test(sampling_is_by_what_is_said),
         cmocka_unit_test(scene_layer_defaults_hold),
+        cmocka_unit_test(slices_have_planes_of_unit_normals),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),
         cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),

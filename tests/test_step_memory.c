@@ -32,7 +32,10 @@ static const char full_scene[] =
             IMAGE("d", "[16, 16]", VOLUME("f") VOLUME("c"), "    sampling: {max_error: 0.01}\n");
 
 static const char edited_scene[] =
-    "threads: 1\nimages:\n" IMAGE("e", "[24, 16]", "      - isosurface: {field: f, values: [0.2]}\n", "");
+    "threads: 1\nimages:\n" IMAGE("e", "[24, 16]",
+                                  "      - isosurface: {field: f, values: [0.2]}\n"
+                                  "      - slice: {field: c, planes: [{normal: [1, 2, 3]}]}\n",
+                                  "");
 
 typedef struct memory_case {
     const char *name;

@@ -10,6 +10,7 @@
 #include "session_changes.h"
 #include "session_check.h"
 #include "session_checksums.h"
+#include "session_distances.h"
 #include "session_draw.h"
 #include "session_guard.h"
 #include "session_isovalues.h"
@@ -60,6 +61,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
     if (!status) status = session_make_plan(&basis, &s->meshes, team->comm, &s->report, &plan, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
+    if (!status && plan.slice_count) status = session_update_distances(&s->meshes, team, error);
     s->report.numbers.prepare_ms = milliseconds_since(start);
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status)

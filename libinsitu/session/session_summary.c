@@ -2,6 +2,7 @@
 #include "session_summary.h"
 
 #include "render.h"
+#include "session_scalars.h"
 
 static int64_t array_bytes(const insitu_array *array, int64_t count)
 {
@@ -39,13 +40,19 @@ static void report_field(session_report *out, const session_mesh *mesh, int inde
 
 static void report_scalar(session_report *out, const session_mesh *mesh, const session_scalar *scalar)
 {
-    const char *name = mesh->fields[scalar->field].given.name;
+    const char *name = session_scalar_name(mesh, scalar);
     if (scalar->pairs) out->numbers.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
     if (scalar->vertex_values) {
         const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof(double);
         out->numbers.bytes_copied += bytes;
         session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" recentred from cells to vertices: %lld bytes",
                          mesh->name, name, (long long)bytes);
+    }
+    if (scalar->distances) {
+        const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof(float);
+        out->numbers.bytes_copied += bytes;
+        session_text_add(&out->copied_why, "mesh \"%s\": distances of vertices from a slice: %lld bytes", mesh->name,
+                         (long long)bytes);
     }
     if (scalar->is_used && scalar->wants_ranges && scalar->unusable)
         session_text_add(&out->warnings, "mesh \"%s\": %lld cells are not drawn: values of field \"%s\" are not finite",

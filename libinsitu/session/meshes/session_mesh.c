@@ -10,6 +10,7 @@ void session_drop_scalars(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->scalar_count; i++) {
         base_free(mesh->scalars[i].vertex_values);
+        base_free(mesh->scalars[i].distances);
         base_free(mesh->scalars[i].pairs);
         base_free(mesh->scalars[i].intervals);
     }

@@ -20,9 +20,18 @@ typedef struct session_extremes {
     double low, high;
 } session_extremes;
 
-/* One scalar of a field as a layer uses it: a component or the magnitude, as it is or recentred to vertices. */
+/* A plane that meshes are cut by. */
+typedef struct session_plane {
+    double normal[3]; /* of length 1 */
+    double point[3];  /* on it */
+    bool is_central; /* the point is this far along the normal from the middle of the data's bounds, and goes with it */
+    double offset;
+} session_plane;
+
+/* A scalar that a layer uses: a component or the magnitude of a field, as it is or recentred to vertices; or the
+ * vertices' signed distances from a plane. */
 typedef struct session_scalar {
-    int field;     /* in the mesh's fields */
+    int field;     /* in the mesh's fields; -1: distances */
     int component; /* as grid_field.component */
     bool is_recentred;
     bool is_used;       /* by an image of this step */
@@ -30,6 +39,8 @@ typedef struct session_scalar {
     bool needs_all;     /* an image of this step may need any cell */
     int interval_count; /* else the values that this step's images show: cells with some are candidates */
     mmbvh_interval *intervals;
+    session_plane plane;   /* of distances: what they are from */
+    float *distances;      /* at vertices, a declared copy; NULL until computed */
     double *vertex_values; /* recentred values, a declared copy; NULL until computed */
     grid_field own;        /* of a recentred one in use: the cells' */
     bool are_values_stale; /* recentred ones are to be computed again */

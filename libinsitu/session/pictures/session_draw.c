@@ -97,7 +97,7 @@ static render_job make_job(const session_drawing *d, const scene_image *image, c
                         .part_count = layers->part_count,
                         .parent = layers->part_count > 1 ? d->parent : NULL,
                         .surfaces = layers->surfaces,
-                        .surface_count = image->isosurface_count,
+                        .surface_count = layers->surface_count,
                         .active = layers->active,
                         .volumes = layers->volumes,
                         .volume_count = image->volume_count,
@@ -246,7 +246,7 @@ bool session_active_cells_pay(const session_plan *plan, const scene_image *image
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
                                 session_picture *picture, base_error *error)
 {
-    const session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal};
+    const session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report};
     session_view view;
     session_layers layers = {0};
     canvas canvas = {0};

@@ -7,6 +7,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_distances.h"
 #include "session_scalars.h"
 
 static bool is_part(const session_mesh *mesh)
@@ -14,19 +15,29 @@ static bool is_part(const session_mesh *mesh)
     return mesh->is_needed && mesh->has_tree && mesh->tree.node_count > 0;
 }
 
+static int count_surfaces(const scene_image *image)
+{
+    int count = image->isosurface_count;
+    for (int i = 0; i < image->slice_count; i++) count += image->slices[i].plane_count;
+    return count;
+}
+
 static bool allocate_layers(const session_meshes *meshes, const scene_image *image, session_layers *out)
 {
-    const size_t surfaces = (size_t)image->isosurface_count, volumes = (size_t)image->volume_count;
+    const size_t surfaces = (size_t)count_surfaces(image), volumes = (size_t)image->volume_count;
     for (int i = 0; i < meshes->count; i++) out->part_count += is_part(meshes->items[i]);
     const size_t fields = (size_t)out->part_count * (2 * surfaces + volumes);
+    out->surface_count = (int)surfaces;
     out->parts = base_calloc((size_t)out->part_count, sizeof *out->parts);
     out->surfaces = base_calloc(surfaces, sizeof *out->surfaces);
     out->volumes = base_calloc(volumes, sizeof *out->volumes);
     out->transfers = base_calloc(surfaces + volumes, sizeof *out->transfers);
-    if (out->transfers) out->transfer_count = image->isosurface_count + image->volume_count;
+    if (out->transfers) out->transfer_count = (int)(surfaces + volumes);
     out->fields = base_calloc(fields, sizeof *out->fields);
+    out->distances = base_calloc(surfaces, sizeof *out->distances);
     out->ranges = base_calloc(fields, sizeof *out->ranges);
-    return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->ranges;
+    return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->distances &&
+           out->ranges;
 }
 
 void session_layers_free(session_layers *layers)
@@ -37,6 +48,7 @@ void session_layers_free(session_layers *layers)
     base_free(layers->volumes);
     base_free(layers->transfers);
     base_free(layers->fields);
+    base_free(layers->distances);
     base_free(layers->ranges);
     *layers = (session_layers){0};
 }
@@ -76,17 +88,43 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     return out;
 }
 
-/* Least and greatest value of a field over all ranks' drawn cells (session_scalars.h). Collective. */
-static insitu_status data_range(const session_layer_basis *basis, const scene_field *field, bool is_positive,
-                                double *low, double *high, base_error *error)
+/* The distances on the meshes that have the field. */
+static render_field place_distances(const session_meshes *meshes, session_layers *layers, int slot,
+                                    const scene_field *field, const scene_plane *plane)
+{
+    const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
+    const render_field out = {layers->fields + first, layers->ranges + first};
+    ptrdiff_t at = first;
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        if (!is_part(mesh)) continue;
+        const session_scalar *scalar = session_find_scalar(mesh, field) ? session_find_distance(mesh, plane) : NULL;
+        layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
+        if (scalar) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
+        at++;
+    }
+    return out;
+}
+
+/* What a range is of: a field, or, where a plane is given, the distances from it on the meshes that have the field. */
+typedef struct range_subject {
+    const scene_field *field;
+    const scene_plane *plane; /* NULL: the field's own values */
+    bool is_positive;         /* only such values count (session_scalars.h) */
+} range_subject;
+
+/* Least and greatest value over all ranks' drawn cells. Collective. */
+static insitu_status data_range(const session_layer_basis *basis, const range_subject *of, double *low, double *high,
+                                base_error *error)
 {
     double mine[2] = {INFINITY, INFINITY}, all[2];
     for (int i = 0; i < basis->meshes->count; i++) {
         const session_mesh *mesh = basis->meshes->items[i];
-        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, of->field) : NULL;
+        if (scalar && of->plane) scalar = session_find_distance(mesh, of->plane);
         if (!scalar) continue;
         double least, most;
-        session_scalar_extent(mesh, scalar, basis->team->threads, is_positive, &least, &most);
+        session_scalar_extent(mesh, scalar, basis->team->threads, of->is_positive, &least, &most);
         mine[0] = fmin(mine[0], least);
         mine[1] = fmin(mine[1], -most);
     }
@@ -103,7 +141,8 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
 {
     double low = map->range.low, high = map->range.high;
     insitu_status status = INSITU_OK;
-    if (!map->range.is_fixed) status = data_range(basis, field, map->scale == SCENE_LOG, &low, &high, error);
+    const range_subject of = {.field = field, .is_positive = map->scale == SCENE_LOG};
+    if (!map->range.is_fixed) status = data_range(basis, &of, &low, &high, error);
     if (status) return status;
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
@@ -130,13 +169,59 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
     return make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[index], error);
 }
 
+static void warn_of_plane(const session_layer_basis *basis, const scene_image *image, int surface, double low,
+                          double high)
+{
+    const session_warning warning = {WARNING_PLANE, image->name, NULL, surface};
+    const double reach = SESSION_BORDER_SHARE * basis->half_diagonal;
+    session_warn(basis->report, &warning, low <= high && (low > reach || high < -reach),
+                 "image \"%s\": a plane of its slices meets no cell: they are %g to %g from it, along its normal",
+                 image->name, low, high);
+}
+
+/* surface: the plane's place among the surfaces. */
+static insitu_status fill_plane(const session_layer_basis *basis, const scene_image *image, const scene_slice *layer,
+                                const scene_plane *plane, int surface, session_layers *layers, base_error *error)
+{
+    const scene_material *m = &layer->material;
+    session_transfer *transfer = &layers->transfers[surface];
+    double low, high;
+    insitu_status status = data_range(basis, &(range_subject){&layer->field, plane, false}, &low, &high, error);
+    if (!status) status = make_transfer(basis, &layer->field, &layer->colour_map, NULL, transfer, error);
+    if (status) return status;
+    layers->distances[surface] = session_slice_distance(low, high, basis->half_diagonal);
+    warn_of_plane(basis, image, surface, low, high);
+    layers->surfaces[surface] = (render_surface_layer){
+        .field = place_distances(basis->meshes, layers, 2 * surface, &layer->field, plane),
+        .value_count = 1,
+        .values = &layers->distances[surface],
+        .colour_field = place_field(basis->meshes, layers, 2 * surface + 1, &layer->field, false),
+        .colour_map = &transfer->transfer,
+        .opacity = layer->opacity,
+        .material = {m->ambient, m->diffuse, m->specular, m->shininess},
+        .root = RENDER_ROBUST,
+        .normal = RENDER_GRADIENT};
+    return INSITU_OK;
+}
+
+static insitu_status fill_slices(const session_layer_basis *basis, const scene_image *image, session_layers *layers,
+                                 base_error *error)
+{
+    int surface = image->isosurface_count;
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < image->slice_count; i++)
+        for (int p = 0; p < image->slices[i].plane_count && !status; p++)
+            status = fill_plane(basis, image, &image->slices[i], &image->slices[i].planes[p], surface++, layers, error);
+    return status;
+}
+
 static insitu_status fill_volume(const session_layer_basis *basis, const scene_image *image, int index,
                                  session_layers *layers, base_error *error)
 {
     const scene_volume *layer = &image->volumes[index];
-    session_transfer *transfer = &layers->transfers[image->isosurface_count + index];
+    session_transfer *transfer = &layers->transfers[layers->surface_count + index];
     layers->volumes[index] = (render_volume_layer){
-        .field = place_field(basis->meshes, layers, 2 * image->isosurface_count + index, &layer->field, true),
+        .field = place_field(basis->meshes, layers, 2 * layers->surface_count + index, &layer->field, true),
         .transfer = &transfer->transfer};
     return make_transfer(basis, &layer->field, &layer->colour_map, layer, transfer, error);
 }
@@ -150,6 +235,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     if (!status) fill_parts(basis->meshes, &layers);
     for (int i = 0; i < image->isosurface_count && !status; i++)
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
+    if (!status) status = fill_slices(basis, image, &layers, error);
     for (int i = 0; i < image->volume_count && !status; i++) status = fill_volume(basis, image, i, &layers, error);
     if (status)
         session_layers_free(&layers);

@@ -5,15 +5,18 @@
 #include "render.h"
 #include "scene.h"
 #include "session_mesh.h"
+#include "session_report.h"
 #include "session_team.h"
 #include "session_transfer.h"
 
 typedef struct session_layers {
     int part_count, transfer_count;
     render_part *parts;
-    render_surface_layer *surfaces;
+    int surface_count;
+    render_surface_layer *surfaces; /* isosurfaces, then planes of slices */
     render_volume_layer *volumes;
     session_transfer *transfers; /* of surfaces, then of volumes */
+    double *distances;           /* of surfaces: the isovalues of planes */
     grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
     mmbvh_ranges *ranges;        /* as the fields */
     render_active_cells *active; /* the step's (session_draw.h), for the caller to set; NULL: none are stored */
@@ -24,6 +27,7 @@ typedef struct session_layer_basis {
     const session_meshes *meshes;
     const session_team *team;
     double half_diagonal; /* of the global bounds */
+    session_report *report;
 } session_layer_basis;
 
 /* Collective: ranges from the data are over all ranks. On an error nothing is left to free. */

@@ -4,6 +4,7 @@
 
 #include "memory.h"
 #include "render.h"
+#include "session_distances.h"
 #include "session_hash.h"
 #include "session_scalars.h"
 #include "session_transfer.h"
@@ -65,17 +66,37 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer, double ha
     return !scalar || add_volume(scalar, layer, half_diagonal);
 }
 
-static bool mark_image(session_mesh *mesh, const scene_image *image, double half_diagonal)
+/* The distance that is drawn is 0 or little from it: see session_slice_distance(). */
+static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
+{
+    const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);
+    session_scalar *scalar;
+    return session_mark_distance(mesh, plane, extent, &scalar) &&
+           add_intervals(scalar, &(mmbvh_interval){-reach, reach}, 1);
+}
+
+static bool mark_slice(session_mesh *mesh, const scene_slice *layer, const session_extent *extent)
+{
+    session_scalar *colour;
+    bool is_marked = session_mark_scalar(mesh, &layer->field, false, &colour);
+    for (int i = 0; i < layer->plane_count && is_marked && colour; i++)
+        is_marked = mark_plane(mesh, &layer->planes[i], extent);
+    return is_marked;
+}
+
+static bool mark_image(session_mesh *mesh, const scene_image *image, const session_extent *extent)
 {
     bool is_marked = true;
     for (int i = 0; i < image->isosurface_count && is_marked; i++)
         is_marked = mark_surface(mesh, &image->isosurfaces[i]);
     for (int i = 0; i < image->volume_count && is_marked; i++)
-        is_marked = mark_volume(mesh, &image->volumes[i], half_diagonal);
+        is_marked = mark_volume(mesh, &image->volumes[i], extent->half_diagonal);
+    for (int i = 0; i < image->slice_count && is_marked; i++) is_marked = mark_slice(mesh, &image->slices[i], extent);
     return is_marked;
 }
 
-bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count, double half_diagonal)
+bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count,
+                        const session_extent *extent)
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
@@ -86,7 +107,7 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
             mesh->scalars[i].interval_count = 0;
         }
         for (int i = 0; i < count && mesh->is_given; i++)
-            if (!mark_image(mesh, images[i], half_diagonal)) return false;
+            if (!mark_image(mesh, images[i], extent)) return false;
     }
     return true;
 }
@@ -102,6 +123,8 @@ bool session_find_candidates(const session_mesh *mesh, uint64_t *key)
         if (s->needs_all) return false;
         const int names[4] = {s->field, s->component, s->is_recentred, s->interval_count};
         session_hash_bytes(key, names, sizeof names);
+        session_hash_bytes(key, s->plane.normal, sizeof s->plane.normal);
+        session_hash_bytes(key, s->plane.point, sizeof s->plane.point);
         session_hash_bytes(key, s->intervals, (size_t)s->interval_count * sizeof *s->intervals);
     }
     return true;

@@ -5,10 +5,12 @@
 
 #include "scene.h"
 #include "session_mesh.h"
+#include "session_space.h"
 
-/* Mark on this rank's meshes and scalars what the images need, and forget what an earlier step's needed. half_diagonal:
- * of the global bounds. False where memory ran out. Local. */
-bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count, double half_diagonal);
+/* Mark on this rank's meshes and scalars what the images need, and forget what an earlier step's needed. False where
+ * memory ran out. Local. */
+bool session_mark_needs(session_meshes *meshes, const scene_image *const *images, int count,
+                        const session_extent *extent);
 
 /* False where values alone do not tell which cells can be seen: any may be. Else *key is a hash of all that decides on
  * the candidates but the values: the scalars and their intervals. */

@@ -143,11 +143,16 @@ static insitu_status check_image(const session_plan_basis *basis, const scene_im
     }
     for (int i = 0; i < image->volume_count && !status; i++)
         status = check_layer_field(basis, &image->volumes[i].field, error);
+    for (int i = 0; i < image->slice_count && !status; i++) {
+        values += image->slices[i].plane_count;
+        status = check_layer_field(basis, &image->slices[i].field, error);
+    }
     if (!status && (values > RENDER_MAX_ISOVALUES || image->volume_count > RENDER_MAX_VOLUMES))
-        status = base_fail(error, INSITU_ERROR_SCENE,
-                           "%s:%d: image \"%s\" has %d isovalues and %d volumes, at most %d and %d are supported",
-                           basis->scene_path, image->line, image->name, values, image->volume_count,
-                           RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES);
+        status =
+            base_fail(error, INSITU_ERROR_SCENE,
+                      "%s:%d: image \"%s\" has %d isovalues and planes and %d volumes, at most %d and %d are supported",
+                      basis->scene_path, image->line, image->name, values, image->volume_count, RENDER_MAX_ISOVALUES,
+                      RENDER_MAX_VOLUMES);
     return status;
 }
 
@@ -191,6 +196,8 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
                           add_recentrings(catalogue, plan, &image->isosurfaces[s].colour_by));
         for (int v = 0; v < image->volume_count && is_planned; v++)
             is_planned = add_recentrings(catalogue, plan, &image->volumes[v].field);
+        for (int n = 0; n < image->slice_count && is_planned; n++)
+            is_planned = add_recentrings(catalogue, plan, &image->slices[n].field);
     }
     return is_planned;
 }
@@ -231,8 +238,9 @@ static void take_images(const session_plan_basis *basis, session_report *report,
 {
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
-        if (is_due(image, basis->cycle) && can_be_drawn(basis, image, report, &plan->refusal))
-            plan->images[plan->image_count++] = image;
+        if (!is_due(image, basis->cycle) || !can_be_drawn(basis, image, report, &plan->refusal)) continue;
+        plan->images[plan->image_count++] = image;
+        plan->slice_count += image->slice_count;
     }
 }
 
@@ -244,7 +252,7 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     session_plan plan = {.images = base_calloc(due, sizeof *plan.images), .cell_count = extent->cell_count};
     if (plan.images) take_images(basis, report, &plan);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
-                          session_mark_needs(meshes, plan.images, plan.image_count, extent->half_diagonal);
+                          session_mark_needs(meshes, plan.images, plan.image_count, extent);
     if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
     const insitu_status status = session_agree(comm, error);
     if (status)

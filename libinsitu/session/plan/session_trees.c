@@ -148,7 +148,7 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
         const insitu_status status = refit_scalar(mesh, scalar, &options);
         if (status)
             return base_fail(error, status, "mesh \"%s\": no memory for the ranges of field \"%s\"", mesh->name,
-                             mesh->fields[scalar->field].given.name);
+                             session_scalar_name(mesh, scalar));
         scalar->are_ranges_stale = false;
         const double seconds = MPI_Wtime() - start;
         measure(&u->trees->rates.refit, seconds, mesh->tree.cell_count);

@@ -260,10 +260,16 @@ static void free_image(scene_image *image)
         base_free(image->volumes[i].opacity);
         free_colour_map(&image->volumes[i].colour_map);
     }
+    for (int i = 0; i < image->slice_count; i++) {
+        free_field(&image->slices[i].field);
+        base_free(image->slices[i].planes);
+        free_colour_map(&image->slices[i].colour_map);
+    }
     for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);
     base_free(image->name);
     base_free(image->isosurfaces);
     base_free(image->volumes);
+    base_free(image->slices);
     base_free(image->lights);
     base_free(image->outputs);
 }

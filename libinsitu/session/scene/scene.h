@@ -106,6 +106,22 @@ typedef struct scene_volume {
     double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */
 } scene_volume;
 
+typedef struct scene_plane {
+    double normal[3]; /* of length 1 */
+    bool has_point;   /* else it goes by the middle of the data's bounds */
+    double point[3];
+    double offset; /* along the normal, from the point to the plane */
+} scene_plane;
+
+typedef struct scene_slice {
+    scene_field field;
+    int plane_count; /* 1 .. 16 */
+    scene_plane *planes;
+    scene_colour_map colour_map;
+    float opacity;
+    scene_material material; /* no light by default: colours are those of the map */
+} scene_slice;
+
 typedef struct scene_light {
     double direction[3]; /* towards the light; camera axes (right, up, backward) unless in_world; unit length */
     bool in_world;
@@ -138,6 +154,8 @@ typedef struct scene_image {
     scene_isosurface *isosurfaces;
     int volume_count; /* at most 4 */
     scene_volume *volumes;
+    int slice_count;
+    scene_slice *slices;
     int light_count; /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
     scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */

@@ -1,4 +1,4 @@
-/* The parts of an image that say what is drawn: isosurfaces and volumes. */
+/* The parts of an image that say what is drawn: its layers. Slices are in scene_slice.c. */
 #include "scene_convert.h"
 
 #include <stdio.h>
@@ -60,8 +60,8 @@ static insitu_status convert_meshes(const scene_document *d, const char *layer, 
     return INSITU_OK;
 }
 
-static insitu_status convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
-                                   const char *component, scene_field *out)
+insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
+                                  const char *component, scene_field *out)
 {
     char field_path[SCENE_PATH_SIZE + 8];
     snprintf(field_path, sizeof field_path, "%s.field", path);
@@ -122,7 +122,8 @@ static insitu_status convert_colour_by(const scene_document *d, const char *path
     out->has_colour_by = true;
     out->colour_by.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = scene_convert_colour_map(d, colour_by_path, &in->colours, &out->colour_map);
-    if (status == INSITU_OK) status = convert_field(d, path, colour_by_path, in->field, in->component, &out->colour_by);
+    if (status == INSITU_OK)
+        status = scene_convert_field(d, path, colour_by_path, in->field, in->component, &out->colour_by);
     return status;
 }
 
@@ -131,7 +132,7 @@ static float given_or(const double *given, float otherwise)
     return given ? (float)*given : otherwise;
 }
 
-static scene_material convert_material(const scene_file_material *in)
+scene_material scene_convert_material(const scene_file_material *in)
 {
     static const scene_file_material none;
     if (!in) in = &none;
@@ -143,7 +144,7 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
                                         int first_value, scene_isosurface *out)
 {
     out->opacity = given_or(in->opacity, 1);
-    out->material = convert_material(in->material);
+    out->material = scene_convert_material(in->material);
     out->normals = in->normals ? (scene_normal)*in->normals : SCENE_GRADIENT;
     out->difference = in->difference ? *in->difference : 1;
     out->field.at_vertices = true;
@@ -151,7 +152,7 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
         return scene_bad(d, path, "interpolate",
                          "cell is not allowed, expected vertex: values that are the same throughout a cell have no "
                          "surface in it");
-    insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
+    insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_values(d, path, in, out);
     if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);
     if (status == INSITU_OK) status = convert_colour_by(d, path, in->colour_by, out);
@@ -191,61 +192,83 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 {
     out->unit_distance = in->unit_distance ? *in->unit_distance : 0;
     out->field.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
-    insitu_status status = convert_field(d, path, path, in->field, in->component, &out->field);
+    insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &in->colours, &out->colour_map);
     if (status == INSITU_OK) status = convert_opacity(d, path, in, out);
     return status;
 }
 
+typedef struct layer_counts {
+    int isosurfaces, volumes, slices;
+    int values; /* isovalues and planes */
+} layer_counts;
+
+static insitu_status count_layer(const scene_document *d, const char *path, const char *key,
+                                 const scene_file_layer *layer, layer_counts *counts)
+{
+    const int kinds = !!layer->isosurface + !!layer->volume + !!layer->slice;
+    if (kinds != 1)
+        return scene_bad(d, path, key, "holds %s, expected one of isosurface, volume and slice",
+                         kinds ? "more than one layer" : "nothing");
+    counts->isosurfaces += layer->isosurface != NULL;
+    counts->volumes += layer->volume != NULL;
+    counts->slices += layer->slice != NULL;
+    counts->values += layer->isosurface ? layer->isosurface->values_count : 0;
+    counts->values += layer->slice ? layer->slice->planes_count : 0;
+    if (counts->values > max_isovalues)
+        return scene_bad(d, path, key, "%d isovalues%s up to here, expected at most %d in an image", counts->values,
+                         counts->slices ? " and planes" : "", max_isovalues);
+    if (counts->volumes > max_volumes)
+        return scene_bad(d, path, key, "%d volumes up to here, expected at most %d in an image", counts->volumes,
+                         max_volumes);
+    return INSITU_OK;
+}
+
 /* Checks the counts of a whole image before anything is made. */
 static insitu_status count_layers(const scene_document *d, const char *path, const scene_file_image *in,
-                                  int *isosurfaces, int *volumes)
+                                  layer_counts *counts)
 {
-    int values = 0;
-    *isosurfaces = *volumes = 0;
-    for (int i = 0; i < in->layers_count; i++) {
-        const scene_file_layer *layer = &in->layers[i];
+    insitu_status status = INSITU_OK;
+    *counts = (layer_counts){0};
+    for (int i = 0; i < in->layers_count && !status; i++) {
         char key[32];
         snprintf(key, sizeof key, "layers[%d]", i);
-        if (!layer->isosurface == !layer->volume) {
-            return scene_bad(d, path, key, "%s, expected one of isosurface and volume",
-                             layer->volume ? "holds both an isosurface and a volume" : "holds nothing");
-        }
-        *isosurfaces += layer->isosurface != NULL;
-        *volumes += layer->volume != NULL;
-        values += layer->isosurface ? layer->isosurface->values_count : 0;
-        if (values > max_isovalues) {
-            return scene_bad(d, path, key, "%d isovalues up to here, expected at most %d in an image", values,
-                             max_isovalues);
-        }
-        if (*volumes > max_volumes) {
-            return scene_bad(d, path, key, "%d volumes up to here, expected at most %d in an image", *volumes,
-                             max_volumes);
-        }
+        status = count_layer(d, path, key, &in->layers[i], counts);
     }
-    return INSITU_OK;
+    return status;
+}
+
+static const char *layer_word(const scene_file_layer *layer)
+{
+    return layer->volume ? "volume" : layer->slice ? "slice" : "isosurface";
+}
+
+/* values: isovalues of the layers before it. */
+static insitu_status convert_layer(const scene_document *d, const char *path, const scene_file_layer *in, int values,
+                                   scene_image *out)
+{
+    if (in->volume) return convert_volume(d, path, in->volume, &out->volumes[out->volume_count++]);
+    if (in->slice) return scene_convert_slice(d, path, in->slice, &out->slices[out->slice_count++]);
+    return convert_isosurface(d, path, in->isosurface, values, &out->isosurfaces[out->isosurface_count++]);
 }
 
 insitu_status scene_convert_layers(const scene_document *d, const char *path, const scene_file_image *in,
                                    scene_image *out)
 {
-    int isosurfaces, volumes, values = 0;
-    insitu_status status = count_layers(d, path, in, &isosurfaces, &volumes);
+    int values = 0;
+    layer_counts counts;
+    insitu_status status = count_layers(d, path, in, &counts);
     if (status != INSITU_OK) return status;
-    out->isosurfaces = base_calloc((size_t)isosurfaces, sizeof *out->isosurfaces);
-    out->volumes = base_calloc((size_t)volumes, sizeof *out->volumes);
-    if (!out->isosurfaces || !out->volumes) return scene_no_memory(d);
+    out->isosurfaces = base_calloc((size_t)counts.isosurfaces, sizeof *out->isosurfaces);
+    out->volumes = base_calloc((size_t)counts.volumes, sizeof *out->volumes);
+    out->slices = base_calloc((size_t)counts.slices, sizeof *out->slices);
+    if (!out->isosurfaces || !out->volumes || !out->slices) return scene_no_memory(d);
     for (int i = 0; i < in->layers_count && status == INSITU_OK; i++) {
         const scene_file_layer *layer = &in->layers[i];
         char layer_path[SCENE_PATH_SIZE - 16]; /* what comes below a layer is added */
-        snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer->volume ? "volume" : "isosurface");
-        if (layer->volume) {
-            status = convert_volume(d, layer_path, layer->volume, &out->volumes[out->volume_count++]);
-        } else {
-            scene_isosurface *surface = &out->isosurfaces[out->isosurface_count++];
-            status = convert_isosurface(d, layer_path, layer->isosurface, values, surface);
-            values += layer->isosurface->values_count;
-        }
+        snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
+        status = convert_layer(d, layer_path, layer, values, out);
+        values += layer->isosurface ? layer->isosurface->values_count : 0;
     }
     return status;
 }

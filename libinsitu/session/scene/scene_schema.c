@@ -228,11 +228,48 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
       .by_default = "a twentieth of the diagonal of the bounds", .low = 0, .is_low_excluded = true, .high = 1e30)
 DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
 
+#define PLANE_KEYS(X)                                                                                                  \
+    X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \
+      .help = "What the plane is at right angles to. Any length but 0.")                                               \
+    X(NUMBERS("point", scene_file_plane, point, 3), .help = "A point of the plane, in scene units.",                   \
+      .by_default = "the middle of the bounds of all the data, at each drawn step")                                    \
+    X(CYAML_FIELD_FLOAT_PTR("offset", OPTIONAL, scene_file_plane, offset),                                             \
+      .help = "How far the plane is moved from `point` along `normal`, in scene units.", .by_default = "`0`")
+DEFINE_MAPPING(plane, "planes", PLANE_KEYS);
+
+static const cyaml_schema_value_t plane = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_plane, plane_fields)};
+
+#define SLICE_KEYS(X)                                                                                                  \
+    X(TEXT("field", REQUIRED, scene_file_slice, field, 255),                                                           \
+      .help = "Name of the field that colours the planes; at most 255 bytes.")                                         \
+    X(TEXT("component", OPTIONAL, scene_file_slice, component, 16), .help = COMPONENT_HELP,                            \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CHOICE("interpolate", scene_file_slice, interpolate, interpolation_words), .help = INTERPOLATE_HELP,             \
+      .by_default = "`cell`")                                                                                          \
+    X(NAMES("mesh"), .help = MESH_HELP, .by_default = MESH_DEFAULT)                                                    \
+    X(CYAML_FIELD_SEQUENCE("planes", CYAML_FLAG_POINTER, scene_file_slice, planes, &plane, 1, 16),                     \
+      .help = "The planes. At most 16 isovalues and planes in an image together. 4 bytes a vertex are held for each "  \
+              "plane. A plane that lies in faces of cells is drawn once, by the cells that its normal points away "    \
+              "from; so that one on the border of the data is seen too, it is taken into them where it lies within a " \
+              "millionth of half the diagonal of their bounds from it.",                                               \
+      .child = &plane_mapping)                                                                                         \
+    COLOUR_MAP_KEYS(X, scene_file_slice)                                                                               \
+    X(NUMBERS("nan", scene_file_slice, colours.nan, 3), .help = "Colour where the field is not a number, sRGB.",       \
+      .by_default = "grey, `[0.6, 0.6, 0.6]`", .low = 0, .high = 1)                                                    \
+    X(CYAML_FIELD_FLOAT_PTR("opacity", OPTIONAL, scene_file_slice, opacity),                                           \
+      .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
+    X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_slice, material, material_fields),                      \
+      .help = "How the planes take light, as an isosurface where it is given; `{}` for a slight gloss.",               \
+      .by_default = "no light: the colours are those of the map", .child = &material_mapping)
+DEFINE_MAPPING(slice, "slice", SLICE_KEYS);
+
 #define LAYER_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_MAPPING_PTR("isosurface", OPTIONAL, scene_file_layer, isosurface, isosurface_fields),                \
       .help = "Surfaces on which a field has given values.", .by_default = "none", .child = &isosurface_mapping)       \
     X(CYAML_FIELD_MAPPING_PTR("volume", OPTIONAL, scene_file_layer, volume, volume_fields),                            \
-      .help = "A field as coloured mist. At most 4 in an image.", .by_default = "none", .child = &volume_mapping)
+      .help = "A field as coloured mist. At most 4 in an image.", .by_default = "none", .child = &volume_mapping)      \
+    X(CYAML_FIELD_MAPPING_PTR("slice", OPTIONAL, scene_file_layer, slice, slice_fields),                               \
+      .help = "Planes through the cells, coloured by a field.", .by_default = "none", .child = &slice_mapping)
 DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
 
 #define SAMPLING_KEYS(X)                                                                                               \
@@ -277,13 +314,13 @@ DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
 #define OUTPUT_KEYS(X)                                                                                                 \
     X(TEXT("path", REQUIRED, scene_file_output, path, 1023),                                                           \
-      .help =                                                                                                          \
-          "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "           \
-          "folders are made. `{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, "             \
-          "`{name}` the image's name. At most 1023 bytes. The channel Z of an EXR is the depth of the nearest "        \
-          "isosurface in the pixel: how far from the eye it is along the camera's axis, in scene units (not along "    \
-          "the pixel's ray). Surfaces of any opacity count, 0 as well, and no volume hides them; it is infinite "      \
-          "where there is none: volumes and the background have no depth.")                                            \
+      .help = "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "       \
+              "folders are made. `{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, "         \
+              "`{name}` the image's name. At most 1023 bytes. The channel Z of an EXR is the depth of the nearest "    \
+              "isosurface or slice in the pixel: how far from the eye it is along the camera's axis, in scene units "  \
+              "(not along "                                                                                            \
+              "the pixel's ray). Surfaces of any opacity count, 0 as well, and no volume hides them; it is infinite "  \
+              "where there is none: volumes and the background have no depth.")                                        \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help =                                                                                                          \
           "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats: R, G, B (linear, times A), A, and the "   \

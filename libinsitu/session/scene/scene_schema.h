@@ -70,9 +70,25 @@ typedef struct scene_file_volume {
     double *unit_distance;
 } scene_file_volume;
 
+typedef struct scene_file_plane {
+    double *normal, *point; /* 3 */
+    double *offset;
+} scene_file_plane;
+
+typedef struct scene_file_slice {
+    char *field, *component;
+    int *interpolate; /* scene_interpolation */
+    scene_file_plane *planes;
+    int planes_count;
+    scene_file_colour_map colours;
+    double *opacity;
+    scene_file_material *material;
+} scene_file_slice;
+
 typedef struct scene_file_layer {
     scene_file_isosurface *isosurface;
     scene_file_volume *volume;
+    scene_file_slice *slice;
 } scene_file_layer;
 
 typedef struct scene_file_sampling {

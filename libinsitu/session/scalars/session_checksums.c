@@ -81,7 +81,7 @@ static void compare(const session_mesh *mesh, session_scalar *scalar, int thread
     scalar->is_suspect = false;
     if (scalar->has_checksum && scalar->checksum == checksum) {
         session_text_add(&report->left_out, "mesh \"%s\": field \"%s\" has the values of the last picture: no ranges",
-                         mesh->name, mesh->fields[scalar->field].given.name);
+                         mesh->name, session_scalar_name(mesh, scalar));
         return;
     }
     scalar->has_checksum = true;

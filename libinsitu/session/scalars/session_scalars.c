@@ -11,6 +11,16 @@ int session_resolve_component(const scene_field *field, int component_count)
     return component_count == 1 ? 0 : -1;
 }
 
+bool session_is_distance(const session_scalar *scalar)
+{
+    return scalar->field < 0;
+}
+
+const char *session_scalar_name(const session_mesh *mesh, const session_scalar *scalar)
+{
+    return session_is_distance(scalar) ? "distance from a slice" : mesh->fields[scalar->field].given.name;
+}
+
 static session_scalar *find_scalar(const session_mesh *mesh, int field, int component, bool is_recentred)
 {
     for (int i = 0; i < mesh->scalar_count; i++) {
@@ -49,6 +59,10 @@ static grid_field given_field(const session_mesh *mesh, const session_scalar *sc
 
 grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
 {
+    if (session_is_distance(scalar))
+        return (grid_field){.values = {(const char *)scalar->distances, (int64_t)sizeof(float), false, false},
+                            .component_stride = (int64_t)sizeof(float),
+                            .component_count = 1};
     if (!scalar->is_recentred) return given_field(mesh, scalar);
     return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
                         .component_stride = (int64_t)sizeof(double),
@@ -56,18 +70,14 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
                         .own = &scalar->own};
 }
 
-static bool add_scalar(session_mesh *mesh, int field, int component, bool is_recentred)
+session_scalar *session_add_scalar(session_mesh *mesh)
 {
     session_scalar *scalars = base_realloc(mesh->scalars, (size_t)(mesh->scalar_count + 1) * sizeof *scalars);
-    if (!scalars) return false;
+    if (!scalars) return NULL;
     mesh->scalars = scalars;
-    scalars[mesh->scalar_count++] = (session_scalar){.field = field,
-                                                     .component = component,
-                                                     .is_recentred = is_recentred,
-                                                     .are_values_stale = true,
-                                                     .is_suspect = true,
-                                                     .are_ranges_stale = true};
-    return true;
+    scalars[mesh->scalar_count] =
+        (session_scalar){.are_values_stale = true, .is_suspect = true, .are_ranges_stale = true};
+    return &scalars[mesh->scalar_count++];
 }
 
 bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool wants_ranges, session_scalar **marked)
@@ -78,10 +88,11 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
     const insitu_field *given = &mesh->fields[index].given;
     session_scalar *scalar = session_find_scalar(mesh, field);
     if (!scalar) {
-        if (!add_scalar(mesh, index, session_resolve_component(field, given->component_count),
-                        field->at_vertices && given->centring == INSITU_CELL))
-            return false;
-        scalar = &mesh->scalars[mesh->scalar_count - 1];
+        scalar = session_add_scalar(mesh);
+        if (!scalar) return false;
+        scalar->field = index;
+        scalar->component = session_resolve_component(field, given->component_count);
+        scalar->is_recentred = field->at_vertices && given->centring == INSITU_CELL;
     }
     scalar->is_used = true;
     scalar->own = given_field(mesh, scalar);

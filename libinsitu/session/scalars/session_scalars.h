@@ -1,4 +1,5 @@
-/* The scalars that layers are drawn by: a component or the magnitude of a field, as it is or recentred to vertices. */
+/* The scalars that layers are drawn by: a component or the magnitude of a field, as it is or recentred to vertices; or
+ * the vertices' distances from a plane. */
 #ifndef SESSION_SCALARS_H
 #define SESSION_SCALARS_H
 
@@ -14,6 +15,14 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
 
 /* This rank's scalar for a layer's field: NULL where the mesh does not have it. */
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
+
+/* A new scalar of field 0, out of date in all. NULL where memory ran out. */
+session_scalar *session_add_scalar(session_mesh *mesh);
+
+/* Is it the vertices' distance from a plane? */
+bool session_is_distance(const session_scalar *scalar);
+/* For messages. */
+const char *session_scalar_name(const session_mesh *mesh, const session_scalar *scalar);
 
 /* The values of a scalar. */
 grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar);

@@ -1,0 +1,127 @@
+#include "session_distances.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_scalars.h"
+
+/* ---- which planes -------------------------------------------------------------------------------------------- */
+
+static void move_along(const double from[3], const double normal[3], double offset, double out[3])
+{
+    for (int axis = 0; axis < 3; axis++) out[axis] = from[axis] + offset * normal[axis];
+}
+
+static session_plane plane_of_scene(const scene_plane *in)
+{
+    session_plane out = {.is_central = !in->has_point, .offset = in->offset};
+    memcpy(out.normal, in->normal, sizeof out.normal);
+    move_along(in->point, in->normal, in->offset, out.point);
+    return out;
+}
+
+static bool are_equal(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+static bool is_same_plane(const session_plane *a, const session_plane *b)
+{
+    if (a->is_central != b->is_central || !are_equal(a->normal, b->normal)) return false;
+    return a->is_central ? a->offset == b->offset : are_equal(a->point, b->point);
+}
+
+session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane)
+{
+    const session_plane wanted = plane_of_scene(plane);
+    for (int i = 0; i < mesh->scalar_count; i++) {
+        session_scalar *scalar = &mesh->scalars[i];
+        if (session_is_distance(scalar) && is_same_plane(&scalar->plane, &wanted)) return scalar;
+    }
+    return NULL;
+}
+
+static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane)
+{
+    session_scalar *scalar = session_add_scalar(mesh);
+    if (!scalar) return NULL;
+    scalar->field = -1;
+    scalar->plane = plane_of_scene(plane);
+    scalar->is_suspect = false;
+    return scalar;
+}
+
+/* A plane through the middle of the data goes with their bounds. */
+static void follow_data(session_scalar *scalar, const session_extent *extent)
+{
+    double middle[3], point[3];
+    if (!scalar->plane.is_central) return;
+    for (int axis = 0; axis < 3; axis++) middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
+    move_along(middle, scalar->plane.normal, scalar->plane.offset, point);
+    if (are_equal(point, scalar->plane.point)) return;
+    memcpy(scalar->plane.point, point, sizeof point);
+    scalar->are_values_stale = true;
+}
+
+bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const session_extent *extent,
+                           session_scalar **marked)
+{
+    session_scalar *scalar = session_find_distance(mesh, plane);
+    if (!scalar) scalar = add_distance(mesh, plane);
+    *marked = scalar;
+    if (!scalar) return false;
+    follow_data(scalar, extent);
+    scalar->is_used = scalar->wants_ranges = true;
+    mesh->is_needed = true;
+    return true;
+}
+
+/* ---- distances ----------------------------------------------------------------------------------------------- */
+
+static void compute(const session_mesh *mesh, const session_plane *plane, int threads, float *out)
+{
+    const double *n = plane->normal, *p = plane->point;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t v = 0; v < mesh->cells.vertex_count; v++) {
+        double at[3];
+        grid_vertex(&mesh->cells, v, at);
+        out[v] = (float)(n[0] * (at[0] - p[0]) + n[1] * (at[1] - p[1]) + n[2] * (at[2] - p[2]));
+    }
+}
+
+static bool update_distance(const session_mesh *mesh, session_scalar *scalar, int threads)
+{
+    if (!scalar->distances)
+        scalar->distances = base_alloc((size_t)mesh->cells.vertex_count * sizeof *scalar->distances);
+    if (!scalar->distances) return false;
+    compute(mesh, &scalar->plane, threads, scalar->distances);
+    scalar->are_values_stale = false;
+    scalar->are_ranges_stale = true;
+    scalar->extremes.is_known = scalar->positive.is_known = false;
+    return true;
+}
+
+insitu_status session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error)
+{
+    for (int i = 0; i < meshes->count && !error->status; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        for (int k = 0; k < mesh->scalar_count && mesh->is_given && !error->status; k++) {
+            session_scalar *scalar = &mesh->scalars[k];
+            if (!session_is_distance(scalar) || !scalar->is_used || !scalar->are_values_stale) continue;
+            if (!update_distance(mesh, scalar, team->threads))
+                session_no_memory(error, mesh->cells.vertex_count * (int64_t)sizeof(float), "distances from a plane");
+        }
+    }
+    return session_agree(team->comm, error);
+}
+
+/* A crossing belongs to the cell that is below the distance and reaches it: the least distance of all has none. A tenth
+ * of the tolerance is told apart from it in single precision, and is less than that resolves of the scene. */
+double session_slice_distance(double low, double high, double half_diagonal)
+{
+    const double tolerance = SESSION_BORDER_SHARE * half_diagonal;
+    if (!(low < high)) return 0;
+    if (low >= 0 && low <= tolerance) return low + 0.1 * tolerance;
+    return high < 0 && high >= -tolerance ? high : 0;
+}

@@ -1,0 +1,30 @@
+/* Signed distances of vertices from planes. A slice is the isosurface of the distance 0: in every cell the interpolant
+ * of the distances at its vertices is the distance itself, because positions are interpolated in the same way. */
+#ifndef SESSION_DISTANCES_H
+#define SESSION_DISTANCES_H
+
+#include "scene.h"
+#include "session_mesh.h"
+#include "session_space.h"
+#include "session_team.h"
+
+/* How far from 0, in halves of the diagonal of the global bounds, a slice's distance may be: one that lies on the
+ * border of the data is taken into them. */
+#define SESSION_BORDER_SHARE 1e-6
+
+/* Note that an image of this step shows the plane on the mesh. False where memory ran out. Local. */
+bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const session_extent *extent,
+                           session_scalar **marked);
+
+/* NULL: the mesh has no distances from the plane. */
+session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
+
+/* Compute the distances in use that are out of date: from a vertex's own coordinates alone, so that all ranks have the
+ * same. Collective. */
+insitu_status session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
+
+/* The distance that is drawn for the plane, of data whose distances are from low to high over all ranks: 0, or, where
+ * the plane lies on their border, so far into them that it shows. */
+double session_slice_distance(double low, double high, double half_diagonal);
+
+#endif

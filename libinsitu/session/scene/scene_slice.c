@@ -1,0 +1,58 @@
+/* Slices of an image: planes, and the field that colours them. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+#include "scene_convert.h"
+
+static const scene_material no_light = {.ambient = 1, .shininess = 1};
+
+/* Of a number far from 1 the square is infinite or 0; of its share in the largest it is not. */
+static bool make_unit(const double in[3], double out[3])
+{
+    const double largest = fmax(fabs(in[0]), fmax(fabs(in[1]), fabs(in[2])));
+    if (!(largest > 0)) return false;
+    const double x = in[0] / largest, y = in[1] / largest, z = in[2] / largest;
+    const double length = sqrt(x * x + y * y + z * z);
+    out[0] = x / length;
+    out[1] = y / length;
+    out[2] = z / length;
+    return true;
+}
+
+static insitu_status convert_plane(const scene_document *d, const char *path, int index, const scene_file_plane *in,
+                                   scene_plane *out)
+{
+    char key[32];
+    snprintf(key, sizeof key, "planes[%d].normal", index);
+    if (!make_unit(in->normal, out->normal))
+        return scene_bad(d, path, key, "[0, 0, 0] has no direction, expected a vector of any length but 0");
+    out->has_point = in->point != NULL;
+    if (in->point) memcpy(out->point, in->point, sizeof out->point);
+    out->offset = in->offset ? *in->offset : 0;
+    return INSITU_OK;
+}
+
+static insitu_status convert_planes(const scene_document *d, const char *path, const scene_file_slice *in,
+                                    scene_slice *out)
+{
+    insitu_status status = INSITU_OK;
+    out->planes = base_calloc((size_t)in->planes_count, sizeof *out->planes);
+    if (!out->planes) return scene_no_memory(d);
+    for (int i = 0; i < in->planes_count && !status; i++)
+        status = convert_plane(d, path, i, &in->planes[i], &out->planes[out->plane_count++]);
+    return status;
+}
+
+insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,
+                                  scene_slice *out)
+{
+    out->opacity = in->opacity ? (float)*in->opacity : 1;
+    out->material = in->material ? scene_convert_material(in->material) : no_light;
+    out->field.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
+    insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
+    if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &in->colours, &out->colour_map);
+    if (status == INSITU_OK) status = convert_planes(d, path, in, out);
+    return status;
+}

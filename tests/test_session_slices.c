@@ -1,0 +1,380 @@
+/* Slices of a session: a plane is where its closed form is and has the colours of a linear field there, on cells of
+ * every type, dealt in any way and with ghosts, the same to the bit as on one rank. A plane in faces of cells is drawn
+ * once and has no hole; one on the border of the data is drawn whichever way its normal points. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "colour_map.h"
+#include "render.h"
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, WIDTH = 48, HEIGHT = 36 };
+
+#define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
+#define IMAGE(layers)                                                                                                  \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE "    layers:\n" layers              \
+    "    outputs: [{path: a.exr}]\n"
+#define SLICE(keys, planes) "      - slice: {field: f, map: turbo, range: [-1.5, 1.7], planes: [" planes "]" keys "}\n"
+
+static const double low = -1.5, high = 1.7;
+
+typedef struct ray {
+    double base[3], direction[3];
+} ray;
+
+static ray ray_of(int pixel)
+{
+    render_camera camera;
+    ray out;
+    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
+                          40, WIDTH, HEIGHT);
+    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, out.base, out.direction);
+    return out;
+}
+
+typedef struct plane {
+    double normal[3], distance;
+} plane;
+
+/* The depth at which the ray meets the plane; at: where. */
+static double meet(const ray *r, const plane *p, double at[3])
+{
+    double along = 0, from = p->distance;
+    for (int a = 0; a < 3; a++) {
+        along += p->normal[a] * r->direction[a];
+        from -= p->normal[a] * r->base[a];
+    }
+    for (int a = 0; a < 3; a++) at[a] = r->base[a] + from / along * r->direction[a];
+    return from / along;
+}
+
+static double outside_by(const double at[3])
+{
+    return fmax(fabs(at[0]), fmax(fabs(at[1]), fabs(at[2]))) - 1;
+}
+
+static void table_colour(double value, double out[3])
+{
+    int count = 0;
+    const float *table = colour_map_table("turbo", &count);
+    const double place = fmin(fmax((value - low) / (high - low), 0), 1) * (count - 1);
+    const int entry = (int)fmin(place, count - 2);
+    for (int c = 0; c < 3; c++) {
+        const double a = (double)table[3 * entry + c], b = (double)table[3 * entry + 3 + c];
+        out[c] = a + (place - entry) * (b - a);
+    }
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------ */
+
+static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, const char *warning)
+{
+    caught_picture picture = {0};
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    const char *warnings = insitu_last_report(session)->warnings;
+    if (warning ? !strstr(warnings, warning) : *warnings) fail_msg("warnings: %s", warnings);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+/* The planes of the scene in nearest-first order of none: the nearest hit within the cube decides. Rays near the cube's
+ * border may do either. Depths are off by roundings of single precision of numbers near 5, times the inverse cosine,
+ * at most 10 here; colours by as much of the field, of slope 1 in 3.2, times the table's slope of at most 12. */
+static bool is_truth(const caught_picture *picture, const plane *planes, int count)
+{
+    const double depth_error = 10 * 5 * 3e-7, colour_error = depth_error / 3.2 * 12;
+    int hits = 0;
+    for (int pixel = 0; pixel < WIDTH * HEIGHT; pixel++) {
+        const ray r = ray_of(pixel);
+        double nearest = INFINITY, where[3] = {0}, colour[3];
+        bool is_near_border = false;
+        for (int i = 0; i < count; i++) {
+            double at[3];
+            const double depth = meet(&r, &planes[i], at), outside = outside_by(at);
+            is_near_border = is_near_border || fabs(outside) < 1e-4;
+            if (outside < 0 && depth < nearest) {
+                nearest = depth;
+                memcpy(where, at, sizeof where);
+            }
+        }
+        if (is_near_border) continue;
+        const float *rgba = picture->rgba + 4 * pixel;
+        if (isinf(nearest) != isinf(picture->depth[pixel]) || (rgba[3] == 1) != isfinite(nearest)) {
+            fprintf(stderr, "pixel %d: depth %g, expected %g\n", pixel, (double)picture->depth[pixel], nearest);
+            return false;
+        }
+        if (isinf(nearest)) continue;
+        hits++;
+        table_colour(test_linear(where), colour);
+        double off = 0;
+        for (int c = 0; c < 3; c++) off = test_worse(off, fabs((double)rgba[c] - colour[c]));
+        if (fabs((double)picture->depth[pixel] - nearest) > depth_error || off > colour_error) {
+            fprintf(stderr, "pixel %d: depth %.9g, expected %.9g; colour off by %g\n", pixel,
+                    (double)picture->depth[pixel], nearest, off);
+            return false;
+        }
+    }
+    return hits > WIDTH * HEIGHT / 20;
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    const size_t pixels = (size_t)WIDTH * HEIGHT;
+    return memcmp(a->rgba, b->rgba, 4 * pixels * sizeof(float)) == 0 &&
+           memcmp(a->depth, b->depth, pixels * sizeof(float)) == 0;
+}
+
+/* ---- inputs -------------------------------------------------------------------------------------------------- */
+
+static void make_whole(test_mesh_kind kind, double jitter, session_input *out)
+{
+    test_mesh_lattice(kind, SIDE, jitter, test_linear, &out->part);
+    input_describe(out);
+}
+
+/* The rank's cells; with ghosts: all cells, of which the others' are ghosts. */
+static void take_part(const session_input *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
+{
+    int *owners = test_calloc((size_t)whole->part.cell_count, sizeof *owners);
+    int *all = test_calloc((size_t)whole->part.cell_count, sizeof *all);
+    test_partition(&whole->part, dealt, SIDE, rank_count, owners);
+    test_mesh_part(&whole->part, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
+    for (int64_t cell = 0; cell < out->part.cell_count && with_ghosts; cell++)
+        out->part.ghosts[cell] = owners[cell] != own_rank;
+    test_free(owners);
+    test_free(all);
+    test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
+    input_describe(out);
+}
+
+static const char three_planes[] =
+    IMAGE(SLICE("", "{normal: [1, 2, -2], offset: -0.4}, {normal: [1, 1, 4], point: [0.1, 0.3, 0.6]}")
+              SLICE("", "{normal: [0, 3, 0], point: [0, -0.6, 0]}"));
+static const plane three[3] = {{{1. / 3, 2. / 3, -2. / 3}, -0.4}, {{1, 1, 4}, 0.1 + 0.3 + 2.4}, {{0, 1, 0}, -0.6}};
+
+static void planes_are_one_picture_of(test_mesh_kind kind)
+{
+    session_input whole = {0};
+    caught_picture alone = {0};
+    bool is_well = true;
+    make_whole(kind, 0.2, &whole);
+    const char *scene = write_scene(three_planes);
+    if (own_rank == 0) {
+        alone = draw(MPI_COMM_SELF, scene, &whole, NULL);
+        is_well = is_truth(&alone, three, 3);
+    }
+    everywhere(is_well);
+    for (int way = 0; way < 3; way++) {
+        session_input part = {0};
+        take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
+        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
+        everywhere(own_rank != 0 || are_same(&picture, &alone));
+        free_picture(&picture);
+        input_free(&part);
+    }
+    free_picture(&alone);
+    input_free(&whole);
+}
+
+static void planes_are_true_and_one_picture_on_any_ranks(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) planes_are_one_picture_of(kind);
+}
+
+/* ---- planes in faces ----------------------------------------------------------------------------------------- */
+
+/* Every ray that meets the plane in the cube has the slice once: 0.5 of opacity. */
+static bool is_once(const caught_picture *picture, const plane *p)
+{
+    int hits = 0;
+    for (int pixel = 0; pixel < WIDTH * HEIGHT; pixel++) {
+        const ray r = ray_of(pixel);
+        double at[3];
+        meet(&r, p, at);
+        const double outside =
+            outside_by((const double[3]){p->normal[0] ? 0 : at[0], p->normal[1] ? 0 : at[1], p->normal[2] ? 0 : at[2]});
+        const float opacity = picture->rgba[4 * pixel + 3];
+        if (fabs(outside) < 1e-5) continue;
+        hits += outside < 0;
+        if (opacity == (outside < 0 ? 0.5f : 0)) continue;
+        fprintf(stderr, "pixel %d: opacity %g\n", pixel, (double)opacity);
+        return false;
+    }
+    return hits > 50;
+}
+
+static void draw_in_faces(test_mesh_kind kind, const char *scene, const plane *p)
+{
+    session_input whole = {0}, part = {0};
+    make_whole(kind, 0, &whole);
+    take_part(&whole, TEST_RANDOM, false, &part);
+    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(scene), &part, NULL);
+    everywhere(own_rank != 0 || is_once(&picture, p));
+    free_picture(&picture);
+    input_free(&part);
+    input_free(&whole);
+}
+
+static void planes_in_faces_are_drawn_once(void **state)
+{
+    (void)state;
+    const plane half = {{1, 0, 0}, 0.5};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [1, 0, 0], point: [0.5, 0, 0]}")), &half);
+        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [-7, 0, 0], point: [0.5, 0, 0]}")), &half);
+    }
+}
+
+static void planes_on_the_border_are_drawn(void **state)
+{
+    (void)state;
+    const plane lower = {{1, 0, 0}, -1}, upper = {{0, 0, 1}, 1};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [1, 0, 0], point: [-1, 5, 0]}")), &lower);
+        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [-1, 0, 0], offset: 1.0000001}")), &lower);
+        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [0, 0, 1], offset: 1}")), &upper);
+        draw_in_faces(kind, IMAGE(SLICE(", opacity: 0.5", "{normal: [0, 0, -1], offset: -0.9999999}")), &upper);
+    }
+}
+
+static void planes_beside_the_data_are_warned_of(void **state)
+{
+    (void)state;
+    session_input part = {0};
+    input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 2], offset: 1.5}"))),
+                                  &part, "a plane of its slices meets no cell: they are -2.5 to -0.5 from it");
+    free_picture(&picture);
+    input_free(&part);
+}
+
+/* ---- values -------------------------------------------------------------------------------------------------- */
+
+/* Hexes of one value each: the colour at a point is that of its cell; where it is NaN it is grey. */
+static bool has_colours_of_cells(const caught_picture *picture)
+{
+    int hits = 0;
+    for (int pixel = 0; pixel < WIDTH * HEIGHT; pixel++) {
+        const ray r = ray_of(pixel);
+        double at[3], expected[3], off = 0;
+        meet(&r, &(plane){{0, 0, 1}, 0.1}, at);
+        const double x = (at[0] + 1) / 2 * SIDE, y = (at[1] + 1) / 2 * SIDE;
+        if (outside_by(at) > -1e-4 || fabs(x - rint(x)) < 1e-4 || fabs(y - rint(y)) < 1e-4) continue;
+        const int cell = (int)x + SIDE * (int)y;
+        table_colour(-1.5 + 0.2 * cell, expected);
+        for (int c = 0; c < 3; c++) {
+            const double wanted = cell == 5 ? (double)RENDER_NO_COLOUR : expected[c];
+            off = test_worse(off, fabs((double)picture->rgba[4 * pixel + c] - wanted));
+        }
+        hits++;
+        if (off > 1e-5) {
+            fprintf(stderr, "pixel %d: off by %g\n", pixel, off);
+            return false;
+        }
+    }
+    return hits > 100;
+}
+
+static void cells_have_their_values_and_no_number_is_grey(void **state)
+{
+    (void)state;
+    session_input whole = {0}, part = {0};
+    make_whole(TEST_HEXES, 0, &whole);
+    take_part(&whole, TEST_RANDOM, false, &part);
+    double *values = test_calloc((size_t)part.part.cell_count + 1, sizeof *values);
+    for (int64_t cell = 0; cell < part.part.cell_count; cell++) {
+        double at[3] = {0};
+        for (int i = 0; i < 8; i++)
+            for (int a = 0; a < 3; a++)
+                at[a] += part.part.coordinates[3 * part.part.connectivity[8 * cell + i] + a] / 8;
+        const int column = (int)((at[0] + 1) / 2 * SIDE) + SIDE * (int)((at[1] + 1) / 2 * SIDE);
+        values[cell] = column == 5 ? NAN : -1.5 + 0.2 * column;
+    }
+    part.field.centring = INSITU_CELL;
+    part.field.count = part.part.cell_count;
+    part.field.values.data = values;
+    caught_picture picture =
+        draw(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1], point: [0, 0, 0.1]}"))), &part, NULL);
+    everywhere(own_rank != 0 || has_colours_of_cells(&picture));
+    free_picture(&picture);
+    test_free(values);
+    input_free(&part);
+    input_free(&whole);
+}
+
+/* ---- what is computed again ---------------------------------------------------------------------------------- */
+
+static session_scalar *distances_of(const insitu_session *session)
+{
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    for (int i = 0; i < mesh->scalar_count; i++)
+        if (mesh->scalars[i].distances) return &mesh->scalars[i];
+    return NULL;
+}
+
+/* Two images of one plane share its distances. New values leave them alone; new coordinates do not, and a plane through
+ * the middle of the data goes with them. */
+static void distances_go_with_the_geometry(void **state)
+{
+    (void)state;
+    session_input part = {0};
+    input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    insitu_session *session = open_session(
+        MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1]}") SLICE("", "{normal: [0, 0, 1]}"))));
+    part.mesh.changed = 0;
+    everywhere(hand_over(session, &part) == INSITU_OK);
+    step_is_good(session, 0);
+    const bool has_cells = part.part.cell_count > 0;
+    const int64_t bytes = insitu_last_report(session)->bytes_copied;
+    everywhere(bytes == part.part.vertex_count * (int64_t)sizeof(float));
+    if (has_cells) distances_of(session)->distances[0] = 77;
+    for (int64_t v = 0; v < part.part.vertex_count; v++) part.part.values[v] += 1;
+    everywhere(insitu_set_field(session, "m", &part.field) == INSITU_OK);
+    step_is_good(session, 1);
+    everywhere(!has_cells || distances_of(session)->distances[0] == 77);
+    for (int64_t v = 0; v < part.part.vertex_count; v++) part.part.coordinates[3 * v + 2] += 3;
+    part.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    everywhere(insitu_set_mesh(session, "m", &part.mesh) == INSITU_OK);
+    step_is_good(session, 2);
+    bool is_right = true;
+    for (int64_t v = 0; v < part.part.vertex_count && is_right; v++)
+        is_right = distances_of(session)->distances[v] == (float)(part.part.coordinates[3 * v + 2] - 3);
+    everywhere(is_right);
+    insitu_destroy(&session);
+    input_free(&part);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(planes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(planes_in_faces_are_drawn_once),
+        cmocka_unit_test(planes_on_the_border_are_drawn),
+        cmocka_unit_test(planes_beside_the_data_are_warned_of),
+        cmocka_unit_test(cells_have_their_values_and_no_number_is_grey),
+        cmocka_unit_test(distances_go_with_the_geometry),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
