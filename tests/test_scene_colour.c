@@ -177,6 +177,20 @@ static void scales_and_outside_are_read(void **state)
     check_colour(map->outside[1], 0, 0, 1);
 }
 
+static void ranges_say_where_they_come_from(void **state)
+{
+    (void)state;
+    const scene_range *r = &map_of("")->range;
+    assert_true(!r->is_fixed && r->source == SCENE_RANGE_DATA);
+    assert_true(map_of(", range: data")->range.source == SCENE_RANGE_DATA);
+    assert_true(map_of(", range: run, scale: log")->range.source == SCENE_RANGE_RUN);
+    assert_true(map_of(", range: symmetric")->range.source == SCENE_RANGE_SYMMETRIC);
+    r = &map_of(", range: {percentile: [2, 98.5]}")->range;
+    assert_true(!r->is_fixed && r->source == SCENE_RANGE_PERCENTILES && r->low == 2 && r->high == 98.5);
+    r = &map_of(", range: [-1, 1e9]")->range;
+    assert_true(r->is_fixed && r->low == -1 && r->high == 1e9);
+}
+
 /* CIELAB's greys are sRGB's; its lightness is 116 cbrt(Y) - 16 of luminance Y. */
 static void files_of_paraview_become_tables(void **state)
 {
@@ -301,7 +315,14 @@ static const char *const bad_keys[][3] = {
     {", nan: [1, 1]", "nan: a list of 2 is not allowed", "a list of 3 numbers"},
     {", range: [1, 1]", "range: [1, 1] does not rise", ""},
     {", range: [1]", "range: a list of 1 is not allowed, expected a list of 2 numbers", ""},
-    {", range: wide", "range: \"wide\" is not allowed, expected", ""},
+    {", range: wide", "range: \"wide\" is not allowed, expected a list of 2 numbers; or one of data, run, symmetric",
+     "; or a mapping with the keys percentile"},
+    {", range: {}", "range.percentile: missing, expected a list of 2 numbers from 0 to 100", ""},
+    {", range: {percentile: 5}", "range.percentile: \"5\" is not allowed, expected a list of 2", ""},
+    {", range: {percentile: [5, 101]}", "range.percentile[1]: \"101\" is not allowed", "from 0 to 100"},
+    {", range: {percentile: [5, 5]}", "range.percentile: [5, 5] does not rise", ""},
+    {", range: {percent: [5, 95]}", "range: the key \"percent\" is unknown", "percentile"},
+    {", range: symmetric, scale: log", "range: symmetric is not allowed beside scale: log", "symlog"},
 };
 
 static void wrong_keys_are_told_with_place_and_expectation(void **state)
@@ -370,6 +391,7 @@ int main(void)
         cmocka_unit_test(lists_become_tables_through_their_colours),
         cmocka_unit_test(maps_are_reversed_and_cut_into_bands),
         cmocka_unit_test(scales_and_outside_are_read),
+        cmocka_unit_test(ranges_say_where_they_come_from),
         cmocka_unit_test(files_of_paraview_become_tables),
         cmocka_unit_test(files_are_read_once_and_then_passed_on),
         cmocka_unit_test(wrong_keys_are_told_with_place_and_expectation),

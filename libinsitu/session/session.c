@@ -51,6 +51,7 @@ static void free_session(insitu_session *session)
     session_trees_free(&session->trees);
     session_scene_file_free(&session->scene_file);
     session_drop_picture(&session->picture);
+    session_run_ranges_free(&session->run_ranges);
     session_report_free(&session->report);
     base_free(session);
 }

@@ -10,6 +10,7 @@
 #include "session_mesh.h"
 #include "session_picture.h"
 #include "session_report.h"
+#include "session_run_ranges.h"
 #include "session_scene_file.h"
 #include "session_space.h"
 #include "session_team.h"
@@ -25,6 +26,7 @@ struct insitu_session {
     session_space space;
     session_trees trees;
     session_picture picture; /* rank 0 */
+    session_run_ranges run_ranges;
     session_report report;
     base_error error; /* of the last call */
 };

@@ -28,6 +28,7 @@ static void reload_scene(insitu_session *s)
 {
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_drop_picture(&s->picture);
+    session_run_ranges_free(&s->run_ranges);
     session_forget_warnings(&s->report);
     for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
 }
@@ -50,7 +51,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     const session_extent *extent = &s->space.extent;
     const session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, changes->cycle, &s->catalogue, extent};
     const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
-                                     &s->space, &s->report};
+                                     &s->space, &s->run_ranges,     &s->report};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);

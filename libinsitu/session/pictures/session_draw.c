@@ -182,12 +182,14 @@ static void write_output(const scene_image *image, const scene_output *output, c
     base_free(path);
 }
 
+/* ranges: NULL, or those of the run. */
 static insitu_status write_outputs(const session_drawing *d, const scene_image *image, const canvas *source,
-                                   base_error *error)
+                                   session_image_ranges *ranges, base_error *error)
 {
     const double start = MPI_Wtime();
     for (int i = 0; i < image->output_count && d->team->rank == 0; i++)
         write_output(image, &image->outputs[i], source, d->cycle, error);
+    if (ranges && d->team->rank == 0) session_write_run_ranges(ranges, image, error);
     if (d->team->rank == 0) d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
     return session_agree(d->team->comm, error);
 }
@@ -246,11 +248,12 @@ bool session_active_cells_pay(const session_plan *plan, const scene_image *image
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
                                 session_picture *picture, base_error *error)
 {
-    const session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report};
+    session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report, NULL};
     session_view view;
     session_layers layers = {0};
     canvas canvas = {0};
     insitu_status status = session_make_view(d->space, d->scene_path, image, d->team, d->report, &view, error);
+    if (!status) status = session_open_run_ranges(d->run_ranges, image, d->team, &basis.run_ranges, error);
     if (!status) status = session_make_layers(&basis, image, &layers, error);
     if (status) return status;
     layers.active = active;
@@ -259,7 +262,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     session_layers_free(&layers);
     if (!status) {
-        status = write_outputs(d, image, &canvas, error);
+        status = write_outputs(d, image, &canvas, basis.run_ranges, error);
         d->report->numbers.images++;
     }
     canvas_free(&canvas, picture);

@@ -6,6 +6,7 @@
 #include "session_picture.h"
 #include "session_plan.h"
 #include "session_report.h"
+#include "session_run_ranges.h"
 #include "session_space.h"
 #include "session_team.h"
 
@@ -17,6 +18,7 @@ typedef struct session_drawing {
     const session_meshes *meshes; /* with their trees */
     const mmbvh *parent;          /* over these trees (session_trees.h) */
     const session_space *space;
+    session_run_ranges *run_ranges;
     session_report *report;
 } session_drawing;
 

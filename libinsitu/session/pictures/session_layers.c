@@ -8,6 +8,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_distances.h"
+#include "session_ranges.h"
 #include "session_scalars.h"
 
 static bool is_part(const session_mesh *mesh)
@@ -106,44 +107,17 @@ static render_field place_distances(const session_meshes *meshes, session_layers
     return out;
 }
 
-/* What a range is of: a field, or, where a plane is given, the distances from it on the meshes that have the field. */
-typedef struct range_subject {
-    const scene_field *field;
-    const scene_plane *plane; /* NULL: the field's own values */
-    bool is_positive;         /* only such values count (session_scalars.h) */
-} range_subject;
-
-/* Least and greatest value over all ranks' drawn cells. Collective. */
-static insitu_status data_range(const session_layer_basis *basis, const range_subject *of, double *low, double *high,
-                                base_error *error)
-{
-    double mine[2] = {INFINITY, INFINITY}, all[2];
-    for (int i = 0; i < basis->meshes->count; i++) {
-        const session_mesh *mesh = basis->meshes->items[i];
-        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, of->field) : NULL;
-        if (scalar && of->plane) scalar = session_find_distance(mesh, of->plane);
-        if (!scalar) continue;
-        double least, most;
-        session_scalar_extent(mesh, scalar, basis->team->threads, of->is_positive, &least, &most);
-        mine[0] = fmin(mine[0], least);
-        mine[1] = fmin(mine[1], -most);
-    }
-    const insitu_status status =
-        session_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, basis->team->comm), "MPI_Allreduce");
-    *low = all[0];
-    *high = -all[1];
-    return status;
-}
-
+/* With what a run has met before. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
 {
     double low = map->range.low, high = map->range.high;
     insitu_status status = INSITU_OK;
-    const range_subject of = {.field = field, .is_positive = map->scale == SCENE_LOG};
-    if (!map->range.is_fixed) status = data_range(basis, &of, &low, &high, error);
+    if (!map->range.is_fixed) status = session_find_range(basis->meshes, basis->team, field, map, &low, &high, error);
     if (status) return status;
+    if (!map->range.is_fixed && map->range.source == SCENE_RANGE_RUN)
+        session_widen_run_range(basis->run_ranges, map, &low, &high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
     return session_takes_memory(map, volume) ? session_agree(basis->team->comm, error) : INSITU_OK;
@@ -186,7 +160,8 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
     const scene_material *m = &layer->material;
     session_transfer *transfer = &layers->transfers[surface];
     double low, high;
-    insitu_status status = data_range(basis, &(range_subject){&layer->field, plane, false}, &low, &high, error);
+    const session_range_subject distances = {&layer->field, plane, false};
+    insitu_status status = session_find_extremes(basis->meshes, basis->team, &distances, &low, &high, error);
     if (!status) status = make_transfer(basis, &layer->field, &layer->colour_map, NULL, transfer, error);
     if (status) return status;
     layers->distances[surface] = session_slice_distance(low, high, basis->half_diagonal);

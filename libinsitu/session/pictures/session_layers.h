@@ -6,6 +6,7 @@
 #include "scene.h"
 #include "session_mesh.h"
 #include "session_report.h"
+#include "session_run_ranges.h"
 #include "session_team.h"
 #include "session_transfer.h"
 
@@ -28,6 +29,7 @@ typedef struct session_layer_basis {
     const session_team *team;
     double half_diagonal; /* of the global bounds */
     session_report *report;
+    session_image_ranges *run_ranges; /* NULL: no layer has one over the run */
 } session_layer_basis;
 
 /* Collective: ranges from the data are over all ranks. On an error nothing is left to free. */

@@ -31,9 +31,18 @@ bool scene_field_is_on(const scene_field *field, const char *mesh);
 /* Does name stand for the mesh? */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
+/* Where a range comes from that is not fixed: always from the values on all ranks, at each drawn step. */
+typedef enum scene_range_source {
+    SCENE_RANGE_DATA,       /* the least and the greatest value */
+    SCENE_RANGE_RUN,        /* those of all steps drawn so far, kept in a file over restarts (session_run_ranges.h) */
+    SCENE_RANGE_SYMMETRIC,  /* as far below 0 as above: the greater size of the two */
+    SCENE_RANGE_PERCENTILES /* the values that low and high percent of the cells are no greater than */
+} scene_range_source;
+
 typedef struct scene_range {
-    bool is_fixed; /* else from the data, over all ranks, at each drawn step */
+    bool is_fixed; /* low and high are values */
     double low, high;
+    scene_range_source source; /* where not fixed */
 } scene_range;
 
 /* How values are spaced along a colour map: as they are; by their logarithm; or, where they are of both signs, linear

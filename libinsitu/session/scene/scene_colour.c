@@ -254,19 +254,41 @@ static void convert_outside(const scene_file_colour_map *in, scene_colour_map *o
 
 /* ---- ranges and scales ----------------------------------------------------------------------------------------- */
 
-static insitu_status convert_range(const scene_document *d, const char *parent, scene_range *out)
+static insitu_status read_ends(const scene_document *d, const char *path, double ends[2])
 {
-    char path[path_size], key[path_size];
-    double ends[2];
-    set_path(path, "%s.range", parent);
-    if (scene_document_kind(d, path) == SCENE_NOTHING) return INSITU_OK;
+    char key[path_size];
     for (int i = 0; i < 2; i++) {
         set_path(key, "%s[%d]", path, i);
         ends[i] = scene_document_number(d, key);
     }
-    *out = (scene_range){true, ends[0], ends[1]};
     if (ends[0] < ends[1]) return INSITU_OK;
     return scene_bad(d, path, "", "[%g, %g] does not rise, expected [low, high] with low < high", ends[0], ends[1]);
+}
+
+static scene_range_source range_source(const char *word)
+{
+    return strcmp(word, "run") == 0         ? SCENE_RANGE_RUN
+           : strcmp(word, "symmetric") == 0 ? SCENE_RANGE_SYMMETRIC
+                                            : SCENE_RANGE_DATA;
+}
+
+static insitu_status convert_range(const scene_document *d, const char *parent, scene_range *out)
+{
+    char path[path_size], percentile[path_size];
+    const char *word = "data";
+    double ends[2] = {0, 0};
+    insitu_status status = INSITU_OK;
+    set_path(path, "%s.range", parent);
+    set_path(percentile, "%s.range.percentile", parent);
+    const scene_node kind = scene_document_kind(d, path);
+    if (kind == SCENE_LIST) status = read_ends(d, path, ends);
+    if (kind == SCENE_MAPPING) status = read_ends(d, percentile, ends);
+    if (kind == SCENE_SCALAR) scene_document_texts(d, path, &word, 1);
+    *out = (scene_range){.is_fixed = kind == SCENE_LIST,
+                         .low = ends[0],
+                         .high = ends[1],
+                         .source = kind == SCENE_MAPPING ? SCENE_RANGE_PERCENTILES : range_source(word)};
+    return status;
 }
 
 static insitu_status check_fixed_range(const scene_document *d, const char *path, const scene_colour_map *map)
@@ -289,6 +311,8 @@ static insitu_status convert_scale(const scene_document *d, const char *path, co
         return scene_bad(d, path, "threshold", "missing, expected a number above 0 for scale: symlog");
     if (out->scale != SCENE_SYMLOG && in->threshold)
         return scene_bad(d, path, "threshold", "given without scale: symlog, expected with it");
+    if (out->scale == SCENE_LOG && out->range.source == SCENE_RANGE_SYMMETRIC)
+        return scene_bad(d, path, "range", "symmetric is not allowed beside scale: log, expected scale: symlog");
     return out->range.is_fixed ? check_fixed_range(d, path, out) : INSITU_OK;
 }
 

@@ -57,7 +57,7 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
     "How a field that has one value a cell is drawn: by the means of the cells at each vertex, on all ranks (8 bytes " \
     "a vertex are held). `cell` is refused: between cells of two values there is a face, not a surface of the value "  \
     "asked for."
-#define RANGE_DEFAULT "from the data on the meshes of the layer, over all ranks, at each drawn step"
+#define RANGE_DEFAULT "`data`"
 
 /* A value of several forms, which is read from the document. */
 #define FORMS(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
@@ -92,7 +92,22 @@ DEFINE_MAPPING(map, "map", MAP_KEYS);
 static const scene_form map_forms[] = {
     {{CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, map_words, CYAML_ARRAY_LEN(map_words))}, {0}},
     {{CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, no_members, map_fields)}, {.child = &map_mapping}}};
-static const scene_form range_forms[] = {{{CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 2)}, {0}}};
+static const scene_form percentile_forms[] = {
+    {{CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 2)}, {.low = 0, .high = 100}}};
+#define RANGE_KEYS(X)                                                                                                  \
+    X(CYAML_FIELD_IGNORE("percentile", REQUIRED),                                                                      \
+      .help = "Two percentages, low < high: the range is from the value that so many of the cells' values are no "     \
+              "greater than to the other. A cell counts once, by the middle between its least and greatest value; "    \
+              "the same on any partition.",                                                                            \
+      TAKES(percentile_forms))
+DEFINE_MAPPING(range, "range", RANGE_KEYS);
+
+static const cyaml_strval_t range_words[] = {
+    {"data", SCENE_RANGE_DATA}, {"run", SCENE_RANGE_RUN}, {"symmetric", SCENE_RANGE_SYMMETRIC}};
+static const scene_form range_forms[] = {
+    {{CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 2)}, {0}},
+    {{CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, range_words, CYAML_ARRAY_LEN(range_words))}, {0}},
+    {{CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, no_members, range_fields)}, {.child = &range_mapping}}};
 
 /* The keys that say how values become colours, of any mapping that has a scene_file_colour_map called colours. */
 #define COLOUR_MAP_KEYS(X, type)                                                                                       \
@@ -116,7 +131,12 @@ static const scene_form range_forms[] = {{{CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG
     X(NUMBERS("above", type, colours.above, 3), .help = "Colour of values above the range, sRGB.",                     \
       .by_default = "that of its high end", .low = 0, .high = 1)                                                       \
     X(FORMS("range"),                                                                                                  \
-      .help = "The values `[low, high]`, low < high, that the ends of the colour map stand for; clamped outside.",     \
+      .help = "The values `[low, high]`, low < high, that the ends of the colour map stand for; clamped outside. Or "  \
+              "of the values on the meshes of the layer, over all ranks, at each drawn step: `data`, the least and "   \
+              "the greatest (with `scale: log` the least above 0); `symmetric`, the same made as wide on both sides "  \
+              "of 0; `run`, the widest of all steps drawn so far, which is kept in the file NAME.ranges beside the "   \
+              "first output's pictures, so that a run that is started again goes on with it (delete it to begin "      \
+              "anew); or percentiles.",                                                                                \
       .by_default = RANGE_DEFAULT, TAKES(range_forms))
 
 #define AUTOMATIC_KEYS(X)                                                                                              \

@@ -1,0 +1,275 @@
+#include "session_run_ranges.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "memory.h"
+#include "session_agree.h"
+
+enum { longest_line = 512 };
+
+/* ---- which layers ---------------------------------------------------------------------------------------------- */
+
+typedef struct layer_list {
+    int count;
+    session_run_range *items; /* NULL: they are counted alone */
+} layer_list;
+
+static void add_layer(layer_list *list, const char *kind, int number, const scene_field *field,
+                      const scene_colour_map *map)
+{
+    if (map->range.is_fixed || map->range.source != SCENE_RANGE_RUN) return;
+    if (list->items) list->items[list->count] = (session_run_range){kind, number, field, map, INFINITY, -INFINITY};
+    list->count++;
+}
+
+static void list_layers(const scene_image *image, layer_list *list)
+{
+    for (int i = 0; i < image->isosurface_count; i++) {
+        const scene_isosurface *layer = &image->isosurfaces[i];
+        if (layer->has_colour_by) add_layer(list, "isosurface", i, &layer->colour_by, &layer->colour_map);
+    }
+    for (int i = 0; i < image->slice_count; i++)
+        add_layer(list, "slice", i, &image->slices[i].field, &image->slices[i].colour_map);
+    for (int i = 0; i < image->volume_count; i++)
+        add_layer(list, "volume", i, &image->volumes[i].field, &image->volumes[i].colour_map);
+}
+
+static int count_layers(const scene_image *image)
+{
+    layer_list list = {0};
+    list_layers(image, &list);
+    return list.count;
+}
+
+/* ---- the file -------------------------------------------------------------------------------------------------- */
+
+/* The simulation may write numbers with a comma. */
+static locale_t use_c_numbers(locale_t *before)
+{
+    const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
+    *before = c_numbers ? uselocale(c_numbers) : (locale_t)0;
+    return c_numbers;
+}
+
+static void use_numbers_again(locale_t c_numbers, locale_t before)
+{
+    if (!c_numbers) return;
+    uselocale(before);
+    freelocale(c_numbers);
+}
+
+static char *file_path(const scene_image *image)
+{
+    const char *output = image->outputs[0].path;
+    size_t folder = strcspn(output, "{");
+    while (folder > 0 && output[folder - 1] != '/') folder--;
+    char *path = base_alloc(folder + strlen(image->name) + sizeof ".ranges");
+    if (!path) return NULL;
+    memcpy(path, output, folder);
+    strcpy(path + folder, image->name);
+    strcat(path, ".ranges");
+    return path;
+}
+
+static void take_line(session_image_ranges *ranges, const session_run_range *line, int component, const char *field)
+{
+    for (int i = 0; i < ranges->count; i++) {
+        session_run_range *layer = &ranges->items[i];
+        if (strcmp(layer->kind, line->kind) != 0 || layer->number != line->number) continue;
+        if (layer->field->component != component || strcmp(layer->field->name, field) != 0) continue;
+        layer->low = line->low;
+        layer->high = line->high;
+    }
+}
+
+static bool read_line(session_image_ranges *ranges, char *text)
+{
+    char kind[16];
+    session_run_range line = {.kind = kind};
+    int component, at = 0;
+    text[strcspn(text, "\n")] = '\0';
+    if (text[0] == '#' || text[0] == '\0') return true;
+    if (sscanf(text, "%15s %d %d %lf %lf %n", kind, &line.number, &component, &line.low, &line.high, &at) < 5)
+        return false;
+    if (at == 0 || !(isfinite(line.low) && isfinite(line.high) && line.low <= line.high)) return false;
+    take_line(ranges, &line, component, text + at);
+    return true;
+}
+
+static insitu_status read_lines(session_image_ranges *ranges, const scene_image *image, FILE *file, base_error *error)
+{
+    char line[longest_line];
+    for (int number = 1; fgets(line, sizeof line, file); number++)
+        if (!read_line(ranges, line))
+            return base_fail(error, INSITU_ERROR_SCENE,
+                             "image \"%s\": %.300s:%d: is no range, expected kind, number, component, low, high and "
+                             "field (delete the file to begin anew)",
+                             image->name, ranges->path, number);
+    if (!ferror(file)) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_IO, "image \"%s\": %.300s: %s", image->name, ranges->path, strerror(errno));
+}
+
+/* What is there; nothing where there is no file. */
+static insitu_status read_ranges(session_image_ranges *ranges, const scene_image *image, base_error *error)
+{
+    const int number = open(ranges->path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (number < 0 && errno == ENOENT) return INSITU_OK;
+    FILE *file = number < 0 ? NULL : fdopen(number, "r");
+    if (!file) {
+        const char *reason = strerror(errno);
+        if (number >= 0) close(number);
+        return base_fail(error, INSITU_ERROR_IO, "image \"%s\": %.300s: cannot be read: %s", image->name, ranges->path,
+                         reason);
+    }
+    locale_t before;
+    const locale_t c_numbers = use_c_numbers(&before);
+    const insitu_status status = read_lines(ranges, image, file, error);
+    use_numbers_again(c_numbers, before);
+    fclose(file);
+    return status;
+}
+
+static void write_lines(const session_image_ranges *ranges, FILE *file)
+{
+    fprintf(file, "# The widest ranges of the run so far. Delete this file to begin anew.\n");
+    for (int i = 0; i < ranges->count; i++) {
+        const session_run_range *r = &ranges->items[i];
+        if (r->low <= r->high)
+            fprintf(file, "%s %d %d %.17g %.17g %s\n", r->kind, r->number, r->field->component, r->low, r->high,
+                    r->field->name);
+    }
+}
+
+/* Into a file of another name, new, which then takes the place of the old one. */
+static bool write_file(const session_image_ranges *ranges, const char *temporary)
+{
+    unlink(temporary);
+    const int number = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    FILE *file = number < 0 ? NULL : fdopen(number, "w");
+    if (!file) {
+        if (number >= 0) close(number);
+        return false;
+    }
+    write_lines(ranges, file);
+    const bool is_written = !ferror(file);
+    return fclose(file) == 0 && is_written && rename(temporary, ranges->path) == 0;
+}
+
+insitu_status session_write_run_ranges(session_image_ranges *ranges, const scene_image *image, base_error *error)
+{
+    if (!ranges->is_changed) return INSITU_OK;
+    const size_t length = strlen(ranges->path);
+    char *temporary = base_alloc(length + sizeof ".new");
+    if (!temporary) return session_no_memory(error, (int64_t)length, "the name of a file of ranges");
+    memcpy(temporary, ranges->path, length);
+    strcpy(temporary + length, ".new");
+    locale_t before;
+    const locale_t c_numbers = use_c_numbers(&before);
+    const bool is_written = write_file(ranges, temporary);
+    const int reason = errno;
+    use_numbers_again(c_numbers, before);
+    if (!is_written) unlink(temporary);
+    base_free(temporary);
+    ranges->is_changed = !is_written;
+    if (is_written) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_IO, "image \"%s\": %.300s: cannot be written: %s", image->name, ranges->path,
+                     strerror(reason));
+}
+
+/* ---- the list -------------------------------------------------------------------------------------------------- */
+
+static void free_ranges(session_image_ranges *ranges)
+{
+    base_free(ranges->image);
+    base_free(ranges->path);
+    base_free(ranges->items);
+}
+
+void session_run_ranges_free(session_run_ranges *all)
+{
+    for (int i = 0; i < all->count; i++) free_ranges(&all->items[i]);
+    base_free(all->items);
+    *all = (session_run_ranges){0};
+}
+
+static session_image_ranges *find_ranges(const session_run_ranges *all, const char *image)
+{
+    for (int i = 0; i < all->count; i++)
+        if (strcmp(all->items[i].image, image) == 0) return &all->items[i];
+    return NULL;
+}
+
+/* An entry at the end of the list, which counts once it is whole. */
+static insitu_status prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
+{
+    const int count = count_layers(image);
+    session_image_ranges *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
+    if (items) {
+        all->items = items;
+        session_image_ranges *new = &items[all->count];
+        *new = (session_image_ranges){.image = base_strdup(image->name),
+                                      .path = file_path(image),
+                                      .count = count,
+                                      .items = base_calloc((size_t)count, sizeof *new->items)};
+        if (new->items) list_layers(image, &(layer_list){0, new->items});
+        if (new->image &&new->path &&new->items) return INSITU_OK;
+        free_ranges(new);
+    }
+    return session_no_memory(error, (int64_t)sizeof *items, "ranges of a run");
+}
+
+/* What rank 0 has read, to all. Collective. */
+static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < ranges->count && !status; i++) {
+        double ends[2] = {ranges->items[i].low, ranges->items[i].high};
+        status = session_mpi(error, MPI_Bcast(ends, 2, MPI_DOUBLE, 0, comm), "MPI_Bcast");
+        ranges->items[i].low = ends[0];
+        ranges->items[i].high = ends[1];
+    }
+    return status;
+}
+
+insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
+                                      session_image_ranges **out, base_error *error)
+{
+    *out = find_ranges(all, image->name);
+    if (*out || count_layers(image) == 0) return INSITU_OK;
+    const bool has_room = prepare_ranges(all, image, error) == INSITU_OK;
+    session_image_ranges *ranges = has_room ? &all->items[all->count] : NULL;
+    insitu_status status = session_agree(team->comm, error);
+    if (!status && team->rank == 0) read_ranges(ranges, image, error);
+    if (!status) status = session_agree_as_is(team->comm, error);
+    if (!status) status = share_ranges(ranges, team->comm, error);
+    if (status && has_room) free_ranges(ranges);
+    if (status) return status;
+    all->count++;
+    *out = ranges;
+    return INSITU_OK;
+}
+
+static session_run_range *find_range(session_image_ranges *ranges, const scene_colour_map *map)
+{
+    int i = 0;
+    while (ranges->items[i].map != map) i++;
+    return &ranges->items[i];
+}
+
+void session_widen_run_range(session_image_ranges *ranges, const scene_colour_map *map, double *low, double *high)
+{
+    session_run_range *range = find_range(ranges, map);
+    if (*low <= *high && (*low < range->low || *high > range->high)) {
+        range->low = fmin(range->low, *low);
+        range->high = fmax(range->high, *high);
+        ranges->is_changed = true;
+    }
+    *low = range->low;
+    *high = range->high;
+}

@@ -1,0 +1,150 @@
+/* Percentiles are found digit by digit: values are taken as float32 numbers, and these as whole numbers in the same
+ * order. A pass counts the values whose leading bits are those found so far by the 11 bits that follow; all ranks add
+ * their counts, and so know in which bin the value of the wanted rank is. Three passes have all 32 bits: the value
+ * itself, not an estimate, whoever counted which cell. */
+#include "session_ranges.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "mmbvh_fetch.h"
+#include "session_agree.h"
+#include "session_distances.h"
+#include "session_scalars.h"
+
+/* ---- least and greatest ---------------------------------------------------------------------------------------- */
+
+insitu_status session_find_extremes(const session_meshes *meshes, const session_team *team,
+                                    const session_range_subject *of, double *low, double *high, base_error *error)
+{
+    double mine[2] = {INFINITY, INFINITY}, all[2];
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, of->field) : NULL;
+        if (scalar && of->plane) scalar = session_find_distance(mesh, of->plane);
+        if (!scalar) continue;
+        double least, most;
+        session_scalar_extent(mesh, scalar, team->threads, of->is_positive, &least, &most);
+        mine[0] = fmin(mine[0], least);
+        mine[1] = fmin(mine[1], -most);
+    }
+    const insitu_status status =
+        session_mpi(error, MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
+    *low = all[0];
+    *high = -all[1];
+    return status;
+}
+
+/* ---- percentiles ----------------------------------------------------------------------------------------------- */
+
+enum { DIGIT_BITS = 11, DIGITS = 1 << DIGIT_BITS, PASSES = 3 };
+
+/* A number that is less where the value is. */
+static uint32_t order_of(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+}
+
+static float value_of(uint32_t order)
+{
+    const uint32_t bits = order & 0x80000000u ? order & 0x7fffffffu : ~order;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* The lowest bit that a pass looks at: the last one has 10 bits left. */
+static int shift_of(int pass)
+{
+    return pass + 1 < PASSES ? 32 - DIGIT_BITS * (pass + 1) : 0;
+}
+
+/* The bits that a pass has found before it. */
+static uint32_t known_of(int pass)
+{
+    return pass ? ~(uint32_t)0 << shift_of(pass - 1) : 0;
+}
+
+typedef struct digit_count {
+    uint32_t found[2]; /* leading bits of both ends, the rest 0 */
+    int pass;
+    bool is_positive;
+} digit_count;
+
+static void count_cells(const session_mesh *mesh, const session_scalar *scalar, int threads, const digit_count *of,
+                        int64_t counts[2 * DIGITS])
+{
+    const grid *g = &mesh->cells;
+    const grid_field field = session_scalar_field(mesh, scalar);
+    const uint32_t known = known_of(of->pass), mask = ~known;
+    const int shift = shift_of(of->pass);
+#pragma omp parallel for num_threads(threads) schedule(static) reduction(+ : counts[:2 * DIGITS])
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (!grid_is_drawn(g, cell)) continue;
+        const fetch_range range = fetch_any_cell_range(g, &field, cell);
+        const float middle = (float)(0.5 * range.low + 0.5 * range.high);
+        if (!range.is_finite || !isfinite(middle) || (of->is_positive && !(middle > 0))) continue;
+        const uint32_t order = order_of(middle);
+        for (int end = 0; end < 2; end++)
+            if ((order & known) == of->found[end]) counts[end * DIGITS + (int)((order & mask) >> shift)]++;
+    }
+}
+
+static insitu_status count_digits(const session_meshes *meshes, const session_team *team, const scene_field *field,
+                                  const digit_count *of, int64_t counts[2 * DIGITS], base_error *error)
+{
+    memset(counts, 0, 2 * DIGITS * sizeof *counts);
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        const session_scalar *scalar = mesh->is_given ? session_find_scalar(mesh, field) : NULL;
+        if (scalar) count_cells(mesh, scalar, team->threads, of, counts);
+    }
+    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, counts, 2 * DIGITS, MPI_INT64_T, MPI_SUM, team->comm),
+                       "MPI_Allreduce");
+}
+
+/* The bin in which the rank is that is left, which becomes one in the bin. */
+static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
+{
+    int digit = 0;
+    while (digit + 1 < DIGITS && *rank >= counts[digit]) *rank -= counts[digit++];
+    return digit;
+}
+
+static insitu_status find_percentiles(const session_meshes *meshes, const session_team *team, const scene_field *field,
+                                      const scene_colour_map *map, double *low, double *high, base_error *error)
+{
+    const double percent[2] = {map->range.low, map->range.high};
+    int64_t counts[2 * DIGITS], total = 0, ranks[2] = {0, 0};
+    digit_count of = {.is_positive = map->scale == SCENE_LOG};
+    for (of.pass = 0; of.pass < PASSES; of.pass++) {
+        const insitu_status status = count_digits(meshes, team, field, &of, counts, error);
+        if (status) return status;
+        for (int i = 0; i < DIGITS && of.pass == 0; i++) total += counts[i];
+        for (int end = 0; end < 2; end++) {
+            if (of.pass == 0) ranks[end] = (int64_t)fmax(ceil(percent[end] / 100 * (double)total), 1) - 1;
+            const int digit = find_digit(counts + (ptrdiff_t)end * DIGITS, &ranks[end]);
+            of.found[end] |= (uint32_t)digit << shift_of(of.pass);
+        }
+    }
+    *low = total ? (double)value_of(of.found[0]) : INFINITY;
+    *high = total ? (double)value_of(of.found[1]) : -INFINITY;
+    return INSITU_OK;
+}
+
+/* ---- the whole ------------------------------------------------------------------------------------------------- */
+
+insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
+                                 const scene_colour_map *map, double *low, double *high, base_error *error)
+{
+    const session_range_subject of = {field, NULL, map->scale == SCENE_LOG};
+    if (map->range.source == SCENE_RANGE_PERCENTILES)
+        return find_percentiles(meshes, team, field, map, low, high, error);
+    const insitu_status status = session_find_extremes(meshes, team, &of, low, high, error);
+    if (status || map->range.source != SCENE_RANGE_SYMMETRIC || *low > *high) return status;
+    *high = fmax(fabs(*low), fabs(*high));
+    *low = -*high;
+    return INSITU_OK;
+}

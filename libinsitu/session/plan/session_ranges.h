@@ -1,0 +1,27 @@
+/* The ranges of values that colour maps stand for, where the scene does not fix them. */
+#ifndef SESSION_RANGES_H
+#define SESSION_RANGES_H
+
+#include "error.h"
+#include "scene.h"
+#include "session_mesh.h"
+#include "session_team.h"
+
+/* What extremes are of: a field, or, where a plane is given, the distances from it on the meshes that have the field.
+ */
+typedef struct session_range_subject {
+    const scene_field *field;
+    const scene_plane *plane; /* NULL: the field's own values */
+    bool is_positive;         /* only such values count (session_scalars.h) */
+} session_range_subject;
+
+/* Least and greatest value over all ranks' drawn cells; low > high: there are none. Collective. */
+insitu_status session_find_extremes(const session_meshes *meshes, const session_team *team,
+                                    const session_range_subject *of, double *low, double *high, base_error *error);
+
+/* The range of a layer's field by the map's source over all ranks' drawn cells, of SCENE_RANGE_RUN of this step alone;
+ * low > high: there are no values. The same bits on any partition. Collective. */
+insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
+                                 const scene_colour_map *map, double *low, double *high, base_error *error);
+
+#endif

@@ -1,0 +1,270 @@
+/* Where ranges of colours come from, over all ranks: pictures by each source are those by the range that brute force
+ * over the whole mesh finds, to the bit; ranges over a run widen, outlive the session, and are told where their file is
+ * broken; colour maps from files are every rank's. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 4 };
+static const test_mesh_kind kind = TEST_MIXED;
+
+static char folder[512], image_name[32];
+static session_input block, dealt;
+
+/* A coloured surface and a volume, both with the keys. */
+static const char *scene_with(const char *surface_keys, const char *volume_keys)
+{
+    static char text[2048];
+    snprintf(
+        text, sizeof text,
+        "images:\n  - name: %s\n    size: [40, 30]\n    layers:\n"
+        "      - isosurface: {field: f, values: [0.1], opacity: 0.7, colour_by: {field: f, component: magnitude%s}}\n"
+        "      - volume: {field: f%s}\n    sampling: {step_cells: 0.5}\n    outputs: [{path: "
+        "\"%s/{name}_{cycle}.exr\"}]\n",
+        image_name, surface_keys, volume_keys, folder);
+    return text;
+}
+
+static caught_picture draw_step(insitu_session *session, int cycle)
+{
+    caught_picture picture = {0};
+    step_is_good(session, cycle);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    return picture;
+}
+
+static caught_picture draw(const session_input *in, const char *surface_keys, const char *volume_keys)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(surface_keys, volume_keys)));
+    everywhere(hand_over(session, in) == INSITU_OK);
+    const caught_picture picture = draw_step(session, 0);
+    insitu_destroy(&session);
+    return picture;
+}
+
+/* The largest difference of a channel; frees both. Surfaces are the same bits, volumes to 1e-6 on several ranks. */
+static void assert_alike(caught_picture *a, caught_picture *b, double allowed)
+{
+    double worst = 0;
+    for (int i = 0; own_rank == 0 && i < 4 * a->width * a->height; i++)
+        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    if (worst > allowed) fprintf(stderr, "pictures differ by %g\n", worst);
+    everywhere(worst <= allowed);
+    free(a->rgba), free(a->depth), free(b->rgba), free(b->depth);
+}
+
+/* ---- ranges by brute force --------------------------------------------------------------------------------------- */
+
+static int compare_values(const void *left, const void *right)
+{
+    const float a = *(const float *)left, b = *(const float *)right;
+    return (a > b) - (a < b);
+}
+
+typedef struct truth {
+    double least, most, least_positive;
+    int64_t count, positive;
+    float *middles; /* sorted */
+} truth;
+
+static truth find_truth(void)
+{
+    test_mesh mesh;
+    test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+    truth t = {INFINITY, -INFINITY, INFINITY, mesh.cell_count, 0, malloc((size_t)mesh.cell_count * sizeof(float))};
+    assert_non_null(t.middles);
+    for (int64_t c = 0; c < mesh.cell_count; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t i = mesh.offsets[c]; i < mesh.offsets[c + 1]; i++) {
+            low = fmin(low, mesh.values[mesh.connectivity[i]]);
+            high = fmax(high, mesh.values[mesh.connectivity[i]]);
+        }
+        t.least = fmin(t.least, low);
+        t.most = fmax(t.most, high);
+        if (low > 0) t.least_positive = fmin(t.least_positive, low);
+        t.middles[c] = (float)(0.5 * low + 0.5 * high);
+        t.positive += t.middles[c] > 0;
+    }
+    qsort(t.middles, (size_t)t.count, sizeof *t.middles, compare_values);
+    test_mesh_free(&mesh);
+    return t;
+}
+
+/* Nearest rank: the least value that percent of count values, after the first `skipped`, are no greater than. */
+static double percentile(const truth *t, int64_t skipped, double percent)
+{
+    const int64_t count = t->count - skipped, rank = (int64_t)ceil(percent / 100 * (double)count);
+    return (double)t->middles[skipped + (rank > 0 ? rank - 1 : 0)];
+}
+
+static void check_source(const char *keys, const char *scale, double low, double high)
+{
+    char fixed[256], by_source[256];
+    snprintf(fixed, sizeof fixed, "%s, range: [%.17g, %.17g]", scale, low, high);
+    snprintf(by_source, sizeof by_source, "%s, range: %s", scale, keys);
+    caught_picture truth = draw(&block, "", fixed), found = draw(&block, "", by_source);
+    assert_alike(&found, &truth, 0);
+    truth = draw(&block, "", fixed), found = draw(&dealt, "", by_source);
+    assert_alike(&found, &truth, 1e-6);
+}
+
+static void ranges_are_those_of_brute_force(void **state)
+{
+    (void)state;
+    truth t = find_truth();
+    const double size = fmax(fabs(t.least), fabs(t.most));
+    const int64_t negative = t.count - t.positive;
+    check_source("data", "", t.least, t.most);
+    check_source("symmetric", "", -size, size);
+    check_source("symmetric", ", scale: symlog, threshold: 0.1", -size, size);
+    check_source("data", ", scale: log", t.least_positive, t.most);
+    check_source("{percentile: [0, 100]}", "", percentile(&t, 0, 0), percentile(&t, 0, 100));
+    check_source("{percentile: [2, 98]}", "", percentile(&t, 0, 2), percentile(&t, 0, 98));
+    check_source("{percentile: [37.5, 50]}", "", percentile(&t, 0, 37.5), percentile(&t, 0, 50));
+    check_source("{percentile: [5, 95]}", ", scale: log", percentile(&t, negative, 5), percentile(&t, negative, 95));
+    free(t.middles);
+}
+
+/* ---- over a run ------------------------------------------------------------------------------------------------ */
+
+static void scale_values(session_input *in, double factor)
+{
+    for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] *= factor;
+}
+
+static const char *ranges_file(void)
+{
+    static char path[600];
+    snprintf(path, sizeof path, "%s/%s.ranges", folder, image_name);
+    return path;
+}
+
+static void remove_ranges(void)
+{
+    if (own_rank == 0) unlink(ranges_file());
+    MPI_Barrier(MPI_COMM_WORLD);
+}
+
+static void ranges_over_a_run_widen_and_outlive_it(void **state)
+{
+    (void)state;
+    truth t = find_truth();
+    char widest[128];
+    const char *run = ", range: run";
+    snprintf(widest, sizeof widest, ", range: [%.17g, %.17g]", 2 * t.least, 2 * t.most);
+    free(t.middles);
+    remove_ranges();
+    caught_picture plain = draw(&dealt, "", ""), by_data = draw(&dealt, "", ", range: data");
+    caught_picture fixed = draw(&dealt, "", widest);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with(run, run)));
+    for (int cycle = 0; cycle < 3; cycle++) {
+        if (cycle) scale_values(&dealt, cycle == 1 ? 2 : 0.5);
+        everywhere(hand_over(session, &dealt) == INSITU_OK);
+        caught_picture picture = draw_step(session, cycle);
+        if (cycle == 0)
+            assert_alike(&picture, &by_data, 0);
+        else
+            free(picture.rgba), free(picture.depth);
+    }
+    insitu_destroy(&session);
+    everywhere(own_rank != 0 || access(ranges_file(), R_OK) == 0);
+    /* Another session goes on; volumes alone, as the surface's colours are of another field. */
+    caught_picture again = draw(&dealt, "", run);
+    assert_alike(&again, &fixed, 0);
+    /* Of another field there is nothing yet. */
+    caught_picture other = draw(&dealt, "", ", component: magnitude, range: run"), fresh;
+    fresh = draw(&dealt, "", ", component: magnitude");
+    assert_alike(&other, &fresh, 0);
+    remove_ranges();
+    caught_picture anew = draw(&dealt, "", run);
+    assert_alike(&anew, &plain, 0);
+    remove_ranges();
+}
+
+static void broken_file_of_ranges_is_told_to_all(void **state)
+{
+    (void)state;
+    static const char *const lines[] = {"volume 0 -2 3 1 f", "volume 0 -2 nan 1 f", "volume 0 -2 1 f", "whatever"};
+    for (int i = 0; i < 4; i++) {
+        FILE *file = own_rank == 0 ? fopen(ranges_file(), "w") : NULL;
+        if (file) fprintf(file, "# kept\nvolume 7 -2 0 1 f\n%s\n", lines[i]);
+        if (file) fclose(file);
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_with("", ", range: run")));
+        everywhere(hand_over(session, &block) == INSITU_OK);
+        const insitu_status status = insitu_step(session, 0, 0);
+        told_everywhere(session, status, INSITU_ERROR_SCENE, image_name, ".ranges:3: is no range",
+                        "delete the file to begin anew");
+        remove_ranges();
+        step_is_good(session, 1);
+        forget_pictures();
+        insitu_destroy(&session);
+        remove_ranges();
+    }
+}
+
+/* ---- files ------------------------------------------------------------------------------------------------------- */
+
+static void write_map(const char *text)
+{
+    char path[600];
+    snprintf(path, sizeof path, "%s/%s.json", folder, image_name);
+    FILE *file = own_rank == 0 ? fopen(path, "w") : NULL;
+    everywhere(own_rank != 0 || (file && fputs(text, file) >= 0 && fclose(file) == 0));
+}
+
+static void maps_from_files_are_every_ranks(void **state)
+{
+    (void)state;
+    char keys[128];
+    write_map("[{\"Name\": \"a\", \"RGBPoints\": [0, 0, 0, 1, 5, 1, 1, 0, 10, 1, 0, 0]}]");
+    snprintf(keys, sizeof keys, ", map: {file: %s.json}", image_name);
+    const char *list = ", map: {colours: [[0, 0, 1], [1, 1, 0], [1, 0, 0]]}";
+    caught_picture by_file = draw(&dealt, keys, keys), by_list = draw(&dealt, list, list);
+    assert_alike(&by_file, &by_list, 0);
+}
+
+static void missing_and_broken_maps_are_told_to_all(void **state)
+{
+    (void)state;
+    char keys[128];
+    insitu_session *session = NULL;
+    insitu_status status =
+        insitu_create(MPI_COMM_WORLD, write_scene(scene_with("", ", map: {file: absent.json}")), &session);
+    everywhere(status == INSITU_ERROR_SCENE && !session && strstr(insitu_error(NULL), "volume.map.file: ") &&
+               strstr(insitu_error(NULL), "absent.json: cannot be read: No such file"));
+    write_map("[{\"Name\": \"a\",\n\"RGBPoints\": [0, 0, 0, 1, 5]}]");
+    snprintf(keys, sizeof keys, ", map: {file: %s.json}", image_name);
+    status = insitu_create(MPI_COMM_WORLD, write_scene(scene_with(keys, "")), &session);
+    everywhere(status == INSITU_ERROR_SCENE && !session && strstr(insitu_error(NULL), "colour_by.map.file: ") &&
+               strstr(insitu_error(NULL), ".json:2: RGBPoints: expected"));
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ranges_are_those_of_brute_force),
+        cmocka_unit_test(ranges_over_a_run_widen_and_outlive_it),
+        cmocka_unit_test(broken_file_of_ranges_is_told_to_all),
+        cmocka_unit_test(maps_from_files_are_every_ranks),
+        cmocka_unit_test(missing_and_broken_maps_are_told_to_all),
+    };
+    const char *scene = write_scene("");
+    snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(scene, '/') - scene), scene);
+    snprintf(image_name, sizeof image_name, "colour_np%d", rank_count);
+    input_create(&block, kind, SIDE, TEST_BLOCK, own_rank, rank_count);
+    input_create(&dealt, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    input_free(&block);
+    input_free(&dealt);
+    return failed;
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
