@@ -1,9 +1,10 @@
 /* A surface is coloured by the map as it is. A volume is integrated over transfer functions that are linear between
  * points of value, so what else a map may be is made of that: bands of a table in which each has 16 entries, so that
  * they change within 1/16 of a band; colours outside of the range of one more entry at an end; and ramps of opacity
- * that are straight along a scale of several pieces that are straight along the values. Those are cut where they are
- * farthest off, until all 32 points are in use: a ramp over six decades is then off by less than 0.003 of its height.
- */
+ * that are straight along a scale of several pieces that are straight along the values. Those are cut into
+ * pieces that are equal along the scale, until all 32 points are in use: by six decades of a logarithm a single ramp is
+ * then off by less than 0.002 of its height, and seven ramps by less than 0.02; by as many to both sides of 0, by twice
+ * that. */
 #include "session_transfer.h"
 
 #include <float.h>
@@ -108,33 +109,53 @@ static double chord_error(const render_transfer *t, const scene_opacity_point *a
     return most * fabs((double)b->opacity - (double)a->opacity);
 }
 
-static int worst_chord(const render_transfer *t, const opacity_points *points, double *error)
+static scene_opacity_point point_between(const scene_opacity_point *a, const scene_opacity_point *b, double share)
+{
+    return (scene_opacity_point){a->at + share * (b->at - a->at),
+                                 (float)(a->opacity + share * (b->opacity - a->opacity))};
+}
+
+/* The same of a ramp that is cut into pieces which are equal by place. */
+static double ramp_error(const render_transfer *t, const scene_opacity_point *ramp, int pieces)
+{
+    double most = 0;
+    for (int i = 0; i < pieces; i++) {
+        const scene_opacity_point a = point_between(ramp, ramp + 1, (double)i / pieces);
+        const scene_opacity_point b = point_between(ramp, ramp + 1, (double)(i + 1) / pieces);
+        most = fmax(most, chord_error(t, &a, &b));
+    }
+    return most;
+}
+
+static int worst_of(const double *errors, int count)
 {
     int worst = 0;
-    *error = 0;
-    for (int i = 0; i + 1 < points->count; i++) {
-        const double of_this = chord_error(t, &points->items[i], &points->items[i + 1]);
-        if (!(of_this > *error)) continue;
-        *error = of_this;
-        worst = i;
-    }
+    for (int i = 1; i < count; i++)
+        if (errors[i] > errors[worst]) worst = i;
     return worst;
 }
 
-/* Cut the ramps that bend along the values until they do not, or there are no more points. */
-static void cut_ramps(const render_transfer *t, opacity_points *points)
+/* Cut the ramps that bend along the values: always the worst into one more piece, until none is left to be cut or no
+ * point. */
+static void cut_ramps(const render_transfer *t, const scene_volume *volume, opacity_points *out)
 {
     static const double good_enough = 1e-4;
-    while (points->count < RENDER_MAX_OPACITY_POINTS) {
-        double error;
-        const int i = worst_chord(t, points, &error);
-        if (error <= good_enough) return;
-        const scene_opacity_point *a = &points->items[i], *b = a + 1;
-        const scene_opacity_point middle = {0.5 * (a->at + b->at), 0.5F * (a->opacity + b->opacity)};
-        memmove(&points->items[i + 2], &points->items[i + 1], (size_t)(points->count - i - 1) * sizeof *points->items);
-        points->items[i + 1] = middle;
-        points->count++;
+    const int ramps = volume->opacity_count - 1;
+    int pieces[RENDER_MAX_OPACITY_POINTS], total = ramps;
+    double errors[RENDER_MAX_OPACITY_POINTS] = {0};
+    for (int i = 0; i < ramps; i++) errors[i] = ramp_error(t, &volume->opacity[i], pieces[i] = 1);
+    while (total + 1 < RENDER_MAX_OPACITY_POINTS) {
+        const int i = worst_of(errors, ramps);
+        if (errors[i] <= good_enough) break;
+        errors[i] = ramp_error(t, &volume->opacity[i], ++pieces[i]);
+        total++;
     }
+    out->count = 0;
+    for (int i = 0; i < ramps; i++)
+        for (int piece = 0; piece < pieces[i]; piece++)
+            out->items[out->count++] =
+                point_between(&volume->opacity[i], &volume->opacity[i] + 1, (double)piece / pieces[i]);
+    out->items[out->count++] = volume->opacity[ramps];
 }
 
 static void set_opacity(const scene_volume *volume, double half_diagonal, session_transfer *out)
@@ -142,7 +163,7 @@ static void set_opacity(const scene_volume *volume, double half_diagonal, sessio
     render_transfer *t = &out->transfer;
     opacity_points points = {.count = volume->opacity_count};
     memcpy(points.items, volume->opacity, (size_t)volume->opacity_count * sizeof *points.items);
-    if (t->scale != RENDER_LINEAR) cut_ramps(t, &points);
+    if (t->scale != RENDER_LINEAR) cut_ramps(t, volume, &points);
     t->opacity_count = points.count;
     for (int i = 0; i < points.count; i++) {
         out->opacity_values[i] = value_at(t, points.items[i].at);

@@ -110,28 +110,22 @@ static const scene_attachment *find_attachment(const scene_attachments *all, con
     return NULL;
 }
 
-/* Takes the path over. */
+/* Takes the path over where it is read. */
 static insitu_status read_attachment(const scene_document *d, const char *key, char *path)
 {
     scene_attachments *all = d->attachments;
     base_error reason = {.status = INSITU_OK};
+    if (!all || !all->read) return scene_bad(d, key, "", "\"%s\": no file can be read here", path);
+    if (all->count == SCENE_MAX_ATTACHMENTS)
+        return scene_bad(d, key, "", "\"%s\" is one file too many, expected at most %d", path, SCENE_MAX_ATTACHMENTS);
     scene_attachment *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
-    if (items) all->items = items;
-    insitu_status status = INSITU_OK;
-    if (!items)
-        status = scene_no_memory(d);
-    else if (!all->read || all->count == SCENE_MAX_ATTACHMENTS)
-        status = scene_bad(d, key, "", "\"%s\" cannot be read: at most %d files can", path, SCENE_MAX_ATTACHMENTS);
-    else
-        status = all->read(path, &items[all->count].text, &items[all->count].size, &reason);
-    if (status == INSITU_OK) {
-        items[all->count++].path = path;
-        return INSITU_OK;
-    }
-    base_free(path);
-    if (reason.status == INSITU_OK) return status;
+    if (!items) return scene_no_memory(d);
+    all->items = items;
+    const insitu_status status = all->read(path, &items[all->count].text, &items[all->count].size, &reason);
     if (status == INSITU_ERROR_MEMORY) return scene_no_memory(d);
-    return scene_bad(d, key, "", "%s", reason.message);
+    if (status != INSITU_OK) return scene_bad(d, key, "", "%s", reason.message);
+    items[all->count++].path = path;
+    return INSITU_OK;
 }
 
 static insitu_status attach(const scene_document *d, const char *key, const char *name, const scene_attachment **out)
@@ -140,16 +134,11 @@ static insitu_status attach(const scene_document *d, const char *key, const char
     char *path = path_from_scene(d->file_name, name);
     if (!path) return scene_no_memory(d);
     *out = find_attachment(d->attachments ? d->attachments : &none, path);
-    if (*out) {
+    const insitu_status status = *out ? INSITU_OK : read_attachment(d, key, path);
+    if (*out || status != INSITU_OK)
         base_free(path);
-        return INSITU_OK;
-    }
-    if (!d->attachments) {
-        base_free(path);
-        return scene_bad(d, key, "", "\"%s\": no file can be read here", name);
-    }
-    const insitu_status status = read_attachment(d, key, path);
-    if (status == INSITU_OK) *out = &d->attachments->items[d->attachments->count - 1];
+    else
+        *out = &d->attachments->items[d->attachments->count - 1];
     return status;
 }
 
