@@ -237,6 +237,15 @@ static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, b
     return status;
 }
 
+/* From the file that rank 0 reads. Collective. */
+static insitu_status fill_ranges(session_image_ranges *ranges, const scene_image *image, const session_team *team,
+                                 base_error *error)
+{
+    if (team->rank == 0) read_ranges(ranges, image, error);
+    const insitu_status status = session_agree_as_is(team->comm, error);
+    return status ? status : share_ranges(ranges, team->comm, error);
+}
+
 insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
                                       session_image_ranges **out, base_error *error)
 {
@@ -245,10 +254,8 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
     const bool has_room = prepare_ranges(all, image, error) == INSITU_OK;
     session_image_ranges *ranges = has_room ? &all->items[all->count] : NULL;
     insitu_status status = session_agree(team->comm, error);
-    if (!status && team->rank == 0) read_ranges(ranges, image, error);
-    if (!status) status = session_agree_as_is(team->comm, error);
-    if (!status) status = share_ranges(ranges, team->comm, error);
-    if (status && has_room) free_ranges(ranges);
+    if (!status && ranges) status = fill_ranges(ranges, image, team, error);
+    if (status && ranges) free_ranges(ranges);
     if (status) return status;
     all->count++;
     *out = ranges;

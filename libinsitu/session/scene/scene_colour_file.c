@@ -168,7 +168,7 @@ insitu_status scene_read_colour_file(const scene_attachment *file, const char *f
     yaml_parser_delete(&parser);
     if (status) return status;
     status = find_map(&f, name, &map);
-    if (!status) status = read_map(&f, map, out);
+    if (!status && map) status = read_map(&f, map, out);
     yaml_document_delete(&f.yaml);
     return status;
 }
