@@ -187,7 +187,9 @@ bool session_make_transfer(double half_diagonal, const scene_colour_map *map, do
                                            .colours = map->colours,
                                            .scale = scale_of(map),
                                            .threshold = fmax(map->threshold, fmax(fabs(low), fabs(high)) / widest_log),
-                                           .unit_distance = 1}};
+                                           .unit_distance = 1},
+                              .low = low,
+                              .high = high};
     if (volume) {
         set_opacity(volume, half_diagonal, out);
         return !session_takes_memory(map, volume) || expand_table(map, out);

@@ -9,7 +9,9 @@ typedef struct session_transfer {
     render_transfer transfer; /* points into this */
     double opacity_values[RENDER_MAX_OPACITY_POINTS];
     float opacities[RENDER_MAX_OPACITY_POINTS];
-    float *table; /* of its own; NULL: the map's */
+    double low, high; /* the values that the map's ends stand for; the transfer's go farther where a volume shows what
+                         is outside of them */
+    float *table;     /* of its own; NULL: the map's */
 } session_transfer;
 
 /* Of a colour map over [low, high] (low > high: there are no values), and the opacity of the volume, NULL: of a
