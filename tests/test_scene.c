@@ -82,6 +82,8 @@ static const char every_key[] = "threads: 3\n"
                                 "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
                                 "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
                                 "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}]}\n"
+                                "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5}\n"
+                                "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}}\n"
                                 "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
                                 "               max_seconds: 10, method: segments}\n"
                                 "    outputs:\n"
@@ -325,6 +327,26 @@ static void sampling_is_by_what_is_said(void **state)
     }
 }
 
+static void surfaces_have_their_colours(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.images[0].surface_count, 2);
+    const scene_surface *surface = s.images[0].surfaces;
+    check_colour(surface[0].colour, linear(1), linear(0.5), linear(0));
+    assert_true(surface[0].opacity == 0.5F && !surface[0].has_colour_by && !surface[0].on.name);
+    assert_true(surface[0].on.mesh_count == 2 && scene_field_is_on(&surface[0].on, "sea/3"));
+    assert_false(scene_field_is_on(&surface[0].on, "seaside"));
+    assert_true(surface[1].opacity == 1 && surface[1].has_colour_by && surface[1].colour_by.at_vertices);
+    assert_true(scene_field_is_on(&surface[1].on, "any"));
+    assert_string_equal(surface[1].colour_by.name, "q");
+    check_built_in(&surface[1].colour_map, "grey");
+    check_colour(surface[1].colour, linear(0.8), linear(0.8), linear(0.8));
+    assert_true(surface[1].material.diffuse == 0.75F);
+    scene_free(&s);
+}
+
 /* A normal of any length, and of numbers whose squares are none. */
 static void slices_have_planes_of_unit_normals(void **state)
 {
@@ -553,8 +575,15 @@ static const struct bad_file {
     {11, "      - volume: {field: f, mesh: {a: b}}", 11, {"volume.mesh: a mapping", "a list of 1 to 64 of them"}},
     {10, "      - isosurface: {field: f, values: [1], interpolate: cell}", 10, {"interpolate: cell is not", "vertex"}},
     {11, "      - volume: {field: f, interpolate: face}", 11, {"interpolate: \"face\"", "one of cell, vertex"}},
-    {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface, volume and slice"}},
+    {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface, volume, slice and surface"}},
     {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds more than one"}},
+    {11, "      - surface: {field: f}", 11, {"surface: the key \"field\" is unknown", "colour_by"}},
+    {11, "      - surface: {colour: red}", 11, {"surface.colour: \"red\"", "a list of 3 numbers from 0 to 1"}},
+    {11, "      - surface: {colour: [1, 0, 0], colour_by: {field: f}}", 11, {"surface.colour: given beside colour_by"}},
+    {11, "      - surface: {colour_by: {map: grey}}", 11, {"surface.colour_by.field: missing", "a text"}},
+    {11, "      - surface: {mesh: []}", 11, {"surface.mesh: a list", "1 to 64"}},
+    {11, "      - surface: {opacity: -1}", 11, {"surface.opacity: \"-1\"", "from 0 to 1"}},
+    {11, "      - {surface: {}, slice: {field: f, planes: [{normal: [0, 0, 1]}]}}", 11, {"holds more than one layer"}},
     {11, "      - clips: {field: f}", 11, {"layers[1]: the key \"clips\" is unknown", "isosurface, volume, slice"}},
     {11, "      - slice: {field: f}", 11, {"slice.planes: missing", "a list of 1 to 16 mappings"}},
     {11, "      - slice: {planes: [{normal: [0, 0, 1]}]}", 11, {"slice.field: missing", "a text"}},
@@ -581,7 +610,7 @@ static const struct bad_file {
      "      - isosurface: {field: f, values: [0,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15]}\n"
      "      - slice: {field: f, planes: [{normal: [0, 0, 1]}]}",
      11,
-     {"layers[1]: 17 isovalues and planes", "at most 16"}},
+     {"layers[1]: 17 isovalues, planes and outer surfaces", "at most 16"}},
     {11, "      - " V "\n      - " V "\n      - " V "\n      - " V "\n      - " V, 15, {"5 volumes", "at most 4"}},
     {11, "      - volume: {field: f, range: [2, 1]}", 11, {"volume.range: [2, 1] does not rise", "low < high"}},
     {11, "      - volume: {field: f, opacity: [[0, 0], [0.5, 1], [0.4, 0]]}", 11, {"opacity[2]: 0.4 comes after 0.5"}},
@@ -816,6 +845,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(sampling_is_by_what_is_said),
         cmocka_unit_test(scene_layer_defaults_hold),
         cmocka_unit_test(slices_have_planes_of_unit_normals),
+        cmocka_unit_test(surfaces_have_their_colours),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),
         cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),

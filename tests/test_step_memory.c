@@ -34,7 +34,8 @@ static const char full_scene[] =
 static const char edited_scene[] =
     "threads: 1\nimages:\n" IMAGE("e", "[24, 16]",
                                   "      - isosurface: {field: f, values: [0.2]}\n"
-                                  "      - slice: {field: c, planes: [{normal: [1, 2, 3]}]}\n",
+                                  "      - slice: {field: c, planes: [{normal: [1, 2, 3]}]}\n"
+                                  "      - surface: {colour_by: {field: c}, opacity: 0.5}\n",
                                   "");
 
 typedef struct memory_case {

@@ -16,6 +16,7 @@
 #include "session_isovalues.h"
 #include "session_recentre.h"
 #include "session_summary.h"
+#include "session_surfaces.h"
 #include "session_vertex_order.h"
 
 static double milliseconds_since(double start)
@@ -63,6 +64,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) status = session_make_plan(&basis, &s->meshes, team->comm, &s->report, &plan, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
     if (!status && plan.slice_count) status = session_update_distances(&s->meshes, team, error);
+    if (!status && plan.surface_count)
+        status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, extent->half_diagonal, error);
     s->report.numbers.prepare_ms = milliseconds_since(start);
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status)

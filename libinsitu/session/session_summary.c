@@ -59,6 +59,15 @@ static void report_scalar(session_report *out, const session_mesh *mesh, const s
                          mesh->name, (long long)scalar->unusable, name);
 }
 
+static void report_outer(session_report *out, const session_mesh *mesh)
+{
+    if (!mesh->outer.mesh) return;
+    out->numbers.bytes_copied += mesh->outer.bytes;
+    session_text_add(&out->copied_why, "mesh \"%s\": its outer faces: %lld bytes", mesh->name,
+                     (long long)mesh->outer.bytes);
+    out->numbers.bytes_trees += mesh->outer.mesh->has_tree ? mmbvh_bytes(&mesh->outer.mesh->tree) : 0;
+}
+
 static void report_mesh(session_report *out, const session_mesh *mesh)
 {
     insitu_report *report = &out->numbers;
@@ -78,7 +87,8 @@ static void report_mesh(session_report *out, const session_mesh *mesh)
         if (scalar->is_used && scalar->wants_ranges && scalar->unusable > unusable) unusable = scalar->unusable;
     }
     report->cells_unusable += unusable;
-    if (report->images && !mesh->is_needed)
+    report_outer(out, mesh);
+    if (report->images && !mesh->is_needed && !mesh->is_outer_wanted)
         session_text_add(&out->left_out, "mesh \"%s\" is in no picture: no tree is built", mesh->name);
     if (report->images && mesh->is_needed && mesh->is_partial)
         session_text_add(

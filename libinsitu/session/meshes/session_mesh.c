@@ -41,8 +41,30 @@ void session_drop_fields(session_mesh *mesh)
     mesh->field_count = 0;
 }
 
+void session_drop_outer(session_mesh *mesh, bool with_faces)
+{
+    session_outer *outer = &mesh->outer;
+    if (outer->mesh) {
+        session_drop_scalars(outer->mesh);
+        session_drop_tree(outer->mesh);
+    }
+    base_free(outer->mesh);
+    base_free(outer->coordinates);
+    base_free(outer->connectivity);
+    base_free(outer->offsets);
+    base_free(outer->types);
+    base_free(outer->vertex_origins);
+    base_free(outer->cell_origins);
+    if (with_faces) base_free(outer->faces);
+    *outer = with_faces ? (session_outer){0}
+                        : (session_outer){.are_faces_known = outer->are_faces_known,
+                                          .face_count = outer->face_count,
+                                          .faces = outer->faces};
+}
+
 void session_drop_contents(session_mesh *mesh)
 {
+    session_drop_outer(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     session_drop_fields(mesh);

@@ -55,6 +55,28 @@ typedef struct session_scalar {
     session_extremes positive; /* low: over those of them whose values are positive */
 } session_scalar;
 
+/* A face of a cell, by its place in the cell's faces (session_cell_faces.h). */
+typedef struct session_face {
+    int64_t cell;
+    int64_t face;
+} session_face;
+
+struct session_mesh;
+
+/* The faces of a mesh that one cell alone has, over all ranks, and a mesh of tets and pyramids on them; a declared copy
+ * (session_outer_mesh.h). */
+typedef struct session_outer {
+    bool are_faces_known;
+    int64_t face_count;
+    session_face *faces;       /* in the order of the cells */
+    struct session_mesh *mesh; /* NULL until made; its name is the mesh's */
+    double *coordinates;       /* of the mesh's vertices × 3 */
+    int64_t *connectivity, *offsets;
+    unsigned char *types;
+    int64_t *vertex_origins, *cell_origins; /* of which vertex and cell of the whole mesh each has its values */
+    int64_t bytes;
+} session_outer;
+
 /* One rank's part of a mesh. */
 typedef struct session_mesh {
     char *name;
@@ -82,6 +104,9 @@ typedef struct session_mesh {
     double rent; /* seconds spent on partial trees since the cells last changed, beyond what a full one would cost */
     int scalar_count;
     session_scalar *scalars;
+
+    bool is_outer_wanted; /* by an image of this step */
+    session_outer outer;
 } session_mesh;
 
 /* All meshes of this rank. */
@@ -118,8 +143,21 @@ void session_remove_mesh(session_meshes *meshes, const char *name);
 void session_drop_scalars(session_mesh *mesh);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_fields(session_mesh *mesh);
+/* Free the mesh of outer faces, and with faces what is known of them as well. */
+void session_drop_outer(session_mesh *mesh, bool with_faces);
 void session_drop_contents(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
+
+/* What may become parts of a picture: the meshes, then the meshes of their outer faces, some NULL. */
+static inline int session_part_slots(const session_meshes *meshes)
+{
+    return 2 * meshes->count;
+}
+
+static inline session_mesh *session_part(const session_meshes *meshes, int slot)
+{
+    return slot < meshes->count ? meshes->items[slot] : meshes->items[slot - meshes->count]->outer.mesh;
+}
 
 /* The first error that a set call left behind, or NULL. */
 const base_error *session_pending_error(const session_meshes *meshes);

@@ -96,7 +96,8 @@ insitu_status session_update_space(session_space *space, session_meshes *meshes,
     space->has_extent = true;
     if (!still_fits(space)) {
         choose_origin(space);
-        for (int i = 0; i < meshes->count; i++) session_drop_tree(meshes->items[i]);
+        for (int i = 0; i < session_part_slots(meshes); i++)
+            if (session_part(meshes, i)) session_drop_tree(session_part(meshes, i));
     }
     meshes->are_cells_changed = false;
     return INSITU_OK;

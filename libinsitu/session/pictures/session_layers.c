@@ -8,17 +8,18 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_distances.h"
+#include "session_outer_mesh.h"
 #include "session_ranges.h"
 #include "session_scalars.h"
 
 static bool is_part(const session_mesh *mesh)
 {
-    return mesh->is_needed && mesh->has_tree && mesh->tree.node_count > 0;
+    return mesh && mesh->is_needed && mesh->has_tree && mesh->tree.node_count > 0;
 }
 
 static int count_surfaces(const scene_image *image)
 {
-    int count = image->isosurface_count;
+    int count = image->isosurface_count + image->surface_count;
     for (int i = 0; i < image->slice_count; i++) count += image->slices[i].plane_count;
     return count;
 }
@@ -26,7 +27,7 @@ static int count_surfaces(const scene_image *image)
 static bool allocate_layers(const session_meshes *meshes, const scene_image *image, session_layers *out)
 {
     const size_t surfaces = (size_t)count_surfaces(image), volumes = (size_t)image->volume_count;
-    for (int i = 0; i < meshes->count; i++) out->part_count += is_part(meshes->items[i]);
+    for (int i = 0; i < session_part_slots(meshes); i++) out->part_count += is_part(session_part(meshes, i));
     const size_t fields = (size_t)out->part_count * (2 * surfaces + volumes);
     out->surface_count = (int)surfaces;
     out->parts = base_calloc((size_t)out->part_count, sizeof *out->parts);
@@ -35,10 +36,12 @@ static bool allocate_layers(const session_meshes *meshes, const scene_image *ima
     out->transfers = base_calloc(surfaces + volumes, sizeof *out->transfers);
     if (out->transfers) out->transfer_count = (int)(surfaces + volumes);
     out->fields = base_calloc(fields, sizeof *out->fields);
+    out->field_count = (int64_t)fields;
+    out->gathered = base_calloc(fields, sizeof *out->gathered);
     out->distances = base_calloc(surfaces, sizeof *out->distances);
     out->ranges = base_calloc(fields, sizeof *out->ranges);
-    return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->distances &&
-           out->ranges;
+    return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->gathered &&
+           out->distances && out->ranges;
 }
 
 void session_layers_free(session_layers *layers)
@@ -49,6 +52,8 @@ void session_layers_free(session_layers *layers)
     base_free(layers->volumes);
     base_free(layers->transfers);
     base_free(layers->fields);
+    for (int64_t i = 0; i < layers->field_count && layers->gathered; i++) base_free(layers->gathered[i]);
+    base_free(layers->gathered);
     base_free(layers->distances);
     base_free(layers->ranges);
     *layers = (session_layers){0};
@@ -57,8 +62,8 @@ void session_layers_free(session_layers *layers)
 static void fill_parts(const session_meshes *meshes, session_layers *layers)
 {
     int part = 0;
-    for (int i = 0; i < meshes->count; i++) {
-        const session_mesh *mesh = meshes->items[i];
+    for (int i = 0; i < session_part_slots(meshes); i++) {
+        const session_mesh *mesh = session_part(meshes, i);
         if (is_part(mesh)) layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree};
     }
 }
@@ -78,8 +83,8 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
     ptrdiff_t at = first;
-    for (int i = 0; i < meshes->count; i++) {
-        const session_mesh *mesh = meshes->items[i];
+    for (int i = 0; i < session_part_slots(meshes); i++) {
+        const session_mesh *mesh = session_part(meshes, i);
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field);
         layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
@@ -96,8 +101,8 @@ static render_field place_distances(const session_meshes *meshes, session_layers
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     const render_field out = {layers->fields + first, layers->ranges + first};
     ptrdiff_t at = first;
-    for (int i = 0; i < meshes->count; i++) {
-        const session_mesh *mesh = meshes->items[i];
+    for (int i = 0; i < session_part_slots(meshes); i++) {
+        const session_mesh *mesh = session_part(meshes, i);
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field) ? session_find_distance(mesh, plane) : NULL;
         layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
@@ -143,6 +148,84 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
     return make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[index], error);
 }
 
+/* ---- outer surfaces ------------------------------------------------------------------------------------------ */
+
+/* NULL: the slot is none of a mesh of outer faces that the layer shows. */
+static const session_mesh *find_whole(const session_meshes *meshes, int slot, const scene_surface *layer)
+{
+    if (slot < meshes->count) return NULL;
+    const session_mesh *whole = meshes->items[slot - meshes->count];
+    return scene_field_is_on(&layer->on, whole->name) ? whole : NULL;
+}
+
+static render_field place_faces(const session_meshes *meshes, session_layers *layers, int slot,
+                                const scene_surface *layer)
+{
+    const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
+    ptrdiff_t at = first;
+    for (int i = 0; i < session_part_slots(meshes); i++) {
+        const session_mesh *mesh = session_part(meshes, i);
+        if (!is_part(mesh)) continue;
+        const bool is_shown = find_whole(meshes, i, layer) != NULL;
+        layers->fields[at] = is_shown ? session_scalar_field(mesh, &mesh->scalars[0]) : absent_field();
+        if (is_shown) layers->ranges[at] = session_scalar_ranges(mesh, &mesh->scalars[0]);
+        at++;
+    }
+    return (render_field){layers->fields + first, layers->ranges + first};
+}
+
+static bool gather(const session_mesh *whole, const session_scalar *scalar, double **values, grid_field *out)
+{
+    const grid_field field = session_scalar_field(whole, scalar);
+    *values = session_gather_outer_values(whole, &field);
+    *out = (grid_field){.values = {(const char *)*values, (int64_t)sizeof **values, true, false},
+                        .component_stride = (int64_t)sizeof **values,
+                        .component_count = 1,
+                        .is_cell_centred = field.is_cell_centred};
+    return *values != NULL;
+}
+
+/* The colours' field at the outer faces, gathered from the cells'. */
+static bool place_gathered(const session_meshes *meshes, session_layers *layers, int slot, const scene_surface *layer,
+                           render_field *out)
+{
+    ptrdiff_t at = (ptrdiff_t)slot * layers->part_count;
+    *out = (render_field){layers->fields + at, layers->ranges + at};
+    for (int i = 0; i < session_part_slots(meshes); i++) {
+        if (!is_part(session_part(meshes, i))) continue;
+        const session_mesh *whole = find_whole(meshes, i, layer);
+        const session_scalar *scalar = whole ? session_find_scalar(whole, &layer->colour_by) : NULL;
+        layers->fields[at] = absent_field();
+        if (scalar && !gather(whole, scalar, &layers->gathered[at], &layers->fields[at])) return false;
+        at++;
+    }
+    return true;
+}
+
+static insitu_status fill_outer(const session_layer_basis *basis, const scene_surface *layer, int surface,
+                                session_layers *layers, base_error *error)
+{
+    const scene_material *m = &layer->material;
+    render_surface_layer *out = &layers->surfaces[surface];
+    *out = (render_surface_layer){.field = place_faces(basis->meshes, layers, 2 * surface, layer),
+                                  .value_count = 1,
+                                  .values = &layers->distances[surface],
+                                  .colours = layer->colour,
+                                  .opacity = layer->opacity,
+                                  .material = {m->ambient, m->diffuse, m->specular, m->shininess},
+                                  .root = RENDER_ROBUST,
+                                  .normal = RENDER_GRADIENT};
+    if (!layer->has_colour_by) return INSITU_OK;
+    out->colour_map = &layers->transfers[surface].transfer;
+    if (!place_gathered(basis->meshes, layers, 2 * surface + 1, layer, &out->colour_field))
+        session_no_memory(error, 1 << 10, "values at outer faces");
+    const insitu_status status = session_agree(basis->team->comm, error);
+    if (status) return status;
+    return make_transfer(basis, &layer->colour_by, &layer->colour_map, NULL, &layers->transfers[surface], error);
+}
+
+/* ---- slices -------------------------------------------------------------------------------------------------- */
+
 static void warn_of_plane(const session_layer_basis *basis, const scene_image *image, int surface, double low,
                           double high)
 {
@@ -182,7 +265,7 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
 static insitu_status fill_slices(const session_layer_basis *basis, const scene_image *image, session_layers *layers,
                                  base_error *error)
 {
-    int surface = image->isosurface_count;
+    int surface = image->isosurface_count + image->surface_count;
     insitu_status status = INSITU_OK;
     for (int i = 0; i < image->slice_count; i++)
         for (int p = 0; p < image->slices[i].plane_count && !status; p++)
@@ -210,6 +293,8 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     if (!status) fill_parts(basis->meshes, &layers);
     for (int i = 0; i < image->isosurface_count && !status; i++)
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
+    for (int i = 0; i < image->surface_count && !status; i++)
+        status = fill_outer(basis, &image->surfaces[i], image->isosurface_count + i, &layers, error);
     if (!status) status = fill_slices(basis, image, &layers, error);
     for (int i = 0; i < image->volume_count && !status; i++) status = fill_volume(basis, image, i, &layers, error);
     if (status)

@@ -14,11 +14,13 @@ typedef struct session_layers {
     int part_count, transfer_count;
     render_part *parts;
     int surface_count;
-    render_surface_layer *surfaces; /* isosurfaces, then planes of slices */
+    render_surface_layer *surfaces; /* isosurfaces, outer surfaces, planes of slices */
     render_volume_layer *volumes;
     session_transfer *transfers; /* of surfaces, then of volumes */
-    double *distances;           /* of surfaces: the isovalues of planes */
+    double *distances;           /* of surfaces: the isovalues of planes; 0 */
     grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
+    int64_t field_count;
+    double **gathered;           /* as the fields: values at outer faces; NULL where they are not such */
     mmbvh_ranges *ranges;        /* as the fields */
     render_active_cells *active; /* the step's (session_draw.h), for the caller to set; NULL: none are stored */
 } session_layers;

@@ -34,6 +34,10 @@ static void list_layers(const scene_image *image, layer_list *list)
         const scene_isosurface *layer = &image->isosurfaces[i];
         if (layer->has_colour_by) add_layer(list, "isosurface", i, &layer->colour_by, &layer->colour_map);
     }
+    for (int i = 0; i < image->surface_count; i++) {
+        const scene_surface *layer = &image->surfaces[i];
+        if (layer->has_colour_by) add_layer(list, "surface", i, &layer->colour_by, &layer->colour_map);
+    }
     for (int i = 0; i < image->slice_count; i++)
         add_layer(list, "slice", i, &image->slices[i].field, &image->slices[i].colour_map);
     for (int i = 0; i < image->volume_count; i++)

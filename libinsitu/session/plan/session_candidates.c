@@ -84,6 +84,14 @@ static bool mark_slice(session_mesh *mesh, const scene_slice *layer, const sessi
     return is_marked;
 }
 
+static bool mark_outer(session_mesh *mesh, const scene_surface *layer)
+{
+    session_scalar *scalar;
+    if (!scene_field_is_on(&layer->on, mesh->name)) return true;
+    mesh->is_outer_wanted = true;
+    return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
+}
+
 static bool mark_image(session_mesh *mesh, const scene_image *image, const session_extent *extent)
 {
     bool is_marked = true;
@@ -91,6 +99,7 @@ static bool mark_image(session_mesh *mesh, const scene_image *image, const sessi
         is_marked = mark_surface(mesh, &image->isosurfaces[i]);
     for (int i = 0; i < image->volume_count && is_marked; i++)
         is_marked = mark_volume(mesh, &image->volumes[i], extent->half_diagonal);
+    for (int i = 0; i < image->surface_count && is_marked; i++) is_marked = mark_outer(mesh, &image->surfaces[i]);
     for (int i = 0; i < image->slice_count && is_marked; i++) is_marked = mark_slice(mesh, &image->slices[i], extent);
     return is_marked;
 }
@@ -100,7 +109,8 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
-        mesh->is_needed = false;
+        mesh->is_needed = mesh->is_outer_wanted = false;
+        if (mesh->outer.mesh) mesh->outer.mesh->is_needed = false;
         for (int i = 0; i < mesh->scalar_count; i++) {
             mesh->scalars[i].is_used = mesh->scalars[i].wants_ranges = false;
             mesh->scalars[i].needs_all = false;

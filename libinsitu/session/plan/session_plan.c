@@ -54,7 +54,7 @@ static insitu_status check_named_mesh(const session_plan_basis *basis, const sce
         const session_catalogue_mesh *mesh = &basis->catalogue->meshes[m];
         if (!scene_name_stands_for(name, mesh->name)) continue;
         is_there = true;
-        is_well = is_well || mesh->first_rank < 0 || session_catalogue_find(mesh, field->name);
+        is_well = is_well || !field->name || mesh->first_rank < 0 || session_catalogue_find(mesh, field->name);
     }
     if (is_well) return INSITU_OK;
     if (is_there) {
@@ -131,6 +131,14 @@ static void warn_of_grey(const session_catalogue *catalogue, const scene_image *
     }
 }
 
+static insitu_status check_surface(const session_plan_basis *basis, const scene_surface *layer, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < layer->on.mesh_count && !status; i++)
+        status = check_named_mesh(basis, &layer->on, layer->on.meshes[i], error);
+    return status || !layer->has_colour_by ? status : check_field(basis, &layer->colour_by, error);
+}
+
 static insitu_status check_image(const session_plan_basis *basis, const scene_image *image, base_error *error)
 {
     int values = 0;
@@ -147,12 +155,14 @@ static insitu_status check_image(const session_plan_basis *basis, const scene_im
         values += image->slices[i].plane_count;
         status = check_layer_field(basis, &image->slices[i].field, error);
     }
+    for (int i = 0; i < image->surface_count && !status; i++) status = check_surface(basis, &image->surfaces[i], error);
+    values += image->surface_count;
     if (!status && (values > RENDER_MAX_ISOVALUES || image->volume_count > RENDER_MAX_VOLUMES))
-        status =
-            base_fail(error, INSITU_ERROR_SCENE,
-                      "%s:%d: image \"%s\" has %d isovalues and planes and %d volumes, at most %d and %d are supported",
-                      basis->scene_path, image->line, image->name, values, image->volume_count, RENDER_MAX_ISOVALUES,
-                      RENDER_MAX_VOLUMES);
+        status = base_fail(error, INSITU_ERROR_SCENE,
+                           "%s:%d: image \"%s\" has %d isovalues, planes and outer surfaces and %d volumes, at most %d "
+                           "and %d are supported",
+                           basis->scene_path, image->line, image->name, values, image->volume_count,
+                           RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES);
     return status;
 }
 
@@ -196,6 +206,9 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
                           add_recentrings(catalogue, plan, &image->isosurfaces[s].colour_by));
         for (int v = 0; v < image->volume_count && is_planned; v++)
             is_planned = add_recentrings(catalogue, plan, &image->volumes[v].field);
+        for (int n = 0; n < image->surface_count && is_planned; n++)
+            is_planned =
+                !image->surfaces[n].has_colour_by || add_recentrings(catalogue, plan, &image->surfaces[n].colour_by);
         for (int n = 0; n < image->slice_count && is_planned; n++)
             is_planned = add_recentrings(catalogue, plan, &image->slices[n].field);
     }
@@ -216,14 +229,35 @@ int session_count_due(const scene *scene, int64_t cycle)
     return count;
 }
 
+static void warn_of_grey_surface(const session_catalogue *catalogue, const scene_image *image,
+                                 const scene_surface *layer, session_report *report)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *mesh = &catalogue->meshes[m];
+        const bool is_grey = mesh->first_rank >= 0 && scene_field_is_on(&layer->on, mesh->name) &&
+                             !session_catalogue_find(mesh, layer->colour_by.name);
+        const session_warning warning = {WARNING_GREY, image->name, mesh->name, layer->colour_by.line};
+        session_warn(report, &warning, is_grey,
+                     "image \"%s\": mesh \"%s\" does not have the field \"%s\": its outer surface is grey", image->name,
+                     mesh->name, layer->colour_by.name);
+    }
+}
+
+static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_image *image, session_report *report)
+{
+    for (int i = 0; i < image->isosurface_count; i++)
+        if (image->isosurfaces[i].has_colour_by) warn_of_grey(catalogue, image, &image->isosurfaces[i], report);
+    for (int i = 0; i < image->surface_count; i++)
+        if (image->surfaces[i].has_colour_by) warn_of_grey_surface(catalogue, image, &image->surfaces[i], report);
+}
+
 /* Without cells anywhere no field can be asked of anyone: the picture is its background. */
 static bool can_be_drawn(const session_plan_basis *basis, const scene_image *image, session_report *report,
                          base_error *refusal)
 {
     if (basis->extent->cell_count == 0) return true;
     if (check_image(basis, image, refusal) != INSITU_OK) return false;
-    for (int i = 0; i < image->isosurface_count; i++)
-        if (image->isosurfaces[i].has_colour_by) warn_of_grey(basis->catalogue, image, &image->isosurfaces[i], report);
+    warn_of_grey_layers(basis->catalogue, image, report);
     return true;
 }
 
@@ -241,6 +275,7 @@ static void take_images(const session_plan_basis *basis, session_report *report,
         if (!is_due(image, basis->cycle) || !can_be_drawn(basis, image, report, &plan->refusal)) continue;
         plan->images[plan->image_count++] = image;
         plan->slice_count += image->slice_count;
+        plan->surface_count += image->surface_count;
     }
 }
 

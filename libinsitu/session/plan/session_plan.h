@@ -18,7 +18,7 @@ typedef struct session_recentring {
 typedef struct session_plan {
     int image_count; /* that can be drawn */
     const scene_image **images;
-    int slice_count; /* of all of them */
+    int slice_count, surface_count; /* of all of them */
     int recentring_count;
     session_recentring *recentrings;
     int64_t cell_count; /* drawn ones of all ranks */

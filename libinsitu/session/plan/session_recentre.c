@@ -19,6 +19,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_exchange.h"
+#include "session_neighbours.h"
 #include "session_scalars.h"
 
 /* Values by group: those of group g are values[starts[g]] .. values[starts[g + 1] - 1]. */
@@ -93,25 +94,6 @@ static void groups_average(value_groups *groups, int threads)
 
 /* ---- this rank's part ---------------------------------------------------------------------------------------- */
 
-static session_key vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
-{
-    session_key key = {{0}};
-    if (by_id) {
-        const insitu_array *ids = &mesh->given.vertex_ids;
-        const int64_t size = session_type_size(ids->type);
-        const grid_array a = {ids->data, ids->stride_bytes ? ids->stride_bytes : size, size == 8, true};
-        key.words[0] = (uint64_t)grid_array_index(&a, vertex);
-        return key;
-    }
-    double position[3];
-    grid_vertex(&mesh->cells, vertex, position);
-    for (int axis = 0; axis < 3; axis++) {
-        const double unsigned_zero = position[axis] + 0.0;
-        memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
-    }
-    return key;
-}
-
 static void group_vertices(const session_mesh *mesh, bool by_id, vertex_groups *groups)
 {
     const grid *g = &mesh->cells;
@@ -122,7 +104,7 @@ static void group_vertices(const session_mesh *mesh, bool by_id, vertex_groups *
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
             if (groups->of_vertex[vertex] >= 0) continue;
-            const session_key key = vertex_key(mesh, vertex, by_id);
+            const session_key key = session_vertex_key(mesh, vertex, by_id);
             const int64_t group = session_keys_add(&groups->keys, &key);
             groups->of_vertex[vertex] = group;
             groups->vertex[group] = vertex;
@@ -199,44 +181,6 @@ static insitu_status make_groups(const session_mesh *mesh, const grid_field *fie
 
 /* ---- what ranks share ---------------------------------------------------------------------------------------- */
 
-typedef struct rank_box {
-    double lower[3], upper[3];
-} rank_box;
-
-static bool do_boxes_meet(const rank_box *a, const rank_box *b)
-{
-    for (int axis = 0; axis < 3; axis++)
-        if (!(a->lower[axis] <= b->upper[axis] && b->lower[axis] <= a->upper[axis])) return false;
-    return true;
-}
-
-/* The other ranks' boxes that meet this one's: to the front of boxes; returns how many. Collective. */
-static insitu_status gather_boxes(const session_team *team, const session_mesh *mesh, double margin, rank_box *boxes,
-                                  int *count, base_error *error)
-{
-    rank_box mine = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (int axis = 0; axis < 3 && mesh && mesh->drawn_count; axis++) {
-        mine.lower[axis] = mesh->lower[axis] - margin;
-        mine.upper[axis] = mesh->upper[axis] + margin;
-    }
-    const insitu_status status =
-        session_mpi(error, MPI_Allgather(&mine, 6, MPI_DOUBLE, boxes, 6, MPI_DOUBLE, team->comm), "MPI_Allgather");
-    *count = 0;
-    for (int rank = 0; rank < team->ranks && !status; rank++)
-        if (rank != team->rank && do_boxes_meet(&boxes[rank], &mine)) boxes[(*count)++] = boxes[rank];
-    return status;
-}
-
-static bool is_shared(const session_mesh *mesh, int64_t vertex, const rank_box *boxes, int count)
-{
-    rank_box point;
-    grid_vertex(&mesh->cells, vertex, point.lower);
-    memcpy(point.upper, point.lower, sizeof point.upper);
-    for (int i = 0; i < count; i++)
-        if (do_boxes_meet(&boxes[i], &point)) return true;
-    return false;
-}
-
 enum { RECORD_HEAD = 4 }; /* words before the values: the key and the count */
 
 typedef struct shared_groups {
@@ -301,13 +245,13 @@ fail:
     return false;
 }
 
-static bool find_shared(const session_mesh *mesh, const vertex_groups *groups, const rank_box *boxes, int box_count,
+static bool find_shared(const session_mesh *mesh, const vertex_groups *groups, const session_box *boxes, int box_count,
                         shared_groups *out)
 {
     out->groups = base_alloc((size_t)groups->keys.count * sizeof *out->groups);
     if (!out->groups) return false;
     for (int64_t group = 0; group < groups->keys.count; group++)
-        if (is_shared(mesh, groups->vertex[group], boxes, box_count)) out->groups[out->count++] = group;
+        if (session_is_in_boxes(mesh, groups->vertex[group], boxes, box_count)) out->groups[out->count++] = group;
     return true;
 }
 
@@ -386,10 +330,10 @@ static insitu_status merge_shared(const session_team *team, const session_mesh *
 {
     shared_groups shared = {0};
     int box_count = 0;
-    rank_box *boxes = base_alloc((size_t)team->ranks * sizeof *boxes);
+    session_box *boxes = base_alloc((size_t)team->ranks * sizeof *boxes);
     if (!boxes) session_no_memory(error, team->ranks * (int64_t)sizeof *boxes, "boxes of ranks");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = gather_boxes(team, mesh, margin, boxes, &box_count, error);
+    if (!status) status = session_gather_boxes(team, mesh, margin, boxes, &box_count, error);
     if (!status) {
         if (!find_shared(mesh, groups, boxes, box_count, &shared) || !pack_records(groups, team->ranks, &shared))
             session_no_memory(error, groups->keys.count * 40, "values at vertices that ranks share");

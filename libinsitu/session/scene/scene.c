@@ -260,6 +260,11 @@ static void free_image(scene_image *image)
         base_free(image->volumes[i].opacity);
         free_colour_map(&image->volumes[i].colour_map);
     }
+    for (int i = 0; i < image->surface_count; i++) {
+        free_field(&image->surfaces[i].on);
+        free_field(&image->surfaces[i].colour_by);
+        free_colour_map(&image->surfaces[i].colour_map);
+    }
     for (int i = 0; i < image->slice_count; i++) {
         free_field(&image->slices[i].field);
         base_free(image->slices[i].planes);
@@ -270,6 +275,7 @@ static void free_image(scene_image *image)
     base_free(image->isosurfaces);
     base_free(image->volumes);
     base_free(image->slices);
+    base_free(image->surfaces);
     base_free(image->lights);
     base_free(image->outputs);
 }

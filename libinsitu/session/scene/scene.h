@@ -115,6 +115,16 @@ typedef struct scene_volume {
     double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */
 } scene_volume;
 
+typedef struct scene_surface {
+    scene_field on;  /* the meshes; no field: name is NULL */
+    float colour[3]; /* linear */
+    bool has_colour_by;
+    scene_field colour_by;
+    scene_colour_map colour_map;
+    float opacity;
+    scene_material material;
+} scene_surface;
+
 typedef struct scene_plane {
     double normal[3]; /* of length 1 */
     bool has_point;   /* else it goes by the middle of the data's bounds */
@@ -163,6 +173,8 @@ typedef struct scene_image {
     scene_isosurface *isosurfaces;
     int volume_count; /* at most 4 */
     scene_volume *volumes;
+    int surface_count;
+    scene_surface *surfaces;
     int slice_count;
     scene_slice *slices;
     int light_count; /* 1 .. 8; a default head light and fill light where none is given */

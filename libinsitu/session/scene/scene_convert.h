@@ -37,14 +37,23 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
 insitu_status scene_read_colour_file(const scene_attachment *file, const char *file_name, const char *name,
                                      scene_colour_points *out, base_error *error);
 
+/* The meshes that a layer names. layer: its path. */
+insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out);
+
 /* A field as a layer shows it. layer: the path of the layer, which says on what meshes; path: that of the mapping which
  * names the field. */
 insitu_status scene_convert_field(const scene_document *d, const char *layer, const char *path, const char *name,
                                   const char *component, scene_field *out);
 
+/* The field that colours a layer, whose path is given. */
+insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
+                                      scene_field *out, scene_colour_map *map);
+
 /* NULL: a slight gloss. */
 scene_material scene_convert_material(const scene_file_material *in);
 
+insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in,
+                                    scene_surface *out);
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,
                                   scene_slice *out);
 

@@ -1,4 +1,5 @@
-/* The parts of an image that say what is drawn: its layers. Slices are in scene_slice.c. */
+/* The parts of an image that say what is drawn: its layers. Slices and outer surfaces are in scene_slice.c
+ * and scene_surface.c. */
 #include "scene_convert.h"
 
 #include <stdio.h>
@@ -42,8 +43,7 @@ static insitu_status convert_component(const scene_document *d, const char *path
     return INSITU_OK;
 }
 
-/* layer: the path of the layer, which says on what meshes. */
-static insitu_status convert_meshes(const scene_document *d, const char *layer, scene_field *out)
+insitu_status scene_convert_meshes(const scene_document *d, const char *layer, scene_field *out)
 {
     char path[SCENE_PATH_SIZE + 8];
     const char *names[SCENE_MAX_NAMES];
@@ -68,7 +68,7 @@ insitu_status scene_convert_field(const scene_document *d, const char *layer, co
     out->line = scene_document_line(d, field_path);
     out->name = base_strdup(name);
     if (!out->name) return scene_no_memory(d);
-    const insitu_status status = convert_meshes(d, layer, out);
+    const insitu_status status = scene_convert_meshes(d, layer, out);
     return status ? status : convert_component(d, path, component, &out->component);
 }
 
@@ -113,18 +113,14 @@ static insitu_status convert_colours(const scene_document *d, const char *path, 
     return INSITU_OK;
 }
 
-static insitu_status convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
-                                       scene_isosurface *out)
+insitu_status scene_convert_colour_by(const scene_document *d, const char *path, const scene_file_colour_by *in,
+                                      scene_field *out, scene_colour_map *map)
 {
-    if (!in) return INSITU_OK;
     char colour_by_path[SCENE_PATH_SIZE];
     snprintf(colour_by_path, sizeof colour_by_path, "%s.colour_by", path);
-    out->has_colour_by = true;
-    out->colour_by.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
-    insitu_status status = scene_convert_colour_map(d, colour_by_path, &in->colours, &out->colour_map);
-    if (status == INSITU_OK)
-        status = scene_convert_field(d, path, colour_by_path, in->field, in->component, &out->colour_by);
-    return status;
+    out->at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
+    const insitu_status status = scene_convert_colour_map(d, colour_by_path, &in->colours, map);
+    return status ? status : scene_convert_field(d, path, colour_by_path, in->field, in->component, out);
 }
 
 static float given_or(const double *given, float otherwise)
@@ -155,7 +151,9 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
     insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = convert_values(d, path, in, out);
     if (status == INSITU_OK) status = convert_colours(d, path, in, first_value, out);
-    if (status == INSITU_OK) status = convert_colour_by(d, path, in->colour_by, out);
+    out->has_colour_by = in->colour_by != NULL;
+    if (status == INSITU_OK && in->colour_by)
+        status = scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);
     return status;
 }
 
@@ -199,25 +197,26 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
 }
 
 typedef struct layer_counts {
-    int isosurfaces, volumes, slices;
-    int values; /* isovalues and planes */
+    int isosurfaces, volumes, slices, surfaces;
+    int values; /* isovalues, planes and outer surfaces */
 } layer_counts;
 
 static insitu_status count_layer(const scene_document *d, const char *path, const char *key,
                                  const scene_file_layer *layer, layer_counts *counts)
 {
-    const int kinds = !!layer->isosurface + !!layer->volume + !!layer->slice;
+    const int kinds = !!layer->isosurface + !!layer->volume + !!layer->slice + !!layer->surface;
     if (kinds != 1)
-        return scene_bad(d, path, key, "holds %s, expected one of isosurface, volume and slice",
+        return scene_bad(d, path, key, "holds %s, expected one of isosurface, volume, slice and surface",
                          kinds ? "more than one layer" : "nothing");
     counts->isosurfaces += layer->isosurface != NULL;
     counts->volumes += layer->volume != NULL;
     counts->slices += layer->slice != NULL;
+    counts->surfaces += layer->surface != NULL;
     counts->values += layer->isosurface ? layer->isosurface->values_count : 0;
-    counts->values += layer->slice ? layer->slice->planes_count : 0;
+    counts->values += layer->slice ? layer->slice->planes_count : layer->surface != NULL;
     if (counts->values > max_isovalues)
         return scene_bad(d, path, key, "%d isovalues%s up to here, expected at most %d in an image", counts->values,
-                         counts->slices ? " and planes" : "", max_isovalues);
+                         counts->slices || counts->surfaces ? ", planes and outer surfaces" : "", max_isovalues);
     if (counts->volumes > max_volumes)
         return scene_bad(d, path, key, "%d volumes up to here, expected at most %d in an image", counts->volumes,
                          max_volumes);
@@ -240,7 +239,7 @@ static insitu_status count_layers(const scene_document *d, const char *path, con
 
 static const char *layer_word(const scene_file_layer *layer)
 {
-    return layer->volume ? "volume" : layer->slice ? "slice" : "isosurface";
+    return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
 
 /* values: isovalues of the layers before it. */
@@ -249,6 +248,7 @@ static insitu_status convert_layer(const scene_document *d, const char *path, co
 {
     if (in->volume) return convert_volume(d, path, in->volume, &out->volumes[out->volume_count++]);
     if (in->slice) return scene_convert_slice(d, path, in->slice, &out->slices[out->slice_count++]);
+    if (in->surface) return scene_convert_surface(d, path, in->surface, &out->surfaces[out->surface_count++]);
     return convert_isosurface(d, path, in->isosurface, values, &out->isosurfaces[out->isosurface_count++]);
 }
 
@@ -262,7 +262,8 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
     out->isosurfaces = base_calloc((size_t)counts.isosurfaces, sizeof *out->isosurfaces);
     out->volumes = base_calloc((size_t)counts.volumes, sizeof *out->volumes);
     out->slices = base_calloc((size_t)counts.slices, sizeof *out->slices);
-    if (!out->isosurfaces || !out->volumes || !out->slices) return scene_no_memory(d);
+    out->surfaces = base_calloc((size_t)counts.surfaces, sizeof *out->surfaces);
+    if (!out->isosurfaces || !out->volumes || !out->slices || !out->surfaces) return scene_no_memory(d);
     for (int i = 0; i < in->layers_count && status == INSITU_OK; i++) {
         const scene_file_layer *layer = &in->layers[i];
         char layer_path[SCENE_PATH_SIZE - 16]; /* what comes below a layer is added */

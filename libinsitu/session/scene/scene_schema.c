@@ -286,13 +286,35 @@ static const cyaml_schema_value_t plane = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .by_default = "no light: the colours are those of the map", .child = &material_mapping)
 DEFINE_MAPPING(slice, "slice", SLICE_KEYS);
 
+#define SURFACE_KEYS(X)                                                                                                \
+    X(NAMES("mesh"), .help = "The mesh whose outer surface is drawn, or a list of meshes, as at an isosurface.",       \
+      .by_default = "all meshes")                                                                                      \
+    X(NUMBERS("colour", scene_file_surface, colour, 3), .help = "Colour, sRGB. Not with `colour_by`.",                 \
+      .by_default = "`[0.8, 0.8, 0.8]`", .low = 0, .high = 1)                                                          \
+    X(CYAML_FIELD_MAPPING_PTR("colour_by", OPTIONAL, scene_file_surface, colour_by, colour_by_fields),                 \
+      .help = "Colour the surface by a field. It is grey, with a warning, on meshes of the layer that do not have "    \
+              "it, and where it is not a number.",                                                                     \
+      .by_default = "by `colour`", .child = &colour_by_mapping)                                                        \
+    X(CYAML_FIELD_FLOAT_PTR("opacity", OPTIONAL, scene_file_surface, opacity),                                         \
+      .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
+    X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_surface, material, material_fields),                    \
+      .help = "How the surface takes light; `{ambient: 1, diffuse: 0, specular: 0}` shows the colours of the map.",    \
+      .by_default = "a slight gloss", .child = &material_mapping)
+DEFINE_MAPPING(surface, "surface", SURFACE_KEYS);
+
 #define LAYER_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_MAPPING_PTR("isosurface", OPTIONAL, scene_file_layer, isosurface, isosurface_fields),                \
       .help = "Surfaces on which a field has given values.", .by_default = "none", .child = &isosurface_mapping)       \
     X(CYAML_FIELD_MAPPING_PTR("volume", OPTIONAL, scene_file_layer, volume, volume_fields),                            \
       .help = "A field as coloured mist. At most 4 in an image.", .by_default = "none", .child = &volume_mapping)      \
     X(CYAML_FIELD_MAPPING_PTR("slice", OPTIONAL, scene_file_layer, slice, slice_fields),                               \
-      .help = "Planes through the cells, coloured by a field.", .by_default = "none", .child = &slice_mapping)
+      .help = "Planes through the cells, coloured by a field.", .by_default = "none", .child = &slice_mapping)         \
+    X(CYAML_FIELD_MAPPING_PTR("surface", OPTIONAL, scene_file_layer, surface, surface_fields),                         \
+      .help = "The outer surface of meshes: the faces that one cell alone has, of the cells of all ranks but ghosts. " \
+              "Faces are one where their vertices are, by global ids or else by equal coordinates; a face that meets " \
+              "smaller ones, at hanging nodes, is drawn, and so are these. They are found once for a mesh, and "       \
+              "some 250 bytes a face are held. Each counts as one isovalue.",                                          \
+      .by_default = "none", .child = &surface_mapping)
 DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
 
 #define SAMPLING_KEYS(X)                                                                                               \
@@ -340,7 +362,7 @@ DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
       .help = "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "       \
               "folders are made. `{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, "         \
               "`{name}` the image's name. At most 1023 bytes. The channel Z of an EXR is the depth of the nearest "    \
-              "isosurface or slice in the pixel: how far from the eye it is along the camera's axis, in scene units "  \
+              "surface in the pixel: how far from the eye it is along the camera's axis, in scene units "              \
               "(not along "                                                                                            \
               "the pixel's ray). Surfaces of any opacity count, 0 as well, and no volume hides them; it is infinite "  \
               "where there is none: volumes and the background have no depth.")                                        \

@@ -70,6 +70,13 @@ typedef struct scene_file_volume {
     double *unit_distance;
 } scene_file_volume;
 
+typedef struct scene_file_surface {
+    double *colour; /* 3 */
+    scene_file_colour_by *colour_by;
+    double *opacity;
+    scene_file_material *material;
+} scene_file_surface;
+
 typedef struct scene_file_plane {
     double *normal, *point; /* 3 */
     double *offset;
@@ -89,6 +96,7 @@ typedef struct scene_file_layer {
     scene_file_isosurface *isosurface;
     scene_file_volume *volume;
     scene_file_slice *slice;
+    scene_file_surface *surface;
 } scene_file_layer;
 
 typedef struct scene_file_sampling {

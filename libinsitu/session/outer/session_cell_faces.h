@@ -1,0 +1,84 @@
+/* The faces of a cell of any type, one after the other. */
+#ifndef SESSION_CELL_FACES_H
+#define SESSION_CELL_FACES_H
+
+#include "grid.h"
+
+/* Quads and triangles of the types of a fixed number of vertices, in VTK's order; -1: there is no fourth vertex. */
+typedef struct session_face_table {
+    int count;
+    signed char vertices[6][4];
+} session_face_table;
+
+static inline const session_face_table *session_faces_of_type(int type)
+{
+    static const session_face_table tet = {4, {{0, 1, 3, -1}, {1, 2, 3, -1}, {2, 0, 3, -1}, {0, 2, 1, -1}}};
+    static const session_face_table hex = {
+        6, {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}}};
+    static const session_face_table wedge = {5,
+                                             {{0, 1, 2, -1}, {3, 5, 4, -1}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}}};
+    static const session_face_table pyramid = {
+        5, {{0, 3, 2, 1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}}};
+    static const session_face_table none = {0};
+    switch (type) {
+    case GRID_TET: return &tet;
+    case GRID_HEX: return &hex;
+    case GRID_WEDGE: return &wedge;
+    case GRID_PYRAMID: return &pyramid;
+    default: return &none;
+    }
+}
+
+typedef struct session_cell_faces {
+    const grid *cells;
+    const session_face_table *table; /* of other cells than polyhedra */
+    int64_t count;
+    int64_t vertices[GRID_MAX_CELL_VERTICES];
+    int64_t first; /* of a polyhedron: the first of its entries of connectivity */
+} session_cell_faces;
+
+static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t cell)
+{
+    session_cell_faces out = {.cells = g};
+    const int type = grid_cell_type(g, cell);
+    if (type == GRID_POLYHEDRON) {
+        int64_t end;
+        grid_cell_faces(g, cell, &out.first, &end);
+        out.count = end - out.first;
+        return out;
+    }
+    out.table = session_faces_of_type(type);
+    out.count = out.table->count;
+    grid_cell_vertices(g, cell, out.vertices);
+    return out;
+}
+
+/* The vertices around a face: session_face_vertex() of 0 .. size - 1. */
+typedef struct session_face_loop {
+    const session_cell_faces *faces;
+    const signed char *places; /* NULL: of a polyhedron */
+    int64_t first, size;
+} session_face_loop;
+
+static inline session_face_loop session_face_of(const session_cell_faces *faces, int64_t face)
+{
+    session_face_loop out = {.faces = faces};
+    if (faces->table) {
+        out.places = faces->table->vertices[face];
+        out.size = out.places[3] < 0 ? 3 : 4;
+        return out;
+    }
+    int64_t end;
+    grid_face_vertices(faces->cells, grid_array_index(&faces->cells->connectivity, faces->first + face), &out.first,
+                       &end);
+    out.size = end - out.first;
+    return out;
+}
+
+static inline int64_t session_face_vertex(const session_face_loop *loop, int64_t i)
+{
+    if (loop->places) return loop->faces->vertices[(int)loop->places[i]];
+    return grid_array_index(&loop->faces->cells->face_connectivity, loop->first + i);
+}
+
+#endif

@@ -1,0 +1,286 @@
+#include "session_outer_mesh.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_cell_faces.h"
+#include "session_scalars.h"
+
+/* ---- one face ------------------------------------------------------------------------------------------------ */
+
+/* Three or four corners in an order that depends on their places alone: from the least, towards the lesser of its
+ * neighbours. */
+typedef struct corner_loop {
+    int count;
+    int64_t vertices[4];
+    double places[4][3];
+} corner_loop;
+
+static int compare_places(const double a[3], const double b[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (a[axis] != b[axis]) return a[axis] < b[axis] ? -1 : 1;
+    return 0;
+}
+
+static void add_corner(corner_loop *loop, const grid *g, int64_t vertex)
+{
+    double place[3];
+    grid_vertex(g, vertex, place);
+    for (int i = 0; i < loop->count; i++)
+        if (compare_places(loop->places[i], place) == 0) return;
+    memcpy(loop->places[loop->count], place, sizeof place);
+    loop->vertices[loop->count++] = vertex;
+}
+
+static void order_corners(corner_loop *loop)
+{
+    const corner_loop in = *loop;
+    const int count = in.count;
+    int least = 0;
+    for (int i = 1; i < count; i++)
+        if (compare_places(in.places[i], in.places[least]) < 0) least = i;
+    const bool is_turned = compare_places(in.places[(least + count - 1) % count], in.places[(least + 1) % count]) < 0;
+    for (int i = 0; i < count; i++) {
+        const int from = (least + (is_turned ? count - i : i)) % count;
+        loop->vertices[i] = in.vertices[from];
+        memcpy(loop->places[i], in.places[from], sizeof in.places[from]);
+    }
+}
+
+static void subtract(const double a[3], const double b[3], double out[3])
+{
+    for (int axis = 0; axis < 3; axis++) out[axis] = a[axis] - b[axis];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Twice the area, and of which way. */
+static void find_normal(const corner_loop *loop, double out[3])
+{
+    double a[3], b[3];
+    subtract(loop->places[loop->count == 4 ? 2 : 1], loop->places[0], a);
+    subtract(loop->places[loop->count - 1], loop->places[loop->count == 4 ? 1 : 0], b);
+    for (int axis = 0; axis < 3; axis++) {
+        const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+        out[axis] = a[next] * b[last] - a[last] * b[next];
+    }
+}
+
+static double perimeter(const corner_loop *loop)
+{
+    double sum = 0, side[3];
+    for (int i = 0; i < loop->count; i++) {
+        subtract(loop->places[(i + 1) % loop->count], loop->places[i], side);
+        sum += sqrt(dot(side, side));
+    }
+    return sum;
+}
+
+/* Over the middle of the corners, half a mean side away, on the side of inside. False where the face has no area but
+ * what rounding leaves. */
+static bool find_apex(const corner_loop *loop, const double inside[3], double apex[3])
+{
+    double normal[3], towards[3], middle[3] = {0, 0, 0};
+    find_normal(loop, normal);
+    const double length = sqrt(dot(normal, normal)), around = perimeter(loop);
+    if (!(length > 1e-12 * around * around)) return false;
+    for (int i = 0; i < loop->count; i++)
+        for (int axis = 0; axis < 3; axis++) middle[axis] += loop->places[i][axis] / loop->count;
+    subtract(inside, middle, towards);
+    const double height = 0.5 * around / loop->count * (dot(towards, normal) < 0 ? -1 : 1);
+    for (int axis = 0; axis < 3; axis++) apex[axis] = middle[axis] + height * normal[axis] / length;
+    return true;
+}
+
+static void find_inside(const grid *g, int64_t cell, double out[3])
+{
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t vertex, count = 0;
+    double sum[3] = {0, 0, 0}, place[3];
+    while (grid_walk_next(&walk, &vertex)) {
+        grid_vertex(g, vertex, place);
+        for (int axis = 0; axis < 3; axis++) sum[axis] += place[axis];
+        count++;
+    }
+    for (int axis = 0; axis < 3; axis++) out[axis] = sum[axis] / (double)(count ? count : 1);
+}
+
+/* ---- the mesh ------------------------------------------------------------------------------------------------ */
+
+/* The mesh while it is made, in arrays of the most that the faces can take. */
+typedef struct outer_work {
+    const grid *cells;
+    session_outer *out;
+    int64_t *places; /* of the whole mesh's vertices among the new ones; -1: not yet there */
+    float *heights;
+    int64_t vertex_count, cell_count, entry_count, pyramid_count;
+} outer_work;
+
+static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
+{
+    memcpy(w->out->coordinates + 3 * w->vertex_count, place, 3 * sizeof *place);
+    w->out->vertex_origins[w->vertex_count] = origin;
+    w->heights[w->vertex_count] = height;
+    return w->vertex_count++;
+}
+
+/* A tet or a pyramid on a triangle or quad. */
+static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
+{
+    double apex[3];
+    if (loop->count < 3) return;
+    order_corners(loop);
+    if (!find_apex(loop, inside, apex)) return;
+    w->out->offsets[w->cell_count] = w->entry_count;
+    w->out->types[w->cell_count] = loop->count == 3 ? GRID_TET : GRID_PYRAMID;
+    w->pyramid_count += loop->count == 4;
+    w->out->cell_origins[w->cell_count++] = origin;
+    for (int i = 0; i < loop->count; i++) {
+        int64_t *place = &w->places[loop->vertices[i]];
+        if (*place < 0) *place = add_vertex(w, loop->places[i], loop->vertices[i], 0);
+        w->out->connectivity[w->entry_count++] = *place;
+    }
+    w->out->connectivity[w->entry_count++] = add_vertex(w, apex, loop->vertices[0], -1);
+}
+
+static void add_fan(outer_work *w, const session_face_loop *face, const double inside[3], int64_t origin)
+{
+    int64_t least = 0;
+    double least_place[3], place[3];
+    grid_vertex(w->cells, session_face_vertex(face, 0), least_place);
+    for (int64_t i = 1; i < face->size; i++) {
+        grid_vertex(w->cells, session_face_vertex(face, i), place);
+        if (compare_places(place, least_place) >= 0) continue;
+        memcpy(least_place, place, sizeof place);
+        least = i;
+    }
+    for (int64_t i = 1; i + 1 < face->size; i++) {
+        corner_loop loop = {0};
+        add_corner(&loop, w->cells, session_face_vertex(face, least));
+        add_corner(&loop, w->cells, session_face_vertex(face, (least + i) % face->size));
+        add_corner(&loop, w->cells, session_face_vertex(face, (least + i + 1) % face->size));
+        add_cell(w, &loop, inside, origin);
+    }
+}
+
+static void add_face(outer_work *w, const session_face *face)
+{
+    const session_cell_faces faces = session_faces_of_cell(w->cells, face->cell);
+    const session_face_loop of = session_face_of(&faces, face->face);
+    double inside[3];
+    find_inside(w->cells, face->cell, inside);
+    if (of.size > 4) {
+        add_fan(w, &of, inside, face->cell);
+        return;
+    }
+    corner_loop loop = {0};
+    for (int64_t i = 0; i < of.size; i++) add_corner(&loop, w->cells, session_face_vertex(&of, i));
+    add_cell(w, &loop, inside, face->cell);
+}
+
+/* The most cells and entries of connectivity. */
+static void count_most(const session_mesh *mesh, int64_t *cells, int64_t *entries)
+{
+    *cells = *entries = 0;
+    for (int64_t i = 0; i < mesh->outer.face_count; i++) {
+        const session_face *face = &mesh->outer.faces[i];
+        const session_cell_faces faces = session_faces_of_cell(&mesh->cells, face->cell);
+        const int64_t size = session_face_of(&faces, face->face).size;
+        *cells += size > 4 ? size - 2 : 1;
+        *entries += size > 4 ? 4 * (size - 2) : size + 1;
+    }
+}
+
+static bool work_create(session_mesh *mesh, outer_work *w)
+{
+    session_outer *out = &mesh->outer;
+    const grid *g = &mesh->cells;
+    int64_t cells, entries;
+    count_most(mesh, &cells, &entries);
+    *w = (outer_work){.cells = g, .out = out};
+    out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
+    out->bytes += out->face_count * (int64_t)sizeof *out->faces;
+    out->mesh = base_calloc(1, sizeof *out->mesh);
+    out->coordinates = base_alloc((size_t)entries * 3 * sizeof *out->coordinates);
+    out->connectivity = base_alloc((size_t)entries * sizeof *out->connectivity);
+    out->vertex_origins = base_alloc((size_t)entries * sizeof *out->vertex_origins);
+    out->offsets = base_alloc(((size_t)cells + 1) * sizeof *out->offsets);
+    out->types = base_alloc((size_t)cells);
+    out->cell_origins = base_alloc((size_t)cells * sizeof *out->cell_origins);
+    w->heights = base_alloc((size_t)entries * sizeof *w->heights);
+    w->places = base_alloc((size_t)g->vertex_count * sizeof *w->places);
+    return out->mesh && out->coordinates && out->connectivity && out->vertex_origins && out->offsets && out->types &&
+           out->cell_origins && w->heights && w->places;
+}
+
+/* Of one type no types nor offsets are told, so that kernels for many cells at once take them. */
+static grid describe(const outer_work *w)
+{
+    const session_outer *out = w->out;
+    const int64_t size = (int64_t)sizeof(double);
+    grid g = {.vertex_count = w->vertex_count,
+              .cell_count = w->cell_count,
+              .connectivity = {(const char *)out->connectivity, size, true, true},
+              .cell_type = w->pyramid_count ? GRID_PYRAMID : GRID_TET};
+    for (int axis = 0; axis < 3; axis++)
+        g.coordinates[axis] = (grid_array){(const char *)(out->coordinates + axis), 3 * size, true, false};
+    if (w->pyramid_count == 0 || w->pyramid_count == w->cell_count) return g;
+    g.offsets = (grid_array){(const char *)out->offsets, size, true, true};
+    g.cell_types = (const char *)out->types;
+    g.cell_types_stride = g.cell_types_bytes = 1;
+    return g;
+}
+
+/* The scalar takes the heights. */
+static bool finish(const session_mesh *mesh, outer_work *w)
+{
+    session_mesh *out = mesh->outer.mesh;
+    out->name = mesh->name;
+    out->is_given = true;
+    out->is_topology_stale = true;
+    out->cells = describe(w);
+    out->given.vertex_count = w->vertex_count;
+    out->given.cell_count = out->drawn_count = w->cell_count;
+    session_scalar *scalar = session_add_scalar(out);
+    if (!scalar) return false;
+    scalar->field = -1;
+    scalar->are_values_stale = scalar->is_suspect = false;
+    scalar->distances = w->heights;
+    w->heights = NULL;
+    return true;
+}
+
+insitu_status session_make_outer_mesh(session_mesh *mesh, base_error *error)
+{
+    outer_work work;
+    if (mesh->outer.mesh) return INSITU_OK;
+    bool is_made = work_create(mesh, &work);
+    if (is_made) {
+        for (int64_t v = 0; v < mesh->cells.vertex_count; v++) work.places[v] = -1;
+        for (int64_t i = 0; i < mesh->outer.face_count; i++) add_face(&work, &mesh->outer.faces[i]);
+        mesh->outer.offsets[work.cell_count] = work.entry_count;
+        is_made = finish(mesh, &work);
+    }
+    base_free(work.places);
+    base_free(work.heights);
+    if (is_made) return INSITU_OK;
+    session_drop_outer(mesh, false);
+    return session_no_memory(error, mesh->outer.face_count * 250, "the mesh of outer faces");
+}
+
+double *session_gather_outer_values(const session_mesh *mesh, const grid_field *field)
+{
+    const session_outer *outer = &mesh->outer;
+    const grid *g = &outer->mesh->cells;
+    const int64_t *origins = field->is_cell_centred ? outer->cell_origins : outer->vertex_origins;
+    const int64_t count = field->is_cell_centred ? g->cell_count : g->vertex_count;
+    double *out = base_alloc((size_t)count * sizeof *out);
+    for (int64_t i = 0; i < count && out; i++) out[i] = grid_field_value(field, origins[i]);
+    return out;
+}

@@ -1,0 +1,14 @@
+/* The outer faces of meshes whose surface an image shows. */
+#ifndef SESSION_SURFACES_H
+#define SESSION_SURFACES_H
+
+#include "session_plan.h"
+#include "session_team.h"
+
+/* Find the faces, once for the cells of a mesh, and make this rank's meshes of them, ready for their trees. Collective.
+ */
+insitu_status session_update_surfaces(const session_plan *plan, const session_catalogue *catalogue,
+                                      const session_meshes *meshes, const session_team *team, double half_diagonal,
+                                      base_error *error);
+
+#endif

@@ -1,0 +1,464 @@
+/* Outer surfaces of a session: the faces that one cell alone has, none missing and none inside, counted by their area;
+ * their pictures by closed form, for any dealing the same to the bit as on one rank; warped faces as the bilinear
+ * patches that they are. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render.h"
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
+
+#define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
+#define IMAGE(layers)                                                                                                  \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE "    layers:\n" layers              \
+    "    outputs: [{path: a.exr}]\n"
+#define PLAIN "material: {ambient: 1, diffuse: 0, specular: 0}"
+#define COLOURED(keys) "      - surface: {colour_by: {field: f, map: grey, range: [-2, 2]}, " PLAIN keys "}\n"
+
+typedef struct ray {
+    double base[3], direction[3];
+} ray;
+
+static ray ray_of(int pixel)
+{
+    render_camera camera;
+    ray out;
+    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
+                          40, WIDTH, HEIGHT);
+    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, out.base, out.direction);
+    return out;
+}
+
+/* ---- inputs -------------------------------------------------------------------------------------------------- */
+
+static void make_whole(test_mesh_kind kind, session_input *out)
+{
+    test_mesh_lattice(kind, SIDE, 0.2, test_linear, &out->part);
+    input_describe(out);
+}
+
+/* The rank's cells, listed its own way; with ghosts: all cells, of which the others' are ghosts. */
+static void take_part(const session_input *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
+{
+    int *owners = test_calloc((size_t)whole->part.cell_count, sizeof *owners);
+    int *all = test_calloc((size_t)whole->part.cell_count, sizeof *all);
+    test_partition(&whole->part, dealt, SIDE, rank_count, owners);
+    test_mesh_part(&whole->part, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
+    for (int64_t cell = 0; cell < out->part.cell_count && with_ghosts; cell++)
+        out->part.ghosts[cell] = owners[cell] != own_rank;
+    test_free(owners);
+    test_free(all);
+    if (!with_ghosts) test_mesh_turn(&out->part, 3 + (uint64_t)own_rank);
+    test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
+    input_describe(out);
+}
+
+static insitu_session *open_with(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    const char *warnings = insitu_last_report(session)->warnings;
+    if (*warnings && !strstr(warnings, "left-handed")) fail_msg("warnings: %s", warnings);
+    return session;
+}
+
+static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    caught_picture picture = {0};
+    insitu_session *session = open_with(comm, scene, in);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+/* ---- which faces --------------------------------------------------------------------------------------------- */
+
+static double area_of(const double *a, const double *b, const double *c)
+{
+    double u[3], v[3], sum = 0;
+    for (int i = 0; i < 3; i++) u[i] = b[i] - a[i], v[i] = c[i] - a[i];
+    for (int i = 0; i < 3; i++) {
+        const double w = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+        sum += w * w;
+    }
+    return 0.5 * sqrt(sum);
+}
+
+/* The area of this rank's outer faces; NaN where one is not on the border of the cube. */
+static double outer_area(const insitu_session *session)
+{
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    const session_outer *outer = &mesh->outer;
+    double sum = 0;
+    for (int64_t cell = 0; cell < outer->mesh->cells.cell_count; cell++) {
+        const int64_t *entries = outer->connectivity + outer->offsets[cell];
+        const int corners = (int)(outer->offsets[cell + 1] - outer->offsets[cell]) - 1;
+        const double *p[4] = {0};
+        bool is_on_border = false;
+        for (int i = 0; i < corners; i++) p[i] = outer->coordinates + 3 * entries[i];
+        for (int axis = 0; axis < 3; axis++) {
+            bool is_on = fabs(p[0][axis]) == 1;
+            for (int i = 1; i < corners; i++) is_on = is_on && p[i][axis] == p[0][axis];
+            is_on_border = is_on_border || is_on;
+        }
+        if (!is_on_border) return NAN;
+        sum += area_of(p[0], p[1], p[2]) + (corners == 4 ? area_of(p[0], p[2], p[3]) : 0);
+    }
+    return sum;
+}
+
+static double whole_area(const session_input *in)
+{
+    insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(IMAGE("      - surface: {}\n")), in);
+    double area = outer_area(session);
+    MPI_Allreduce(MPI_IN_PLACE, &area, 1, MPI_DOUBLE, MPI_SUM, MPI_COMM_WORLD);
+    insitu_destroy(&session);
+    return area;
+}
+
+/* Six squares of 4. Sums of some hundred areas round by less than 1e-12. */
+static void outer_faces_are_the_cube_s(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int way = 0; way < 4; way++) {
+            session_input whole = {0}, part = {0};
+            make_whole(kind, &whole);
+            take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
+            if (way == 3 && kind != TEST_POLYHEDRA)
+                test_mesh_to_polyhedra(&part.part, 0.5); /* some of them, beside the others */
+            input_describe(&part);
+            const double area = whole_area(&part);
+            if (!(fabs(area - 24) < 1e-12))
+                fprintf(stderr, "%s, %d: area %.17g\n", test_mesh_kind_name(kind), way, area);
+            everywhere(fabs(area - 24) < 1e-12);
+            input_free(&part);
+            input_free(&whole);
+        }
+}
+
+static int64_t *make_ids(const session_input *whole, const session_input *part, int64_t factor, int64_t offset)
+{
+    int64_t *ids = test_calloc((size_t)part->part.vertex_count + 1, sizeof *ids);
+    for (int64_t v = 0; v < part->part.vertex_count; v++)
+        for (int64_t w = 0; w < whole->part.vertex_count; w++)
+            if (memcmp(whole->part.coordinates + 3 * w, part->part.coordinates + 3 * v, 3 * sizeof(double)) == 0)
+                ids[v] = factor * w + offset;
+    return ids;
+}
+
+/* With ids that are the same on all ranks nothing changes; with ids of each rank's own its whole border is outer. */
+static void faces_are_one_by_ids(void **state)
+{
+    (void)state;
+    session_input whole = {0}, part = {0};
+    make_whole(TEST_HEXES, &whole);
+    take_part(&whole, TEST_BLOCK, false, &part);
+    int64_t *shared = make_ids(&whole, &part, 7, -100), *own = make_ids(&whole, &part, rank_count, own_rank);
+    part.mesh.vertex_ids = (insitu_array){shared, INSITU_INT64, 0};
+    everywhere(fabs(whole_area(&part) - 24) < 1e-12);
+    part.mesh.vertex_ids = (insitu_array){own, INSITU_INT64, 0};
+    const double area = whole_area(&part);
+    everywhere(rank_count == 1 ? fabs(area - 24) < 1e-12 : isnan(area));
+    test_free(shared);
+    test_free(own);
+    input_free(&part);
+    input_free(&whole);
+}
+
+/* ---- pictures of the cube ------------------------------------------------------------------------------------ */
+
+/* Where the ray is in the cube: depths; false where it is not. near: how near it is to an edge or a miss. */
+static bool cross_cube(const ray *r, double depths[2], double *margin)
+{
+    double in[3], out[3];
+    depths[0] = -INFINITY;
+    depths[1] = INFINITY;
+    for (int a = 0; a < 3; a++) {
+        const double one = (-1 - r->base[a]) / r->direction[a], other = (1 - r->base[a]) / r->direction[a];
+        in[a] = fmin(one, other);
+        out[a] = fmax(one, other);
+        depths[0] = fmax(depths[0], in[a]);
+        depths[1] = fmin(depths[1], out[a]);
+    }
+    *margin = fabs(depths[1] - depths[0]);
+    return depths[0] < depths[1];
+}
+
+/* A hit's depth is off by roundings of numbers near 5 in single precision, and by as much of position across the ray
+ * over the slant, at most 10 here; the grey of a place by its rounded position, of slope 1 in 4 and the table's of 3.
+ */
+static bool is_cube(const caught_picture *picture, float opacity)
+{
+    int hits = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        const ray r = ray_of(pixel);
+        double depths[2], margin;
+        const bool is_hit = cross_cube(&r, depths, &margin);
+        if (margin < 1e-4) continue;
+        const float alpha = picture->rgba[4 * pixel + 3], depth = picture->depth[pixel];
+        const bool is_well =
+            is_hit ? alpha == opacity && fabs((double)depth - depths[0]) < 1.5e-5 : alpha == 0 && isinf(depth);
+        hits += is_hit;
+        if (is_well) continue;
+        fprintf(stderr, "pixel %d: opacity %g, depth %.9g, expected %.9g\n", pixel, (double)alpha, (double)depth,
+                is_hit ? depths[0] : (double)INFINITY);
+        return false;
+    }
+    return hits > PIXELS / 5;
+}
+
+static bool has_linear_colours(const caught_picture *picture, const caught_picture *other)
+{
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        const ray r = ray_of(pixel);
+        double depths[2], margin, at[3];
+        if (!cross_cube(&r, depths, &margin) || margin < 1e-4) continue;
+        for (int a = 0; a < 3; a++) at[a] = r.base[a] + depths[0] * r.direction[a];
+        const double grey = (test_linear(at) + 2) / 4;
+        const double light = grey <= 0.04045 ? grey / 12.92 : pow((grey + 0.055) / 1.055, 2.4);
+        if (fabs((double)picture->rgba[4 * pixel] - light) < 1e-4) continue;
+        fprintf(stderr, "pixel %d: %g, expected %g\n", pixel, (double)picture->rgba[4 * pixel], light);
+        return false;
+    }
+    return memcmp(picture->depth, other->depth, PIXELS * sizeof(float)) == 0;
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
+           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
+}
+
+/* Half-clear surfaces are crossed twice by every ray: opacity 3/4. */
+static void cube_is_one_picture_of(test_mesh_kind kind)
+{
+    session_input whole = {0};
+    caught_picture alone = {0}, clear = {0};
+    bool is_well = true;
+    make_whole(kind, &whole);
+    const char *scene = write_scene(IMAGE(COLOURED("")));
+    if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole);
+    scene = write_scene(IMAGE(COLOURED(", opacity: 0.5")));
+    if (own_rank == 0) {
+        clear = draw(MPI_COMM_SELF, scene, &whole);
+        is_well = is_cube(&alone, 1) && is_cube(&clear, 0.75F) && has_linear_colours(&alone, &clear);
+    }
+    everywhere(is_well);
+    for (int way = 0; way < 3; way++) {
+        session_input part = {0};
+        take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
+        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part);
+        everywhere(own_rank != 0 || are_same(&picture, &clear));
+        free_picture(&picture);
+        input_free(&part);
+    }
+    free_picture(&alone);
+    free_picture(&clear);
+    input_free(&whole);
+}
+
+static void cubes_are_true_and_one_picture_on_any_ranks(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) cube_is_one_picture_of(kind);
+}
+
+/* ---- warped faces -------------------------------------------------------------------------------------------- */
+
+/* Each bilinear patch is first met by so many squares along a side, of two triangles; Newton's method then finds where
+ * the ray meets the patch itself. */
+enum { FINE = 16, STEPS = 6 };
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void patch_point(const double *const p[4], double u, double v, double out[3])
+{
+    for (int a = 0; a < 3; a++)
+        out[a] = (1 - v) * ((1 - u) * p[0][a] + u * p[1][a]) + v * ((1 - u) * p[3][a] + u * p[2][a]);
+}
+
+static bool meets_triangle(const ray *r, const double *a, const double *b, const double *c)
+{
+    double u[3], v[3], w[3], p[3], q[3];
+    for (int i = 0; i < 3; i++) u[i] = b[i] - a[i], v[i] = c[i] - a[i], w[i] = r->base[i] - a[i];
+    cross(r->direction, v, p);
+    cross(w, u, q);
+    const double det = dot(u, p), s = dot(w, p) / det, t = dot(r->direction, q) / det;
+    return s >= 0 && t >= 0 && s + t <= 1;
+}
+
+/* Where a ray meets a patch: its depth, and the sine of the angle at which it does. */
+typedef struct patch_hit {
+    double depth, slant;
+} patch_hit;
+
+static patch_hit polish(const ray *r, const double *const p[4], double u, double v)
+{
+    patch_hit out = {INFINITY, 1};
+    for (int step = 0; step < STEPS; step++) {
+        double at[3], du[3], dv[3], normal[3], left[3], a[3], b[3];
+        patch_point(p, u, v, at);
+        for (int i = 0; i < 3; i++) {
+            du[i] = (1 - v) * (p[1][i] - p[0][i]) + v * (p[2][i] - p[3][i]);
+            dv[i] = (1 - u) * (p[3][i] - p[0][i]) + u * (p[2][i] - p[1][i]);
+            left[i] = r->base[i] - at[i];
+        }
+        cross(du, dv, normal);
+        cross(r->direction, dv, a);
+        cross(du, r->direction, b);
+        const double det = dot(normal, r->direction);
+        out.depth = -dot(normal, left) / det;
+        out.slant = fabs(det) / sqrt(dot(normal, normal) * dot(r->direction, r->direction));
+        u -= dot(left, a) / -dot(du, a);
+        v -= dot(left, b) / -dot(dv, b);
+    }
+    return out;
+}
+
+static void meet_patch(const ray *r, const double *const p[4], patch_hit *nearest)
+{
+    for (int i = 0; i < FINE; i++)
+        for (int j = 0; j < FINE; j++) {
+            double q[4][3];
+            for (int k = 0; k < 4; k++)
+                patch_point(p, (double)(i + (k == 1 || k == 2)) / FINE, (double)(j + k / 2) / FINE, q[k]);
+            if (!meets_triangle(r, q[0], q[1], q[2]) && !meets_triangle(r, q[0], q[2], q[3])) continue;
+            const patch_hit hit = polish(r, p, (i + 0.5) / FINE, (j + 0.5) / FINE);
+            if (hit.depth < nearest->depth) *nearest = hit;
+        }
+}
+
+/* Rays beside the silhouette are left out: those whose neighbours are not hit. Depths are off by roundings of numbers
+ * near 7 in single precision and of places across the ray, over the slant. */
+static bool is_hex(const caught_picture *picture, const double *places)
+{
+    static const int faces[6][4] = {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}};
+    patch_hit *truth = test_calloc(PIXELS, sizeof *truth);
+    int hits = 0, wrong = 0, edge = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        const ray r = ray_of(pixel);
+        truth[pixel] = (patch_hit){INFINITY, 1};
+        for (int face = 0; face < 6; face++) {
+            const double *p[4];
+            for (int i = 0; i < 4; i++) p[i] = places + 3 * faces[face][i];
+            meet_patch(&r, p, &truth[pixel]);
+        }
+    }
+    for (int pixel = WIDTH; pixel < PIXELS - WIDTH; pixel++) {
+        const double depth = (double)picture->depth[pixel];
+        const bool is_hit = isfinite(truth[pixel].depth);
+        hits += is_hit;
+        if (is_hit ? fabs(depth - truth[pixel].depth) * truth[pixel].slant < 5e-6 : isinf(depth)) continue;
+        const bool is_inside = isfinite(truth[pixel - 1].depth) && isfinite(truth[pixel + 1].depth) &&
+                               isfinite(truth[pixel - WIDTH].depth) && isfinite(truth[pixel + WIDTH].depth);
+        const bool is_outside = isinf(truth[pixel - 1].depth) && isinf(truth[pixel + 1].depth) &&
+                                isinf(truth[pixel - WIDTH].depth) && isinf(truth[pixel + WIDTH].depth);
+        wrong += is_inside || is_outside;
+        edge++;
+        if (is_inside || is_outside)
+            fprintf(stderr, "pixel %d: depth %g, expected %g\n", pixel, depth, truth[pixel].depth);
+    }
+    test_free(truth);
+    return hits > 100 && wrong == 0 && edge < hits / 20;
+}
+
+static void warped_faces_are_bilinear_patches(void **state)
+{
+    (void)state;
+    if (own_rank != 0) return;
+    char scene[256];
+    const char *folder = IMAGE("      - surface: {}\n");
+    snprintf(scene, sizeof scene, "test_session_surfaces_warped_%d.yaml", rank_count);
+    FILE *file = fopen(scene, "w");
+    assert_true(file && fputs(folder, file) >= 0 && fclose(file) == 0);
+    for (uint64_t seed = 1; seed <= 6; seed++) {
+        session_input in = {0};
+        test_mesh_single(TEST_UNIT_HEX, test_linear, &in.part);
+        for (int64_t i = 0; i < 24; i++) {
+            const double moved = test_uniform_in((uint64_t)i, seed, -0.25, 0.25);
+            in.part.coordinates[i] = 1.5 * (in.part.coordinates[i] - 0.5 + moved);
+        }
+        if (seed % 2) test_mesh_to_polyhedra(&in.part, 1);
+        input_describe(&in);
+        double places[24];
+        memcpy(places, in.part.coordinates, sizeof places);
+        caught_picture picture = draw(MPI_COMM_SELF, scene, &in);
+        assert_true(is_hex(&picture, places));
+        free_picture(&picture);
+        input_free(&in);
+    }
+    remove(scene);
+}
+
+/* ---- what is found again ------------------------------------------------------------------------------------- */
+
+static void faces_are_found_once_for_the_cells(void **state)
+{
+    (void)state;
+    session_input whole = {0}, part = {0};
+    make_whole(TEST_MIXED, &whole);
+    take_part(&whole, TEST_BLOCK, false, &part);
+    insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(IMAGE(COLOURED(""))), &part);
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    const session_face *faces = mesh->outer.faces;
+    everywhere(insitu_last_report(session)->bytes_copied >= mesh->outer.bytes && mesh->tree.node_count == 0);
+    for (int64_t v = 0; v < part.part.vertex_count; v++) part.part.coordinates[3 * v + 1] *= 2;
+    part.mesh.changed = INSITU_CHANGED_GEOMETRY;
+    everywhere(insitu_set_mesh(session, "m", &part.mesh) == INSITU_OK);
+    step_is_good(session, 1);
+    everywhere(mesh->outer.faces == faces);
+    double highest = 0;
+    for (int64_t v = 0; v < mesh->outer.mesh->cells.vertex_count; v++)
+        highest = fmax(highest, mesh->outer.coordinates[3 * v + 1]);
+    MPI_Allreduce(MPI_IN_PLACE, &highest, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
+    everywhere(highest == 2);
+    part.mesh.changed = INSITU_CHANGED_ALL;
+    everywhere(hand_over(session, &part) == INSITU_OK);
+    everywhere(!mesh->outer.are_faces_known);
+    step_is_good(session, 2);
+    everywhere(mesh->outer.are_faces_known);
+    insitu_destroy(&session);
+    input_free(&part);
+    input_free(&whole);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(outer_faces_are_the_cube_s),
+        cmocka_unit_test(faces_are_one_by_ids),
+        cmocka_unit_test(cubes_are_true_and_one_picture_on_any_ranks),
+        cmocka_unit_test(warped_faces_are_bilinear_patches),
+        cmocka_unit_test(faces_are_found_once_for_the_cells),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
