@@ -54,7 +54,10 @@ static const struct stored_file {
     {"maps/falling.json", "[{\"Name\": \"a\", \"RGBPoints\": [1, 0, 0, 0,\n 0, 1, 1, 1]}]"},
     {"maps/flat.json", "[{\"Name\": \"a\", \"RGBPoints\": [1, 0, 0, 0, 1, 1, 1, 1]}]"},
     {"maps/step.json", "[{\"ColorSpace\":\n \"XYZ\", \"RGBPoints\": [0, 0, 0, 0, 1, 1, 1, 1]}]"},
-    {"maps/indexed.json", "[\n{\"Name\": \"a\", \"IndexedColors\": [0, 0, 0, 1, 1, 1]}]"},
+    {"maps/indexed.json", "[\n{\"Name\": \"a\", \"IndexedColors\": [0, 0, 0, 1, 0.5, 1, 0, 1, 0]}]"},
+    {"maps/pale.json", "{\"IndexedColors\": [0, 0, 0, 1,\n 1, 2]}"},
+    {"maps/two.json", "{\"IndexedColors\": [0, 0]}"},
+    {"maps/bare.json", "[\n{\"Name\": \"a\"}]"},
     {"maps/list.json", "[[1, 2]]"},
     {"maps/empty.json", ""},
     {"maps/none.json", "[]"},
@@ -217,6 +220,10 @@ static void files_of_paraview_become_tables(void **state)
     check_colour(entry(map, 1), 1, 0, 0);
     check_colour(entry(map, 128), 1, 0, 0);
     check_colour(entry(map, 129), 1, 1, 1);
+    map = map_of(", map: {file: indexed.json}, reversed: true");
+    assert_true(map->is_banded && map->count == 3);
+    check_colour(entry(map, 0), 0, 1, 0);
+    check_colour(entry(map, 1), 1, 0.5, 1);
     map = map_of(", map: {file: several.json, name: uneven}");
     check_colour(entry(map, 256), 1, 0, 0);
     /* Moreland's own middle has a lightness of 88, the file's one of 88.1: less than a code. */
@@ -297,7 +304,10 @@ static const char *const bad_keys[][3] = {
     {", map: {file: flat.json}", "map.file: flat.json:1: RGBPoints: all values are the same", ""},
     {", map: {file: step.json}",
      "map.file: step.json:2: ColorSpace: expected one of RGB, HSV, Lab, CIELAB, Diverging and Step", ""},
-    {", map: {file: indexed.json}", "map.file: indexed.json:2: the map has no RGBPoints", ""},
+    {", map: {file: bare.json}", "map.file: bare.json:2: the map has no RGBPoints", ""},
+    {", map: {file: pale.json}", "map.file: pale.json:2: IndexedColors: a colour is outside of 0 to 1", ""},
+    {", map: {file: two.json}", "map.file: two.json:1: IndexedColors: expected 1 to 4096 times three", ""},
+    {", discrete: 3, map: {file: indexed.json}", "discrete: given beside a map of 3 bands", ""},
     {", map: {file: list.json}", "map.file: list.json:1: expected a colour map", ""},
     {", map: {file: empty.json}", "map.file: empty.json:1: is empty", ""},
     {", map: {file: none.json}", "map.file: none.json:1: holds no colour map", ""},

@@ -240,6 +240,68 @@ static double ramps_are_off(scene_scale scale, double low, const scene_volume *v
     return worst;
 }
 
+/* ---- tables of volumes ---- */
+
+static void table_colour(const render_transfer *t, double value, double colour[3])
+{
+    const double from = render_scaled(t->scale, t->threshold, t->low),
+                 to = render_scaled(t->scale, t->threshold, t->high);
+    const double place = (render_scaled(t->scale, t->threshold, value) - from) / (to - from) * (t->colour_count - 1);
+    const double held = fmin(fmax(place, 0), t->colour_count - 1);
+    const int i = held < t->colour_count - 1 ? (int)held : t->colour_count - 2;
+    for (int c = 0; c < 3; c++) {
+        const double low = (double)t->colours[3 * i + c], high = (double)t->colours[3 * i + 3 + c];
+        colour[c] = low + (held - i) * (high - low);
+    }
+}
+
+static void assert_colour(const render_transfer *t, double value, const float expected[3])
+{
+    double colour[3];
+    table_colour(t, value, colour);
+    for (int c = 0; c < 3; c++)
+        if (!(fabs(colour[c] - (double)expected[c]) <= 1e-6))
+            fail_msg("value %g, channel %d: %g, expected %g", value, c, colour[c], (double)expected[c]);
+}
+
+/* Within a sixteenth of a band of its borders it may be another's; what is outside begins one entry beyond the ends. */
+static void volumes_have_bands_and_colours_outside(void **state)
+{
+    (void)state;
+    const float colours[4][3] = {{0.1F, 0, 0}, {0, 0.5F, 0}, {0, 0, 0.9F}, {1, 1, 0}};
+    const scene_opacity_point ramp[2] = {{0, 0}, {1, 1}};
+    const scene_volume volume = {.opacity_count = 2, .opacity = (scene_opacity_point *)ramp};
+    for (int i = 0; i < 12; i++) {
+        session_transfer made;
+        scene_colour_map map = {.count = 4,
+                                .colours = (float *)colours[0],
+                                .is_banded = i % 2,
+                                .scale = i / 4 == 0   ? SCENE_LINEAR
+                                         : i / 4 == 1 ? SCENE_LOG
+                                                      : SCENE_SYMLOG,
+                                .threshold = 0.5,
+                                .has_below = i / 2 % 2,
+                                .has_above = true,
+                                .outside = {{0.3F, 0.3F, 0.3F}, {0.6F, 0.6F, 0.6F}}};
+        assert_true(session_make_transfer(1, &map, 1, 10, &volume, &made));
+        const render_transfer *t = &made.transfer;
+        assert_true(made.low == 1 && made.high == 10 && t->opacity_values[0] == 1);
+        const double from = render_scaled(t->scale, 0.5, 1), width = render_scaled(t->scale, 0.5, 10) - from;
+        for (int step = 0; step < 64; step++) {
+            const double place = (step + 0.5) / 64;
+            const int band = step / 16;
+            if (map.is_banded && step % 16 > 0 && step % 16 < 15)
+                assert_colour(t, render_unscaled(t->scale, 0.5, from + place * width), colours[band]);
+        }
+        for (int entry = 0; entry < 4 && !map.is_banded; entry++)
+            assert_colour(t, render_unscaled(t->scale, 0.5, from + entry / 3.0 * width), colours[entry]);
+        const double gap = width / (map.is_banded ? 63 : 3) * 1.001;
+        assert_colour(t, render_unscaled(t->scale, 0.5, from + width + gap), map.outside[1]);
+        assert_colour(t, render_unscaled(t->scale, 0.5, from - gap), map.has_below ? map.outside[0] : colours[0]);
+        session_transfer_free(&made);
+    }
+}
+
 static void ramps_by_a_scale_are_as_near_as_is_said(void **state)
 {
     (void)state;
@@ -293,6 +355,7 @@ static int run(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ranges_are_those_of_brute_force),
         cmocka_unit_test(ranges_over_a_run_widen_and_outlive_it),
+        cmocka_unit_test(volumes_have_bands_and_colours_outside),
         cmocka_unit_test(ramps_by_a_scale_are_as_near_as_is_said),
         cmocka_unit_test(broken_file_of_ranges_is_told_to_all),
         cmocka_unit_test(maps_from_files_are_every_ranks),

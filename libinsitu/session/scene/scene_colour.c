@@ -40,9 +40,20 @@ static insitu_status take_built_in(const scene_document *d, const char *name, sc
     return status;
 }
 
+static insitu_status take_bands(const scene_document *d, const scene_colour_points *bands, const char *name,
+                                scene_colour_map *out)
+{
+    const insitu_status status = make_table(d, name, bands->count, out);
+    out->is_banded = true;
+    for (int i = 0; i < 3 * bands->count && status == INSITU_OK; i++)
+        out->colours[i] = colour_linear_from_srgb((float)bands->items[i / 3].srgb[i % 3]);
+    return status;
+}
+
 static insitu_status take_points(const scene_document *d, const scene_colour_points *points, const char *name,
                                  scene_colour_map *out)
 {
+    if (points->is_banded) return take_bands(d, points, name, out);
     const insitu_status status = make_table(d, name, colour_points_entries(points->items, points->count), out);
     if (status == INSITU_OK) colour_points_fill(points->items, points->count, points->space, out->colours, out->count);
     return status;
@@ -311,6 +322,8 @@ insitu_status scene_convert_colour_map(const scene_document *d, const char *path
     insitu_status status = convert_map(d, path, out);
     if (status != INSITU_OK) return status;
     if (in->reversed && *in->reversed) reverse(out);
+    if (in->discrete && out->is_banded)
+        return scene_bad(d, path, "discrete", "given beside a map of %d bands, expected one of the two", out->count);
     if (in->discrete) status = cut_into_bands(d, *in->discrete, out);
     if (status == INSITU_OK) convert_outside(in, out);
     if (status == INSITU_OK) status = convert_range(d, path, &out->range);

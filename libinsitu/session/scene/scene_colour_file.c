@@ -1,7 +1,7 @@
 /* Colour maps in files as ParaView exports them: a JSON list of mappings, or one mapping, each with RGBPoints (value,
- * red, green and blue in turn), a Name and a ColorSpace. libyaml reads JSON, which YAML holds. The values are only
- * relative: the first is the low end of a layer's range, and the last the high end. */
-#include <locale.h>
+ * red, green and blue in turn) and a ColorSpace, or IndexedColors (of bands), and a Name. libyaml reads JSON, which
+ * YAML holds. The values are only relative: the first is the low end of a layer's range, and the last the high end. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <yaml.h>
@@ -45,13 +45,15 @@ static const yaml_node_t *find_value(const colour_file *f, const yaml_node_t *ma
     return NULL;
 }
 
-static insitu_status read_number(const colour_file *f, const yaml_node_t *node, double *number)
+static insitu_status read_number(const colour_file *f, const char *key, const yaml_node_t *node, double *number)
 {
+    char what[64];
     const char *text = text_of(node);
     char *end;
     *number = strtod(text, &end);
     if (end != text && !*end && *number - *number == 0) return INSITU_OK;
-    return bad_place(f, node, "RGBPoints: not a number, expected numbers");
+    snprintf(what, sizeof what, "%s: not a number, expected numbers", key);
+    return bad_place(f, node, what);
 }
 
 static insitu_status read_point(const colour_file *f, const yaml_node_t *list, int i, scene_colour_points *out)
@@ -61,7 +63,7 @@ static insitu_status read_point(const colour_file *f, const yaml_node_t *list, i
     const yaml_node_t *first = node_of(f, list->data.sequence.items.start[4 * (ptrdiff_t)i]);
     for (int n = 0; n < 4; n++) {
         const insitu_status status =
-            read_number(f, node_of(f, list->data.sequence.items.start[4 * i + n]), &numbers[n]);
+            read_number(f, "RGBPoints", node_of(f, list->data.sequence.items.start[4 * i + n]), &numbers[n]);
         if (status) return status;
         if (n > 0 && !(numbers[n] >= 0 && numbers[n] <= 1))
             return bad_place(f, first, "RGBPoints: a colour is outside of 0 to 1");
@@ -106,9 +108,31 @@ static insitu_status read_space(const colour_file *f, const yaml_node_t *node, c
     return bad_place(f, node, "ColorSpace: expected one of RGB, HSV, Lab, CIELAB, Diverging and Step");
 }
 
+/* Colours of categories: red, green and blue in turn. */
+static insitu_status read_bands(const colour_file *f, const yaml_node_t *list, scene_colour_points *out)
+{
+    const int numbers = list->type == YAML_SEQUENCE_NODE ? item_count(list) : 0;
+    if (numbers < 3 || numbers % 3 || numbers > 3 * max_points)
+        return bad_place(f, list, "IndexedColors: expected 1 to 4096 times three numbers: red, green, blue");
+    out->is_banded = true;
+    out->count = numbers / 3;
+    out->items = base_calloc((size_t)out->count, sizeof *out->items);
+    if (!out->items) return base_fail(f->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", f->name);
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < numbers && !status; i++) {
+        const yaml_node_t *node = node_of(f, list->data.sequence.items.start[i]);
+        double *channel = &out->items[i / 3].srgb[i % 3];
+        status = read_number(f, "IndexedColors", node, channel);
+        if (!status && !(*channel >= 0 && *channel <= 1))
+            status = bad_place(f, node, "IndexedColors: a colour is outside of 0 to 1");
+    }
+    return status;
+}
+
 static insitu_status read_map(const colour_file *f, const yaml_node_t *mapping, scene_colour_points *out)
 {
-    const yaml_node_t *points = find_value(f, mapping, "RGBPoints");
+    const yaml_node_t *points = find_value(f, mapping, "RGBPoints"), *bands = find_value(f, mapping, "IndexedColors");
+    if (!points && bands) return read_bands(f, bands, out);
     if (!points) return bad_place(f, mapping, "the map has no RGBPoints, expected a list of value, red, green, blue");
     const insitu_status status = read_space(f, find_value(f, mapping, "ColorSpace"), &out->space);
     return status ? status : read_points(f, points, out);

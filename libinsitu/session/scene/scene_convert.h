@@ -13,6 +13,7 @@ typedef struct scene_colour_points {
     int count;
     colour_point *items;
     colour_space space;
+    bool is_banded; /* each colour is that of a band */
 } scene_colour_points;
 
 /* A new message-less failure for a block that could not be had. */

@@ -82,7 +82,8 @@ typedef struct no_members {
               "last 1; two the same make a step, of a 1024th of the map.",                                             \
       .by_default = "evenly spaced", TAKES(place_list_forms))                                                          \
     X(CYAML_FIELD_IGNORE("file", OPTIONAL),                                                                            \
-      .help = "A file of colour maps as ParaView writes them (JSON, `RGBPoints`), relative to the scene's folder. It " \
+      .help = "A file of colour maps as ParaView writes them (JSON, `RGBPoints`, or bands by `IndexedColors`), "       \
+              "relative to the scene's folder. It "                                                                    \
               "is read on rank 0, again when the scene is.",                                                           \
       .by_default = "none", TAKES(path_forms))                                                                         \
     X(CYAML_FIELD_IGNORE("name", OPTIONAL), .help = "The name of the map in the file. Needed where it holds several.", \
