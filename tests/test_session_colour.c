@@ -187,6 +187,41 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     remove_ranges();
 }
 
+/* Every kind of layer that has colours of a field: the same picture as by the data, and a line in the file. */
+static void every_kind_of_layer_has_a_range_over_a_run(void **state)
+{
+    (void)state;
+    static const char *const layers[][2] = {
+        {"isosurface", "isosurface: {field: f, values: [0.1], colour_by: {field: f, component: magnitude%s}}"},
+        {"surface", "surface: {colour_by: {field: f%s}}"},
+        {"slice", "slice: {field: f, planes: [{normal: [1, 1, 0]}, {normal: [0, 0, 1]}]%s}"},
+        {"volume", "volume: {field: f%s}"},
+    };
+    for (int i = 0; i < 4; i++) {
+        caught_picture pictures[2];
+        remove_ranges();
+        for (int is_run = 0; is_run < 2; is_run++) {
+            char text[1024], layer[256], line[128] = "";
+            snprintf(layer, sizeof layer, layers[i][1], is_run ? ", range: run" : "");
+            snprintf(text, sizeof text,
+                     "images:\n  - name: %s\n    size: [40, 30]\n    layers:\n      - %s\n"
+                     "    outputs: [{path: \"%s/a.exr\"}]\n",
+                     image_name, layer, folder);
+            insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+            everywhere(hand_over(session, &block) == INSITU_OK);
+            pictures[is_run] = draw_step(session, 0);
+            insitu_destroy(&session);
+            FILE *file = own_rank == 0 ? fopen(ranges_file(), "r") : NULL;
+            everywhere(own_rank != 0 || (file != NULL) == is_run);
+            while (file && fgets(line, sizeof line, file) && line[0] == '#') line[0] = '\0';
+            everywhere(!file || strncmp(line, layers[i][0], strlen(layers[i][0])) == 0);
+            if (file) fclose(file);
+        }
+        assert_alike(&pictures[0], &pictures[1], 1e-6);
+    }
+    remove_ranges();
+}
+
 static void broken_file_of_ranges_is_told_to_all(void **state)
 {
     (void)state;
@@ -355,6 +390,7 @@ static int run(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ranges_are_those_of_brute_force),
         cmocka_unit_test(ranges_over_a_run_widen_and_outlive_it),
+        cmocka_unit_test(every_kind_of_layer_has_a_range_over_a_run),
         cmocka_unit_test(volumes_have_bands_and_colours_outside),
         cmocka_unit_test(ramps_by_a_scale_are_as_near_as_is_said),
         cmocka_unit_test(broken_file_of_ranges_is_told_to_all),

@@ -38,6 +38,10 @@ static void list_layers(const scene_image *image, layer_list *list)
         const scene_surface *layer = &image->surfaces[i];
         if (layer->has_colour_by) add_layer(list, "surface", i, &layer->colour_by, &layer->colour_map);
     }
+    for (int i = 0; i < image->surface_count; i++) {
+        const scene_surface *layer = &image->surfaces[i];
+        if (layer->has_colour_by) add_layer(list, "surface", i, &layer->colour_by, &layer->colour_map);
+    }
     for (int i = 0; i < image->slice_count; i++)
         add_layer(list, "slice", i, &image->slices[i].field, &image->slices[i].colour_map);
     for (int i = 0; i < image->volume_count; i++)
@@ -73,11 +77,9 @@ static char *file_path(const scene_image *image)
     const char *output = image->outputs[0].path;
     size_t folder = strcspn(output, "{");
     while (folder > 0 && output[folder - 1] != '/') folder--;
-    char *path = base_alloc(folder + strlen(image->name) + sizeof ".ranges");
-    if (!path) return NULL;
-    memcpy(path, output, folder);
-    strcpy(path + folder, image->name);
-    strcat(path, ".ranges");
+    const size_t size = folder + strlen(image->name) + sizeof ".ranges";
+    char *path = base_alloc(size);
+    if (path) snprintf(path, size, "%.*s%s.ranges", (int)folder, output, image->name);
     return path;
 }
 
@@ -168,11 +170,10 @@ static bool write_file(const session_image_ranges *ranges, const char *temporary
 insitu_status session_write_run_ranges(session_image_ranges *ranges, const scene_image *image, base_error *error)
 {
     if (!ranges->is_changed) return INSITU_OK;
-    const size_t length = strlen(ranges->path);
-    char *temporary = base_alloc(length + sizeof ".new");
-    if (!temporary) return session_no_memory(error, (int64_t)length, "the name of a file of ranges");
-    memcpy(temporary, ranges->path, length);
-    strcpy(temporary + length, ".new");
+    const size_t size = strlen(ranges->path) + sizeof ".new";
+    char *temporary = base_alloc(size);
+    if (!temporary) return session_no_memory(error, (int64_t)size, "the name of a file of ranges");
+    snprintf(temporary, size, "%s.new", ranges->path);
     locale_t before;
     const locale_t c_numbers = use_c_numbers(&before);
     const bool is_written = write_file(ranges, temporary);
@@ -268,14 +269,15 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
 
 static session_run_range *find_range(session_image_ranges *ranges, const scene_colour_map *map)
 {
-    int i = 0;
-    while (ranges->items[i].map != map) i++;
-    return &ranges->items[i];
+    for (int i = 0; ranges && i < ranges->count; i++)
+        if (ranges->items[i].map == map) return &ranges->items[i];
+    return NULL;
 }
 
 void session_widen_run_range(session_image_ranges *ranges, const scene_colour_map *map, double *low, double *high)
 {
     session_run_range *range = find_range(ranges, map);
+    if (!range) return;
     if (*low <= *high && (*low < range->low || *high > range->high)) {
         range->low = fmin(range->low, *low);
         range->high = fmax(range->high, *high);

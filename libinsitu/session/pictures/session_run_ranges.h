@@ -3,9 +3,9 @@
  * They are kept in a file NAME.ranges, NAME being the image's, in the folder of the image's first output: the part of
  * its path before the last slash that comes before any placeholder. It is text, written anew after each picture for
  * which a range became wider, and read when the first picture of the image is drawn, so that a run that is started
- * again goes on with the ranges of the one before. A line: isosurface, surface, slice or volume, the layer's number among those
- * of its kind from 0 on, the component (scene.h), low, high, and the field. Lines that are of no layer of the image are
- * left out. */
+ * again goes on with the ranges of the one before. A line: isosurface, surface, slice or volume, the layer's number
+ * among those of its kind from 0 on, the component (scene.h), low, high, and the field. Lines that are of no layer of
+ * the image are left out. */
 #ifndef SESSION_RUN_RANGES_H
 #define SESSION_RUN_RANGES_H
 

@@ -141,7 +141,7 @@ static void cut_ramps(const render_transfer *t, const scene_volume *volume, opac
 {
     static const double good_enough = 1e-4;
     const int ramps = volume->opacity_count - 1;
-    int pieces[RENDER_MAX_OPACITY_POINTS], total = ramps;
+    int pieces[RENDER_MAX_OPACITY_POINTS] = {0}, total = ramps;
     double errors[RENDER_MAX_OPACITY_POINTS] = {0};
     for (int i = 0; i < ramps; i++) errors[i] = ramp_error(t, &volume->opacity[i], pieces[i] = 1);
     while (total + 1 < RENDER_MAX_OPACITY_POINTS) {

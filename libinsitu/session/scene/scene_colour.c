@@ -110,7 +110,7 @@ static char *path_from_scene(const char *scene_path, const char *name)
     char *path = base_alloc(folder + strlen(name) + 1);
     if (!path) return NULL;
     memcpy(path, scene_path, folder);
-    strcpy(path + folder, name);
+    memcpy(path + folder, name, strlen(name) + 1);
     return path;
 }
 
@@ -126,7 +126,7 @@ static insitu_status read_attachment(const scene_document *d, const char *key, c
 {
     scene_attachments *all = d->attachments;
     base_error reason = {.status = INSITU_OK};
-    if (!all || !all->read) return scene_bad(d, key, "", "\"%s\": no file can be read here", path);
+    if (!all->read) return scene_bad(d, key, "", "\"%s\": no file can be read here", path);
     if (all->count == SCENE_MAX_ATTACHMENTS)
         return scene_bad(d, key, "", "\"%s\" is one file too many, expected at most %d", path, SCENE_MAX_ATTACHMENTS);
     scene_attachment *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
@@ -141,15 +141,16 @@ static insitu_status read_attachment(const scene_document *d, const char *key, c
 
 static insitu_status attach(const scene_document *d, const char *key, const char *name, const scene_attachment **out)
 {
-    static const scene_attachments none;
+    const scene_attachments *all = d->attachments;
+    if (!all) return scene_bad(d, key, "", "\"%s\": no file can be read here", name);
     char *path = path_from_scene(d->file_name, name);
     if (!path) return scene_no_memory(d);
-    *out = find_attachment(d->attachments ? d->attachments : &none, path);
+    *out = find_attachment(all, path);
     const insitu_status status = *out ? INSITU_OK : read_attachment(d, key, path);
     if (*out || status != INSITU_OK)
         base_free(path);
     else
-        *out = &d->attachments->items[d->attachments->count - 1];
+        *out = &all->items[all->count - 1];
     return status;
 }
 
