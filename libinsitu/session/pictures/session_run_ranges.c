@@ -211,22 +211,23 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const ch
 }
 
 /* An entry at the end of the list, which counts once it is whole. */
-static insitu_status prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
+static bool prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
     const int count = count_layers(image);
     session_image_ranges *items = base_realloc(all->items, ((size_t)all->count + 1) * sizeof *items);
     if (items) {
         all->items = items;
-        session_image_ranges *new = &items[all->count];
-        *new = (session_image_ranges){.image = base_strdup(image->name),
-                                      .path = file_path(image),
-                                      .count = count,
-                                      .items = base_calloc((size_t)count, sizeof *new->items)};
-        if (new->items) list_layers(image, &(layer_list){0, new->items});
-        if (new->image &&new->path &&new->items) return INSITU_OK;
-        free_ranges(new);
+        session_image_ranges *entry = &items[all->count];
+        *entry = (session_image_ranges){.image = base_strdup(image->name),
+                                        .path = file_path(image),
+                                        .count = count,
+                                        .items = base_calloc((size_t)count, sizeof *entry->items)};
+        if (entry->items) list_layers(image, &(layer_list){0, entry->items});
+        if (entry->image && entry->path && entry->items) return true;
+        free_ranges(entry);
     }
-    return session_no_memory(error, (int64_t)sizeof *items, "ranges of a run");
+    session_no_memory(error, (int64_t)sizeof *items, "ranges of a run");
+    return false;
 }
 
 /* What rank 0 has read, to all. Collective. */
@@ -256,7 +257,7 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
 {
     *out = find_ranges(all, image->name);
     if (*out || count_layers(image) == 0) return INSITU_OK;
-    const bool has_room = prepare_ranges(all, image, error) == INSITU_OK;
+    const bool has_room = prepare_ranges(all, image, error);
     session_image_ranges *ranges = has_room ? &all->items[all->count] : NULL;
     insitu_status status = session_agree(team->comm, error);
     if (!status && ranges) status = fill_ranges(ranges, image, team, error);
