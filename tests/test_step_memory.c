@@ -31,12 +31,16 @@ static const char full_scene[] =
         IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01}\n")
             IMAGE("d", "[16, 16]", VOLUME("f") VOLUME("c"), "    sampling: {max_error: 0.01}\n");
 
-static const char edited_scene[] =
-    "threads: 1\nimages:\n" IMAGE("e", "[24, 16]",
-                                  "      - isosurface: {field: f, values: [0.2]}\n"
-                                  "      - slice: {field: c, planes: [{normal: [1, 2, 3]}]}\n"
-                                  "      - surface: {colour_by: {field: c}, opacity: 0.5}\n",
-                                  "");
+static const char edited_scene[] = "threads: 1\nimages:\n" IMAGE(
+    "e", "[24, 16]",
+    "      - isosurface: {field: f, values: [0.2]}\n"
+    "      - slice: {field: c, planes: [{normal: [1, 2, 3]}]}\n"
+    "      - surface: {opacity: 0.5, colour_by: {field: c, discrete: 4,\n"
+    "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"
+    "          range: run, below: [0, 0, 0]}}\n"
+    "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: symlog,\n"
+    "          threshold: 0.1, above: [1, 1, 1]}\n",
+    "    sampling: {step_cells: 0.5}\n");
 
 typedef struct memory_case {
     const char *name;

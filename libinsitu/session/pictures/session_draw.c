@@ -189,7 +189,7 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
     const double start = MPI_Wtime();
     for (int i = 0; i < image->output_count && d->team->rank == 0; i++)
         write_output(image, &image->outputs[i], source, d->cycle, error);
-    if (ranges && d->team->rank == 0) session_write_run_ranges(ranges, image, error);
+    if (ranges && d->team->rank == 0) session_write_run_ranges(ranges, error);
     if (d->team->rank == 0) d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
     return session_agree(d->team->comm, error);
 }

@@ -57,19 +57,25 @@ static int count_layers(const scene_image *image)
 
 /* ---- the file -------------------------------------------------------------------------------------------------- */
 
-/* The simulation may write numbers with a comma. */
-static locale_t use_c_numbers(locale_t *before)
+/* The simulation may write numbers with a comma: false where memory runs out. */
+static bool use_c_numbers(locale_t *numbers, locale_t *before)
 {
-    const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
-    *before = c_numbers ? uselocale(c_numbers) : (locale_t)0;
-    return c_numbers;
+    *numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
+    if (*numbers) *before = uselocale(*numbers);
+    return *numbers != (locale_t)0;
 }
 
-static void use_numbers_again(locale_t c_numbers, locale_t before)
+static void use_numbers_again(locale_t numbers, locale_t before)
 {
-    if (!c_numbers) return;
     uselocale(before);
-    freelocale(c_numbers);
+    freelocale(numbers);
+}
+
+/* reason: of errno. */
+static insitu_status fail(const session_image_ranges *ranges, const char *what, int reason, base_error *error)
+{
+    return base_fail(error, reason == ENOMEM ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+                     "image \"%s\": %.300s: cannot be %s: %s", ranges->image, ranges->path, what, strerror(reason));
 }
 
 static char *file_path(const scene_image *image)
@@ -108,7 +114,7 @@ static bool read_line(session_image_ranges *ranges, char *text)
     return true;
 }
 
-static insitu_status read_lines(session_image_ranges *ranges, const scene_image *image, FILE *file, base_error *error)
+static insitu_status read_lines(session_image_ranges *ranges, FILE *file, base_error *error)
 {
     char line[longest_line];
     for (int number = 1; fgets(line, sizeof line, file); number++)
@@ -116,27 +122,26 @@ static insitu_status read_lines(session_image_ranges *ranges, const scene_image 
             return base_fail(error, INSITU_ERROR_SCENE,
                              "image \"%s\": %.300s:%d: is no range, expected kind, number, component, low, high and "
                              "field (delete the file to begin anew)",
-                             image->name, ranges->path, number);
-    if (!ferror(file)) return INSITU_OK;
-    return base_fail(error, INSITU_ERROR_IO, "image \"%s\": %.300s: %s", image->name, ranges->path, strerror(errno));
+                             ranges->image, ranges->path, number);
+    return ferror(file) ? fail(ranges, "read", errno, error) : INSITU_OK;
 }
 
 /* What is there; nothing where there is no file. */
-static insitu_status read_ranges(session_image_ranges *ranges, const scene_image *image, base_error *error)
+static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
+    locale_t numbers, before;
     const int number = open(ranges->path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    if (number < 0 && errno == ENOENT) return INSITU_OK;
-    FILE *file = number < 0 ? NULL : fdopen(number, "r");
-    if (!file) {
-        const char *reason = strerror(errno);
-        if (number >= 0) close(number);
-        return base_fail(error, INSITU_ERROR_IO, "image \"%s\": %.300s: cannot be read: %s", image->name, ranges->path,
-                         reason);
+    if (number < 0) return errno == ENOENT ? INSITU_OK : fail(ranges, "read", errno, error);
+    FILE *file = fdopen(number, "r");
+    if (!file || !use_c_numbers(&numbers, &before)) {
+        if (file)
+            fclose(file);
+        else
+            close(number);
+        return fail(ranges, "read", ENOMEM, error);
     }
-    locale_t before;
-    const locale_t c_numbers = use_c_numbers(&before);
-    const insitu_status status = read_lines(ranges, image, file, error);
-    use_numbers_again(c_numbers, before);
+    const insitu_status status = read_lines(ranges, file, error);
+    use_numbers_again(numbers, before);
     fclose(file);
     return status;
 }
@@ -152,7 +157,7 @@ static void write_lines(const session_image_ranges *ranges, FILE *file)
     }
 }
 
-/* Into a file of another name, new, which then takes the place of the old one. */
+/* Into a file of a name of this process's, new, which then takes the place of the old one. */
 static bool write_file(const session_image_ranges *ranges, const char *temporary)
 {
     unlink(temporary);
@@ -167,24 +172,24 @@ static bool write_file(const session_image_ranges *ranges, const char *temporary
     return fclose(file) == 0 && is_written && rename(temporary, ranges->path) == 0;
 }
 
-insitu_status session_write_run_ranges(session_image_ranges *ranges, const scene_image *image, base_error *error)
+insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error *error)
 {
+    locale_t numbers, before;
     if (!ranges->is_changed) return INSITU_OK;
-    const size_t size = strlen(ranges->path) + sizeof ".new";
+    const size_t size = strlen(ranges->path) + 24; /* . and a process */
     char *temporary = base_alloc(size);
-    if (!temporary) return session_no_memory(error, (int64_t)size, "the name of a file of ranges");
-    snprintf(temporary, size, "%s.new", ranges->path);
-    locale_t before;
-    const locale_t c_numbers = use_c_numbers(&before);
+    if (!temporary || !use_c_numbers(&numbers, &before)) {
+        base_free(temporary);
+        return fail(ranges, "written", ENOMEM, error);
+    }
+    snprintf(temporary, size, "%s.%ld", ranges->path, (long)getpid());
     const bool is_written = write_file(ranges, temporary);
     const int reason = errno;
-    use_numbers_again(c_numbers, before);
+    use_numbers_again(numbers, before);
     if (!is_written) unlink(temporary);
     base_free(temporary);
     ranges->is_changed = !is_written;
-    if (is_written) return INSITU_OK;
-    return base_fail(error, INSITU_ERROR_IO, "image \"%s\": %.300s: cannot be written: %s", image->name, ranges->path,
-                     strerror(reason));
+    return is_written ? INSITU_OK : fail(ranges, "written", reason, error);
 }
 
 /* ---- the list -------------------------------------------------------------------------------------------------- */
@@ -244,10 +249,9 @@ static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, b
 }
 
 /* From the file that rank 0 reads. Collective. */
-static insitu_status fill_ranges(session_image_ranges *ranges, const scene_image *image, const session_team *team,
-                                 base_error *error)
+static insitu_status fill_ranges(session_image_ranges *ranges, const session_team *team, base_error *error)
 {
-    if (team->rank == 0) read_ranges(ranges, image, error);
+    if (team->rank == 0) read_ranges(ranges, error);
     const insitu_status status = session_agree_as_is(team->comm, error);
     return status ? status : share_ranges(ranges, team->comm, error);
 }
@@ -260,7 +264,7 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
     const bool has_room = prepare_ranges(all, image, error);
     session_image_ranges *ranges = has_room ? &all->items[all->count] : NULL;
     insitu_status status = session_agree(team->comm, error);
-    if (!status && ranges) status = fill_ranges(ranges, image, team, error);
+    if (!status && ranges) status = fill_ranges(ranges, team, error);
     if (status && ranges) free_ranges(ranges);
     if (status) return status;
     all->count++;

@@ -42,7 +42,7 @@ insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image
 void session_widen_run_range(session_image_ranges *ranges, const scene_colour_map *map, double *low, double *high);
 
 /* Write the file where a range has changed. On rank 0. */
-insitu_status session_write_run_ranges(session_image_ranges *ranges, const scene_image *image, base_error *error);
+insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error *error);
 
 void session_run_ranges_free(session_run_ranges *all);
 
