@@ -29,6 +29,19 @@ target_link_libraries(test_image_output PRIVATE
 add_test(NAME image_output COMMAND test_image_output ${CMAKE_CURRENT_BINARY_DIR}/image_output)
 set_tests_properties(image_output PROPERTIES TIMEOUT 120)
 
+add_executable(test_decorations test_decorations.c)
+target_link_libraries(test_decorations PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA m)
+add_test(NAME decorations COMMAND test_decorations)
+set_tests_properties(decorations PROPERTIES TIMEOUT 60)
+
+add_executable(test_decorated_image test_decorated_image.cpp ${PROJECT_SOURCE_DIR}/adaptors/image/decorate.cpp)
+target_include_directories(test_decorated_image PRIVATE ${PROJECT_SOURCE_DIR}/adaptors/image)
+target_include_directories(test_decorated_image SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
+target_link_libraries(test_decorated_image PRIVATE
+  insitu_flags insitu_internal ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY} PkgConfig::CMOCKA)
+add_test(NAME decorated_image COMMAND test_decorated_image)
+set_tests_properties(decorated_image PROPERTIES TIMEOUT 60)
+
 # Memory runs out: quickly at every 41st allocation of the first picture, in the long tests at each.
 add_library(test_failing_heap OBJECT failing_heap.c)
 target_link_libraries(test_failing_heap PRIVATE insitu_flags ${CMAKE_DL_LIBS})

@@ -40,7 +40,7 @@ struct picture {
     std::vector<float> rgba, depth;
     insitu_image view(bool with_depth) const
     {
-        return {width, height, rgba.data(), with_depth ? depth.data() : nullptr};
+        return {width, height, rgba.data(), with_depth ? depth.data() : nullptr, nullptr};
     }
 };
 
@@ -265,7 +265,7 @@ void longest_legal_name_is_written(void **)
 {
     const fs::path in = folder / "long";
     const picture p = make_picture(3, 2, true);
-    for (const std::size_t length : {244, 255}) {
+    for (const std::size_t length : {std::size_t{244}, std::size_t{255}}) {
         const fs::path path = in / (std::string(length - 4, 'a') + ".png");
         write_well(p.view(false), INSITU_PNG8, path);
         assert_true(fs::is_regular_file(path));

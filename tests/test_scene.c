@@ -105,7 +105,17 @@ static const char every_key[] = "threads: 3\n"
                                 "           scale: symlog, threshold: 0.5, below: [0, 0, 1], above: [0, 1, 0],\n"
                                 "           nan: [1, 0, 1]}}\n"
                                 "    sampling: {max_error: 1e-3}\n"
-                                "    outputs: [{path: c.png}]\n";
+                                "    decorations:\n"
+                                "      title: \"{name} at {time:.2f} s\"\n"
+                                "      text: [{text: \"cycle {cycle}\", at: bottom_right}, {text: plain}]\n"
+                                "      colour_bar: {at: left, labels: [p in Pa, q], ticks: 4}\n"
+                                "      outline: true\n"
+                                "      axes: true\n"
+                                "      colour: [1, 0, 0.5]\n"
+                                "      size: 0.04\n"
+                                "    outputs:\n"
+                                "      - {path: c.png, decorations: false}\n"
+                                "      - {path: \"c{time:.1e}.exr\", decorations: true}\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -632,7 +642,27 @@ static const struct bad_file {
     {12, "    sampling: {jitter: maybe}", 12, {"sampling.jitter: \"maybe\"", "true or false"}},
     {12, "    sampling: {frames: 4097}", 12, {"sampling.frames: \"4097\"", "from 1 to 4096"}},
     {14, "      - path: a.jpg", 14, {"outputs[0].path: \"a.jpg\"", ".png or .exr"}},
-    {14, "      - path: a{time}.png", 14, {"\"{time}\" is unknown", "{cycle}"}},
+    {14, "      - path: a{date}.png", 14, {"\"{date}\" is unknown", "{cycle}"}},
+    {14, "      - path: a{time:.18f}.png", 14, {"\"{time:.18f}\" is unknown", "{time:.17f}"}},
+    {14, "      - path: a{time:.2x}.png", 14, {"\"{time:.2x}\" is unknown", "(or e, or g)"}},
+    {14, "      - path: a{time:2f}.png", 14, {"\"{time:2f}\" is unknown"}},
+    {14, "      - path: a.png\n        decorations: 3", 15, {"outputs[0].decorations: \"3\"", "true or false"}},
+    {12, "    decorations: true", 12, {"decorations: \"true\"", "a mapping with the keys title, text, colour_bar"}},
+    {12, "    decorations: {titel: t}", 12, {"decorations: the key \"titel\" is unknown", "title"}},
+    {12, "    decorations: {title: [a]}", 12, {"decorations.title: a list", "a text of 1 to 255 bytes"}},
+    {12, "    decorations: {title: \"{times}\"}", 12, {"decorations.title: \"{times}\" is unknown", "{time}"}},
+    {12, "    decorations: {text: t}", 12, {"decorations.text: \"t\"", "a list of 1 to 16 mappings"}},
+    {12, "    decorations: {text: [{at: top}]}", 12, {"text[0].text: missing"}},
+    {12, "    decorations: {text: [{text: \"{x}\"}]}", 12, {"text[0].text: \"{x}\" is unknown"}},
+    {12, "    decorations: {text: [{text: a, at: middle}]}", 12, {"text[0].at: \"middle\"", "top_left, top"}},
+    {12, "    decorations: {colour_bar: true}", 12, {"colour_bar: \"true\"", "keys at, labels, ticks"}},
+    {12, "    decorations: {colour_bar: {at: top}}", 12, {"colour_bar.at: \"top\"", "one of left, right"}},
+    {12, "    decorations: {colour_bar: {ticks: 1}}", 12, {"colour_bar.ticks: \"1\"", "from 2 to 12"}},
+    {12, "    decorations: {outline: box}", 12, {"decorations.outline: \"box\"", "true or false"}},
+    {12, "    decorations: {axes: 3}", 12, {"decorations.axes: \"3\"", "true or false"}},
+    {12, "    decorations: {colour: [1, 0]}", 12, {"decorations.colour: a list of 2", "a list of 3 numbers"}},
+    {12, "    decorations: {colour: [1, 0, 2]}", 12, {"decorations.colour[2]: \"2\"", "from 0 to 1"}},
+    {12, "    decorations: {size: 1}", 12, {"decorations.size: \"1\"", "from 0.005 to 0.2"}},
     {14, "      - path: a{cycle:6}.png", 14, {"\"{cycle:6}\" is unknown"}},
     {14, "      - path: a{cycle:021}.png", 14, {"\"{cycle:021}\" is unknown"}},
     {14, "      - path: a{cycle.png", 14, {"is unknown"}},
@@ -772,7 +802,7 @@ static void scene_numbers_do_not_follow_the_locale(void **state)
     setlocale(LC_NUMERIC, "C");
 }
 
-static void scene_output_path_replaces_placeholders(void **state)
+static void scene_texts_have_their_placeholders_replaced(void **state)
 {
     (void)state;
     static const struct {
@@ -780,6 +810,8 @@ static void scene_output_path_replaces_placeholders(void **state)
         long long cycle;
         const char *path;
     } cases[] = {{"a.png", 7, "a.png"},
+                 {"{time}s", 7, "0.125s"},
+                 {"{time:.2f} {time:.0f} {time:.3e} {time:.1g}", 7, "0.12 0 1.250e-01 0.1"},
                  {"{name}/{cycle}.png", 7, "wave/7.png"},
                  {"{cycle:06}{cycle:01}", 42, "00004242"},
                  {"{cycle:020}", 1, "00000000000000000001"},
@@ -789,12 +821,12 @@ static void scene_output_path_replaces_placeholders(void **state)
                  {"{", 1, "{"},
                  {"", 1, ""}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char *path = scene_output_path(cases[i].pattern, "wave", cases[i].cycle);
+        char *path = scene_expand(cases[i].pattern, &(scene_moment){"wave", cases[i].cycle, 0.125});
         assert_string_equal(path, cases[i].path);
         base_free(path);
     }
     base_memory_fail_nth(1);
-    assert_null(scene_output_path("a", "b", 1));
+    assert_null(scene_expand("a", &(scene_moment){"b", 1, 0}));
     base_memory_fail_nth(0);
 }
 
@@ -827,6 +859,27 @@ static void check_mapping(const scene_mapping *mapping)
     }
 }
 
+static void scene_decorations_are_read(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(every_key, &s);
+    const scene_decorations *d = &s.images[2].decorations;
+    assert_true(d->is_given && d->has_outline && d->has_axes && d->has_bars && d->has_colour);
+    assert_string_equal(d->title, "{name} at {time:.2f} s");
+    assert_int_equal(d->words_count, 2);
+    assert_string_equal(d->words[0].text, "cycle {cycle}");
+    assert_true(d->words[0].at == SCENE_BOTTOM_RIGHT && d->words[1].at == SCENE_TOP_LEFT);
+    assert_true(d->bars_at == SCENE_LEFT && d->tick_count == 4 && d->label_count == 2 && d->size == 0.04);
+    assert_string_equal(d->labels[0], "p in Pa");
+    assert_true(d->colour[0] == 1 && d->colour[1] == 0 && d->colour[2] == colour_linear_from_srgb(0.5F));
+    assert_true(!s.images[2].outputs[0].has_decorations && s.images[2].outputs[1].has_decorations);
+    scene_free(&s);
+    parse_good(fewest_keys, &s);
+    assert_true(!s.images[0].decorations.is_given && s.images[0].outputs[0].has_decorations);
+    scene_free(&s);
+}
+
 static void schema_keys_have_help_and_defaults(void **state)
 {
     (void)state;
@@ -839,6 +892,7 @@ int main(int argument_count, char **arguments)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scene_image_keys_are_read),
         cmocka_unit_test(scene_view_keys_are_read),
+        cmocka_unit_test(scene_decorations_are_read),
         cmocka_unit_test(scene_isosurface_keys_are_read),
         cmocka_unit_test(scene_volume_keys_are_read),
         cmocka_unit_test(scene_image_defaults_hold),
@@ -855,7 +909,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_truncated_files_end_well),
         cmocka_unit_test(scene_every_failed_allocation_is_an_error_without_a_leak),
         cmocka_unit_test(scene_numbers_do_not_follow_the_locale),
-        cmocka_unit_test(scene_output_path_replaces_placeholders),
+        cmocka_unit_test(scene_texts_have_their_placeholders_replaced),
         cmocka_unit_test(schema_keys_have_help_and_defaults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -26,9 +26,12 @@ static int64_t allocation;
 
 /* Surfaces alone and in front of a volume, by samples and by segments, values at vertices and in cells, several
  * volumes, frames that are summed. */
+#define DECORATIONS                                                                                                    \
+    "    decorations: {title: t, text: [{text: a}], colour_bar: {labels: x}, outline: true, axes: true}\n"
+
 static const char full_scene[] =
     "threads: 1\nimages:\n" IMAGE("a", "[24, 16]", SURFACES VOLUME("f"), "    sampling: {step_cells: 0.5, frames: 3}\n")
-        IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01}\n")
+        IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01}\n" DECORATIONS)
             IMAGE("d", "[16, 16]", VOLUME("f") VOLUME("c"), "    sampling: {max_error: 0.01}\n");
 
 static const char edited_scene[] = "threads: 1\nimages:\n" IMAGE(

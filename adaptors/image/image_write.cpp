@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "decorate.h"
 #include "memory_reserve.h"
 #include "picture_file.h"
 
@@ -184,13 +185,31 @@ void write_exr(const insitu_image &image, const std::string &path)
     write_pixels(image, l, image.depth ? all.data() : image.rgba, path);
 }
 
-void write(const insitu_image &image, insitu_image_format format, const std::string &path)
+void write_undecorated(const insitu_image &image, insitu_image_format format, const std::string &path)
 {
     switch (format) {
     case INSITU_PNG8: write_png<std::uint8_t>(image, OIIO::TypeDesc::UINT8, path); break;
     case INSITU_PNG16: write_png<std::uint16_t>(image, OIIO::TypeDesc::UINT16, path); break;
     case INSITU_EXR: write_exr(image, path); break;
     }
+}
+
+/* FreeType and OpenImageIO hold a font's glyphs and tables of their own. */
+std::string write(const insitu_image &image, insitu_image_format format, const std::string &path)
+{
+    enum { FONT_TABLES = 4 << 20 };
+    std::string warning;
+    insitu_image finished = image;
+    std::vector<float> rgba;
+    if (image.decorations) {
+        rgba.assign(image.rgba, image.rgba + 4 * pixel_count(image));
+        const memory_reserve reserve(FONT_TABLES);
+        OIIO::attribute("threads", 1);
+        decorate(image, rgba, warning);
+        finished.rgba = rgba.data();
+    }
+    write_undecorated(finished, format, path);
+    return warning;
 }
 
 insitu_status fail(insitu_status status, const char *path, const char *what, char *message, std::size_t size)
@@ -209,7 +228,8 @@ extern "C" insitu_status insitu_image_write(const insitu_image *image, insitu_im
         return fail(INSITU_ERROR_ARGUMENT, path, "no image, no path, no pixels or an unknown format", message, size);
     }
     try {
-        write(*image, format, path);
+        const std::string warning = write(*image, format, path);
+        if (message && size) std::snprintf(message, size, "%s", warning.c_str());
         return INSITU_OK;
     } catch (const std::bad_alloc &) {
         return fail(INSITU_ERROR_MEMORY, path, "no memory", message, size);

@@ -1,6 +1,6 @@
 /* The report of a step while it is written: its numbers, its lists of words, and which warnings were told.
  *
- * A warning says that something is drawn as asked but hardly as meant. All but WARNING_ISA are the same on every rank,
+ * A warning says that something is drawn as asked but hardly as meant. All but WARNING_ISA and WARNING_WORDS are the same on every rank,
  * because they are found from what ranks share. A warning is told in the first step in which it holds. It is told again
  * if it has not held in between, or if the scene was edited. */
 #ifndef SESSION_REPORT_H
@@ -46,6 +46,7 @@ typedef enum session_warning_kind {
     WARNING_VIEW,     /* a camera sees no cell */
     WARNING_GREY,     /* a surface has not the field that colours it */
     WARNING_OVERLAP,  /* cells overlap in some pixels */
+    WARNING_WORDS,    /* rank 0 has no font for the words of a picture */
     WARNING_ISA       /* INSITU_ISA of this rank's environment is not taken */
 } session_warning_kind;
 

@@ -8,6 +8,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_decorations.h"
 #include "session_frame.h"
 #include "session_image.h"
 #include "session_layers.h"
@@ -18,8 +19,9 @@ enum { overlap_fragments = 1 << 22 };
 
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
 typedef struct canvas {
-    image frame; /* its memory is the session's picture */
-    double *sum; /* NULL: there is one frame */
+    image frame;                      /* its memory is the session's picture */
+    double *sum;                      /* NULL: there is one frame */
+    session_decorations *decorations; /* NULL: there are none, and the frame has its background */
 } canvas;
 
 /* A picture's memory stays for the next one, unless it is more than this. */
@@ -29,6 +31,7 @@ static void canvas_free(canvas *c, session_picture *picture)
 {
     if (picture->bytes > kept_bytes) session_drop_picture(picture);
     base_free(c->sum);
+    session_free_decorations(c->decorations);
 }
 
 static bool wants_depth(const scene_image *image)
@@ -135,7 +138,9 @@ static void warn_of_overlaps(session_report *report, const scene_image *image, i
 static insitu_status draw_frames(const session_drawing *d, const scene_image *image, const session_view *view,
                                  const session_layers *layers, canvas *canvas, base_error *error)
 {
-    const session_frame_target target = {d->team->comm, d->team->compositing_comm, image->background,
+    static const float no_background[4] = {0, 0, 0, 0}; /* edges may go between it and the picture */
+    const session_frame_target target = {d->team->comm, d->team->compositing_comm,
+                                         image->decorations.is_given ? no_background : image->background,
                                          overlap_fragments};
     render_job job = make_job(d, image, view, layers);
     int64_t overlaps = 0;
@@ -164,10 +169,17 @@ static insitu_image_format format_of(scene_format format)
     return INSITU_PNG8;
 }
 
-static void write_output(const scene_image *image, const scene_output *output, const canvas *source, int64_t cycle,
-                         base_error *error)
+static scene_moment moment_of(const session_drawing *d, const scene_image *image)
 {
-    char *path = scene_output_path(output->path, image->name, (long long)cycle);
+    return (scene_moment){image->name, (long long)d->cycle, d->report->numbers.time};
+}
+
+static void write_output(const session_drawing *d, const scene_image *image, const scene_output *output,
+                         const canvas *source, base_error *error)
+{
+    const session_decorations *decorations = source->decorations;
+    const scene_moment moment = moment_of(d, image);
+    char *path = scene_expand(output->path, &moment);
     if (!path) {
         base_fail(error, INSITU_ERROR_MEMORY, "no memory for the name of a picture");
         return;
@@ -175,10 +187,16 @@ static void write_output(const scene_image *image, const scene_output *output, c
     const insitu_image picture = {.width = image->width,
                                   .height = image->height,
                                   .rgba = source->frame.rgba,
-                                  .depth = output->format == SCENE_EXR ? source->frame.depth : NULL};
+                                  .depth = output->format == SCENE_EXR ? source->frame.depth : NULL,
+                                  .decorations = !decorations              ? NULL
+                                                 : output->has_decorations ? &decorations->all
+                                                                           : &decorations->background};
     base_error reason = {0};
     if (session_write_image(&picture, format_of(output->format), path, &reason) != INSITU_OK)
         base_fail(error, reason.status, "image \"%s\": %.900s", image->name, reason.message);
+    const session_warning warning = {WARNING_WORDS, image->name, NULL, 0};
+    session_warn(d->report, &warning, reason.status == INSITU_OK && *reason.message, "image \"%s\": %.900s",
+                 image->name, reason.message);
     base_free(path);
 }
 
@@ -188,7 +206,7 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 {
     const double start = MPI_Wtime();
     for (int i = 0; i < image->output_count && d->team->rank == 0; i++)
-        write_output(image, &image->outputs[i], source, d->cycle, error);
+        write_output(d, image, &image->outputs[i], source, error);
     if (ranges && d->team->rank == 0) session_write_run_ranges(ranges, error);
     if (d->team->rank == 0) d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
     return session_agree(d->team->comm, error);
@@ -258,13 +276,18 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (status) return status;
     layers.active = active;
     canvas_create(image, d->team->rank, picture, &canvas, error);
+    if (image->decorations.is_given && d->team->rank == 0) {
+        const scene_moment moment = moment_of(d, image);
+        canvas.decorations = session_make_decorations(image, &moment, &d->space->extent, &view, &layers);
+        if (!canvas.decorations) session_no_memory(error, (int64_t)sizeof *canvas.decorations, "decorations");
+    }
     status = session_agree(d->team->comm, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
-    session_layers_free(&layers);
     if (!status) {
         status = write_outputs(d, image, &canvas, basis.run_ranges, error);
         d->report->numbers.images++;
     }
+    session_layers_free(&layers);
     canvas_free(&canvas, picture);
     return status;
 }

@@ -131,5 +131,7 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
 
     char message[sizeof error->message / 2] = "";
     const insitu_status written = write(image, format, path, message, sizeof message);
-    return written == INSITU_OK ? INSITU_OK : base_fail(error, written, "%s", message);
+    if (written != INSITU_OK) return base_fail(error, written, "%s", message);
+    if (error && *message) snprintf(error->message, sizeof error->message, "%s", message);
+    return INSITU_OK;
 }

@@ -153,6 +153,10 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
     if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
+    char decorations_path[SCENE_PATH_SIZE];
+    snprintf(decorations_path, sizeof decorations_path, "%s.decorations", path);
+    if (status == INSITU_OK)
+        status = scene_convert_decorations(d, decorations_path, in->decorations, &out->decorations);
     if (status == INSITU_OK) status = scene_convert_outputs(d, path, in, out);
     return status;
 }
@@ -271,6 +275,7 @@ static void free_image(scene_image *image)
         free_colour_map(&image->slices[i].colour_map);
     }
     for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);
+    scene_free_decorations(&image->decorations);
     base_free(image->name);
     base_free(image->isosurfaces);
     base_free(image->volumes);

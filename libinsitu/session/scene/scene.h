@@ -156,11 +156,46 @@ typedef struct scene_camera {
     double zoom;  /* automatic: 1 fits the bounds' sphere; larger is nearer */
 } scene_camera;
 
+/* Places in the picture, as insitu_anchor (image_output.h) has them. */
+typedef enum scene_anchor {
+    SCENE_TOP_LEFT,
+    SCENE_TOP,
+    SCENE_TOP_RIGHT,
+    SCENE_LEFT,
+    SCENE_RIGHT,
+    SCENE_BOTTOM_LEFT,
+    SCENE_BOTTOM,
+    SCENE_BOTTOM_RIGHT
+} scene_anchor;
+
+typedef struct scene_words {
+    char *text; /* {time}, {cycle} and {name} are replaced */
+    scene_anchor at;
+} scene_words;
+
+/* What is written and drawn beside the data. */
+typedef struct scene_decorations {
+    bool is_given; /* else there are none */
+    char *title;   /* NULL: none */
+    int words_count;
+    scene_words *words;
+    bool has_bars; /* one for each layer that colours by a field */
+    scene_anchor bars_at;
+    int tick_count; /* about so many a bar */
+    int label_count;
+    char **labels; /* of the bars in turn; beyond them the fields' names */
+    bool has_outline, has_axes;
+    bool has_colour;
+    float colour[3]; /* linear; where has_colour is not set, light on a dark background and dark on a light one */
+    double size;     /* of words, a share of the picture's height */
+} scene_decorations;
+
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 
 typedef struct scene_output {
-    char *path;          /* {cycle}, {cycle:06}, {name} are replaced; relative to the working directory of rank 0 */
-    scene_format format; /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
+    char *path; /* {cycle}, {cycle:06}, {time}, {name} are replaced; relative to the working directory of rank 0 */
+    scene_format format;  /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
+    bool has_decorations; /* of the image, if that has any */
 } scene_output;
 
 typedef struct scene_image {
@@ -177,6 +212,7 @@ typedef struct scene_image {
     scene_surface *surfaces;
     int slice_count;
     scene_slice *slices;
+    scene_decorations decorations;
     int light_count; /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
     scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */
@@ -209,7 +245,15 @@ insitu_status scene_parse(const char *text, size_t size, const char *file_name, 
 
 void scene_free(scene *s);
 
-/* Replace {cycle}, {cycle:0N} and {name} of pattern. The result is from base_alloc(), NULL where memory ran out. */
-char *scene_output_path(const char *pattern, const char *name, long long cycle);
+/* What placeholders stand for. */
+typedef struct scene_moment {
+    const char *name; /* of the image */
+    long long cycle;
+    double time;
+} scene_moment;
+
+/* Replace {cycle}, {cycle:0N}, {time}, {time:.Nf} (or e, or g) and {name} of pattern. Numbers have a decimal point in
+ * any locale. The result is from base_alloc(), NULL where memory ran out. */
+char *scene_expand(const char *pattern, const scene_moment *moment);
 
 #endif

@@ -29,6 +29,12 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
 insitu_status scene_convert_outputs(const scene_document *d, const char *path, const scene_file_image *in,
                                     scene_image *out);
 
+insitu_status scene_convert_decorations(const scene_document *d, const char *path, const scene_file_decorations *in,
+                                        scene_decorations *out);
+void scene_free_decorations(scene_decorations *decorations);
+/* Refuse placeholders that are none. key: of the text. */
+insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text);
+
 /* The keys that say how values become colours, of the mapping at path. */
 insitu_status scene_convert_colour_map(const scene_document *d, const char *path, const scene_file_colour_map *in,
                                        scene_colour_map *out);

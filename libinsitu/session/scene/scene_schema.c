@@ -39,6 +39,11 @@ static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"di
 static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"vertex", SCENE_BY_VERTEX}};
 static const cyaml_strval_t tree_words[] = {
     {"auto", SCENE_TREE_AUTO}, {"full", SCENE_TREE_FULL}, {"partial", SCENE_TREE_PARTIAL}};
+static const cyaml_strval_t anchor_words[] = {{"top_left", SCENE_TOP_LEFT},   {"top", SCENE_TOP},
+                                              {"top_right", SCENE_TOP_RIGHT}, {"left", SCENE_LEFT},
+                                              {"right", SCENE_RIGHT},         {"bottom_left", SCENE_BOTTOM_LEFT},
+                                              {"bottom", SCENE_BOTTOM},       {"bottom_right", SCENE_BOTTOM_RIGHT}};
+static const cyaml_strval_t side_words[] = {{"left", SCENE_LEFT}, {"right", SCENE_RIGHT}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
 
 #define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
@@ -358,20 +363,66 @@ DEFINE_MAPPING(layer, "layers", LAYER_KEYS);
       .by_default = "`3600`", .low = 1, .high = 1e9)
 DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
+#define PLACEHOLDERS                                                                                                   \
+    "`{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, `{time}` the time, `{time:.3f}` the " \
+    "time as C's printf writes it (`f`, `e` or `g`), `{name}` the image's name."
+
+#define WORDS_KEYS(X)                                                                                                  \
+    X(TEXT("text", REQUIRED, scene_file_words, text, 255), .help = "One line of text. " PLACEHOLDERS)                  \
+    X(CHOICE("at", scene_file_words, at, anchor_words), .help = "Where it stands.", .by_default = "`top_left`")
+DEFINE_MAPPING(words, "text", WORDS_KEYS);
+
+#define COLOUR_BAR_KEYS(X)                                                                                             \
+    X(CHOICE("at", scene_file_colour_bar, at, side_words), .help = "The side of the picture.",                         \
+      .by_default = "`right`")                                                                                         \
+    X(NAMES("labels"),                                                                                                 \
+      .help = "The words above a bar, units for instance; a list of them where there are several bars, in the order "  \
+              "of the layers: isosurfaces, surfaces, slices, volumes.",                                                \
+      .by_default = "the names of the fields, with their components")                                                  \
+    X(CYAML_FIELD_INT_PTR("ticks", OPTIONAL, scene_file_colour_bar, ticks),                                            \
+      .help = "At most so many ticks, at round numbers.", .by_default = "`6`", .low = 2, .high = 12)
+DEFINE_MAPPING(colour_bar, "colour_bar", COLOUR_BAR_KEYS);
+
+static const cyaml_schema_value_t words = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_words, words_fields)};
+
+#define DECORATIONS_KEYS(X)                                                                                            \
+    X(TEXT("title", OPTIONAL, scene_file_decorations, title, 255),                                                     \
+      .help = "One line in the middle at the top, larger than other text, with the same placeholders.",                \
+      .by_default = "none")                                                                                            \
+    X(CYAML_FIELD_SEQUENCE("text", POINTER, scene_file_decorations, text, &words, 1, 16),                              \
+      .help = "Lines of text. Those of one place stack.", .by_default = "none", .child = &words_mapping)               \
+    X(CYAML_FIELD_MAPPING_PTR("colour_bar", OPTIONAL, scene_file_decorations, colour_bar, colour_bar_fields),          \
+      .help = "A bar of colours with its numbers for each layer that is coloured by a field: isosurfaces and "         \
+              "surfaces with `colour_by`, slices and volumes. `{}` takes all its defaults.",                           \
+      .by_default = "none", .child = &colour_bar_mapping)                                                              \
+    X(CYAML_FIELD_BOOL_PTR("outline", OPTIONAL, scene_file_decorations, outline),                                      \
+      .help = "The edges of the box around all data; what is drawn hides those that lie behind it.",                   \
+      .by_default = "`false`")                                                                                         \
+    X(CYAML_FIELD_BOOL_PTR("axes", OPTIONAL, scene_file_decorations, axes),                                            \
+      .help = "The directions of x, y and z, in the lower left corner.", .by_default = "`false`")                      \
+    X(NUMBERS("colour", scene_file_decorations, colour, 3), .help = "Colour of words and lines, sRGB.",                \
+      .by_default = "light where the background is dark, dark where it is light or transparent", .low = 0, .high = 1)  \
+    X(CYAML_FIELD_FLOAT_PTR("size", OPTIONAL, scene_file_decorations, size),                                           \
+      .help = "Height of words as a share of the picture's height.", .by_default = "`0.03`", .low = 0.005,             \
+      .high = 0.2)
+DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
+
 #define OUTPUT_KEYS(X)                                                                                                 \
     X(TEXT("path", REQUIRED, scene_file_output, path, 1023),                                                           \
-      .help = "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "       \
-              "folders are made. `{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, "         \
-              "`{name}` the image's name. At most 1023 bytes. The channel Z of an EXR is the depth of the nearest "    \
-              "surface in the pixel: how far from the eye it is along the camera's axis, in scene units "              \
-              "(not along "                                                                                            \
-              "the pixel's ray). Surfaces of any opacity count, 0 as well, and no volume hides them; it is infinite "  \
-              "where there is none: volumes and the background have no depth.")                                        \
+      .help =                                                                                                          \
+          "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "           \
+          "folders are made. " PLACEHOLDERS                                                                            \
+          " At most 1023 bytes. The channel Z of an EXR is the depth of the nearest surface in the pixel: how far "    \
+          "from the eye it is along the camera's axis, in scene units (not along the pixel's ray). Surfaces of any "   \
+          "opacity count, 0 as well, and no volume hides them; it is infinite where there is none: volumes and the "   \
+          "background have no depth.")                                                                                 \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help =                                                                                                          \
           "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats: R, G, B (linear, times A), A, and the "   \
           "depth, Z.",                                                                                                 \
-      .by_default = "`8`", .low = 8, .high = 16)
+      .by_default = "`8`", .low = 8, .high = 16)                                                                       \
+    X(CYAML_FIELD_BOOL_PTR("decorations", OPTIONAL, scene_file_output, decorations),                                   \
+      .help = "Draw the image's decorations into this file.", .by_default = "`true` for PNG, `false` for EXR")
 DEFINE_MAPPING(output, "outputs", OUTPUT_KEYS);
 
 static const cyaml_schema_value_t light = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_light, light_fields)};
@@ -400,6 +451,12 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
       .help = "How volumes are integrated, and how finely.",                                                           \
       .by_default = "one volume to a `max_error` of 0.01; several by samples, half a cell apart, jittered",            \
       .child = &sampling_mapping)                                                                                      \
+    X(CYAML_FIELD_MAPPING_PTR("decorations", OPTIONAL, scene_file_image, decorations, decorations_fields),             \
+      .help =                                                                                                          \
+          "What is written and drawn beside the data. Nothing of it lies over another, and all of it grows with "      \
+          "the picture. Words need a font: DejaVuSans, or another common one, in the system's folders or in those "    \
+          "that OPENIMAGEIO_FONTS names in rank 0's environment; without one the report warns.",                       \
+      .by_default = "none", .child = &decorations_mapping)                                                             \
     X(CYAML_FIELD_SEQUENCE("outputs", CYAML_FLAG_POINTER, scene_file_image, outputs, &output, 1, 16),                  \
       .help = "Files that the image is written to. No two files of a scene may have the same name.",                   \
       .child = &output_mapping)

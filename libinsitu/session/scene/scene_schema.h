@@ -108,9 +108,30 @@ typedef struct scene_file_sampling {
     double *max_seconds;
 } scene_file_sampling;
 
+typedef struct scene_file_words {
+    char *text;
+    int *at; /* scene_anchor */
+} scene_file_words;
+
+typedef struct scene_file_colour_bar {
+    int *at; /* scene_anchor */
+    int *ticks;
+} scene_file_colour_bar;
+
+typedef struct scene_file_decorations {
+    char *title;
+    scene_file_words *text;
+    int text_count;
+    scene_file_colour_bar *colour_bar;
+    bool *outline, *axes;
+    double *colour; /* 3 */
+    double *size;
+} scene_file_decorations;
+
 typedef struct scene_file_output {
     char *path;
     int *bits;
+    bool *decorations;
 } scene_file_output;
 
 typedef struct scene_file_image {
@@ -125,6 +146,7 @@ typedef struct scene_file_image {
     scene_file_layer *layers;
     int layers_count;
     scene_file_sampling *sampling;
+    scene_file_decorations *decorations;
     scene_file_output *outputs;
     int outputs_count;
 } scene_file_image;

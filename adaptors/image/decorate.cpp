@@ -1,0 +1,392 @@
+/* Everything is drawn in linear light on premultiplied colours, so that edges of lines and letters are smooth on any
+ * background. Order: the strokes that what is drawn hides go under the picture, the background under these, all else
+ * over it. Sizes are shares of the picture's height: a picture of twice the size is the same picture, finer.
+ *
+ * Text is OpenImageIO's, by FreeType. It looks fonts up by name in the system's folders and in those that
+ * OPENIMAGEIO_FONTS names. */
+#include "decorate.h"
+
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imagebufalgo.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <glob.h>
+#include <new>
+
+namespace
+{
+
+const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans", "DroidSans"};
+
+struct sheet {
+    const insitu_image &image;
+    const insitu_decorations &what;
+    std::vector<float> &rgba;
+    const char *font; /* NULL: none was found */
+    int size;         /* of words, pixels */
+    double margin;
+    std::vector<area> taken;
+};
+
+/* ---- pixels -------------------------------------------------------------------------------------------------- */
+
+float *pixel_at(sheet &s, int x, int y)
+{
+    return &s.rgba[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(s.image.width) +
+                        static_cast<std::size_t>(x))];
+}
+
+/* Colour of this opacity over the pixel, or under it. */
+void blend(float *pixel, const float colour[3], double opacity, bool is_behind)
+{
+    const double seen = is_behind ? opacity * (1 - std::min(1.0, static_cast<double>(pixel[3]))) : opacity;
+    const double kept = is_behind ? 1 : 1 - opacity;
+    for (int c = 0; c < 4; c++)
+        pixel[c] = static_cast<float>(pixel[c] * kept + (c < 3 ? static_cast<double>(colour[c]) : 1.0) * seen);
+}
+
+void put_background(sheet &s)
+{
+    for (std::size_t i = 0; i < s.rgba.size(); i += 4) {
+        const float left = 1 - std::min(1.0F, s.rgba[i + 3]);
+        for (std::size_t c = 0; c < 4; c++) s.rgba[i + c] += left * s.what.background[c];
+    }
+}
+
+/* How much of the pixel [x, x + 1) the interval covers. */
+double covered(double low, double high, int x)
+{
+    return std::clamp(std::min(high, x + 1.0) - std::max(low, static_cast<double>(x)), 0.0, 1.0);
+}
+
+void fill(sheet &s, const area &a, const float colour[3], double opacity)
+{
+    const int x1 = std::min(s.image.width, static_cast<int>(std::ceil(a.x1)));
+    const int y1 = std::min(s.image.height, static_cast<int>(std::ceil(a.y1)));
+    for (int y = std::max(0, static_cast<int>(a.y0)); y < y1; y++)
+        for (int x = std::max(0, static_cast<int>(a.x0)); x < x1; x++)
+            blend(pixel_at(s, x, y), colour, opacity * covered(a.x0, a.x1, x) * covered(a.y0, a.y1, y), false);
+}
+
+double distance_to(const insitu_stroke &line, double x, double y)
+{
+    const double dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
+    const double square = dx * dx + dy * dy;
+    const double along = square > 0 ? ((x - line.from[0]) * dx + (y - line.from[1]) * dy) / square : 0;
+    const double at = std::clamp(along, 0.0, 1.0);
+    return std::hypot(x - (line.from[0] + at * dx), y - (line.from[1] + at * dy));
+}
+
+/* Row by row, the columns that the line may meet: long lines cost their length, not their box. */
+void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float colour[3])
+{
+    const double reach = 0.5 * width + 1, dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
+    const double top = std::min(line.from[1], line.to[1]) - reach, bottom = std::max(line.from[1], line.to[1]) + reach;
+    for (int y = std::max(0, static_cast<int>(top)); y < std::min<double>(s.image.height, bottom); y++) {
+        double low = std::min(line.from[0], line.to[0]), high = std::max(line.from[0], line.to[0]);
+        if (dy != 0) {
+            const double a = line.from[0] + (y - reach - line.from[1]) / dy * dx;
+            const double b = line.from[0] + (y + 1 + reach - line.from[1]) / dy * dx;
+            low = std::max(low, std::min(a, b));
+            high = std::min(high, std::max(a, b));
+        }
+        const int first = static_cast<int>(std::clamp(low - reach, 0.0, static_cast<double>(s.image.width)));
+        const double end = std::min(static_cast<double>(s.image.width), high + reach);
+        for (int x = first; x < end; x++) {
+            const double inside = 0.5 + 0.5 * width - distance_to(line, x + 0.5, y + 0.5);
+            if (inside > 0) blend(pixel_at(s, x, y), colour, std::min(inside, 1.0), line.is_behind);
+        }
+    }
+}
+
+double line_width(const sheet &s)
+{
+    return std::max(1.0, s.image.height / 540.0);
+}
+
+void draw_strokes(sheet &s, bool behind)
+{
+    for (int i = 0; i < s.what.stroke_count; i++)
+        if (s.what.strokes[i].is_behind == behind) draw_stroke(s, s.what.strokes[i], line_width(s), s.what.colour);
+}
+
+/* ---- words --------------------------------------------------------------------------------------------------- */
+
+/* FreeType crashes where it finds no memory for a font, and OpenImageIO passes by letters for which there is none. So
+ * there must be far more memory than words take before any are made. */
+void check_memory()
+{
+    enum { ENOUGH = 2 << 20 };
+    void *volatile block = std::malloc(ENOUGH);
+    if (!block) throw std::bad_alloc();
+    std::free(block);
+}
+
+int width_of(const sheet &s, const std::string &text, int size)
+{
+    if (!s.font || text.empty()) return 0;
+    check_memory();
+    const OIIO::ROI box = OIIO::ImageBufAlgo::text_size(text, size, s.font);
+    return box.defined() ? box.xend : 0;
+}
+
+/* How much of each pixel letters cover: they begin at `left`, on this baseline. */
+struct lettering {
+    int width, height, left, baseline;
+    std::vector<float> covered;
+};
+
+lettering make_lettering(const sheet &s, const std::string &text, int size)
+{
+    using namespace OIIO;
+    const float one = 1;
+    lettering out{width_of(s, text, size) + size, 2 * size, size / 2, size + size / 2, {}};
+    out.covered.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+    ImageBuf picture(ImageSpec(out.width, out.height, 1, TypeDesc::FLOAT), out.covered.data());
+    const bool well =
+        ImageBufAlgo::render_text(picture, out.left, out.baseline, text, size, s.font, one,
+                                  ImageBufAlgo::TextAlignX::Left, ImageBufAlgo::TextAlignY::Baseline, 0, ROI(), 1);
+    if (!well) throw std::bad_alloc(); /* the font was there when it was looked for */
+    return out;
+}
+
+/* From the left end of its baseline. */
+void write_text(sheet &s, const std::string &text, double x, double baseline, int size)
+{
+    if (!s.font || text.empty()) return;
+    const lettering letters = make_lettering(s, text, size);
+    const int left = static_cast<int>(std::lround(x)) - letters.left;
+    const int top = static_cast<int>(std::lround(baseline)) - letters.baseline;
+    for (int row = std::max(0, -top); row < letters.height && top + row < s.image.height; row++)
+        for (int column = std::max(0, -left); column < letters.width && left + column < s.image.width; column++) {
+            const float covered = letters.covered[static_cast<std::size_t>(row * letters.width + column)];
+            if (covered > 0)
+                blend(pixel_at(s, left + column, top + row), s.what.colour, static_cast<double>(covered), false);
+        }
+}
+
+/* A plate in the background's colour, so that words can be read on any picture. */
+void put_plate(sheet &s, const area &block)
+{
+    const float alpha = s.what.background[3];
+    if (!(alpha > 0)) return;
+    const float colour[3] = {s.what.background[0] / alpha, s.what.background[1] / alpha, s.what.background[2] / alpha};
+    const double pad = 0.25 * s.size;
+    fill(s, {block.x0 - pad, block.y0 - pad, block.x1 + pad, block.y1 + pad}, colour, 0.6 * static_cast<double>(alpha));
+}
+
+/* Words that are wider than the picture are made smaller. */
+void draw_words(sheet &s, const insitu_words &words)
+{
+    int size = std::max(1, static_cast<int>(std::lround(s.size * static_cast<double>(words.size))));
+    const double room = std::max(1.0, s.image.width - 2 * s.margin);
+    int width = width_of(s, words.text, size);
+    if (width > room) {
+        size = std::max(1, static_cast<int>(size * room / width));
+        width = width_of(s, words.text, size);
+    }
+    const area block = place_block(s.image, {words.at, 0}, width, 1.2 * size, s.margin, s.taken);
+    put_plate(s, block);
+    write_text(s, words.text, block.x0, block.y0 + 0.95 * size, size);
+}
+
+/* ---- colour bars --------------------------------------------------------------------------------------------- */
+
+/* Linear between the table's entries, as the renderer looks them up. */
+void colour_at(const insitu_colour_bar &bar, double place, float out[3])
+{
+    const int last = bar.colour_count - 1;
+    const double x = std::clamp(place, 0.0, 1.0) * (bar.is_banded ? bar.colour_count : last);
+    const int i = std::min(static_cast<int>(x), bar.is_banded ? last : last - 1);
+    const float part = bar.is_banded ? 0 : static_cast<float>(x - i);
+    for (int c = 0; c < 3; c++) {
+        const float low = bar.colours[3 * i + c], high = bar.is_banded ? low : bar.colours[3 * i + 3 + c];
+        out[c] = low + part * (high - low);
+    }
+}
+
+void draw_gradient(sheet &s, const insitu_colour_bar &bar, const area &where)
+{
+    for (int y = static_cast<int>(where.y0); y < where.y1; y++) {
+        float colour[3];
+        colour_at(bar, (where.y1 - (y + 0.5)) / (where.y1 - where.y0), colour);
+        fill(s, {where.x0, std::max(where.y0, static_cast<double>(y)), where.x1, std::min(where.y1, y + 1.0)}, colour,
+             1);
+    }
+}
+
+void draw_frame(sheet &s, const area &a)
+{
+    const double corners[4][2] = {{a.x0, a.y0}, {a.x1, a.y0}, {a.x1, a.y1}, {a.x0, a.y1}};
+    for (int i = 0; i < 4; i++) {
+        const double *from = corners[i], *to = corners[(i + 1) % 4];
+        draw_stroke(s, {{from[0], from[1]}, {to[0], to[1]}, false}, line_width(s), s.what.colour);
+    }
+}
+
+/* Small boxes beyond the ends, where values outside of the range have colours of their own. */
+void draw_outside(sheet &s, const insitu_colour_bar &bar, const area &where)
+{
+    const double height = 0.45 * s.size;
+    const area below = {where.x0, where.y1, where.x1, where.y1 + height};
+    const area above = {where.x0, where.y0 - height, where.x1, where.y0};
+    if (bar.below) fill(s, below, bar.below, 1), draw_frame(s, below);
+    if (bar.above) fill(s, above, bar.above, 1), draw_frame(s, above);
+}
+
+void draw_ticks(sheet &s, const insitu_colour_bar &bar, const area &where)
+{
+    for (int i = 0; i < bar.tick_count; i++) {
+        const double y = where.y1 - bar.ticks[i].place * (where.y1 - where.y0), end = where.x1 + 0.3 * s.size;
+        draw_stroke(s, {{where.x1, y}, {end, y}, false}, line_width(s), s.what.colour);
+        write_text(s, bar.ticks[i].text, end + 0.2 * s.size, y + 0.36 * s.size, s.size);
+    }
+}
+
+/* The label, a gap, and the bar with its ticks at its right. Bars of one side share its height. */
+void draw_bar(sheet &s, const insitu_colour_bar &bar)
+{
+    int sharing = 0, before = 0, words = 0;
+    for (int i = 0; i < s.what.bar_count; i++) {
+        sharing += s.what.bars[i].at == bar.at;
+        before += s.what.bars[i].at == bar.at && &s.what.bars[i] < &bar;
+    }
+    for (int i = 0; i < bar.tick_count; i++) words = std::max(words, width_of(s, bar.ticks[i].text, s.size));
+    const double thickness = 0.9 * s.size, head = 1.7 * s.size, foot = 0.5 * s.size;
+    const double length = std::max(2.0 * s.size, 0.62 * s.image.height / sharing - head - foot);
+    const double width = std::max<double>(width_of(s, bar.label, s.size), thickness + 0.5 * s.size + words);
+    const double height = head + length + foot, gap = 0.5 * s.margin;
+    const double above = (before - 0.5 * (sharing - 1)) * (height + gap); /* of the middle of the side */
+    const area block = place_block(s.image, {bar.at, above}, width, height, s.margin, s.taken);
+    const area gradient = {block.x0, block.y0 + head, block.x0 + thickness, block.y0 + head + length};
+    put_plate(s, block);
+    write_text(s, bar.label, block.x0, block.y0 + 0.95 * s.size, s.size);
+    draw_gradient(s, bar, gradient);
+    draw_frame(s, gradient);
+    draw_outside(s, bar, gradient);
+    draw_ticks(s, bar, gradient);
+}
+
+/* ---- axes ---------------------------------------------------------------------------------------------------- */
+
+/* Red, green and blue for x, y and z, the one that points away from the eye first. */
+void draw_axes(sheet &s)
+{
+    static const float colours[3][3] = {{0.8F, 0.05F, 0.05F}, {0.05F, 0.5F, 0.05F}, {0.08F, 0.2F, 0.9F}};
+    const double arm = 2.2 * s.size, side = 2 * arm + 2 * s.size;
+    const area block = place_block(s.image, {INSITU_BOTTOM_LEFT, 0}, side, side, s.margin, s.taken);
+    const double middle[2] = {0.5 * (block.x0 + block.x1), 0.5 * (block.y0 + block.y1)};
+    int order[3] = {0, 1, 2};
+    std::sort(order, order + 3, [&](int a, int b) { return s.what.axes[a][2] < s.what.axes[b][2]; });
+    for (const int axis : order) {
+        const double *d = s.what.axes[axis];
+        const double tip[2] = {middle[0] + arm * d[0], middle[1] - arm * d[1]};
+        const std::string name(1, static_cast<char>('x' + axis));
+        draw_stroke(s, {{middle[0], middle[1]}, {tip[0], tip[1]}, false}, 1.5 * line_width(s), colours[axis]);
+        write_text(s, name, middle[0] + (arm + 0.6 * s.size) * d[0] - 0.3 * s.size,
+                   middle[1] - (arm + 0.6 * s.size) * d[1] + 0.3 * s.size, s.size);
+    }
+}
+
+/* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+/* By glob(), as the C++ library's walk through folders ends the process where it finds no memory. */
+bool is_in_folder(const std::string &folder)
+{
+    bool is_found = false;
+    for (const char *font : fonts) {
+        const std::string pattern = folder + "/{,*/,*/*/,*/*/*/}" + font + ".*";
+        glob_t files{};
+        const int result = glob(pattern.c_str(), GLOB_BRACE, nullptr, &files);
+        globfree(&files);
+        if (result == GLOB_NOSPACE) throw std::bad_alloc();
+        is_found = is_found || result == 0;
+    }
+    return is_found;
+}
+
+/* Where OpenImageIO finds no font though there is one, there was no memory for it. */
+bool is_installed()
+{
+    const char *own = std::getenv("OPENIMAGEIO_FONTS");
+    return is_in_folder("/usr/share/fonts") || is_in_folder("/usr/local/share/fonts") || (own && is_in_folder(own));
+}
+
+const char *find_font(std::string &warning)
+{
+    check_memory();
+    for (const char *font : fonts)
+        if (OIIO::ImageBufAlgo::text_size("x", 16, font).defined()) return font;
+    if (is_installed()) throw std::bad_alloc();
+    warning = "no font was found, so its words are left out; expected DejaVuSans in the system's fonts or in a folder "
+              "that OPENIMAGEIO_FONTS names";
+    return nullptr;
+}
+
+bool has_words(const insitu_decorations &what)
+{
+    return what.words_count > 0 || what.bar_count > 0 || what.has_axes;
+}
+
+bool are_apart(const area &a, const area &b, double gap)
+{
+    return a.x1 + gap <= b.x0 || b.x1 + gap <= a.x0 || a.y1 + gap <= b.y0 || b.y1 + gap <= a.y0;
+}
+
+bool is_at_right(insitu_anchor at)
+{
+    return at == INSITU_TOP_RIGHT || at == INSITU_RIGHT || at == INSITU_BOTTOM_RIGHT;
+}
+
+bool is_at_bottom(insitu_anchor at)
+{
+    return at == INSITU_BOTTOM_LEFT || at == INSITU_BOTTOM || at == INSITU_BOTTOM_RIGHT;
+}
+
+area block_at(const insitu_image &image, const spot &where, double width, double height, double margin)
+{
+    const insitu_anchor at = where.at;
+    const bool is_centred = at == INSITU_TOP || at == INSITU_BOTTOM,
+               is_middle = at == INSITU_LEFT || at == INSITU_RIGHT;
+    const double x = is_centred ? 0.5 * (image.width - width) : is_at_right(at) ? image.width - margin - width : margin;
+    const double y = is_middle          ? 0.5 * (image.height - height)
+                     : is_at_bottom(at) ? image.height - margin - height
+                                        : margin;
+    return {x, y + where.down, x + width, y + where.down + height};
+}
+
+} // namespace
+
+area place_block(const insitu_image &image, const spot &where, double width, double height, double margin,
+                 std::vector<area> &taken)
+{
+    const area first = block_at(image, where, width, height, margin);
+    area block = first;
+    const double gap = 0.5 * margin;
+    for (std::size_t i = 0; i < taken.size(); i++) {
+        if (are_apart(block, taken[i], gap)) continue;
+        const double y = is_at_bottom(where.at) ? taken[i].y0 - gap - height : taken[i].y1 + gap;
+        block = {block.x0, y, block.x1, y + height};
+        i = static_cast<std::size_t>(-1); /* the new place may be another's */
+    }
+    if (block.y0 < 0 || block.y1 > image.height) block = first;
+    taken.push_back(block);
+    return block;
+}
+
+void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &warning)
+{
+    const insitu_decorations &what = *image.decorations;
+    sheet s{image, what, rgba, nullptr, 0, 0, {}};
+    s.size = std::max(1, static_cast<int>(std::lround(what.size * image.height)));
+    s.margin = 0.7 * s.size;
+    if (has_words(what)) s.font = find_font(warning);
+    draw_strokes(s, true);
+    put_background(s);
+    draw_strokes(s, false);
+    for (int i = 0; i < what.words_count; i++) draw_words(s, what.words[i]);
+    for (int i = 0; i < what.bar_count; i++) draw_bar(s, what.bars[i]);
+    if (what.has_axes) draw_axes(s);
+}

@@ -1,0 +1,219 @@
+/* The domain's box is convex and all data is in it: an edge between two faces that are seen from within lies behind
+ * everything, any other edge before everything or beside it. So no depth is needed to draw edges right, neither among
+ * surfaces nor in the mist of a volume. */
+#include "session_decorations.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+
+/* ---- the box ------------------------------------------------------------------------------------------------- */
+
+/* A point as the camera sees it: right, up, forward of the eye. */
+typedef struct seen_point {
+    double at[3];
+} seen_point;
+
+static seen_point see(const render_camera *c, const double p[3])
+{
+    const double *const axes[3] = {c->right, c->up, c->forward};
+    seen_point out;
+    for (int i = 0; i < 3; i++) {
+        out.at[i] = 0;
+        for (int a = 0; a < 3; a++) out.at[i] += axes[i][a] * (p[a] - c->eye[a]);
+    }
+    return out;
+}
+
+static void project(const render_camera *c, const seen_point *p, double pixel[2])
+{
+    const double depth = c->is_orthographic ? 1 : p->at[2], scale = 0.5 * c->height / (c->half_height * depth);
+    pixel[0] = 0.5 * c->width + p->at[0] * scale;
+    pixel[1] = 0.5 * c->height - p->at[1] * scale;
+}
+
+/* Cuts the edge off at the plane of this depth; false where all of it is nearer. */
+static bool cut_near(seen_point *a, seen_point *b, double near)
+{
+    if (a->at[2] < near && b->at[2] < near) return false;
+    if (a->at[2] >= near && b->at[2] >= near) return true;
+    const double share = (near - a->at[2]) / (b->at[2] - a->at[2]);
+    seen_point *hidden = a->at[2] < near ? a : b;
+    seen_point cut;
+    for (int i = 0; i < 3; i++) cut.at[i] = a->at[i] + share * (b->at[i] - a->at[i]);
+    *hidden = cut;
+    return true;
+}
+
+/* Is the box's face across this axis, at its low or high end, seen from outside? */
+static bool is_seen_outside(const double lower[3], const double upper[3], const render_camera *c, int axis, bool high)
+{
+    if (c->is_orthographic) return high ? c->forward[axis] < 0 : c->forward[axis] > 0;
+    return high ? c->eye[axis] > upper[axis] : c->eye[axis] < lower[axis];
+}
+
+int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
+                        insitu_stroke strokes[SESSION_BOX_EDGES])
+{
+    double size = 0;
+    int count = 0;
+    for (int a = 0; a < 3; a++) size = fmax(size, upper[a] - lower[a]);
+    for (int edge = 0; edge < SESSION_BOX_EDGES; edge++) {
+        const int axis = edge / 4, b = (axis + 1) % 3, c = (axis + 2) % 3;
+        const bool high_b = edge & 1, high_c = edge & 2;
+        double from[3], to[3];
+        from[axis] = lower[axis];
+        to[axis] = upper[axis];
+        from[b] = to[b] = high_b ? upper[b] : lower[b];
+        from[c] = to[c] = high_c ? upper[c] : lower[c];
+        seen_point p = see(camera, from), q = see(camera, to);
+        if (!camera->is_orthographic && !cut_near(&p, &q, 1e-3 * size)) continue;
+        insitu_stroke *stroke = &strokes[count++];
+        project(camera, &p, stroke->from);
+        project(camera, &q, stroke->to);
+        stroke->is_behind =
+            !is_seen_outside(lower, upper, camera, b, high_b) && !is_seen_outside(lower, upper, camera, c, high_c);
+    }
+    return count;
+}
+
+/* ---- words and bars ------------------------------------------------------------------------------------------ */
+
+/* Light on a dark background, dark on a light one or on none. */
+static void choose_colour(const scene_image *image, float colour[3])
+{
+    const float *b = image->background;
+    const double luminance = 0.2126 * (double)b[0] + 0.7152 * (double)b[1] + 0.0722 * (double)b[2];
+    const bool is_dark = b[3] > 0.5F && luminance < 0.18 * (double)b[3];
+    for (int i = 0; i < 3; i++)
+        colour[i] = image->decorations.has_colour ? image->decorations.colour[i] : is_dark ? 0.85F : 0.01F;
+}
+
+/* False: no memory. */
+static bool add_words(session_decorations *d, const char *text, const scene_moment *moment, insitu_anchor at,
+                      float size)
+{
+    char *expanded = scene_expand(text, moment);
+    if (expanded) d->words[d->all.words_count++] = (insitu_words){expanded, at, size};
+    return expanded != NULL;
+}
+
+static bool fill_words(session_decorations *d, const scene_decorations *scene, const scene_moment *moment)
+{
+    bool well = !scene->title || add_words(d, scene->title, moment, INSITU_TOP, 1.4F);
+    for (int i = 0; i < scene->words_count && well; i++)
+        well = add_words(d, scene->words[i].text, moment, (insitu_anchor)scene->words[i].at, 1);
+    return well;
+}
+
+static void write_label(const scene_decorations *scene, int bar, const scene_field *field, char label[300])
+{
+    static const char *const axes[] = {" x", " y", " z"};
+    char component[16] = "";
+    if (field->component == SCENE_COMPONENT_MAGNITUDE)
+        snprintf(component, sizeof component, " magnitude");
+    else if (field->component > 2)
+        snprintf(component, sizeof component, " %d", field->component);
+    else if (field->component >= 0)
+        snprintf(component, sizeof component, "%s", axes[field->component]);
+    if (bar < scene->label_count)
+        snprintf(label, 300, "%s", scene->labels[bar]);
+    else
+        snprintf(label, 300, "%s%s", field->name, component);
+}
+
+/* Has an earlier bar the same label, colours and numbers? Several layers may show one field. */
+static bool is_repeated(const session_decorations *d, int bar)
+{
+    const insitu_colour_bar *b = &d->bars[bar];
+    bool is_found = false;
+    for (int i = 0; i < bar && !is_found; i++) {
+        const insitu_colour_bar *a = &d->bars[i];
+        is_found = strcmp(a->label, b->label) == 0 && a->is_banded == b->is_banded &&
+                   a->colour_count == b->colour_count && a->tick_count == b->tick_count &&
+                   memcmp(a->colours, b->colours, (size_t)a->colour_count * 3 * sizeof *a->colours) == 0 &&
+                   memcmp(a->ticks, b->ticks, (size_t)a->tick_count * sizeof *a->ticks) == 0;
+    }
+    return is_found;
+}
+
+static void add_bar(session_decorations *d, const scene_decorations *scene, const scene_field *field,
+                    const scene_colour_map *map, const session_transfer *transfer)
+{
+    const int i = d->all.bar_count;
+    if (i == SESSION_MAX_BARS) return;
+    const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high};
+    write_label(scene, i, field, d->labels[i]);
+    d->bars[i] = (insitu_colour_bar){.label = d->labels[i],
+                                     .colours = map->colours,
+                                     .colour_count = map->count,
+                                     .is_banded = map->is_banded,
+                                     .below = map->has_below ? map->outside[0] : NULL,
+                                     .above = map->has_above ? map->outside[1] : NULL,
+                                     .at = (insitu_anchor)scene->bars_at,
+                                     .tick_count = session_make_ticks(&scale, scene->tick_count, d->ticks[i]),
+                                     .ticks = d->ticks[i]};
+    if (!is_repeated(d, i)) d->all.bar_count++;
+}
+
+static void fill_bars(session_decorations *d, const scene_image *image, const session_layers *layers)
+{
+    for (int i = 0; i < image->isosurface_count; i++)
+        if (image->isosurfaces[i].has_colour_by)
+            add_bar(d, &image->decorations, &image->isosurfaces[i].colour_by, &image->isosurfaces[i].colour_map,
+                    &layers->transfers[i]);
+    const int outer = image->isosurface_count, planes = outer + image->surface_count;
+    for (int i = 0; i < image->surface_count; i++)
+        if (image->surfaces[i].has_colour_by)
+            add_bar(d, &image->decorations, &image->surfaces[i].colour_by, &image->surfaces[i].colour_map,
+                    &layers->transfers[outer + i]);
+    for (int i = 0, plane = planes; i < image->slice_count; plane += image->slices[i++].plane_count)
+        add_bar(d, &image->decorations, &image->slices[i].field, &image->slices[i].colour_map,
+                &layers->transfers[plane]);
+    for (int i = 0; i < image->volume_count; i++)
+        add_bar(d, &image->decorations, &image->volumes[i].field, &image->volumes[i].colour_map,
+                &layers->transfers[layers->surface_count + i]);
+}
+
+/* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+static void fill_axes(session_decorations *d, const render_camera *c)
+{
+    for (int a = 0; a < 3; a++) {
+        d->all.axes[a][0] = c->right[a];
+        d->all.axes[a][1] = c->up[a];
+        d->all.axes[a][2] = -c->forward[a];
+    }
+}
+
+session_decorations *session_make_decorations(const scene_image *image, const scene_moment *moment,
+                                              const session_extent *extent, const session_view *view,
+                                              const session_layers *layers)
+{
+    const scene_decorations *scene = &image->decorations;
+    session_decorations *d = base_calloc(1, sizeof *d);
+    if (!d) return NULL;
+    d->all = (insitu_decorations){
+        .size = scene->size, .words = d->words, .bars = d->bars, .strokes = d->strokes, .has_axes = scene->has_axes};
+    memcpy(d->all.background, image->background, sizeof d->all.background);
+    d->background = d->all;
+    d->background.has_axes = false;
+    choose_colour(image, d->all.colour);
+    fill_axes(d, &view->camera);
+    if (scene->has_bars) fill_bars(d, image, layers);
+    if (scene->has_outline && extent->cell_count)
+        d->all.stroke_count = session_box_strokes(extent->lower, extent->upper, &view->camera, d->strokes);
+    if (fill_words(d, scene, moment)) return d;
+    session_free_decorations(d);
+    return NULL;
+}
+
+void session_free_decorations(session_decorations *decorations)
+{
+    if (!decorations) return;
+    for (int i = 0; i < decorations->all.words_count; i++) base_free((void *)(uintptr_t)decorations->words[i].text);
+    base_free(decorations);
+}

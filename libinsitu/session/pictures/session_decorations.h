@@ -1,0 +1,37 @@
+/* What is written and drawn beside an image's data, as the image library takes it. */
+#ifndef SESSION_DECORATIONS_H
+#define SESSION_DECORATIONS_H
+
+#include "insitu/image_output.h"
+#include "scene.h"
+#include "session_layers.h"
+#include "session_space.h"
+#include "session_ticks.h"
+#include "session_view.h"
+
+enum { SESSION_MAX_BARS = 20, SESSION_MAX_WORDS = 17, SESSION_BOX_EDGES = 12 };
+
+typedef struct session_decorations {
+    insitu_decorations all;        /* points into this and into the layers */
+    insitu_decorations background; /* the background alone, for files without decorations */
+    insitu_words words[SESSION_MAX_WORDS];
+    insitu_colour_bar bars[SESSION_MAX_BARS];
+    insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
+    char labels[SESSION_MAX_BARS][300];
+    insitu_stroke strokes[SESSION_BOX_EDGES];
+} session_decorations;
+
+/* Make them for an image that has some. NULL: no memory. Local. */
+session_decorations *session_make_decorations(const scene_image *image, const scene_moment *moment,
+                                              const session_extent *extent, const session_view *view,
+                                              const session_layers *layers);
+
+/* decorations may be NULL. */
+void session_free_decorations(session_decorations *decorations);
+
+/* Edges of a box as the camera sees them, cut off at the eye's plane; returns how many there are. An edge is behind
+ * what is in the box where both of its faces are seen from within. Local. */
+int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
+                        insitu_stroke strokes[SESSION_BOX_EDGES]);
+
+#endif

@@ -1,0 +1,163 @@
+#include "session_ticks.h"
+
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* A step of 1, 2 or 5 times 10^exponent. */
+typedef struct round_step {
+    int factor, exponent;
+} round_step;
+
+static double size_of(round_step step)
+{
+    return step.factor * pow(10, step.exponent);
+}
+
+static round_step next_step(round_step step)
+{
+    if (step.factor == 5) return (round_step){1, step.exponent + 1};
+    return (round_step){step.factor == 1 ? 2 : 5, step.exponent};
+}
+
+/* Multiples of the step in [low, high]. A bound that is one but for rounding counts. */
+static void multiples(double low, double high, double step, double *first, double *last)
+{
+    const double slack = 1e-9 * (high - low) / step;
+    *first = ceil(low / step - slack);
+    *last = floor(high / step + slack);
+}
+
+static round_step choose_step(double low, double high, int most)
+{
+    round_step step = {1, (int)floor(log10((high - low) / most))};
+    double first, last;
+    multiples(low, high, size_of(step), &first, &last);
+    while (last - first >= most) {
+        step = next_step(step);
+        multiples(low, high, size_of(step), &first, &last);
+    }
+    return step;
+}
+
+/* "1.20e+05" to "1.2e5" would lose a digit that its neighbours have; so the exponent alone is shortened: "1.20e5". */
+static void shorten_exponent(char *text)
+{
+    char *e = strchr(text, 'e');
+    if (!e) return;
+    const bool is_negative = e[1] == '-';
+    const char *digits = e + 2 + strspn(e + 2, "0");
+    memmove(e + 1 + is_negative, digits, strlen(digits) + 1);
+}
+
+/* digits: behind the point, of a plain number or of one with an exponent. */
+static void write_number(double value, bool is_plain, int digits, char *text, size_t size)
+{
+    const int shown = digits < 0 ? 0 : digits > 15 ? 15 : digits;
+    if (value == 0)
+        snprintf(text, size, "0");
+    else if (is_plain)
+        snprintf(text, size, "%.*f", shown, value);
+    else
+        snprintf(text, size, "%.*e", shown, value);
+    if (!is_plain) shorten_exponent(text);
+}
+
+static double place_of(const session_scale *s, double value)
+{
+    const double low = render_scaled(s->kind, s->threshold, s->low);
+    const double high = render_scaled(s->kind, s->threshold, s->high);
+    return fmin(fmax((render_scaled(s->kind, s->threshold, value) - low) / (high - low), 0), 1);
+}
+
+/* ---- linear -------------------------------------------------------------------------------------------------- */
+
+static int fill_multiples(const session_scale *s, int most, insitu_tick *ticks)
+{
+    const round_step step = choose_step(s->low, s->high, most);
+    const double largest = fmax(fabs(s->low), fabs(s->high));
+    const bool is_plain = largest < 1e6 && largest >= 1e-3 && step.exponent > -9;
+    const int digits = is_plain ? -step.exponent : (int)floor(log10(largest)) - step.exponent;
+    double first, last;
+    int count = 0;
+    multiples(s->low, s->high, size_of(step), &first, &last);
+    for (double n = first; n <= last && count < SESSION_MAX_TICKS; n++) {
+        const double value = n * size_of(step);
+        ticks[count].place = place_of(s, value);
+        write_number(value, is_plain, digits, ticks[count].text, sizeof ticks[count].text);
+        count++;
+    }
+    return count;
+}
+
+/* ---- logarithmic --------------------------------------------------------------------------------------------- */
+
+/* Which numbers of a power of ten get a tick: 1, or 1, 2 and 5, of every so many powers. */
+typedef struct decade_choice {
+    bool has_2_and_5;
+    int every;
+} decade_choice;
+
+static void add_value(const session_scale *s, double value, insitu_tick *ticks, int *count)
+{
+    const double size = fabs(value), slack = 1e-9 * size;
+    if (value < s->low - slack || value > s->high + slack) return;
+    if (*count < SESSION_MAX_TICKS) {
+        insitu_tick *tick = &ticks[*count];
+        const bool is_plain = size < 1e4 && size > 9e-4;
+        tick->place = place_of(s, value);
+        write_number(value, is_plain, is_plain && size < 0.9999 ? (int)ceil(-log10(size) - 1e-9) : 0, tick->text,
+                     sizeof tick->text);
+    }
+    (*count)++;
+}
+
+/* The powers of ten from the smallest that shows to the largest, on the side of the sign. */
+static void add_decades(const session_scale *s, double sign, decade_choice choice, insitu_tick *ticks, int *count)
+{
+    const double largest = fmax(fabs(s->low), fabs(s->high));
+    const double smallest = s->kind == RENDER_SYMLOG ? s->threshold : s->low;
+    const int last = (int)floor(log10(largest) + 1e-9), first = (int)floor(log10(smallest) + 1e-9);
+    for (int n = first; n <= last; n++) {
+        if (n % choice.every) continue;
+        const double power = pow(10, n);
+        if (power >= smallest * (1 - 1e-9)) add_value(s, sign * power, ticks, count);
+        if (choice.has_2_and_5 && 2 * power >= smallest) add_value(s, sign * 2 * power, ticks, count);
+        if (choice.has_2_and_5 && 5 * power >= smallest) add_value(s, sign * 5 * power, ticks, count);
+    }
+}
+
+static int fill_decades(const session_scale *s, decade_choice choice, insitu_tick *ticks)
+{
+    int count = 0;
+    if (s->kind == RENDER_SYMLOG) {
+        add_decades(s, -1, choice, ticks, &count);
+        add_value(s, 0, ticks, &count);
+    }
+    add_decades(s, 1, choice, ticks, &count);
+    return count;
+}
+
+/* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
+{
+    if (s->kind == RENDER_LINEAR) return fill_multiples(s, most, ticks);
+    int count = fill_decades(s, (decade_choice){true, 1}, ticks);
+    for (int every = 1; count > most && every <= 64; every++)
+        count = fill_decades(s, (decade_choice){false, every}, ticks);
+    return count < 2 ? fill_multiples(s, most, ticks) : count;
+}
+
+int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS])
+{
+    const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
+    const locale_t before = c_numbers ? uselocale(c_numbers) : (locale_t)0;
+    const int count = fill_ticks(scale, most, ticks);
+    if (c_numbers) {
+        uselocale(before);
+        freelocale(c_numbers);
+    }
+    return count;
+}

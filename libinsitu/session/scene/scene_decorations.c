@@ -1,0 +1,76 @@
+/* The part of an image that says what is written and drawn beside the data. */
+#include <stdio.h>
+#include <string.h>
+
+#include "colour_map.h"
+#include "memory.h"
+#include "scene_convert.h"
+
+static insitu_status convert_text(const scene_document *d, const char *path, const char *key, const char *text,
+                                  char **out)
+{
+    const insitu_status status = scene_check_placeholders(d, path, key, text);
+    if (status) return status;
+    *out = base_strdup(text);
+    return *out ? INSITU_OK : scene_no_memory(d);
+}
+
+static insitu_status convert_words(const scene_document *d, const char *path, const scene_file_decorations *in,
+                                   scene_decorations *out)
+{
+    insitu_status status = INSITU_OK;
+    out->words = base_calloc((size_t)in->text_count, sizeof *out->words);
+    if (!out->words) return scene_no_memory(d);
+    for (int i = 0; i < in->text_count && !status; i++) {
+        char words_path[SCENE_PATH_SIZE];
+        snprintf(words_path, sizeof words_path, "%s.text[%d]", path, i);
+        out->words_count++;
+        out->words[i].at = in->text[i].at ? (scene_anchor)*in->text[i].at : SCENE_TOP_LEFT;
+        status = convert_text(d, words_path, "text", in->text[i].text, &out->words[i].text);
+    }
+    return status;
+}
+
+static insitu_status convert_bars(const scene_document *d, const char *path, const scene_file_colour_bar *in,
+                                  scene_decorations *out)
+{
+    char labels_path[SCENE_PATH_SIZE + 8];
+    const char *labels[SCENE_MAX_NAMES];
+    snprintf(labels_path, sizeof labels_path, "%s.colour_bar.labels", path);
+    out->has_bars = in != NULL;
+    out->bars_at = in && in->at ? (scene_anchor)*in->at : SCENE_RIGHT;
+    out->tick_count = in && in->ticks ? *in->ticks : 6;
+    const int count = in ? scene_document_texts(d, labels_path, labels, SCENE_MAX_NAMES) : 0;
+    out->labels = base_calloc((size_t)count, sizeof *out->labels);
+    if (!out->labels) return scene_no_memory(d);
+    while (out->label_count < count) {
+        char *label = base_strdup(labels[out->label_count]);
+        if (!label) return scene_no_memory(d);
+        out->labels[out->label_count++] = label;
+    }
+    return INSITU_OK;
+}
+
+insitu_status scene_convert_decorations(const scene_document *d, const char *path, const scene_file_decorations *in,
+                                        scene_decorations *out)
+{
+    if (!in) return INSITU_OK;
+    out->is_given = true;
+    out->has_outline = in->outline && *in->outline;
+    out->has_axes = in->axes && *in->axes;
+    out->has_colour = in->colour != NULL;
+    for (int i = 0; in->colour && i < 3; i++) out->colour[i] = colour_linear_from_srgb((float)in->colour[i]);
+    out->size = in->size ? *in->size : 0.03;
+    insitu_status status = in->title ? convert_text(d, path, "title", in->title, &out->title) : INSITU_OK;
+    if (!status) status = convert_words(d, path, in, out);
+    return status ? status : convert_bars(d, path, in->colour_bar, out);
+}
+
+void scene_free_decorations(scene_decorations *decorations)
+{
+    for (int i = 0; i < decorations->words_count; i++) base_free(decorations->words[i].text);
+    for (int i = 0; i < decorations->label_count; i++) base_free(decorations->labels[i]);
+    base_free(decorations->words);
+    base_free(decorations->labels);
+    base_free(decorations->title);
+}

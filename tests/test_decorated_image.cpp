@@ -1,0 +1,212 @@
+/* Decorations as they are drawn over a picture: where they stand, what they hide, and that a bar has its map's colours.
+ */
+#include <cmath>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "decorate.h"
+
+extern "C" {
+#include <cmocka.h>
+}
+
+namespace
+{
+
+const int width = 320, height = 240;
+
+/* Premultiplied grey of this opacity everywhere. */
+std::vector<float> sheet_of(float grey, float alpha)
+{
+    std::vector<float> rgba(static_cast<std::size_t>(4 * width * height));
+    for (std::size_t i = 0; i < rgba.size(); i++) rgba[i] = i % 4 == 3 ? alpha : grey * alpha;
+    return rgba;
+}
+
+insitu_decorations plain()
+{
+    insitu_decorations d{};
+    d.background[0] = d.background[1] = d.background[2] = 0.25F;
+    d.background[3] = 1;
+    d.colour[0] = d.colour[1] = d.colour[2] = 1;
+    d.size = 0.05;
+    return d;
+}
+
+std::vector<float> draw(const std::vector<float> &rgba, const insitu_decorations &d)
+{
+    std::string warning;
+    const insitu_image image{width, height, rgba.data(), nullptr, &d};
+    std::vector<float> out = rgba;
+    decorate(image, out, warning);
+    assert_string_equal(warning.c_str(), "");
+    return out;
+}
+
+float at(const std::vector<float> &rgba, int x, int y, int channel = 0)
+{
+    return rgba[static_cast<std::size_t>(4 * (y * width + x) + channel)];
+}
+
+void the_picture_is_put_over_its_background(void **)
+{
+    const std::vector<float> out = draw(sheet_of(0.5F, 0.25F), plain());
+    for (std::size_t i = 0; i < out.size(); i++)
+        assert_true(std::fabs(out[i] - (i % 4 == 3 ? 1 : 0.125F + 0.75F * 0.25F)) < 1e-6F);
+}
+
+/* A line before the picture has its colour; one behind shows by what light the picture lets through, over the
+ * background. Beside them nothing is changed. */
+void strokes_are_before_or_behind_the_picture(void **)
+{
+    const insitu_stroke strokes[] = {{{0, 50.5}, {width, 50.5}, false}, {{0, 100.5}, {width, 100.5}, true}};
+    insitu_decorations d = plain();
+    d.stroke_count = 2;
+    d.strokes = strokes;
+    const std::vector<float> out = draw(sheet_of(0.5F, 0.75F), d), without = draw(sheet_of(0.5F, 0.75F), plain());
+    assert_true(std::fabs(at(out, 160, 50) - 1) < 1e-6F);
+    assert_true(std::fabs(at(out, 160, 100) - (0.375F + 0.25F)) < 1e-6F);
+    for (int y : {48, 52, 98, 102}) assert_true(at(out, 160, y) == at(without, 160, y));
+    const std::vector<float> hidden = draw(sheet_of(0.5F, 1), d);
+    assert_true(at(hidden, 160, 100) == 0.5F);
+}
+
+/* A line's light is its length times its width, whichever way it goes: edges are smooth. */
+void slanted_strokes_are_as_bright_as_straight_ones(void **)
+{
+    for (int degrees = 0; degrees < 180; degrees += 7) {
+        const double angle = degrees * 3.14159265358979 / 180, dx = 90 * std::cos(angle), dy = 90 * std::sin(angle);
+        const insitu_stroke stroke = {{160.3 - dx, 120.2 - dy}, {160.3 + dx, 120.2 + dy}, false};
+        insitu_decorations d = plain();
+        d.background[0] = d.background[1] = d.background[2] = 0;
+        d.stroke_count = 1;
+        d.strokes = &stroke;
+        double sum = 0;
+        const std::vector<float> out = draw(sheet_of(0, 0), d);
+        for (std::size_t i = 0; i < out.size(); i += 4) sum += out[i];
+        /* A tent one pixel wide on either side holds 180; the round ends add at most one each. */
+        assert_true(sum > 178 && sum < 183);
+    }
+}
+
+/* Where the tallest column of the bar's colours is. */
+void a_bar_has_the_colours_of_its_map(void **)
+{
+    const float colours[] = {0.1F, 0.2F, 0.9F, 0.3F, 0.8F, 0.1F, 0.9F, 0.1F, 0.2F};
+    insitu_colour_bar bar{};
+    bar.label = "speed";
+    bar.colours = colours;
+    bar.colour_count = 3;
+    for (const insitu_anchor side : {INSITU_LEFT, INSITU_RIGHT}) {
+        bar.at = side;
+        insitu_decorations d = plain();
+        d.bar_count = 1;
+        d.bars = &bar;
+        const std::vector<float> out = draw(sheet_of(0, 0), d);
+        int matched = 0;
+        for (int x = 0; x < width; x++) {
+            int run = 0;
+            float before = -1;
+            for (int y = 0; y < height; y++) {
+                /* On the table's lower half green rises from 0.2 to 0.8 by the share by which blue falls from 0.9 to
+                 * 0.1. */
+                const float r = at(out, x, y, 0), g = at(out, x, y, 1), b = at(out, x, y, 2);
+                const bool is_low = std::fabs((g - 0.2F) / 0.6F - (0.9F - b) / 0.8F) < 1e-4F && r < 0.31F;
+                const bool is_high = std::fabs((r - 0.3F) / 0.6F - (0.8F - g) / 0.7F) < 1e-4F && b < 0.21F && r > 0.29F;
+                if (!is_low && !is_high) continue;
+                if (before >= 0 && is_high) assert_true(r <= before + 1e-6F); /* the high end is above */
+                before = is_high ? r : before;
+                run++;
+            }
+            matched = run > matched ? run : matched;
+        }
+        assert_true(matched > height / 3);
+    }
+}
+
+void bands_are_of_equal_height(void **)
+{
+    const float colours[] = {0.9F, 0, 0, 0, 0.9F, 0, 0, 0, 0.9F};
+    insitu_colour_bar bar{};
+    bar.label = "";
+    bar.colours = colours;
+    bar.colour_count = 3;
+    bar.is_banded = true;
+    bar.at = INSITU_RIGHT;
+    insitu_decorations d = plain();
+    d.bar_count = 1;
+    d.bars = &bar;
+    const std::vector<float> out = draw(sheet_of(0, 0), d);
+    int rows[3] = {0, 0, 0};
+    for (int band = 0; band < 3; band++)
+        for (int x = 0; x < width; x++) {
+            int count = 0;
+            for (int y = 0; y < height; y++) count += at(out, x, y, band) == 0.9F && at(out, x, y, (band + 1) % 3) == 0;
+            rows[band] = count > rows[band] ? count : rows[band];
+        }
+    /* The frame takes a row of the outer bands, and a border may cut a row. */
+    assert_true(rows[1] > 30 && std::abs(rows[0] - rows[1]) <= 2 && std::abs(rows[2] - rows[1]) <= 2);
+}
+
+void words_are_written_at_their_anchor(void **)
+{
+    for (int anchor = INSITU_TOP_LEFT; anchor <= INSITU_BOTTOM_RIGHT; anchor++) {
+        const insitu_words words{"Hill", static_cast<insitu_anchor>(anchor), 1};
+        insitu_decorations d = plain();
+        d.words_count = 1;
+        d.words = &words;
+        const std::vector<float> out = draw(sheet_of(0, 0), d);
+        double sum = 0, x_sum = 0, y_sum = 0;
+        for (int y = 0; y < height; y++)
+            for (int x = 0; x < width; x++) {
+                const double light = static_cast<double>(at(out, x, y)) - 0.25;
+                sum += light, x_sum += light * x, y_sum += light * y;
+            }
+        assert_true(sum > 10);
+        const double x = x_sum / sum / width, y = y_sum / sum / height;
+        const bool left = anchor == INSITU_TOP_LEFT || anchor == INSITU_LEFT || anchor == INSITU_BOTTOM_LEFT;
+        const bool right = anchor == INSITU_TOP_RIGHT || anchor == INSITU_RIGHT || anchor == INSITU_BOTTOM_RIGHT;
+        assert_true(left ? x < 0.2 : right ? x > 0.8 : x > 0.4 && x < 0.6);
+        const bool top = anchor <= INSITU_TOP_RIGHT, bottom = anchor >= INSITU_BOTTOM_LEFT;
+        assert_true(top ? y < 0.15 : bottom ? y > 0.85 : y > 0.4 && y < 0.6);
+    }
+}
+
+/* Any blocks for which there is room are apart, and within the picture. */
+void blocks_do_not_overlap(void **)
+{
+    const insitu_image image{1000, 800, nullptr, nullptr, nullptr};
+    std::srand(3);
+    for (int round = 0; round < 2000; round++) {
+        std::vector<area> taken;
+        for (int n = 0; n < 12; n++) {
+            const spot where{static_cast<insitu_anchor>(std::rand() % 8), 0};
+            place_block(image, where, 10 + std::rand() % 240, 8 + std::rand() % 40, 12, taken);
+        }
+        for (std::size_t i = 0; i < taken.size(); i++) {
+            assert_true(taken[i].x0 >= 0 && taken[i].y0 >= 0 && taken[i].x1 <= 1000 && taken[i].y1 <= 800);
+            for (std::size_t k = 0; k < i; k++)
+                assert_true(taken[i].x1 <= taken[k].x0 || taken[k].x1 <= taken[i].x0 || taken[i].y1 <= taken[k].y0 ||
+                            taken[k].y1 <= taken[i].y0);
+        }
+    }
+}
+
+} // namespace
+
+int main()
+{
+    const CMUnitTest tests[] = {cmocka_unit_test(the_picture_is_put_over_its_background),
+                                cmocka_unit_test(strokes_are_before_or_behind_the_picture),
+                                cmocka_unit_test(slanted_strokes_are_as_bright_as_straight_ones),
+                                cmocka_unit_test(a_bar_has_the_colours_of_its_map),
+                                cmocka_unit_test(bands_are_of_equal_height),
+                                cmocka_unit_test(words_are_written_at_their_anchor),
+                                cmocka_unit_test(blocks_do_not_overlap)};
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

@@ -1,0 +1,164 @@
+/* Ticks at round numbers, and the edges of the domain's box as the camera sees them. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "session_decorations.h"
+
+/* ---- ticks --------------------------------------------------------------------------------------------------- */
+
+static void ticks_are_at_round_numbers(void **state)
+{
+    (void)state;
+    static const struct {
+        session_scale scale;
+        int most;
+        const char *words; /* of all ticks, low ones first */
+    } cases[] = {
+        {{RENDER_LINEAR, 0, 0, 1}, 6, "0 0.2 0.4 0.6 0.8 1.0"},
+        {{RENDER_LINEAR, 0, -1, 1}, 6, "-1.0 -0.5 0 0.5 1.0"},
+        {{RENDER_LINEAR, 0, 0, 6.3}, 6, "0 2 4 6"},
+        {{RENDER_LINEAR, 0, 0.1, 0.3}, 3, "0.1 0.2 0.3"},
+        {{RENDER_LINEAR, 0, 101300, 101340}, 6, "101300 101310 101320 101330 101340"},
+        {{RENDER_LINEAR, 0, 0, 3.2e7}, 4, "0 1e7 2e7 3e7"},
+        {{RENDER_LINEAR, 0, -2.5e-7, 2.5e-7}, 4, "-2e-7 0 2e-7"},
+        {{RENDER_LINEAR, 0, 1e9, 1e9 + 30}, 4, "1.00000000e9 1.00000001e9 1.00000002e9 1.00000003e9"},
+        {{RENDER_LOG, 0, 0.01, 100}, 6, "0.01 0.1 1 10 100"},
+        {{RENDER_LOG, 0, 1e-8, 1e8}, 6, "1e-6 0.001 1 1000 1e6"},
+        {{RENDER_LOG, 0, 1, 10}, 6, "1 2 5 10"},
+        {{RENDER_LOG, 0, 3, 4}, 6, "3.0 3.2 3.4 3.6 3.8 4.0"},
+        {{RENDER_SYMLOG, 1, -100, 100}, 8, "-1 -10 -100 0 1 10 100"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        insitu_tick ticks[SESSION_MAX_TICKS];
+        char words[400] = "";
+        const int count = session_make_ticks(&cases[i].scale, cases[i].most, ticks);
+        for (int n = 0; n < count; n++)
+            snprintf(words + strlen(words), sizeof words - strlen(words), "%s%s", n ? " " : "", ticks[n].text);
+        assert_string_equal(words, cases[i].words);
+    }
+}
+
+/* A tick's words are its value, to the last digit that they show; its place is that of the value. */
+static void ticks_stand_where_their_numbers_are(void **state)
+{
+    (void)state;
+    srand(7);
+    for (int i = 0; i < 20000; i++) {
+        const double size = pow(10, rand() % 40 - 20), middle = size * (2.0 * rand() / RAND_MAX - 1);
+        const double half = size * pow(10, -(rand() % 6)) * (0.1 + (double)rand() / RAND_MAX);
+        const session_scale scale = {RENDER_LINEAR, 0, middle - half, middle + half};
+        const int most = 2 + rand() % 11;
+        insitu_tick ticks[SESSION_MAX_TICKS];
+        const int count = session_make_ticks(&scale, most, ticks);
+        assert_in_range(count, 1, most);
+        for (int n = 0; n < count; n++) {
+            const double value = scale.low + ticks[n].place * 2 * half;
+            /* Round numbers are apart by a fifth of the range over most, or more; words are exact to a tenth of that.
+             */
+            assert_true(fabs(strtod(ticks[n].text, NULL) - value) < 0.02 * half / most + 1e-12 * size);
+            if (n) assert_true(strcmp(ticks[n].text, ticks[n - 1].text) != 0 && ticks[n].place > ticks[n - 1].place);
+        }
+    }
+}
+
+/* ---- the box ------------------------------------------------------------------------------------------------- */
+
+/* How far a point is from the ray through a place of the picture (continuous pixels), as the renderer has rays. */
+static double off_ray(const render_camera *c, const double pixel[2], const double point[3])
+{
+    double base[3], direction[3], right[3], down[3], unused[3], along = 0, length = 0, square = 0;
+    render_camera_ray(c, 0, 0, base, direction);
+    render_camera_ray(c, 1, 0, c->is_orthographic ? right : unused, c->is_orthographic ? unused : right);
+    render_camera_ray(c, 0, 1, c->is_orthographic ? down : unused, c->is_orthographic ? unused : down);
+    double *moved = c->is_orthographic ? base : direction;
+    const double start[3] = {moved[0], moved[1], moved[2]};
+    for (int a = 0; a < 3; a++)
+        moved[a] += (pixel[0] - 0.5) * (right[a] - start[a]) + (pixel[1] - 0.5) * (down[a] - start[a]);
+    for (int a = 0; a < 3; a++) {
+        along += (point[a] - base[a]) * direction[a];
+        length += direction[a] * direction[a];
+    }
+    for (int a = 0; a < 3; a++) square += pow(point[a] - base[a] - along / length * direction[a], 2);
+    return sqrt(square);
+}
+
+static void check_corners(const render_camera *c, const double lower[3], const double upper[3])
+{
+    insitu_stroke strokes[SESSION_BOX_EDGES];
+    assert_int_equal(session_box_strokes(lower, upper, c, strokes), SESSION_BOX_EDGES);
+    for (int edge = 0; edge < SESSION_BOX_EDGES; edge++) {
+        double best[2] = {INFINITY, INFINITY};
+        for (int corner = 0; corner < 8; corner++) {
+            const double p[3] = {corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
+                                 corner & 4 ? upper[2] : lower[2]};
+            best[0] = fmin(best[0], off_ray(c, strokes[edge].from, p));
+            best[1] = fmin(best[1], off_ray(c, strokes[edge].to, p));
+        }
+        assert_true(best[0] < 1e-9 && best[1] < 1e-9);
+    }
+}
+
+static int behind(const render_camera *c, const double lower[3], const double upper[3])
+{
+    insitu_stroke strokes[SESSION_BOX_EDGES];
+    int count = 0;
+    const int all = session_box_strokes(lower, upper, c, strokes);
+    for (int i = 0; i < all; i++) count += strokes[i].is_behind;
+    return count;
+}
+
+static void edges_are_where_rays_see_them(void **state)
+{
+    (void)state;
+    const double lower[3] = {-1, 2, 0}, upper[3] = {3, 3, 5}, focal[3] = {1, 2.5, 2.5}, up[3] = {0, 1, 0};
+    const double eyes[][3] = {{9, 8, 12}, {-20, 2.5, 2.5}, {1.5, 30, 2}};
+    for (int i = 0; i < 3; i++) {
+        render_camera c;
+        assert_true(render_camera_look_at(&c, eyes[i], focal, i == 2 ? (double[3]){1, 0, 0} : up, 40, 301, 200));
+        check_corners(&c, lower, upper);
+        c.is_orthographic = true;
+        c.half_height = 4;
+        check_corners(&c, lower, upper);
+    }
+}
+
+/* Of a box seen over a corner three edges are behind it, over an edge five, and face on eight: the far face's four and
+ * those that run away from the eye. From within all twelve are. */
+static void edges_that_data_hides_are_told(void **state)
+{
+    (void)state;
+    const double lower[3] = {0, 0, 0}, upper[3] = {1, 1, 1}, focal[3] = {0.5, 0.5, 0.5}, up[3] = {0, 1, 0.01};
+    const double eyes[][3] = {{4, 5, 6}, {4, 5, 0.5}, {0.5, 0.5, 7}};
+    const int expected[] = {3, 5, 8};
+    render_camera c;
+    for (int i = 0; i < 3; i++) {
+        assert_true(render_camera_look_at(&c, eyes[i], focal, up, 40, 64, 64));
+        assert_int_equal(behind(&c, lower, upper), expected[i]);
+    }
+    const double inside[3] = {0.4, 0.4, 0.4};
+    insitu_stroke strokes[SESSION_BOX_EDGES];
+    assert_true(render_camera_look_at(&c, inside, focal, up, 40, 64, 64));
+    const int count = session_box_strokes(lower, upper, &c, strokes);
+    assert_in_range(count, 3, 11); /* edges behind the eye are left out, others are cut off */
+    for (int i = 0; i < count; i++) {
+        assert_true(strokes[i].is_behind);
+        for (int a = 0; a < 2; a++) assert_true(isfinite(strokes[i].from[a]) && isfinite(strokes[i].to[a]));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ticks_are_at_round_numbers), cmocka_unit_test(ticks_stand_where_their_numbers_are),
+        cmocka_unit_test(edges_are_where_rays_see_them), cmocka_unit_test(edges_that_data_hides_are_told)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
