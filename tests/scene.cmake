@@ -34,6 +34,11 @@ target_link_libraries(test_decorations PRIVATE insitu_flags insitu_internal PkgC
 add_test(NAME decorations COMMAND test_decorations)
 set_tests_properties(decorations PROPERTIES TIMEOUT 60)
 
+add_executable(test_session_camera test_session_camera.c)
+target_link_libraries(test_session_camera PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA m)
+add_test(NAME session_camera COMMAND test_session_camera)
+set_tests_properties(session_camera PROPERTIES TIMEOUT 60)
+
 add_executable(test_decorated_image test_decorated_image.cpp ${PROJECT_SOURCE_DIR}/adaptors/image/decorate.cpp)
 target_include_directories(test_decorated_image PRIVATE ${PROJECT_SOURCE_DIR}/adaptors/image)
 target_include_directories(test_decorated_image SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})

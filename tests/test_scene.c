@@ -91,7 +91,8 @@ static const char every_key[] = "threads: 3\n"
                                 "        bits: 16\n"
                                 "      - path: out/wave_{cycle}.EXR\n"
                                 "  - name: second\n"
-                                "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5}}\n"
+                                "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box},\n"
+                                "             projection: orthographic, height: 2.5}\n"
                                 "    layers: [{volume: {field: p}}]\n"
                                 "    sampling: {step: 0.125}\n"
                                 "    outputs: [{path: b.png, bits: 8}]\n"
@@ -192,7 +193,8 @@ static void scene_view_keys_are_read(void **state)
     check_vector(camera->focal, 1, 0, 0);
     check_vector(camera->up, 0, 0, 1);
     assert_true(camera->angle == 35.5);
-    assert_true(s.images[1].camera.is_automatic);
+    assert_true(s.images[1].camera.is_automatic && s.images[1].camera.fits_box);
+    assert_true(s.images[1].camera.is_orthographic && s.images[1].camera.height == 2.5);
     check_vector(s.images[1].camera.direction, 0, 0.6, 0.8);
     assert_true(s.images[1].camera.zoom == 1.5);
 
@@ -526,6 +528,10 @@ static const struct bad_file {
     {6, "    camera: {position: [0, 5, 0], focal: [0, 0, 0], automatic: {}}", 6, {"camera.automatic: given beside"}},
     {6, "    camera: {position: [1e308, 0, 0], focal: [-1e308, 0, 0]}", 6, {"camera.position: too far from focal"}},
     {6, "    camera: {automatic: {direction: [0, 0, 0]}}", 6, {"camera.automatic.direction: has length 0"}},
+    {6, "    camera: {automatic: {fit: data}}", 6, {"camera.automatic.fit: \"data\"", "one of sphere, box"}},
+    {6, "    camera: {projection: flat}", 6, {"camera.projection: \"flat\"", "perspective, orthographic"}},
+    {6, "    camera: {height: 3}", 6, {"camera.height: given without projection: orthographic"}},
+    {6, "    camera: {projection: orthographic, height: 0}", 6, {"camera.height: \"0\"", "above 0"}},
     {6, "    camera: {automatic: {zoom: 0}}", 6, {"camera.automatic.zoom: \"0\"", "from 0.0001 to 1000"}},
     {6, "    camera: {automatic: {zoom: 1e-300}}", 6, {"camera.automatic.zoom: \"1e-300\"", "from 0.0001 to 1000"}},
     {6, "    camera: {angle: 0}", 6, {"camera.angle: \"0\"", "from 1e-06 and below 180"}},

@@ -4,55 +4,17 @@
 #include <math.h>
 
 #include "session_agree.h"
+#include "session_camera.h"
 
 static double length(const double v[3])
 {
     return hypot(hypot(v[0], v[1]), v[2]);
 }
 
-/* Distance from which a sphere just fits into the narrower of the two angles of view. */
-static double fitting_distance(double radius, double angle_degrees, int width, int height)
-{
-    double half = 0.5 * angle_degrees * 3.14159265358979323846 / 180;
-    if (width < height) half = atan(tan(half) * width / height);
-    return radius / sin(half);
-}
-
-/* up, or an axis that is not along the view where up is. */
-static void choose_up(const double direction[3], const double up[3], double out[3])
-{
-    const double cross[3] = {direction[1] * up[2] - direction[2] * up[1], direction[2] * up[0] - direction[0] * up[2],
-                             direction[0] * up[1] - direction[1] * up[0]};
-    for (int axis = 0; axis < 3; axis++) out[axis] = up[axis];
-    if (length(cross) > 1e-6 * length(direction) * length(up)) return;
-    int least = 0;
-    for (int axis = 1; axis < 3; axis++)
-        if (fabs(direction[axis]) < fabs(direction[least])) least = axis;
-    for (int axis = 0; axis < 3; axis++) out[axis] = axis == least;
-}
-
-static bool automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
-{
-    const scene_camera *c = &image->camera;
-    double focal[3], eye[3], up[3];
-    const double radius = extent->half_diagonal > 0 ? extent->half_diagonal : 1;
-    const double distance = fitting_distance(radius, c->angle, image->width, image->height) / c->zoom;
-    for (int axis = 0; axis < 3; axis++) {
-        focal[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
-        eye[axis] = focal[axis] + c->direction[axis] / length(c->direction) * distance;
-    }
-    choose_up(c->direction, c->up, up);
-    return render_camera_look_at(out, eye, focal, up, c->angle, image->width, image->height);
-}
-
 static insitu_status make_camera(const session_extent *extent, const char *scene_path, const scene_image *image,
                                  render_camera *out, base_error *error)
 {
-    const scene_camera *c = &image->camera;
-    const bool is_made =
-        c->is_automatic ? automatic_camera(extent, image, out)
-                        : render_camera_look_at(out, c->eye, c->focal, c->up, c->angle, image->width, image->height);
-    if (is_made) return INSITU_OK;
+    if (session_make_camera(extent, image, out)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_SCENE,
                      "%s:%d: image \"%s\": its camera stands at its focal point or looks along its up direction",
                      scene_path, image->line, image->name);
@@ -166,10 +128,11 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
         const double place[2] = {along(offset, c->right), along(offset, c->up)};
         b.behind += z <= 0;
         for (int a = 0; a < 2; a++) {
-            beyond[2 * a] += place[a] < -half[a] * z;
-            beyond[2 * a + 1] += place[a] > half[a] * z;
-            if (z > 0) b.low[a] = fmin(b.low[a], place[a] / (half[a] * z));
-            if (z > 0) b.high[a] = fmax(b.high[a], place[a] / (half[a] * z));
+            const double border = half[a] * (c->is_orthographic ? 1 : z);
+            beyond[2 * a] += place[a] < -border;
+            beyond[2 * a + 1] += place[a] > border;
+            if (z > 0) b.low[a] = fmin(b.low[a], place[a] / border);
+            if (z > 0) b.high[a] = fmax(b.high[a], place[a] / border);
         }
     }
     for (int side = 0; side < 4; side++) b.is_beside = b.is_beside || beyond[side] == 8;

@@ -152,8 +152,11 @@ typedef struct scene_camera {
     double eye[3], focal[3];
     double direction[3]; /* automatic: from the focal point towards the eye */
     double up[3];
-    double angle; /* vertical, degrees; 40 by default */
-    double zoom;  /* automatic: 1 fits the bounds' sphere; larger is nearer */
+    double angle;  /* vertical, degrees; 40 by default */
+    double zoom;   /* automatic: 1 fits the bounds; larger is nearer */
+    bool fits_box; /* automatic: the bounds' box fills the frame; else the sphere around it */
+    bool is_orthographic;
+    double height; /* orthographic: of what the picture shows, scene units; 0: as far as a perspective one shows */
 } scene_camera;
 
 /* Places in the picture, as insitu_anchor (image_output.h) has them. */

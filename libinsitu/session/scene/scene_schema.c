@@ -44,6 +44,9 @@ static const cyaml_strval_t anchor_words[] = {{"top_left", SCENE_TOP_LEFT},   {"
                                               {"right", SCENE_RIGHT},         {"bottom_left", SCENE_BOTTOM_LEFT},
                                               {"bottom", SCENE_BOTTOM},       {"bottom_right", SCENE_BOTTOM_RIGHT}};
 static const cyaml_strval_t side_words[] = {{"left", SCENE_LEFT}, {"right", SCENE_RIGHT}};
+static const cyaml_strval_t fit_words[] = {{"sphere", SCENE_FIT_SPHERE}, {"box", SCENE_FIT_BOX}};
+static const cyaml_strval_t projection_words[] = {{"perspective", SCENE_PERSPECTIVE},
+                                                  {"orthographic", SCENE_ORTHOGRAPHIC}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
 
 #define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
@@ -148,9 +151,12 @@ static const scene_form range_forms[] = {
 #define AUTOMATIC_KEYS(X)                                                                                              \
     X(NUMBERS("direction", scene_file_automatic, direction, 3),                                                        \
       .help = "From the middle of the data towards the eye. Any length but 0.", .by_default = "`[1, 0.8, 1.2]`")       \
-    X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom),                                             \
-      .help = "1 fits the sphere around the data's bounds into the image; larger is nearer.", .by_default = "`1`",     \
-      .low = 1e-4, .high = 1000)
+    X(CHOICE("fit", scene_file_automatic, fit, fit_words),                                                             \
+      .help = "What fits into the image: the `box` of the data's bounds, which then fills 0.95 of the frame's width "  \
+              "or height, or the `sphere` around it, which looks the same size from every side.",                      \
+      .by_default = "`sphere`")                                                                                        \
+    X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom), .help = "1 fits; larger is nearer.",        \
+      .by_default = "`1`", .low = 1e-4, .high = 1000)
 DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
 
 #define CAMERA_KEYS(X)                                                                                                 \
@@ -166,7 +172,14 @@ DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
       .by_default = "`[0, 1, 0]`; `[0, 0, 1]` where the view is along y")                                              \
     X(CYAML_FIELD_FLOAT_PTR("angle", OPTIONAL, scene_file_camera, angle),                                              \
       .help = "Whole vertical angle of view, in degrees.", .by_default = "`40`", .low = 1e-6, .high = 180,             \
-      .is_high_excluded = true)
+      .is_high_excluded = true)                                                                                        \
+    X(CHOICE("projection", scene_file_camera, projection, projection_words),                                           \
+      .help = "`orthographic`: all rays are parallel, and equal lengths look equal wherever they are.",                \
+      .by_default = "`perspective`")                                                                                   \
+    X(CYAML_FIELD_FLOAT_PTR("height", OPTIONAL, scene_file_camera, height),                                            \
+      .help = "With `projection: orthographic`: the height of what the image shows, in scene units.",                  \
+      .by_default = "what fits the data; with `position`, what a perspective image shows at `focal`", .low = 0,        \
+      .is_low_excluded = true, .high = 1e30)
 DEFINE_MAPPING(camera, "camera", CAMERA_KEYS);
 
 #define LIGHT_KEYS(X)                                                                                                  \

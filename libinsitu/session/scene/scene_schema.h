@@ -12,13 +12,19 @@ typedef enum scene_frame { SCENE_FRAME_CAMERA, SCENE_FRAME_WORLD } scene_frame;
 typedef struct scene_file_automatic {
     double *direction; /* 3 */
     double *zoom;
+    int *fit; /* scene_fit */
 } scene_file_automatic;
+
+typedef enum scene_fit { SCENE_FIT_SPHERE, SCENE_FIT_BOX } scene_fit;
+typedef enum scene_projection { SCENE_PERSPECTIVE, SCENE_ORTHOGRAPHIC } scene_projection;
 
 typedef struct scene_file_camera {
     double *position, *focal; /* 3 */
     scene_file_automatic *automatic;
     double *up; /* 3 */
     double *angle;
+    int *projection; /* scene_projection */
+    double *height;
 } scene_file_camera;
 
 typedef struct scene_file_light {

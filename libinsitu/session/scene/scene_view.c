@@ -75,6 +75,7 @@ static insitu_status convert_automatic(const scene_document *d, const char *path
 {
     if (in && in->direction) copy_vector(out->direction, in->direction);
     if (in && in->zoom) out->zoom = *in->zoom;
+    out->fits_box = in && in->fit && *in->fit == SCENE_FIT_BOX;
     if (normalize(out->direction)) return INSITU_OK;
     return scene_bad(d, path, "automatic.direction", "has length 0, expected a direction");
 }
@@ -90,6 +91,10 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
         is_explicit ? convert_explicit(d, path, in, out) : convert_automatic(d, path, in->automatic, out);
     if (status == INSITU_OK) status = convert_up(d, path, in->up, out);
     if (in->angle) out->angle = *in->angle;
+    out->is_orthographic = in->projection && *in->projection == SCENE_ORTHOGRAPHIC;
+    out->height = in->height ? *in->height : 0;
+    if (status == INSITU_OK && in->height && !out->is_orthographic)
+        status = scene_bad(d, path, "height", "given without projection: orthographic, expected beside that");
     return status;
 }
 

@@ -1,0 +1,143 @@
+/* An automatic camera looks along a given direction. What is left to find is where it stands: for the sphere around the
+ * bounds, on the line through their middle; for the box, where its corners just fill the frame.
+ *
+ * A corner at (x, y) across and w towards the eye, seen from a place s to the right and D towards the eye, is within
+ * the right border if x - s <= t (D - w), t being the tangent of half the angle; and within the left one if s - x <= t
+ * (D - w). So with a = max(x + t w) and b = max(t w - x), D is at least (a + b) / 2t, and s = (a - b) / 2 does for
+ * every such D. The same holds for up and down; the larger D serves both. */
+#include "session_camera.h"
+
+#include <math.h>
+
+/* Of the half frame, that the data fills at most. */
+static const double filled = 0.95;
+
+static double length(const double v[3])
+{
+    return hypot(hypot(v[0], v[1]), v[2]);
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* up, or an axis that is not along the view where up is. */
+static void choose_up(const double direction[3], const double up[3], double out[3])
+{
+    const double cross[3] = {direction[1] * up[2] - direction[2] * up[1], direction[2] * up[0] - direction[0] * up[2],
+                             direction[0] * up[1] - direction[1] * up[0]};
+    for (int axis = 0; axis < 3; axis++) out[axis] = up[axis];
+    if (length(cross) > 1e-6 * length(direction) * length(up)) return;
+    int least = 0;
+    for (int axis = 1; axis < 3; axis++)
+        if (fabs(direction[axis]) < fabs(direction[least])) least = axis;
+    for (int axis = 0; axis < 3; axis++) out[axis] = axis == least;
+}
+
+/* ---- where it stands ------------------------------------------------------------------------------------------- */
+
+/* How far from the middle of the bounds: to the right, up, and towards the eye; and half the height of an orthographic
+ * picture. */
+typedef struct camera_stand {
+    double right, up, back, half_height;
+} camera_stand;
+
+/* Tangents of half the angles of view, across and up. */
+typedef struct camera_tangents {
+    double across, up;
+} camera_tangents;
+
+static camera_tangents tangents_of(const scene_image *image)
+{
+    const double up = tan(image->camera.angle * (3.14159265358979323846 / 360));
+    return (camera_tangents){up * image->width / image->height, up};
+}
+
+/* From where a sphere just fits into the narrower of the two angles of view. */
+static camera_stand fit_sphere(double radius, const scene_image *image, camera_tangents t)
+{
+    double half = 0.5 * image->camera.angle * 3.14159265358979323846 / 180;
+    if (image->width < image->height) half = atan(tan(half) * image->width / image->height);
+    return (camera_stand){.back = radius / sin(half), .half_height = radius * fmax(1, t.up / t.across)};
+}
+
+/* The largest of so many places of corners, for which see above. */
+typedef struct corner_reach {
+    double right, left, up, down, back;
+} corner_reach;
+
+static corner_reach reach_of_corners(const session_extent *e, const render_camera *axes, double across, double up)
+{
+    corner_reach r = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3];
+        for (int a = 0; a < 3; a++) p[a] = (corner >> a & 1 ? 0.5 : -0.5) * (e->upper[a] - e->lower[a]);
+        const double x = dot(p, axes->right), y = dot(p, axes->up), w = -dot(p, axes->forward);
+        r.right = fmax(r.right, x + across * w);
+        r.left = fmax(r.left, across * w - x);
+        r.up = fmax(r.up, y + up * w);
+        r.down = fmax(r.down, up * w - y);
+        r.back = fmax(r.back, w);
+    }
+    return r;
+}
+
+static camera_stand fit_box(const session_extent *e, const render_camera *axes, camera_tangents t)
+{
+    const double across = filled * t.across, up = filled * t.up;
+    const corner_reach near = reach_of_corners(e, axes, across, up), flat = reach_of_corners(e, axes, 0, 0);
+    const double back = fmax((near.right + near.left) / (2 * across), (near.up + near.down) / (2 * up));
+    return (camera_stand){.right = 0.5 * (near.right - near.left),
+                          .up = 0.5 * (near.up - near.down),
+                          .back = fmax(back, near.back + 0.01 * e->half_diagonal), /* flat bounds, seen edge on */
+                          .half_height = fmax(flat.up, flat.right * t.up / t.across) / filled};
+}
+
+/* The eye is where all data is before it. An orthographic picture is no other from farther away. */
+static void set_orthographic(const scene_image *image, double half_height, render_camera *camera)
+{
+    if (!image->camera.is_orthographic) return;
+    camera->is_orthographic = true;
+    camera->half_height = image->camera.height > 0 ? 0.5 * image->camera.height : half_height;
+}
+
+static bool automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
+{
+    const scene_camera *c = &image->camera;
+    const double radius = extent->half_diagonal > 0 ? extent->half_diagonal : 1;
+    const camera_tangents tangents = tangents_of(image);
+    double middle[3], eye[3], focal[3], up[3];
+    render_camera axes;
+    for (int a = 0; a < 3; a++) {
+        middle[a] = 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
+        eye[a] = middle[a] + c->direction[a] / length(c->direction) * radius;
+    }
+    choose_up(c->direction, c->up, up);
+    if (!render_camera_look_at(&axes, eye, middle, up, c->angle, image->width, image->height)) return false;
+    const bool by_box = c->fits_box && extent->half_diagonal > 0;
+    const camera_stand stand = by_box ? fit_box(extent, &axes, tangents) : fit_sphere(radius, image, tangents);
+    const bool is_flat = c->is_orthographic;
+    const double back = is_flat ? 2 * radius : stand.back / c->zoom;
+    for (int a = 0; a < 3; a++) {
+        focal[a] = middle[a] + (is_flat ? 0 : stand.right * axes.right[a] + stand.up * axes.up[a]);
+        eye[a] = focal[a] + c->direction[a] / length(c->direction) * back;
+    }
+    if (!render_camera_look_at(out, eye, focal, up, c->angle, image->width, image->height)) return false;
+    set_orthographic(image, stand.half_height / c->zoom, out);
+    return true;
+}
+
+static bool explicit_camera(const scene_image *image, render_camera *out)
+{
+    const scene_camera *c = &image->camera;
+    if (!render_camera_look_at(out, c->eye, c->focal, c->up, c->angle, image->width, image->height)) return false;
+    const double between[3] = {c->eye[0] - c->focal[0], c->eye[1] - c->focal[1], c->eye[2] - c->focal[2]};
+    set_orthographic(image, out->half_height * length(between), out);
+    return true;
+}
+
+bool session_make_camera(const session_extent *extent, const scene_image *image, render_camera *out)
+{
+    return image->camera.is_automatic ? automatic_camera(extent, image, out) : explicit_camera(image, out);
+}

@@ -1,0 +1,12 @@
+/* A scene's camera to the renderer's. */
+#ifndef SESSION_CAMERA_H
+#define SESSION_CAMERA_H
+
+#include "render.h"
+#include "scene.h"
+#include "session_space.h"
+
+/* False where the camera stands at its focal point, or looks along its up direction. Local; the same on every rank. */
+bool session_make_camera(const session_extent *extent, const scene_image *image, render_camera *out);
+
+#endif

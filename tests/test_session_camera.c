@@ -1,0 +1,144 @@
+/* Automatic cameras: what they are to fit is in the frame, and fills it. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "session_camera.h"
+
+static double uniform(double low, double high)
+{
+    return low + (high - low) * ((double)rand() / RAND_MAX);
+}
+
+static session_extent random_extent(void)
+{
+    session_extent e = {.cell_count = 1};
+    double square = 0;
+    const double size = pow(10, uniform(-3, 6));
+    for (int a = 0; a < 3; a++) {
+        e.lower[a] = size * uniform(-5, 5);
+        e.upper[a] = e.lower[a] + size * (rand() % 7 ? uniform(0.01, 1) : 0); /* flat at times */
+        square += pow(e.upper[a] - e.lower[a], 2);
+    }
+    e.half_diagonal = 0.5 * sqrt(square);
+    return e;
+}
+
+static scene_image random_image(void)
+{
+    scene_image image = {.width = 64 + rand() % 400, .height = 64 + rand() % 400};
+    image.camera = (scene_camera){.is_automatic = true, .angle = uniform(5, 60), .zoom = 1};
+    for (int a = 0; a < 3; a++) image.camera.direction[a] = uniform(-1, 1);
+    image.camera.up[rand() % 3] = 1;
+    return image;
+}
+
+/* The borders of the bounds in the picture, -1 and 1 being the picture's; false where a corner is not before the eye.
+ */
+static bool borders(const render_camera *c, const session_extent *e, double low[2], double high[2])
+{
+    const double half[2] = {c->half_height * c->width / c->height, c->half_height};
+    bool are_before = true;
+    for (int a = 0; a < 2; a++) low[a] = INFINITY, high[a] = -INFINITY;
+    for (int corner = 0; corner < 8; corner++) {
+        double x[2] = {0, 0}, z = 0;
+        for (int a = 0; a < 3; a++) {
+            const double offset = (corner >> a & 1 ? e->upper[a] : e->lower[a]) - c->eye[a];
+            x[0] += offset * c->right[a];
+            x[1] += offset * c->up[a];
+            z += offset * c->forward[a];
+        }
+        are_before = are_before && z > 0;
+        for (int a = 0; a < 2; a++) {
+            const double place = x[a] / (half[a] * (c->is_orthographic ? 1 : z));
+            low[a] = fmin(low[a], place);
+            high[a] = fmax(high[a], place);
+        }
+    }
+    return are_before;
+}
+
+/* The eye keeps off the nearest corner by a hundredth of the half diagonal, wherever else it were to stand. */
+static bool is_close(const render_camera *c, const session_extent *e)
+{
+    double nearest = INFINITY;
+    for (int corner = 0; corner < 8; corner++) {
+        double z = 0;
+        for (int a = 0; a < 3; a++) z += ((corner >> a & 1 ? e->upper[a] : e->lower[a]) - c->eye[a]) * c->forward[a];
+        nearest = fmin(nearest, z);
+    }
+    return nearest < 0.0101 * e->half_diagonal;
+}
+
+/* The tighter of width and height is filled from border to border, the other lies within and in the middle. Rounding:
+ * of bounds up to a thousand times as far from the origin as they are large. */
+static void check_box(bool is_orthographic)
+{
+    srand(11);
+    for (int i = 0; i < 3000; i++) {
+        const session_extent extent = random_extent();
+        scene_image image = random_image();
+        render_camera camera;
+        double low[2], high[2];
+        image.camera.fits_box = true;
+        image.camera.is_orthographic = is_orthographic;
+        if (!(extent.half_diagonal > 0) || !session_make_camera(&extent, &image, &camera)) continue;
+        assert_true(borders(&camera, &extent, low, high));
+        double most = 0;
+        for (int a = 0; a < 2; a++) most = fmax(most, fmax(-low[a], high[a]));
+        assert_true(most <= 0.95 + 1e-9);
+        if (fmin(extent.upper[0] - extent.lower[0],
+                 fmin(extent.upper[1] - extent.lower[1], extent.upper[2] - extent.lower[2])) > 0)
+            assert_true(most > 0.95 - 1e-9 || is_close(&camera, &extent));
+    }
+}
+
+static void a_box_fills_the_frame(void **state)
+{
+    (void)state;
+    check_box(false);
+}
+
+static void a_box_fills_an_orthographic_frame(void **state)
+{
+    (void)state;
+    check_box(true);
+}
+
+static void zoom_and_height_are_what_they_say(void **state)
+{
+    (void)state;
+    const session_extent extent = {.lower = {0, 0, 0}, .upper = {2, 2, 2}, .half_diagonal = sqrt(3), .cell_count = 1};
+    scene_image image = {.width = 200, .height = 100};
+    render_camera camera;
+    image.camera = (scene_camera){.is_automatic = true,
+                                  .angle = 40,
+                                  .zoom = 2,
+                                  .fits_box = true,
+                                  .is_orthographic = true,
+                                  .direction = {0, 0, 1},
+                                  .up = {0, 1, 0}};
+    assert_true(session_make_camera(&extent, &image, &camera));
+    assert_true(fabs(camera.half_height - 1 / 0.95 / 2) < 1e-12);
+    image.camera.height = 7;
+    assert_true(session_make_camera(&extent, &image, &camera) && camera.half_height == 3.5);
+    /* An explicit camera's picture shows as much at the focal point either way. */
+    image.camera = (scene_camera){
+        .eye = {1, 1, 11}, .focal = {1, 1, 1}, .up = {0, 1, 0}, .angle = 90, .zoom = 1, .is_orthographic = true};
+    assert_true(session_make_camera(&extent, &image, &camera));
+    assert_true(camera.is_orthographic && fabs(camera.half_height - 10) < 1e-12);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_box_fills_the_frame),
+                                       cmocka_unit_test(a_box_fills_an_orthographic_frame),
+                                       cmocka_unit_test(zoom_and_height_are_what_they_say)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
