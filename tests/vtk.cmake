@@ -55,3 +55,8 @@ target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 
 set_tests_properties(vtk_tool vtk_images PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
+
+# Every scene of the gallery is drawn, where its grids are to be had.
+add_test(NAME gallery COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/gallery.sh $<TARGET_FILE:insitu-render>
+  ${PROJECT_SOURCE_DIR}/docs/gallery ${CMAKE_CURRENT_BINARY_DIR}/gallery)
+set_tests_properties(gallery PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 SKIP_RETURN_CODE 77)
