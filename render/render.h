@@ -86,6 +86,7 @@ typedef struct render_transfer {
 
 enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 16, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
 enum { RENDER_MAX_GROUP = 64 };
+enum { RENDER_MAX_CLIP_PLANES = 16 };
 enum { RENDER_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
 
 typedef struct render_light {
@@ -181,6 +182,12 @@ void render_active_cells_free(render_active_cells *active);
 void render_active_cells_clear(render_active_cells *active);
 int64_t render_active_cells_bytes(const render_active_cells *active);
 
+/* What is drawn lies where normal . position <= distance. */
+typedef struct render_clip_plane {
+    double normal[3]; /* world, any length but 0 */
+    double distance;
+} render_clip_plane;
+
 typedef struct render_job {
     render_camera camera;
     render_space space;
@@ -193,6 +200,8 @@ typedef struct render_job {
     render_active_cells *active; /* NULL: nothing is kept */
     const render_volume_layer *volumes;
     int volume_count;
+    int clip_count;
+    const render_clip_plane *clips; /* all layers are drawn within all of them, at most RENDER_MAX_CLIP_PLANES */
     const render_light *lights;
     int light_count;
     double step; /* distance between samples, scene units, > 0; volumes only */

@@ -196,6 +196,9 @@ static insitu_status check_job(const render_job *job, base_error *error)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%d isovalues, %d volumes, %d lights: at most %d, %d, %d",
                          values, job->volume_count, job->light_count, RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES,
                          RENDER_MAX_LIGHTS);
+    if (job->clip_count < 0 || job->clip_count > RENDER_MAX_CLIP_PLANES)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "%d clipping planes, expected at most %d", job->clip_count,
+                         RENDER_MAX_CLIP_PLANES);
     if (!job->volume_count) return INSITU_OK;
     if (!(job->max_error >= 0) || !(job->extent >= 0))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "max_error of %g over %g, expected 0 or more", job->max_error,

@@ -45,78 +45,80 @@ static void parse_good(const char *text, scene *s)
     if (parse(text, s, &error) != INSITU_OK) fail_msg("refused: %s", error.message);
 }
 
-static const char every_key[] = "threads: 3\n"
-                                "tree: partial\n"
-                                "images:\n"
-                                "  - name: wave\n"
-                                "    size: [640, 480]\n"
-                                "    every: 10\n"
-                                "    camera: {position: [4, 3, 5], focal: [1, 0, 0], up: [0, 0, 2], angle: 35.5}\n"
-                                "    background: [0.5, 0.25, 1, 0.5]\n"
-                                "    lights:\n"
-                                "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
-                                "      - {direction: [3, 0, 4], in: camera}\n"
-                                "    layers:\n"
-                                "      - isosurface:\n"
-                                "          field: pressure\n"
-                                "          component: magnitude\n"
-                                "          values: [0.2, 0.5, -1e-3]\n"
-                                "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
-                                "          opacity: 0.5\n"
-                                "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
-                                "          normals: differences\n"
-                                "          difference: 0.25\n"
-                                "      - volume:\n"
-                                "          field: temperature\n"
-                                "          component: y\n"
-                                "          mesh: [air, sea]\n"
-                                "          interpolate: vertex\n"
-                                "          map: cool_to_warm\n"
-                                "          range: [-2, 3]\n"
-                                "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
-                                "          unit_distance: 0.1\n"
-                                "      - isosurface:\n"
-                                "          {field: q, values: [7], mesh: air, interpolate: vertex, colour_by:\n"
-                                "           {field: speed, component: 2, map: inferno, range: [0, 1],\n"
-                                "            interpolate: vertex}}\n"
-                                "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
-                                "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
-                                "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}]}\n"
-                                "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5}\n"
-                                "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}}\n"
-                                "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
-                                "               max_seconds: 10, method: segments}\n"
-                                "    outputs:\n"
-                                "      - path: \"out/{name}_{cycle:06}.png\"\n"
-                                "        bits: 16\n"
-                                "      - path: out/wave_{cycle}.EXR\n"
-                                "  - name: second\n"
-                                "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box},\n"
-                                "             projection: orthographic, height: 2.5}\n"
-                                "    layers: [{volume: {field: p}}]\n"
-                                "    sampling: {step: 0.125}\n"
-                                "    outputs: [{path: b.png, bits: 8}]\n"
-                                "  - name: third\n"
-                                "    layers:\n"
-                                "      - volume: {field: p}\n"
-                                "      - volume: {field: q}\n"
-                                "      - isosurface:\n"
-                                "          {field: q, values: [7], colour_by: {field: p, reversed: true, discrete: 5,\n"
-                                "           map: {colours: [[0, 0, 0], [1, 0, 0], [1, 1, 1]], at: [0, 0.25, 1]},\n"
-                                "           scale: symlog, threshold: 0.5, below: [0, 0, 1], above: [0, 1, 0],\n"
-                                "           nan: [1, 0, 1]}}\n"
-                                "    sampling: {max_error: 1e-3}\n"
-                                "    decorations:\n"
-                                "      title: \"{name} at {time:.2f} s\"\n"
-                                "      text: [{text: \"cycle {cycle}\", at: bottom_right}, {text: plain}]\n"
-                                "      colour_bar: {at: left, labels: [p in Pa, q], ticks: 4}\n"
-                                "      outline: true\n"
-                                "      axes: true\n"
-                                "      colour: [1, 0, 0.5]\n"
-                                "      size: 0.04\n"
-                                "    outputs:\n"
-                                "      - {path: c.png, decorations: false}\n"
-                                "      - {path: \"c{time:.1e}.exr\", decorations: true}\n";
+static const char every_key[] =
+    "threads: 3\n"
+    "tree: partial\n"
+    "images:\n"
+    "  - name: wave\n"
+    "    size: [640, 480]\n"
+    "    every: 10\n"
+    "    camera: {position: [4, 3, 5], focal: [1, 0, 0], up: [0, 0, 2], angle: 35.5}\n"
+    "    background: [0.5, 0.25, 1, 0.5]\n"
+    "    lights:\n"
+    "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
+    "      - {direction: [3, 0, 4], in: camera}\n"
+    "    layers:\n"
+    "      - isosurface:\n"
+    "          field: pressure\n"
+    "          component: magnitude\n"
+    "          values: [0.2, 0.5, -1e-3]\n"
+    "          colours: [[1, 0, 0], [0.5, 0.25, 0]]\n"
+    "          opacity: 0.5\n"
+    "          material: {ambient: 0.1, diffuse: 0.2, specular: 0.3, shininess: 40}\n"
+    "          normals: differences\n"
+    "          difference: 0.25\n"
+    "      - volume:\n"
+    "          field: temperature\n"
+    "          component: y\n"
+    "          mesh: [air, sea]\n"
+    "          interpolate: vertex\n"
+    "          map: cool_to_warm\n"
+    "          range: [-2, 3]\n"
+    "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
+    "          unit_distance: 0.1\n"
+    "      - isosurface:\n"
+    "          {field: q, values: [7], mesh: air, interpolate: vertex, colour_by:\n"
+    "           {field: speed, component: 2, map: inferno, range: [0, 1],\n"
+    "            interpolate: vertex}}\n"
+    "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
+    "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
+    "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}]}\n"
+    "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5}\n"
+    "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}}\n"
+    "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
+    "               max_seconds: 10, method: segments}\n"
+    "    clip: {planes: [{normal: [0, 0, -2], point: [1, 2, 3]}], box: [[0, 0, 0], [1, 2, 3]]}\n"
+    "    outputs:\n"
+    "      - path: \"out/{name}_{cycle:06}.png\"\n"
+    "        bits: 16\n"
+    "      - path: out/wave_{cycle}.EXR\n"
+    "  - name: second\n"
+    "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box},\n"
+    "             projection: orthographic, height: 2.5}\n"
+    "    layers: [{volume: {field: p}}]\n"
+    "    sampling: {step: 0.125}\n"
+    "    outputs: [{path: b.png, bits: 8}]\n"
+    "  - name: third\n"
+    "    layers:\n"
+    "      - volume: {field: p}\n"
+    "      - volume: {field: q}\n"
+    "      - isosurface:\n"
+    "          {field: q, values: [7], colour_by: {field: p, reversed: true, discrete: 5,\n"
+    "           map: {colours: [[0, 0, 0], [1, 0, 0], [1, 1, 1]], at: [0, 0.25, 1]},\n"
+    "           scale: symlog, threshold: 0.5, below: [0, 0, 1], above: [0, 1, 0],\n"
+    "           nan: [1, 0, 1]}}\n"
+    "    sampling: {max_error: 1e-3}\n"
+    "    decorations:\n"
+    "      title: \"{name} at {time:.2f} s\"\n"
+    "      text: [{text: \"cycle {cycle}\", at: bottom_right}, {text: plain}]\n"
+    "      colour_bar: {at: left, labels: [p in Pa, q], ticks: 4}\n"
+    "      outline: true\n"
+    "      axes: true\n"
+    "      colour: [1, 0, 0.5]\n"
+    "      size: 0.04\n"
+    "    outputs:\n"
+    "      - {path: c.png, decorations: false}\n"
+    "      - {path: \"c{time:.1e}.exr\", decorations: true}\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -337,6 +339,26 @@ static void sampling_is_by_what_is_said(void **state)
         assert_true(image->method == cases[i].method && image->max_error == cases[i].max_error);
         scene_free(&s);
     }
+}
+
+static void clips_are_planes(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(every_key, &s);
+    const scene_clip *clip = &s.images[0].clip;
+    assert_int_equal(clip->plane_count, 7);
+    check_vector(clip->planes[0].normal, 0, 0, -1);
+    check_vector(clip->planes[0].point, 1, 2, 3);
+    for (int i = 1; i < 7; i++) {
+        const scene_plane *plane = &clip->planes[i];
+        const int axis = (i - 1) / 2, side = (i - 1) % 2;
+        assert_true(plane->has_point && plane->offset == 0 && plane->normal[axis] == (side ? 1 : -1));
+        assert_true(plane->normal[(axis + 1) % 3] == 0 && plane->normal[(axis + 2) % 3] == 0);
+        assert_true(plane->point[axis] == (side ? axis + 1 : 0));
+    }
+    assert_int_equal(s.images[1].clip.plane_count, 0);
+    scene_free(&s);
 }
 
 static void surfaces_have_their_colours(void **state)
@@ -593,6 +615,12 @@ static const struct bad_file {
     {11, "      - volume: {field: f, interpolate: face}", 11, {"interpolate: \"face\"", "one of cell, vertex"}},
     {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface, volume, slice and surface"}},
     {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds more than one"}},
+    {8, "    clip: {}", 8, {"images[0].clip: holds nothing", "planes or a box"}},
+    {8, "    clip: {planes: []}", 8, {"clip.planes: a list of 0", "1 to 10"}},
+    {8, "    clip: {planes: [{normal: [0, 0, 0]}]}", 8, {"clip.planes[0].normal: [0, 0, 0]", "any length but 0"}},
+    {8, "    clip: {box: [[0, 0, 0]]}", 8, {"clip.box: a list of 1", "a list of 2"}},
+    {8, "    clip: {box: [[0, 0, 0], [1, 0, 1]]}", 8, {"clip.box: from 0 to 0 along y", "first corner to be less"}},
+    {8, "    clip: {sphere: 1}", 8, {"clip: the key \"sphere\" is unknown", "planes, box"}},
     {11, "      - surface: {field: f}", 11, {"surface: the key \"field\" is unknown", "colour_by"}},
     {11, "      - surface: {colour: red}", 11, {"surface.colour: \"red\"", "a list of 3 numbers from 0 to 1"}},
     {11, "      - surface: {colour: [1, 0, 0], colour_by: {field: f}}", 11, {"surface.colour: given beside colour_by"}},
@@ -906,6 +934,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_layer_defaults_hold),
         cmocka_unit_test(slices_have_planes_of_unit_normals),
         cmocka_unit_test(surfaces_have_their_colours),
+        cmocka_unit_test(clips_are_planes),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),
         cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),

@@ -44,8 +44,8 @@ typedef struct kernel_packet {
      * orthographic their origins (kernel_line.h). */
     bool is_pencil;
     vf u, v;
-    vf t_near; /* the eye's plane */
-    vf t_far;  /* nearest opaque hit so far, +inf at first */
+    vf t_near; /* the eye's plane, or clip_in where that is farther */
+    vf t_far;  /* nearest opaque hit so far, +inf or clip_out at first */
     uint32_t pixel[SIMD_WIDTH];
     /* camera space direction to the eye, for shading: unit length; where has_view */
     vf view[3];
@@ -57,6 +57,8 @@ typedef struct kernel_packet {
     /* samples: at t = sample_base + m * sample_step for whole numbers m >= sample_first */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
+    /* For volumes: where the job's clipping planes have the ray; -inf and +inf without them. */
+    vf clip_in, clip_out;
 } kernel_packet;
 
 /* Packets cover rectangles: 4 × 4, 4 × 2 or 2 × 2 pixels. */
@@ -228,6 +230,46 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
+/* Where the clipping planes have a ray; which is empty where begin > end. */
+static inline void kernel_clip_ray(const kernel_frame *f, double px, double py, float *begin, float *end)
+{
+    const render_space *s = &f->job->space;
+    double base[3], direction[3], first = -INFINITY, last = INFINITY;
+    kernel_tree_ray(f, px, py, base, direction);
+    for (int i = 0; i < f->job->clip_count; i++) {
+        const render_clip_plane *plane = &f->job->clips[i];
+        double left = plane->distance, along = 0;
+        for (int a = 0; a < 3; a++) {
+            left -= plane->normal[a] * s->origin[a];
+            along += plane->normal[a] * direction[a];
+        }
+        left *= s->scale;
+        for (int a = 0; a < 3; a++) left -= plane->normal[a] * base[a];
+        if (along > 0)
+            last = fmin(last, left / along);
+        else if (along < 0)
+            first = fmax(first, left / along);
+        else if (left < 0)
+            last = -INFINITY;
+    }
+    *begin = (float)first;
+    *end = (float)last;
+}
+
+/* A function of the ray alone, in double: the same on all ranks. */
+static __attribute__((noinline, cold)) void kernel_packet_clip(kernel_packet *p)
+{
+    kernel_lanes l;
+    float begin[SIMD_WIDTH], end[SIMD_WIDTH];
+    kernel_packet_lanes(p, &l);
+    for (int i = 0; i < SIMD_WIDTH; i++) kernel_clip_ray(p->frame, l.px[i], l.py[i], &begin[i], &end[i]);
+    p->clip_in = vf_load(begin);
+    p->clip_out = vf_load(end);
+    p->t_near = vf_max(p->t_near, p->clip_in);
+    p->t_far = p->clip_out;
+    p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
+}
+
 /* Sets up what rays need in cells. The tile's rays must be there. */
 static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile,
                                        kernel_thread *thread, int x0, int y0)
@@ -255,6 +297,11 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
     p->v = camera->is_orthographic ? p->origin_y : p->slope_y;
     p->t_near = vf_set((float)-f->depth_shift);
     p->t_far = vf_set(INFINITY);
+    if (f->volume_count) {
+        p->clip_in = vf_set(-INFINITY);
+        p->clip_out = vf_set(INFINITY);
+    }
+    if (f->job->clip_count) kernel_packet_clip(p);
 }
 
 /* Sets up what rays need besides to go down trees on their own, and for volumes. */

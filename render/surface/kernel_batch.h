@@ -386,6 +386,8 @@ static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
 SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
 {
     const render_surface_layer *l = t->surface->layer;
+    /* Rays that are clipped begin each at a depth of its own, which packets know. */
+    if (t->frame->job->clip_count) return false;
     return t->layer < t->frame->opaque_count && !l->colour_map && l->normal != RENDER_DIFFERENCES;
 }
 

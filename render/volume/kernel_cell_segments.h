@@ -112,7 +112,7 @@ SIMD_INLINE void kernel_span_run(kernel_packet *p, kernel_segment_state *state, 
     const kernel_segments *list = state->list;
     vf from = vf_max(i->t_in, p->t_near);
     /* To be mixed, segments are whole, whatever surfaces this rank knows of: the same on any partition. */
-    const vf end = state->mixing > 0 ? i->t_out : vf_min(i->t_out, p->t_far);
+    const vf end = vf_min(i->t_out, state->mixing > 0 ? p->clip_out : p->t_far);
     vm open = vm_and(i->mask, vm_and(p->active, vm_and(vf_lt(from, end), vf_lt(from, p->t_far))));
     while (vm_any(open)) {
         vf to = end;

@@ -88,6 +88,7 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     kernel_table_colour(transfer, value, colour);
     for (int a = 0; a < 3; a++) colour[a] *= absorbed;
     mask = vm_and(mask, vm_and(vf_lt(t, p->t_far), vf_lt(zero, absorbed)));
+    mask = vm_and(mask, vf_le(p->clip_in, t));
     if (!p->frame->job->separate_samples) {
         mask = vm_and(mask, vf_lt(t, state->samples->marked));
         state->samples->marked = vf_select(mask, t, state->samples->marked);

@@ -124,6 +124,7 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const ke
         vm has = vm_none();
         for (int v = 0; v < p->frame->volume_count; v++) has = vm_or(has, vf_eq(s->value[v][n], s->value[v][n]));
         has = vm_and(has, vm_and(vf_lt(t, p->t_far), vf_lt(vf_set(KERNEL_DARK), b->light)));
+        has = vm_and(has, vf_le(p->clip_in, t));
         if (!is_alone) kernel_blend_close(p, b, vm_not(has));
         if (!vm_any(has)) continue;
         kernel_blend_close(p, b, vm_and(has, kernel_blend_breaks(p, b, s, n, hits, t)));

@@ -2,9 +2,11 @@
 #include "session_view.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "session_agree.h"
 #include "session_camera.h"
+#include "session_distances.h"
 
 static double length(const double v[3])
 {
@@ -161,6 +163,22 @@ static void warn_of_view(const session_extent *e, const scene_image *image, cons
                  why ? why : "");
 }
 
+/* ---- clipping ------------------------------------------------------------------------------------------------ */
+
+/* Further out by twice what a slice's plane may be from its place, so that a slice in it is seen. */
+static void fill_clips(const session_extent *e, const scene_image *image, session_view *out)
+{
+    out->clip_count = image->clip.plane_count;
+    for (int i = 0; i < out->clip_count; i++) {
+        const scene_plane *plane = &image->clip.planes[i];
+        render_clip_plane *clip = &out->clips[i];
+        double point[3];
+        session_find_plane_point(plane, e, point);
+        memcpy(clip->normal, plane->normal, sizeof clip->normal);
+        clip->distance = along(point, plane->normal) + 2 * SESSION_BORDER_SHARE * e->half_diagonal;
+    }
+}
+
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
 
 insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
@@ -170,6 +188,7 @@ insitu_status session_make_view(const session_space *space, const char *scene_pa
     insitu_status status = make_camera(&space->extent, scene_path, image, &out->camera, error);
     if (status) return status; /* on all ranks alike */
     fill_view(space, image, out);
+    fill_clips(&space->extent, image, out);
     check_time(&space->extent, scene_path, image, out, team->threads, error);
     status = session_agree_as_is(team->comm, error);
     if (!status) warn_of_view(&space->extent, image, out, report);

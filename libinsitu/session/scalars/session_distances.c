@@ -13,6 +13,13 @@ static void move_along(const double from[3], const double normal[3], double offs
     for (int axis = 0; axis < 3; axis++) out[axis] = from[axis] + offset * normal[axis];
 }
 
+void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3])
+{
+    double middle[3];
+    for (int axis = 0; axis < 3; axis++) middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
+    move_along(plane->has_point ? plane->point : middle, plane->normal, plane->offset, point);
+}
+
 static session_plane plane_of_scene(const scene_plane *in)
 {
     session_plane out = {.is_central = !in->has_point, .offset = in->offset};
@@ -53,12 +60,10 @@ static session_scalar *add_distance(session_mesh *mesh, const scene_plane *plane
 }
 
 /* A plane through the middle of the data goes with their bounds. */
-static void follow_data(session_scalar *scalar, const session_extent *extent)
+static void follow_data(session_scalar *scalar, const scene_plane *plane, const session_extent *extent)
 {
-    double middle[3], point[3];
-    if (!scalar->plane.is_central) return;
-    for (int axis = 0; axis < 3; axis++) middle[axis] = 0.5 * extent->lower[axis] + 0.5 * extent->upper[axis];
-    move_along(middle, scalar->plane.normal, scalar->plane.offset, point);
+    double point[3];
+    session_find_plane_point(plane, extent, point);
     if (are_equal(point, scalar->plane.point)) return;
     memcpy(scalar->plane.point, point, sizeof point);
     scalar->are_values_stale = true;
@@ -71,7 +76,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
     if (!scalar) scalar = add_distance(mesh, plane);
     *marked = scalar;
     if (!scalar) return false;
-    follow_data(scalar, extent);
+    follow_data(scalar, plane, extent);
     scalar->is_used = scalar->wants_ranges = true;
     mesh->is_needed = true;
     return true;

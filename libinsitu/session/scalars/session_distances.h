@@ -12,6 +12,9 @@
  * border of the data is taken into them. */
 #define SESSION_BORDER_SHARE 1e-6
 
+/* A point of the plane in this step. */
+void session_find_plane_point(const scene_plane *plane, const session_extent *extent, double point[3]);
+
 /* Note that an image of this step shows the plane on the mesh. False where memory ran out. Local. */
 bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const session_extent *extent,
                            session_scalar **marked);

@@ -141,8 +141,9 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
 static insitu_status convert_image(const scene_document *d, const char *path, const scene_file_image *in,
                                    const scene *s, scene_image *out)
 {
-    char camera_path[SCENE_PATH_SIZE];
+    char camera_path[SCENE_PATH_SIZE], clip_path[SCENE_PATH_SIZE];
     snprintf(camera_path, sizeof camera_path, "%s.camera", path);
+    snprintf(clip_path, sizeof clip_path, "%s.clip", path);
     out->line = scene_document_line(d, path);
     out->width = in->size ? in->size[0] : 1280;
     out->height = in->size ? in->size[1] : 720;
@@ -151,6 +152,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     insitu_status status = convert_name(d, path, s, in->name, out);
     if (status == INSITU_OK) status = scene_convert_camera(d, camera_path, in->camera, &out->camera);
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
+    if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, &out->clip);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
     if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
     char decorations_path[SCENE_PATH_SIZE];
@@ -280,6 +282,7 @@ static void free_image(scene_image *image)
     base_free(image->isosurfaces);
     base_free(image->volumes);
     base_free(image->slices);
+    base_free(image->clip.planes);
     base_free(image->surfaces);
     base_free(image->lights);
     base_free(image->outputs);

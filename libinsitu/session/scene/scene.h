@@ -132,6 +132,12 @@ typedef struct scene_plane {
     double offset; /* along the normal, from the point to the plane */
 } scene_plane;
 
+/* What is on the side of any of the planes that its normal points to is cut away. */
+typedef struct scene_clip {
+    int plane_count; /* 0 .. 16 */
+    scene_plane *planes;
+} scene_clip;
+
 typedef struct scene_slice {
     scene_field field;
     int plane_count; /* 1 .. 16 */
@@ -216,6 +222,7 @@ typedef struct scene_image {
     int slice_count;
     scene_slice *slices;
     scene_decorations decorations;
+    scene_clip clip;
     int light_count; /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
     scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */

@@ -59,6 +59,8 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 /* NULL: a slight gloss. */
 scene_material scene_convert_material(const scene_file_material *in);
 
+/* in: NULL where nothing is clipped. */
+insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in, scene_clip *out);
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in,
                                     scene_surface *out);
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,

@@ -281,6 +281,17 @@ DEFINE_MAPPING(plane, "planes", PLANE_KEYS);
 
 static const cyaml_schema_value_t plane = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_plane, plane_fields)};
 
+#define CLIP_KEYS(X)                                                                                                   \
+    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_clip, planes, &plane, 1, 10),                                 \
+      .help = "Planes. What lies on the side of any of them that its `normal` points to is cut away. A slice in the "  \
+              "plane itself is not.",                                                                                  \
+      .by_default = "none", .child = &plane_mapping)                                                                   \
+    X(CYAML_FIELD_SEQUENCE_FIXED("box", POINTER, scene_file_clip, box, &colour, 2),                                    \
+      .help = "Two corners, `[[x, y, z], [x, y, z]]`, the first less than the other along each axis. What lies "       \
+              "outside of the box is cut away.",                                                                       \
+      .by_default = "none")
+DEFINE_MAPPING(clip, "clip", CLIP_KEYS);
+
 #define SLICE_KEYS(X)                                                                                                  \
     X(TEXT("field", REQUIRED, scene_file_slice, field, 255),                                                           \
       .help = "Name of the field that colours the planes; at most 255 bytes.")                                         \
@@ -458,6 +469,9 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
       .help = "The lights, in place of the default ones.",                                                             \
       .by_default = "a light from the upper right of the camera and a weaker one from its left",                       \
       .child = &light_mapping)                                                                                         \
+    X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, scene_file_image, clip, clip_fields),                                  \
+      .help = "Cuts parts of all layers away, exactly, and through the cells; volumes keep their `max_error`.",        \
+      .by_default = "nothing is cut away", .child = &clip_mapping)                                                     \
     X(CYAML_FIELD_SEQUENCE("layers", CYAML_FLAG_POINTER, scene_file_image, layers, &layer, 1, 20),                     \
       .help = "What is drawn. Each entry holds one of the keys of a layer.", .child = &layer_mapping)                  \
     X(CYAML_FIELD_MAPPING_PTR("sampling", OPTIONAL, scene_file_image, sampling, sampling_fields),                      \

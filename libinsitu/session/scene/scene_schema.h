@@ -88,6 +88,12 @@ typedef struct scene_file_plane {
     double *offset;
 } scene_file_plane;
 
+typedef struct scene_file_clip {
+    scene_file_plane *planes;
+    int planes_count;
+    double (*box)[3]; /* 2 */
+} scene_file_clip;
+
 typedef struct scene_file_slice {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
@@ -149,6 +155,7 @@ typedef struct scene_file_image {
     int background_count;
     scene_file_light *lights;
     int lights_count;
+    scene_file_clip *clip;
     scene_file_layer *layers;
     int layers_count;
     scene_file_sampling *sampling;

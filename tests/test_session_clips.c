@@ -1,0 +1,323 @@
+/* Clipping: every layer is drawn within the planes alone, by closed form: the cube's surface, isosurfaces that are
+ * planes, a medium of one opacity by all methods. On cells of every type, and dealt at random the same picture as on
+ * one rank. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render.h"
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
+
+#define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
+/* x + 2 y + 2 z <= 0.9, and a box that leaves out x < -0.7 and y > 0.8. */
+#define CLIP                                                                                                           \
+    "    clip: {planes: [{normal: [1, 2, 2], point: [0, 0, 0], offset: 0.3}], box: [[-0.7, -5, -5], [5, 0.8, 5]]}\n"
+#define IMAGE(layers, more)                                                                                            \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE CLIP more "    layers:\n" layers    \
+    "    outputs: [{path: a.exr}]\n"
+
+typedef struct half_space {
+    double normal[3], distance;
+} half_space;
+
+static const half_space clips[] = {
+    {{1. / 3, 2. / 3, 2. / 3}, 0.3}, {{-1, 0, 0}, 0.7}, {{1, 0, 0}, 5}, {{0, -1, 0}, 5}, {{0, 1, 0}, 0.8}};
+static const half_space cube[] = {{{1, 0, 0}, 1},  {{-1, 0, 0}, 1}, {{0, 1, 0}, 1},
+                                  {{0, -1, 0}, 1}, {{0, 0, 1}, 1},  {{0, 0, -1}, 1}};
+/* test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1: its isosurface 0.2. */
+static const half_space linear = {{0.3, -0.7, 0.5}, 0.1};
+
+typedef struct ray {
+    double base[3], direction[3];
+} ray;
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static ray ray_of(int pixel)
+{
+    render_camera camera;
+    ray out;
+    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
+                          40, WIDTH, HEIGHT);
+    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, out.base, out.direction);
+    return out;
+}
+
+static double meet(const ray *r, const half_space *plane)
+{
+    return (plane->distance - dot(plane->normal, r->base)) / dot(plane->normal, r->direction);
+}
+
+typedef struct span {
+    double begin, end;
+} span;
+
+static span cut(const ray *r, const half_space *planes, size_t count)
+{
+    span out = {0, INFINITY};
+    for (size_t i = 0; i < count; i++) {
+        const double depth = meet(r, &planes[i]);
+        if (dot(planes[i].normal, r->direction) > 0)
+            out.end = fmin(out.end, depth);
+        else
+            out.begin = fmax(out.begin, depth);
+    }
+    return out;
+}
+
+static span clipped(const ray *r)
+{
+    return cut(r, clips, sizeof clips / sizeof *clips);
+}
+
+static span cube_span(const ray *r)
+{
+    return cut(r, cube, 6);
+}
+
+/* ---- what is to be seen -------------------------------------------------------------------------------------- */
+
+enum { MOST = 3 };
+
+/* Depths of crossings in the clipped space, in order; NaN first: rounding decides. */
+static int keep(const ray *r, const double *depths, int count, double out[MOST])
+{
+    const span s = clipped(r);
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        if (fabs(depths[i] - s.begin) < 1e-4 || fabs(depths[i] - s.end) < 1e-4) return -1;
+        if (depths[i] > s.begin && depths[i] < s.end) out[kept++] = depths[i];
+    }
+    return kept;
+}
+
+static int see_cube(const ray *r, double out[MOST])
+{
+    const span s = cube_span(r);
+    if (fabs(s.end - s.begin) < 1e-4) return -1;
+    if (s.end < s.begin) return 0;
+    const double depths[2] = {s.begin, s.end};
+    return keep(r, depths, 2, out);
+}
+
+static int see_plane(const ray *r, double out[MOST])
+{
+    const span s = cube_span(r);
+    const double depth = meet(r, &linear);
+    if (fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4) return -1;
+    if (!(depth > s.begin && depth < s.end)) return 0;
+    return keep(r, &depth, 1, out);
+}
+
+typedef int see_function(const ray *r, double out[MOST]);
+
+/* Surfaces of an opacity: the nearest depth, and opacity by their number. */
+static bool has_surfaces(const caught_picture *picture, see_function *see, double opacity)
+{
+    int hits = 0, behind = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        const ray r = ray_of(pixel);
+        double depths[MOST];
+        const int count = see(&r, depths);
+        if (count < 0) continue;
+        const double alpha = 1 - pow(1 - opacity, count), depth = count ? depths[0] : (double)INFINITY;
+        const double own = (double)picture->depth[pixel];
+        hits += count > 0;
+        behind += count == 1;
+        if (fabs((double)picture->rgba[4 * pixel + 3] - alpha) < 1e-6 &&
+            (own == depth || fabs(own - depth) < 1.5e-5)) /* as in test_session_surfaces.c */
+            continue;
+        fprintf(stderr, "pixel %d: opacity %g, depth %g; expected %g, %g\n", pixel,
+                (double)picture->rgba[4 * pixel + 3], own, alpha, depth);
+        return false;
+    }
+    return hits > PIXELS / 60 && behind > PIXELS / 80;
+}
+
+/* Half of the light goes through a length of 1. The planes are moved outwards by 2e-6 of half the diagonal, which is
+ * 4e-6, over their slants. */
+static bool has_medium(const caught_picture *picture, double media, double tolerance)
+{
+    int hits = 0;
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        const ray r = ray_of(pixel);
+        const span s = cube_span(&r), c = clipped(&r);
+        const double length =
+            fmax(fmin(s.end, c.end) - fmax(s.begin, c.begin), 0) * sqrt(dot(r.direction, r.direction));
+        const double alpha = 1 - pow(0.5, media * length), own = (double)picture->rgba[4 * pixel + 3];
+        hits += alpha > 0.1;
+        if (fabs(own - alpha) < tolerance) continue;
+        fprintf(stderr, "pixel %d: opacity %g, expected %g\n", pixel, own, alpha);
+        return false;
+    }
+    return hits > PIXELS / 20;
+}
+
+static bool is_clear_cube(const caught_picture *p)
+{
+    return has_surfaces(p, see_cube, 0.5);
+}
+static bool is_cube(const caught_picture *p)
+{
+    return has_surfaces(p, see_cube, 1);
+}
+static bool is_plane(const caught_picture *p)
+{
+    return has_surfaces(p, see_plane, 1);
+}
+static bool is_clear_plane(const caught_picture *p)
+{
+    return has_surfaces(p, see_plane, 0.25);
+}
+static bool is_exact_medium(const caught_picture *p)
+{
+    return has_medium(p, 1, 1e-4);
+}
+/* A step of 0.01 is 0.0069 of the light, at either end of a ray. */
+static bool is_sampled_medium(const caught_picture *p)
+{
+    return has_medium(p, 1, 0.014);
+}
+static bool is_double_medium(const caught_picture *p)
+{
+    return has_medium(p, 2, 2e-4);
+}
+static bool is_double_sampled_medium(const caught_picture *p)
+{
+    return has_medium(p, 2, 0.028);
+}
+
+#define MEDIUM "      - volume: {field: f, range: [-9, 9], opacity: [[0, 0.5], [1, 0.5]], unit_distance: 1}\n"
+
+typedef struct clip_case {
+    const char *name, *scene;
+    bool (*is_right)(const caught_picture *picture);
+    double tolerance; /* between ranks; 0: the same bits */
+} clip_case;
+
+static const clip_case cases[] = {
+    {"surface", IMAGE("      - surface: {}\n", ""), is_cube, 0},
+    {"clear surface", IMAGE("      - surface: {opacity: 0.5}\n", ""), is_clear_cube, 0},
+    {"isosurface", IMAGE("      - isosurface: {field: f, values: [0.2]}\n", ""), is_plane, 0},
+    {"coloured", IMAGE("      - isosurface: {field: f, values: [0.2], colour_by: {field: f}}\n", ""), is_plane, 0},
+    {"clear isosurface", IMAGE("      - isosurface: {field: f, values: [0.2], opacity: 0.25}\n", ""), is_clear_plane,
+     0},
+    {"to an error", IMAGE(MEDIUM, ""), is_exact_medium, 1e-6},
+    {"to a small error", IMAGE(MEDIUM, "    sampling: {max_error: 1e-4}\n"), is_exact_medium, 1e-6},
+    {"segments", IMAGE(MEDIUM, "    sampling: {method: segments}\n"), is_exact_medium, 1e-6},
+    {"samples", IMAGE(MEDIUM, "    sampling: {step: 0.01}\n"), is_sampled_medium, 1e-6},
+    {"two by segments", IMAGE(MEDIUM MEDIUM, "    sampling: {method: segments}\n"), is_double_medium, 1e-6},
+    {"two by samples", IMAGE(MEDIUM MEDIUM, "    sampling: {step: 0.01}\n"), is_double_sampled_medium, 1e-6},
+    {"clear surface in a medium", IMAGE(MEDIUM "      - isosurface: {field: f, values: [0.2], opacity: 0}\n", ""),
+     is_exact_medium, 1e-6},
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+/* ---- pictures ------------------------------------------------------------------------------------------------ */
+
+static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    caught_picture picture = {0};
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+static double difference(const caught_picture *a, const caught_picture *b)
+{
+    double worst = 0;
+    for (int i = 0; i < 4 * PIXELS; i++) worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    return memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0 ? worst : (double)INFINITY;
+}
+
+static void judge(test_mesh_kind kind, const clip_case *c, const session_input *whole, const session_input *part)
+{
+    const char *scene = write_scene(c->scene);
+    caught_picture ours = draw(MPI_COMM_WORLD, scene, part), alone = {0};
+    bool is_well = true;
+    if (own_rank == 0) {
+        alone = draw(MPI_COMM_SELF, scene, whole);
+        const double off = difference(&ours, &alone);
+        is_well = c->is_right(&alone) && off <= c->tolerance;
+        if (!is_well) fprintf(stderr, "%s, %s: ranks are off by %g\n", test_mesh_kind_name(kind), c->name, off);
+    }
+    everywhere(is_well);
+    free_picture(&ours);
+    free_picture(&alone);
+}
+
+static void layers_are_clipped(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input whole = {0}, part = {0};
+        test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
+        input_describe(&whole);
+        int *owners = test_calloc((size_t)whole.part.cell_count, sizeof *owners);
+        test_partition(&whole.part, TEST_RANDOM, SIDE, rank_count, owners);
+        test_mesh_part(&whole.part, owners, own_rank, &part.part);
+        test_free(owners);
+        input_describe(&part);
+        for (int i = 0; i < CASES; i++) judge(kind, &cases[i], &whole, &part);
+        input_free(&part);
+        input_free(&whole);
+    }
+}
+
+/* A slice in a clipping plane is seen whole, and in front of all else. */
+static void slices_in_the_clipping_plane_are_seen(void **state)
+{
+    (void)state;
+    static const char *const text = IMAGE(
+        "      - slice: {field: f, planes: [{normal: [-1, -2, -2], point: [0.9, 0, 0]}]}\n      - surface: {}\n", "");
+    session_input in = {0};
+    input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
+    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(text), &in);
+    int hits = 0;
+    bool is_well = true;
+    for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {
+        const ray r = ray_of(pixel);
+        const span s = cube_span(&r), box = cut(&r, clips + 1, 4);
+        const double depth = meet(&r, &clips[0]);
+        if (!(depth > fmax(s.begin, box.begin) + 1e-4 && depth < fmin(s.end, box.end) - 1e-4)) continue;
+        hits++;
+        is_well = is_well && fabs((double)picture.depth[pixel] - depth) < 1.5e-5;
+    }
+    everywhere(own_rank != 0 || (is_well && hits > PIXELS / 20));
+    free_picture(&picture);
+    input_free(&in);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(layers_are_clipped),
+        cmocka_unit_test(slices_in_the_clipping_plane_are_seen),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
