@@ -201,6 +201,11 @@ void wrong_options_are_named(void **)
     expect(run_tool("--steps"), 1, "a value is missing");
     expect(run_tool(""), 1, "missing");
     expect(run_tool("scene.yaml"), 1, "data files are missing");
+    expect(run_tool("--size 3 row.vtu"), 1, "--size 3: expected WIDTHxHEIGHT");
+    expect(run_tool("--size 0x9 row.vtu"), 1, "--size 0x9: expected WIDTHxHEIGHT");
+    expect(run_tool("--camera 0,0,0 row.vtu"), 1, "--camera 0,0,0: expected X,Y,Z");
+    expect(run_tool("--field none row.vtu"), 1, "no mesh has the field \"none\"");
+    expect(run_tool("--size 64x48 --camera 1,2,3 row.vtu"), 0, "1 step, 1 picture");
 }
 
 /* One rank alone gets a file that is not there, so it alone fails before and where others go on to collective calls. */

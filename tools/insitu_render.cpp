@@ -20,6 +20,7 @@
 
 #include "data_file.h"
 #include "data_info.h"
+#include "default_scene.h"
 #include "grids_of.h"
 #include "insitu/insitu.h"
 #include "insitu/vtk.h"
@@ -231,7 +232,13 @@ void draw(const world &w, const options &o)
 {
     std::unique_ptr<step_source> source;
     all_do(w, [&] { source = std::make_unique<step_source>(o, w.rank, w.ranks); });
-    stage on(w, o.scene);
+    std::unique_ptr<temporary_file> made;
+    std::string scene = o.scene;
+    all_do(w, [&] {
+        if (scene.empty() && w.is_root()) made = std::make_unique<temporary_file>(default_scene(o));
+    });
+    if (made) scene = made->path(); /* rank 0 alone reads it */
+    stage on(w, scene.empty() ? "default scene" : scene);
     run_state run;
     progress bar(w.is_root(), source->count());
     for (size_t i = 0; i < source->count(); i++) draw_step(w, *source, on, i, run, bar);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
 
@@ -33,6 +35,35 @@ void parse_steps(const std::string &text, options &o)
     if (!first.empty()) o.first_step = parse_step(first, text);
     if (!last.empty()) o.last_step = parse_step(last, text);
     if (o.first_step > o.last_step) throw std::runtime_error("--steps " + text + ": the first step is after the last");
+}
+
+void parse_size(const std::string &text, options &o)
+{
+    char rest = 0;
+    const bool are_two = std::sscanf(text.c_str(), "%dx%d%c", &o.width, &o.height, &rest) == 2;
+    if (!are_two || o.width < 1 || o.height < 1 || o.width > 32768 || o.height > 32768)
+        throw std::runtime_error("--size " + text + ": expected WIDTHxHEIGHT, from 1x1 to 32768x32768");
+}
+
+void parse_camera(const std::string &text, options &o)
+{
+    double d[3];
+    char rest = 0;
+    const bool are_three = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &d[0], &d[1], &d[2], &rest) == 3;
+    const double size = are_three ? std::hypot(d[0], d[1], d[2]) : 0;
+    if (!(size > 0) || !std::isfinite(size))
+        throw std::runtime_error("--camera " + text + ": expected X,Y,Z, the direction from the data to the eye");
+    char direction[100];
+    std::snprintf(direction, sizeof direction, "%.9g, %.9g, %.9g", d[0] / size, d[1] / size, d[2] / size);
+    o.direction = direction;
+}
+
+bool is_scene(const std::string &name)
+{
+    const auto ends_with = [&](const std::string &end) {
+        return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+    };
+    return ends_with(".yaml") || ends_with(".yml");
 }
 
 /* The runs of digits of a name, and the name with each run as '#'. */
@@ -104,6 +135,12 @@ void parse_argument(int argc, char **argv, int &i, options &o, std::vector<std::
         o.pieces = true;
     else if (takes_value("--steps", argc, argv, i, value))
         parse_steps(value, o);
+    else if (takes_value("--size", argc, argv, i, value))
+        parse_size(value, o);
+    else if (takes_value("--camera", argc, argv, i, value))
+        parse_camera(value, o);
+    else if (takes_value("--field", argc, argv, i, value))
+        o.field = value;
     else if (takes_value("--partition", argc, argv, i, value)) {
         if (!parse_partition(value, o.how))
             throw std::runtime_error("--partition " + value + ": expected block, random or checkerboard");
@@ -124,8 +161,10 @@ options parse_options(int argc, char **argv)
     if (!o.info) {
         if (names.empty())
             throw std::runtime_error("a scene file and data files are missing; see insitu-render --help");
-        o.scene = names.front();
-        names.erase(names.begin());
+        if (is_scene(names.front()) || why_not_data(names.front()) != "") {
+            o.scene = names.front();
+            names.erase(names.begin());
+        }
     }
     if (names.empty()) throw std::runtime_error("data files are missing; see insitu-render --help");
     o.files = names;
@@ -135,19 +174,23 @@ options parse_options(int argc, char **argv)
 
 std::string help_text()
 {
-    return "usage: insitu-render [options] scene.yaml file...\n"
-           "       mpirun -n ranks insitu-render [options] scene.yaml file...\n"
+    return "usage: insitu-render [options] [scene.yaml] file...\n"
+           "       mpirun -n ranks insitu-render [options] [scene.yaml] file...\n"
            "       insitu-render --info file...\n"
            "\n"
            "Draw the pictures that a scene file describes, from files of unstructured cells. Several\n"
            "files are time steps, in order; a file with time steps inside is stepped through. Pictures\n"
-           "go where the scene's outputs say, relative to the working directory.\n"
+           "go where the scene's outputs say, relative to the working directory. Without a scene the\n"
+           "outer surface is drawn, coloured by a field, to NAME_CYCLE.png.\n"
            "\n"
            "  --info               list cells by type, bounds, fields with their ranges, and times\n"
            "  --steps A:B          only steps A to B, counting from 0; A:, :B and A do too\n"
            "  --pieces             the files are pieces of one step, not steps\n"
            "  --partition HOW      how cells are dealt out to ranks: block (default), random or\n"
            "                       checkerboard; pictures do not depend on it\n"
+           "  --field NAME         without a scene: the field; the first is the default\n"
+           "  --size WxH           without a scene: the picture's size; 1280x720 is the default\n"
+           "  --camera X,Y,Z       without a scene: the direction from the data to the eye\n"
            "  --version            print the version\n"
            "  --help               print this\n"
            "\n"
