@@ -13,11 +13,6 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-insitu_status scene_no_memory(const scene_document *d)
-{
-    return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", d->file_name);
-}
-
 /* ---- libcyaml ---- */
 
 static void *cyaml_memory(void *context, void *block, size_t size)

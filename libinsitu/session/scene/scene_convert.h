@@ -16,9 +16,6 @@ typedef struct scene_colour_points {
     bool is_banded; /* each colour is that of a band */
 } scene_colour_points;
 
-/* A new message-less failure for a block that could not be had. */
-insitu_status scene_no_memory(const scene_document *d);
-
 /* Each fills one part of an image; path is that of the file's part, for messages. */
 insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
                                    scene_camera *out);

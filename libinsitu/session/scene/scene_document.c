@@ -237,6 +237,11 @@ double scene_document_number(const scene_document *d, const char *path)
     return node && node->type == YAML_SCALAR_NODE ? strtod(text_of(node), NULL) : 0;
 }
 
+insitu_status scene_no_memory(const scene_document *d)
+{
+    return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", d->file_name);
+}
+
 insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
 {
     char path[path_size], what[sizeof d->error->message / 2];

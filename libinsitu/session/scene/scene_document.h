@@ -43,6 +43,9 @@ double scene_document_number(const scene_document *d, const char *path);
 insitu_status scene_bad(const scene_document *d, const char *parent, const char *key, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
+/* Records that memory ran out while the scene was read; returns INSITU_ERROR_MEMORY. */
+insitu_status scene_no_memory(const scene_document *d);
+
 /* What may stand at a key, in words: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1". */
 enum { SCENE_WORDS_SIZE = 640 };
 void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
