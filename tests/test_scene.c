@@ -93,6 +93,7 @@ static const char every_key[] =
     "        bits: 16\n"
     "      - path: out/wave_{cycle}.EXR\n"
     "  - name: second\n"
+    "    every_time: 0.25\n"
     "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box},\n"
     "             projection: orthographic, height: 2.5}\n"
     "    layers: [{volume: {field: p}}]\n"
@@ -196,6 +197,7 @@ static void scene_view_keys_are_read(void **state)
     check_vector(camera->up, 0, 0, 1);
     assert_true(camera->angle == 35.5);
     assert_true(s.images[1].camera.is_automatic && s.images[1].camera.fits_box);
+    assert_true(s.images[0].every_time == 0 && s.images[1].every_time == 0.25);
     assert_true(s.images[1].camera.is_orthographic && s.images[1].camera.height == 2.5);
     check_vector(s.images[1].camera.direction, 0, 0.6, 0.8);
     assert_true(s.images[1].camera.zoom == 1.5);
@@ -525,7 +527,7 @@ static const struct bad_file {
     {1, "[[[[[[[[[[[[[[[[[[[[ ", 1, {"too deep", "16"}},
     {1, "threads: \x01", 1, {"not valid YAML", "control characters"}},
     {2, "pictures:", 2, {"the key \"pictures\" is unknown"}},
-    {3, "  - title: a", 3, {"images[0]: the key \"title\" is unknown", "name, size, every, camera"}},
+    {3, "  - title: a", 3, {"images[0]: the key \"title\" is unknown", "name, size, every, every_time, camera"}},
     {3, "  - every: 3\n    name: a", 6, {"images[0]: the key \"every\" is given twice"}},
     {3, "  - threads: 1", 3, {"the key \"threads\" is unknown"}},
     {3, "  - [a]: b", 3, {"the key a list is unknown"}},
@@ -550,6 +552,8 @@ static const struct bad_file {
     {6, "    camera: {position: [0, 5, 0], focal: [0, 0, 0], automatic: {}}", 6, {"camera.automatic: given beside"}},
     {6, "    camera: {position: [1e308, 0, 0], focal: [-1e308, 0, 0]}", 6, {"camera.position: too far from focal"}},
     {6, "    camera: {automatic: {direction: [0, 0, 0]}}", 6, {"camera.automatic.direction: has length 0"}},
+    {5, "    every_time: 0", 5, {"every_time: \"0\"", "above 0"}},
+    {5, "    every: 2\n    every_time: 1", 6, {"every_time: given beside every"}},
     {6, "    camera: {automatic: {fit: data}}", 6, {"camera.automatic.fit: \"data\"", "one of sphere, box"}},
     {6, "    camera: {projection: flat}", 6, {"camera.projection: \"flat\"", "perspective, orthographic"}},
     {6, "    camera: {height: 3}", 6, {"camera.height: given without projection: orthographic"}},

@@ -453,6 +453,34 @@ static void component_that_is_not_there_is_named(void **context)
     insitu_destroy(&session);
 }
 
+/* By multiples of a quarter, at times that are sums of 0.1: the tenth is a rounding less than 1, and counts as 1. A
+ * step that passes several multiples draws once, and one that stands still draws nothing. */
+static void images_are_drawn_when_their_time_has_passed(void **context)
+{
+    (void)context;
+    static const int expected[] = {1, 0, 0, 1, 0, 1, 0, 0, 1, 0, 1};
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene("images:\n  - name: a\n    size: [24, 16]\n    every_time: 0.25\n"
+                                                 "    layers:\n      - " SURFACE "\n"
+                                                 "    outputs:\n      - path: a_{cycle}_{time:.2f}.exr\n"));
+    everywhere(hand_over(session, &input) == INSITU_OK);
+    double time = 0;
+    for (int cycle = 0; cycle < 11; cycle++, time += 0.1) {
+        forget_pictures();
+        told_everywhere(session, insitu_step(session, cycle, time), INSITU_OK, "");
+        everywhere(insitu_last_report(session)->images == expected[cycle]);
+    }
+    everywhere(own_rank != 0 || !strcmp(caught[0].path, "a_10_1.00.exr"));
+    const double later[] = {7.1, 7.1, 7.2, 7.3};
+    const int then[] = {1, 0, 0, 1};
+    for (int i = 0; i < 4; i++) {
+        told_everywhere(session, insitu_step(session, 11 + i, later[i]), INSITU_OK, "");
+        everywhere(insitu_last_report(session)->images == then[i]);
+    }
+    forget_pictures();
+    insitu_destroy(&session);
+}
+
 static void ranks_at_different_cycles_are_told(void **context)
 {
     (void)context;
@@ -687,6 +715,7 @@ static int run(void)
         cmocka_unit_test(missing_field_leaves_the_other_picture),
         cmocka_unit_test(component_that_is_not_there_is_named),
         cmocka_unit_test(ranks_at_different_cycles_are_told),
+        cmocka_unit_test(images_are_drawn_when_their_time_has_passed),
         cmocka_unit_test(picture_that_cannot_be_written_is_told_to_all),
         cmocka_unit_test(edited_scene_is_taken_and_a_broken_one_is_not),
         cmocka_unit_test(bad_scene_opens_no_session),

@@ -28,6 +28,8 @@ struct insitu_session {
     session_picture picture; /* rank 0 */
     session_run_ranges run_ranges;
     session_report report;
+    bool has_stepped;
+    double last_time; /* of the last step */
     base_error error; /* of the last call */
 };
 

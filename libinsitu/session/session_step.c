@@ -45,12 +45,13 @@ static void use_common_kernels(int level, session_report *report)
 }
 
 /* The phases of a step in which an image is due. What the plan does not name is not computed. */
-static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, base_error *error)
+static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
+                                     base_error *error)
 {
     const double start = MPI_Wtime();
     const session_team *team = &s->team;
     const session_extent *extent = &s->space.extent;
-    const session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, changes->cycle, &s->catalogue, extent};
+    const session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, &s->catalogue, extent};
     const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
                                      &s->space, &s->run_ranges,     &s->report};
     session_plan plan = {0};
@@ -86,12 +87,15 @@ static insitu_status step(insitu_session *s, int64_t cycle, double time, const s
     s->report.numbers.time = changes.time;
     if (changes.of_scene) reload_scene(s);
     status = session_check_input(&changes, &s->meshes, &s->team, error);
-    if (status || session_count_due(&s->scene_file.scene, changes.cycle) == 0) return status;
+    const session_moment moment = {changes.cycle, changes.time, s->last_time, !s->has_stepped};
+    s->has_stepped = true;
+    s->last_time = changes.time;
+    if (status || session_count_due(&s->scene_file.scene, &moment) == 0) return status;
     use_common_kernels(changes.isa_level, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
                                    changes.are_threads_lacking || changes.of_scene, guard, &s->report, error);
     if (status) return status;
-    status = draw_due_images(s, &changes, error);
+    status = draw_due_images(s, &changes, &moment, error);
     session_guard_end_team(s->team.threads);
     return status;
 }

@@ -2,6 +2,7 @@
  * is read off the catalogue, which all ranks share, so all come to the same answer without asking. */
 #include "session_plan.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #include "memory.h"
@@ -217,15 +218,24 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
 
-static bool is_due(const scene_image *image, int64_t cycle)
+/* Multiples of the interval up to the time. A time that is one but for rounding counts: steps of 0.1 add up to less. */
+static double intervals(double time, double interval)
 {
-    return image->every <= 1 || cycle % image->every == 0;
+    const double count = time / interval;
+    return floor(count + 1e-9 * fmax(1, fabs(count)));
 }
 
-int session_count_due(const scene *scene, int64_t cycle)
+static bool is_due(const scene_image *image, const session_moment *m)
+{
+    if (image->every_time > 0)
+        return m->is_first || intervals(m->time, image->every_time) != intervals(m->last_time, image->every_time);
+    return image->every <= 1 || m->cycle % image->every == 0;
+}
+
+int session_count_due(const scene *scene, const session_moment *moment)
 {
     int count = 0;
-    for (int i = 0; i < scene->image_count; i++) count += is_due(&scene->images[i], cycle);
+    for (int i = 0; i < scene->image_count; i++) count += is_due(&scene->images[i], moment);
     return count;
 }
 
@@ -272,7 +282,7 @@ static void take_images(const session_plan_basis *basis, session_report *report,
 {
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
-        if (!is_due(image, basis->cycle) || !can_be_drawn(basis, image, report, &plan->refusal)) continue;
+        if (!is_due(image, basis->moment) || !can_be_drawn(basis, image, report, &plan->refusal)) continue;
         plan->images[plan->image_count++] = image;
         plan->slice_count += image->slice_count;
         plan->surface_count += image->surface_count;
@@ -282,7 +292,7 @@ static void take_images(const session_plan_basis *basis, session_report *report,
 insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, MPI_Comm comm,
                                 session_report *report, session_plan *out, base_error *error)
 {
-    const size_t due = (size_t)session_count_due(basis->scene, basis->cycle);
+    const size_t due = (size_t)session_count_due(basis->scene, basis->moment);
     const session_extent *extent = basis->extent;
     session_plan plan = {.images = base_calloc(due, sizeof *plan.images), .cell_count = extent->cell_count};
     if (plan.images) take_images(basis, report, &plan);

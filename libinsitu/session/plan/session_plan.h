@@ -25,17 +25,24 @@ typedef struct session_plan {
     base_error refusal; /* of the first due image that cannot be drawn */
 } session_plan;
 
+/* A step, and the time of the one before; the same on every rank. */
+typedef struct session_moment {
+    int64_t cycle;
+    double time, last_time;
+    bool is_first; /* there is no step before */
+} session_moment;
+
 /* What a plan is made of; the same on every rank. */
 typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* for messages */
-    int64_t cycle;
+    const session_moment *moment;
     const session_catalogue *catalogue;
     const session_extent *extent;
 } session_plan_basis;
 
 /* How many images are due. Local. */
-int session_count_due(const scene *scene, int64_t cycle);
+int session_count_due(const scene *scene, const session_moment *moment);
 
 /* Find which of the due images can be drawn, and mark on this rank's meshes and scalars what they need. An image that
  * cannot be drawn is no error of this call. Collective. */

@@ -143,8 +143,11 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     out->width = in->size ? in->size[0] : 1280;
     out->height = in->size ? in->size[1] : 720;
     out->every = in->every ? *in->every : 1;
+    out->every_time = in->every_time ? *in->every_time : 0;
     convert_background(in, out->background);
     insitu_status status = convert_name(d, path, s, in->name, out);
+    if (status == INSITU_OK && in->every && in->every_time)
+        status = scene_bad(d, path, "every_time", "given beside every, expected one of the two");
     if (status == INSITU_OK) status = scene_convert_camera(d, camera_path, in->camera, &out->camera);
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
     if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, &out->clip);

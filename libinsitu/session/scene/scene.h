@@ -234,7 +234,8 @@ typedef struct scene_image {
     double max_seconds;           /* that samples may take by estimate; 3600 by default */
     int output_count;             /* >= 1 */
     scene_output *outputs;
-    int every; /* drawn at cycles that are multiples of it; 1 by default */
+    int every;         /* drawn at cycles that are multiples of it; 1 by default */
+    double every_time; /* > 0: instead, when the time passes a multiple of it */
 } scene_image;
 
 /* What trees are built over: all cells, those that the images can show, or what costs less. */

@@ -460,6 +460,11 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
       .help = "Width and height in pixels.", .by_default = "`[1280, 720]`", .low = 1, .high = 32768)                   \
     X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_image, every),                                                 \
       .help = "Draw at the cycles that are multiples of this.", .by_default = "`1`", .low = 1, .high = 1000000000)     \
+    X(CYAML_FIELD_FLOAT_PTR("every_time", OPTIONAL, scene_file_image, every_time),                                     \
+      .help =                                                                                                          \
+          "Draw at the first step, and whenever the time has passed a multiple of this since the step before. Not "    \
+          "with `every`.",                                                                                             \
+      .by_default = "by `every`", .low = 0, .is_low_excluded = true, .high = 1e30)                                     \
     X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, camera_fields),                            \
       .help = "Where the image is seen from.", .by_default = "automatic", .child = &camera_mapping)                    \
     X(CYAML_FIELD_SEQUENCE("background", POINTER, scene_file_image, background, &number, 3, 4),                        \

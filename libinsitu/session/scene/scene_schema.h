@@ -150,6 +150,7 @@ typedef struct scene_file_image {
     char *name;
     int *size; /* 2 */
     int *every;
+    double *every_time;
     scene_file_camera *camera;
     double *background; /* 3 or 4 */
     int background_count;
