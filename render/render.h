@@ -35,15 +35,20 @@ typedef struct render_camera {
     double half_height;                 /* perspective: tangent of half the vertical angle; else half the height */
     bool is_orthographic;
     int width, height;
+    double offset[2]; /* of every ray from its pixel's centre, in pixels, to the right and down; 0 by default */
 } render_camera;
+
+/* The offset of sample k of count (1, 2, 4, 8 or 16) in a pixel. Along either axis the samples are evenly spaced, and
+ * their mean is the pixel's centre. */
+void render_camera_sample(int count, int k, double offset[2]);
 
 /* Camera at eye that looks at focal. vertical_degrees is the whole vertical angle, in (0, 180). False where eye equals
  * focal, or up is parallel to the view. */
 bool render_camera_look_at(render_camera *camera, const double eye[3], const double focal[3], const double up[3],
                            double vertical_degrees, int width, int height);
 
-/* The ray through the centre of pixel (x, y): p(z) = base + z * direction, z >= 0. direction has length 1 along
- * forward, not 1 overall. */
+/* The ray through pixel (x, y), at its centre but for the offset: p(z) = base + z * direction, z >= 0. direction has
+ * length 1 along forward, not 1 overall. */
 void render_camera_ray(const render_camera *camera, int x, int y, double base[3], double direction[3]);
 
 /* Where float32 numbers live: positions are taken relative to origin and multiplied by scale, a power of two that

@@ -41,12 +41,22 @@ bool render_camera_look_at(render_camera *camera, const double eye[3], const dou
 void render_camera_ray(const render_camera *camera, int x, int y, double base[3], double direction[3])
 {
     const double pixel = 2 * camera->half_height / camera->height;
-    const double px = (x + 0.5 - 0.5 * camera->width) * pixel, py = (0.5 * camera->height - (y + 0.5)) * pixel;
+    const double px = (x + (0.5 + camera->offset[0]) - 0.5 * camera->width) * pixel;
+    const double py = (0.5 * camera->height - (y + (0.5 + camera->offset[1]))) * pixel;
     for (int a = 0; a < 3; a++) {
         const double sideways = px * camera->right[a] + py * camera->up[a];
         base[a] = camera->eye[a] + (camera->is_orthographic ? sideways : 0);
         direction[a] = camera->forward[a] + (camera->is_orthographic ? 0 : sideways);
     }
+}
+
+/* Samples stand in columns 0, 1, ... of a grid of count × count, each in a row of its own, no two neighbours near. */
+void render_camera_sample(int count, int k, double offset[2])
+{
+    static const unsigned char few[4] = {1, 3, 0, 2};
+    const int row = count <= 2 ? k : count == 4 ? few[k] : count == 8 ? 3 * k % 8 : 5 * k % 16;
+    offset[0] = (k + 0.5) / count - 0.5;
+    offset[1] = (row + 0.5) / count - 0.5;
 }
 
 /* A bijective mix of 32 bits (two rounds of multiply and shift), then its top 24 as a fraction. */

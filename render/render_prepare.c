@@ -120,9 +120,9 @@ static void prepare_camera(kernel_frame *f)
         for (int a = 0; a < 3; a++) f->scaled_axes[i][a] = axes[i][a] * s->scale;
     f->depth_shift = s->depth_origin * s->scale;
     f->scaled_step = f->job->step * s->scale;
-    f->slope_x0 = (0.5 - 0.5 * c->width) * pixel;
+    f->slope_x0 = (0.5 + c->offset[0] - 0.5 * c->width) * pixel;
     f->slope_dx = pixel;
-    f->slope_y0 = (0.5 * c->height - 0.5) * pixel;
+    f->slope_y0 = (0.5 * c->height - (0.5 + c->offset[1])) * pixel;
     f->slope_dy = -pixel;
     for (int i = 0; i < f->job->light_count; i++)
         for (int k = 0; k < 3; k++) {

@@ -94,6 +94,7 @@ static const char every_key[] =
     "      - path: out/wave_{cycle}.EXR\n"
     "  - name: second\n"
     "    every_time: 0.25\n"
+    "    antialias: 4\n"
     "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box},\n"
     "             projection: orthographic, height: 2.5}\n"
     "    layers: [{volume: {field: p}}]\n"
@@ -196,6 +197,7 @@ static void scene_view_keys_are_read(void **state)
     check_vector(camera->focal, 1, 0, 0);
     check_vector(camera->up, 0, 0, 1);
     assert_true(camera->angle == 35.5);
+    assert_true(s.images[0].antialias == 1 && s.images[1].antialias == 4 && s.images[1].frames == 4);
     assert_true(s.images[1].camera.is_automatic && s.images[1].camera.fits_box);
     assert_true(s.images[0].every_time == 0 && s.images[1].every_time == 0.25);
     assert_true(s.images[1].camera.is_orthographic && s.images[1].camera.height == 2.5);
@@ -554,6 +556,8 @@ static const struct bad_file {
     {6, "    camera: {automatic: {direction: [0, 0, 0]}}", 6, {"camera.automatic.direction: has length 0"}},
     {5, "    every_time: 0", 5, {"every_time: \"0\"", "above 0"}},
     {5, "    every: 2\n    every_time: 1", 6, {"every_time: given beside every"}},
+    {6, "    antialias: 3", 6, {"antialias: is 3", "1, 2, 4, 8 or 16"}},
+    {6, "    antialias: 32", 6, {"antialias: \"32\"", "from 1 to 16"}},
     {6, "    camera: {automatic: {fit: data}}", 6, {"camera.automatic.fit: \"data\"", "one of sphere, box"}},
     {6, "    camera: {projection: flat}", 6, {"camera.projection: \"flat\"", "perspective, orthographic"}},
     {6, "    camera: {height: 3}", 6, {"camera.height: given without projection: orthographic"}},

@@ -6,6 +6,7 @@
 
 #include <string.h>
 
+#include "comp_edges.h"
 #include "memory.h"
 #include "session_agree.h"
 #include "session_decorations.h"
@@ -20,6 +21,7 @@ enum { overlap_fragments = 1 << 22 };
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
 typedef struct canvas {
     image frame;                      /* its memory is the session's picture */
+    float *depth;                     /* the frame's, put by while it is drawn without */
     double *sum;                      /* NULL: there is one frame */
     session_decorations *decorations; /* NULL: there are none, and the frame has its background */
 } canvas;
@@ -59,12 +61,26 @@ static insitu_status canvas_create(const scene_image *image, int rank, session_p
     return INSITU_OK;
 }
 
-static void canvas_add(canvas *c, int threads)
+/* pixels: NULL, or those that the frame has. */
+static void canvas_add(canvas *c, const unsigned char *pixels, int threads)
 {
     if (!c->sum) return;
-    const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
+    const int64_t count = (int64_t)c->frame.width * c->frame.height;
 #pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t i = 0; i < count; i++) c->sum[i] += (double)c->frame.rgba[i];
+    for (int64_t p = 0; p < count; p++)
+        for (int i = 0; i < 4 && (!pixels || pixel_set_has(pixels, p)); i++)
+            c->sum[4 * p + i] += (double)c->frame.rgba[4 * p + i];
+}
+
+/* As if the pixels outside of the set had so many frames, all like this one: their average is that frame to the bit. */
+static void canvas_begin_edges(canvas *c, const unsigned char *pixels, int frames, int threads)
+{
+    if (!c->sum) return;
+    const int64_t count = (int64_t)c->frame.width * c->frame.height;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t p = 0; p < count; p++)
+        for (int i = 0; i < 4 && !pixel_set_has(pixels, p); i++)
+            c->sum[4 * p + i] = (double)c->frame.rgba[4 * p + i] * frames;
 }
 
 static void average_frames(canvas *c, int frames, int threads)
@@ -137,24 +153,78 @@ static void warn_of_overlaps(session_report *report, const scene_image *image, i
         image->name, (long long)pixels);
 }
 
+/* What the frames of an image share. */
+typedef struct frames_basis {
+    const session_drawing *drawing;
+    session_frame_target target;
+    canvas *canvas;
+    int64_t overlaps; /* pixels, at most of any frame */
+} frames_basis;
+
+static insitu_status draw_frame(frames_basis *b, const render_job *job, base_error *error)
+{
+    session_frame frame;
+    const insitu_status status = session_draw_frame(&b->target, job, &b->canvas->frame, &frame, error);
+    report_frame(&b->drawing->report->numbers, &frame);
+    if (!status && frame.overlaps > b->overlaps) b->overlaps = frame.overlaps;
+    return status;
+}
+
+static bool has_edges_alone(const scene_image *image)
+{
+    return image->antialias > 1 && image->volume_count == 0;
+}
+
+/* Rank 0 knows the picture, and tells all ranks which pixels are at edges. *pixels is the caller's to free. */
+static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_error *error)
+{
+    const image *picture = &b->canvas->frame;
+    const session_team *team = b->drawing->team;
+    const size_t bytes = pixel_set_bytes((int64_t)picture->width * picture->height);
+    *pixels = base_calloc(bytes, 1);
+    if (!*pixels) session_no_memory(error, (int64_t)bytes, "the pixels at edges");
+    const insitu_status status = session_agree(team->comm, error);
+    if (status) return status;
+    if (team->rank == 0) comp_find_edges(picture, *pixels);
+    return session_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
+}
+
+/* A frame through the pixels' centres: its depth is kept, and it tells where edges are. Not one of those averaged. */
+static insitu_status draw_centres(frames_basis *b, const scene_image *image, render_job *job, unsigned char **pixels,
+                                  base_error *error)
+{
+    canvas *c = b->canvas;
+    insitu_status status = draw_frame(b, job, error);
+    if (!status && has_edges_alone(image)) {
+        status = share_edges(b, pixels, error);
+        if (!status) canvas_begin_edges(c, *pixels, image->frames, b->drawing->team->threads);
+        job->pixels = *pixels;
+    }
+    c->depth = c->frame.depth;
+    c->frame.depth = NULL;
+    return status;
+}
+
 static insitu_status draw_frames(const session_drawing *d, const scene_image *image, const session_view *view,
                                  const session_layers *layers, canvas *canvas, base_error *error)
 {
     static const float no_background[4] = {0, 0, 0, 0}; /* edges may go between it and the picture */
-    const session_frame_target target = {d->team->comm, d->team->compositing_comm,
-                                         image->decorations.is_given ? no_background : image->background,
-                                         overlap_fragments};
+    const float *background = image->decorations.is_given ? no_background : image->background;
+    frames_basis basis = {d, {d->team->comm, d->team->compositing_comm, background, overlap_fragments}, canvas, 0};
     render_job job = make_job(d, image, view, layers);
-    int64_t overlaps = 0;
-    for (job.frame = 0; job.frame < image->frames; job.frame++) {
-        session_frame frame;
-        const insitu_status status = session_draw_frame(&target, &job, &canvas->frame, &frame, error);
-        report_frame(&d->report->numbers, &frame);
-        if (status) return status;
-        if (frame.overlaps > overlaps) overlaps = frame.overlaps;
-        canvas_add(canvas, d->team->threads);
+    unsigned char *pixels = NULL;
+    insitu_status status = INSITU_OK;
+    const bool has_centres = image->antialias > 1 && (has_edges_alone(image) || wants_depth(image));
+    if (has_centres) status = draw_centres(&basis, image, &job, &pixels, error);
+    for (job.frame = 0; job.frame < image->frames && !status; job.frame++) {
+        render_camera_sample(image->antialias, job.frame % image->antialias, job.camera.offset);
+        status = draw_frame(&basis, &job, error);
+        if (!status) canvas_add(canvas, pixels, d->team->threads);
     }
-    warn_of_overlaps(d->report, image, overlaps);
+    if (has_centres) canvas->frame.depth = canvas->depth;
+    base_free(pixels);
+    if (status) return status;
+    warn_of_overlaps(d->report, image, basis.overlaps);
     canvas_finish(canvas, image->frames, &view->space, d->team->threads);
     return INSITU_OK;
 }
@@ -250,13 +320,19 @@ static bool has_same(const scene_image *image, const scene_isosurface *layer)
     return false;
 }
 
+/* Frames of all pixels: the others are not drawn from what is stored. */
+static int whole_frames(const scene_image *image)
+{
+    return has_edges_alone(image) ? 1 : image->frames;
+}
+
 bool session_active_cells_pay(const session_plan *plan, const scene_image *image)
 {
     for (int i = 0; i < image->isosurface_count; i++) {
         int64_t frames = 0;
         if (!can_be_stored(&image->isosurfaces[i])) continue;
         for (int n = 0; n < plan->image_count; n++)
-            if (has_same(plan->images[n], &image->isosurfaces[i])) frames += plan->images[n]->frames;
+            if (has_same(plan->images[n], &image->isosurfaces[i])) frames += whole_frames(plan->images[n]);
         if (frames >= LEAST_FRAMES) return true;
     }
     return false;

@@ -133,6 +133,16 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     return INSITU_OK;
 }
 
+static insitu_status convert_antialias(const scene_document *d, const char *path, const int *antialias,
+                                       scene_image *out)
+{
+    const int count = antialias ? *antialias : 1;
+    if (count & (count - 1)) return scene_bad(d, path, "antialias", "is %d, expected 1, 2, 4, 8 or 16", count);
+    out->antialias = count;
+    out->frames = (out->frames + count - 1) / count * count;
+    return INSITU_OK;
+}
+
 static insitu_status convert_image(const scene_document *d, const char *path, const scene_file_image *in,
                                    const scene *s, scene_image *out)
 {
@@ -153,6 +163,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, &out->clip);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
     if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
+    if (status == INSITU_OK) status = convert_antialias(d, path, in->antialias, out);
     char decorations_path[SCENE_PATH_SIZE];
     snprintf(decorations_path, sizeof decorations_path, "%s.decorations", path);
     if (status == INSITU_OK)

@@ -230,9 +230,11 @@ typedef struct scene_image {
     double step;                  /* sample distance in scene units; 0: by step_cells */
     double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
     bool jitter;                  /* true by default */
-    int frames;                   /* accumulated; 1 by default, 1 .. 4096 */
-    double max_seconds;           /* that samples may take by estimate; 3600 by default */
-    int output_count;             /* >= 1 */
+    int frames;                   /* accumulated; a multiple of antialias; 1 by default, 1 .. 4096 */
+    int antialias; /* places in a pixel that frames go through in turn: 1 (default), 2, 4, 8 or 16. Where there are no
+                    * volumes only pixels at edges take more than one frame */
+    double max_seconds; /* that samples may take by estimate; 3600 by default */
+    int output_count;   /* >= 1 */
     scene_output *outputs;
     int every;         /* drawn at cycles that are multiples of it; 1 by default */
     double every_time; /* > 0: instead, when the time passes a multiple of it */

@@ -483,6 +483,14 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
       .help = "How volumes are integrated, and how finely.",                                                           \
       .by_default = "one volume to a `max_error` of 0.01; several by samples, half a cell apart, jittered",            \
       .child = &sampling_mapping)                                                                                      \
+    X(CYAML_FIELD_INT_PTR("antialias", OPTIONAL, scene_file_image, antialias),                                         \
+      .help =                                                                                                          \
+          "Samples a pixel, at fixed places in it: 1, 2, 4, 8 or 16, averaged in linear light. Images without "        \
+          "volumes take them where a pixel differs from a neighbour of the picture at one sample a pixel, by some 6 "  \
+          "of 255 codes, and so miss what is thinner than a pixel and not met by that; those with volumes take them "  \
+          "everywhere, each with a jitter of its own (`frames`, rounded up to a multiple of this, if those are "       \
+          "more). Depth in an EXR is that of the pixel's centre.",                                                     \
+      .by_default = "`1`", .low = 1, .high = 16)                                                                       \
     X(CYAML_FIELD_MAPPING_PTR("decorations", OPTIONAL, scene_file_image, decorations, decorations_fields),             \
       .help =                                                                                                          \
           "What is written and drawn beside the data. Nothing of it lies over another, and all of it grows with "      \

@@ -151,6 +151,7 @@ typedef struct scene_file_image {
     int *size; /* 2 */
     int *every;
     double *every_time;
+    int *antialias;
     scene_file_camera *camera;
     double *background; /* 3 or 4 */
     int background_count;
