@@ -241,7 +241,7 @@ void accuracy_subject_free(accuracy_subject *s)
 static void begin_scene(accuracy_scene *scene, const accuracy_subject *s)
 {
     memset(scene, 0, sizeof *scene);
-    scene->part = (render_part){&s->view.cells, &s->tree};
+    scene->part = (render_part){&s->view.cells, &s->tree, NULL};
     scene->ranges = mmbvh_own_ranges(&s->tree);
     scene->job = (render_job){.camera = s->camera,
                               .space = s->space,

@@ -87,7 +87,7 @@ accuracy_truth *accuracy_truth_create(const accuracy_subject *subject, int block
     t->subject = subject;
     t->pixels = bench_pixels_create(&subject->view.cells, &subject->camera, block);
     t->count = bench_pixels_count(t->pixels);
-    t->kept = (render_part){bench_pixels_cells(t->pixels), NULL};
+    t->kept = (render_part){bench_pixels_cells(t->pixels), NULL, NULL};
     trace_surface(t);
     t->rgba[ACCURACY_OPACITY] = integrate(t, ACCURACY_OPACITY);
     t->rgba[ACCURACY_EXTINCTION] = integrate(t, ACCURACY_EXTINCTION);

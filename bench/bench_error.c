@@ -170,7 +170,7 @@ const grid *bench_pixels_cells(const bench_pixels *all)
 static reference_ray *trace_chosen(const bench_pixels *all, const render_job *job)
 {
     const float nothing[4] = {0, 0, 0, 0};
-    const render_part part = {&all->kept, NULL};
+    const render_part part = {&all->kept, NULL, NULL};
     const int count = all->columns * all->rows;
     render_job kept = *job;
     kept.parts = &part;

@@ -36,7 +36,7 @@ static void set_job(bench_scene *s)
 {
     const double distance =
         sqrt(bench_eye[0] * bench_eye[0] + bench_eye[1] * bench_eye[1] + bench_eye[2] * bench_eye[2]);
-    s->part = (render_part){&s->view.cells, &s->tree};
+    s->part = (render_part){&s->view.cells, &s->tree, NULL};
     s->job = (render_job){.parts = &s->part,
                           .part_count = 1,
                           .surfaces = &s->surface,
@@ -173,7 +173,7 @@ double *bench_scene_integrals(bench_scene *s, const render_transfer *transfer)
     const float nothing[4] = {0, 0, 0, 0};
     const bench_pixels *pixels = bench_scene_pixels(s);
     const int count = bench_pixels_count(pixels);
-    const render_part kept = {bench_pixels_cells(pixels), NULL};
+    const render_part kept = {bench_pixels_cells(pixels), NULL, NULL};
     const render_volume_layer layer = {s->volume.field, transfer};
     render_job job = s->job;
     double *rgba = malloc(4 * (size_t)count * sizeof *rgba);

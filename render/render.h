@@ -136,6 +136,9 @@ typedef struct render_surface_layer {
     int root_steps; /* N of Neubauer's method (thesis, 4.3.3), 0 .. 64 */
     render_normal normal;
     double difference; /* h of central differences, > 0, in sizes of the hit's cell (cube root of its box's volume) */
+    float edge_width;  /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
+                          of three such vertices or pyramids on four */
+    float edge_colour[3]; /* linear */
 } render_surface_layer;
 
 typedef struct render_volume_layer {
@@ -153,6 +156,10 @@ typedef struct render_volume_layer {
 typedef struct render_part {
     const grid *cells;
     const mmbvh *tree; /* over cells; its origin and scale are the space's */
+    /* For layers with edges: loops of vertices. loops[cell]: 0 where every edge between the cell's vertices in the
+     * surface is drawn; else it is one triangle of a polygon, whose corner count is at loops[loops[cell]] and whose
+     * corners follow. NULL: there are no polygons. */
+    const int64_t *loops;
 } render_part;
 
 /* How rays find isosurfaces and the cells of samples: the same picture to the last bit, at different speed. By tiles of

@@ -58,7 +58,7 @@ void fixture_create(render_fixture *f, const test_mesh *meshes, int count, test_
         /* A part without nodes has the field all the same. */
         f->ranges[i] = mmbvh_own_ranges(&f->trees[i]);
         if (!f->ranges[i].low) f->ranges[i] = mmbvh_pair_ranges((const float *)tent_opacities);
-        f->parts[i] = (render_part){&f->views[i].cells, &f->trees[i]};
+        f->parts[i] = (render_part){&f->views[i].cells, &f->trees[i], NULL};
     }
     f->lights[0] = (render_light){{0.6, 0.64, 0.48}, {0.9f, 0.8f, 0.7f}};
     f->lights[1] = (render_light){{-0.8, 0, 0.6}, {0.1f, 0.2f, 0.3f}};

@@ -83,8 +83,9 @@ static const char every_key[] =
     "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
     "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
     "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}]}\n"
-    "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5}\n"
-    "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}}\n"
+    "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5,\n"
+    "                  edges: {width: 2, colour: [0, 0.5, 1]}}\n"
+    "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}, edges: {}}\n"
     "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
     "               max_seconds: 10, method: segments}\n"
     "    clip: {planes: [{normal: [0, 0, -2], point: [1, 2, 3]}], box: [[0, 0, 0], [1, 2, 3]]}\n"
@@ -374,6 +375,9 @@ static void surfaces_have_their_colours(void **state)
     const scene_surface *surface = s.images[0].surfaces;
     check_colour(surface[0].colour, linear(1), linear(0.5), linear(0));
     assert_true(surface[0].opacity == 0.5F && !surface[0].has_colour_by && !surface[0].on.name);
+    assert_true(surface[0].edge_width == 2 && surface[1].edge_width >= 1);
+    check_colour(surface[0].edge_colour, linear(0), linear(0.5), linear(1));
+    check_colour(surface[1].edge_colour, linear(0.1), linear(0.1), linear(0.1));
     assert_true(surface[0].on.mesh_count == 2 && scene_field_is_on(&surface[0].on, "sea/3"));
     assert_false(scene_field_is_on(&surface[0].on, "seaside"));
     assert_true(surface[1].opacity == 1 && surface[1].has_colour_by && surface[1].colour_by.at_vertices);
@@ -556,6 +560,9 @@ static const struct bad_file {
     {6, "    camera: {automatic: {direction: [0, 0, 0]}}", 6, {"camera.automatic.direction: has length 0"}},
     {5, "    every_time: 0", 5, {"every_time: \"0\"", "above 0"}},
     {5, "    every: 2\n    every_time: 1", 6, {"every_time: given beside every"}},
+    {10, "      - surface: {edges: {width: 0}}", 10, {"layers[0].surface.edges.width: \"0\"", "0.5 to 100"}},
+    {10, "      - surface: {edges: {colour: [0, 0, 2]}}", 10, {"surface.edges.colour[2]: \"2\"", "from 0 to 1"}},
+    {10, "      - surface: {edges: true}", 10, {"surface.edges: \"true\"", "a mapping"}},
     {6, "    antialias: 3", 6, {"antialias: is 3", "1, 2, 4, 8 or 16"}},
     {6, "    antialias: 32", 6, {"antialias: \"32\"", "from 1 to 16"}},
     {6, "    camera: {automatic: {fit: data}}", 6, {"camera.automatic.fit: \"data\"", "one of sphere, box"}},

@@ -388,7 +388,8 @@ SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
     const render_surface_layer *l = t->surface->layer;
     /* Rays that are clipped begin each at a depth of its own, which packets know. */
     if (t->frame->job->clip_count) return false;
-    return t->layer < t->frame->opaque_count && !l->colour_map && l->normal != RENDER_DIFFERENCES;
+    const bool is_plain = !l->colour_map && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
+    return is_plain && t->layer < t->frame->opaque_count;
 }
 
 /* What is added from now on is of the part and the layer under way: what waits, of others, is traced. */

@@ -14,6 +14,7 @@
 #include "kernel_bounds.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
+#include "kernel_edges.h"
 #include "kernel_field.h"
 #include "kernel_hits.h"
 #include "kernel_map.h"
@@ -102,6 +103,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     /* Polyhedra (no cell given) have their own gradient always. */
     const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, at->w, colour);
+    if (s->layer->edge_width > 0 && c) kernel_draw_edges(p, s->layer, c, t, colour);
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
         if (__builtin_expect(vm_any(tied), 0)) {

@@ -52,6 +52,7 @@ SIMD_INLINE void kernel_blocks_meet(kernel_tile_trace *t, unsigned blocks, int p
 /* Of a moved cell with its values, before blocks meet it. */
 SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
 {
+    t->cell->part = part;
     kernel_cell_order(t->cell);
     kernel_cell_lines(t->cell, t->frame, &t->tile);
     if (t->surface->layer->colour_map) kernel_cell_colours(t->cell, t->surface, part);

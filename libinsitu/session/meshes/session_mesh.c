@@ -53,6 +53,7 @@ void session_drop_outer(session_mesh *mesh, bool with_faces)
     base_free(outer->connectivity);
     base_free(outer->offsets);
     base_free(outer->types);
+    base_free(outer->loops);
     base_free(outer->vertex_origins);
     base_free(outer->cell_origins);
     if (with_faces) base_free(outer->faces);

@@ -73,6 +73,7 @@ typedef struct session_outer {
     double *coordinates;       /* of the mesh's vertices × 3 */
     int64_t *connectivity, *offsets;
     unsigned char *types;
+    int64_t *loops;                         /* as render_part.loops */
     int64_t *vertex_origins, *cell_origins; /* of which vertex and cell of the whole mesh each has its values */
     int64_t bytes;
 } session_outer;

@@ -120,6 +120,7 @@ typedef struct outer_work {
     int64_t *places; /* of the whole mesh's vertices among the new ones; -1: not yet there */
     float *heights;
     int64_t vertex_count, cell_count, entry_count, pyramid_count;
+    int64_t loop_end; /* of what is filled of the loops of polygons */
 } outer_work;
 
 static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, float height)
@@ -130,7 +131,14 @@ static int64_t add_vertex(outer_work *w, const double place[3], int64_t origin, 
     return w->vertex_count++;
 }
 
-/* A tet or a pyramid on a triangle or quad. */
+static int64_t place_vertex(outer_work *w, int64_t origin, const double place[3])
+{
+    int64_t *out = &w->places[origin];
+    if (*out < 0) *out = add_vertex(w, place, origin, 0);
+    return *out;
+}
+
+/* A tet or a pyramid on a triangle or quad; none where that has no area. */
 static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
 {
     double apex[3];
@@ -141,12 +149,23 @@ static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], i
     w->out->types[w->cell_count] = loop->count == 3 ? GRID_TET : GRID_PYRAMID;
     w->pyramid_count += loop->count == 4;
     w->out->cell_origins[w->cell_count++] = origin;
-    for (int i = 0; i < loop->count; i++) {
-        int64_t *place = &w->places[loop->vertices[i]];
-        if (*place < 0) *place = add_vertex(w, loop->places[i], loop->vertices[i], 0);
-        w->out->connectivity[w->entry_count++] = *place;
-    }
+    for (int i = 0; i < loop->count; i++)
+        w->out->connectivity[w->entry_count++] = place_vertex(w, loop->vertices[i], loop->places[i]);
     w->out->connectivity[w->entry_count++] = add_vertex(w, apex, loop->vertices[0], -1);
+}
+
+/* The polygon that the cells from first on are of. */
+static void add_loop(outer_work *w, const session_face_loop *face, int64_t first)
+{
+    int64_t *loops = w->out->loops;
+    for (int64_t cell = first; cell < w->cell_count; cell++) loops[cell] = w->loop_end;
+    loops[w->loop_end++] = face->size;
+    for (int64_t i = 0; i < face->size; i++) {
+        double place[3];
+        const int64_t vertex = session_face_vertex(face, i);
+        grid_vertex(w->cells, vertex, place);
+        loops[w->loop_end++] = place_vertex(w, vertex, place);
+    }
 }
 
 static void add_fan(outer_work *w, const session_face_loop *face, const double inside[3], int64_t origin)
@@ -160,6 +179,7 @@ static void add_fan(outer_work *w, const session_face_loop *face, const double i
         memcpy(least_place, place, sizeof place);
         least = i;
     }
+    const int64_t first = w->cell_count;
     for (int64_t i = 1; i + 1 < face->size; i++) {
         corner_loop loop = {0};
         add_corner(&loop, w->cells, session_face_vertex(face, least));
@@ -167,6 +187,7 @@ static void add_fan(outer_work *w, const session_face_loop *face, const double i
         add_corner(&loop, w->cells, session_face_vertex(face, (least + i + 1) % face->size));
         add_cell(w, &loop, inside, origin);
     }
+    add_loop(w, face, first);
 }
 
 static void add_face(outer_work *w, const session_face *face)
@@ -184,15 +205,16 @@ static void add_face(outer_work *w, const session_face *face)
     add_cell(w, &loop, inside, face->cell);
 }
 
-/* The most cells and entries of connectivity. */
-static void count_most(const session_mesh *mesh, int64_t *cells, int64_t *entries)
+/* The most cells and entries of connectivity; and what loops of polygons take. */
+static void count_most(const session_mesh *mesh, int64_t *cells, int64_t *entries, int64_t *loops)
 {
-    *cells = *entries = 0;
+    *cells = *entries = *loops = 0;
     for (int64_t i = 0; i < mesh->outer.face_count; i++) {
         const session_face *face = &mesh->outer.faces[i];
         const session_cell_faces faces = session_faces_of_cell(&mesh->cells, face->cell);
         const int64_t size = session_face_of(&faces, face->face).size;
         *cells += size > 4 ? size - 2 : 1;
+        *loops += size > 4 ? size + 1 : 0;
         *entries += size > 4 ? 4 * (size - 2) : size + 1;
     }
 }
@@ -201,10 +223,11 @@ static bool work_create(session_mesh *mesh, outer_work *w)
 {
     session_outer *out = &mesh->outer;
     const grid *g = &mesh->cells;
-    int64_t cells, entries;
-    count_most(mesh, &cells, &entries);
+    int64_t cells, entries, loops;
+    count_most(mesh, &cells, &entries, &loops);
     *w = (outer_work){.cells = g, .out = out};
     out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
+    if (loops) out->bytes += (cells + loops) * (int64_t)sizeof *out->loops;
     out->bytes += out->face_count * (int64_t)sizeof *out->faces;
     out->mesh = base_calloc(1, sizeof *out->mesh);
     out->coordinates = base_alloc((size_t)entries * 3 * sizeof *out->coordinates);
@@ -212,11 +235,13 @@ static bool work_create(session_mesh *mesh, outer_work *w)
     out->vertex_origins = base_alloc((size_t)entries * sizeof *out->vertex_origins);
     out->offsets = base_alloc(((size_t)cells + 1) * sizeof *out->offsets);
     out->types = base_alloc((size_t)cells);
+    if (loops) out->loops = base_calloc((size_t)(cells + loops), sizeof *out->loops);
+    w->loop_end = cells;
     out->cell_origins = base_alloc((size_t)cells * sizeof *out->cell_origins);
     w->heights = base_alloc((size_t)entries * sizeof *w->heights);
     w->places = base_alloc((size_t)g->vertex_count * sizeof *w->places);
     return out->mesh && out->coordinates && out->connectivity && out->vertex_origins && out->offsets && out->types &&
-           out->cell_origins && w->heights && w->places;
+           (out->loops || !loops) && out->cell_origins && w->heights && w->places;
 }
 
 /* Of one type no types nor offsets are told, so that kernels for many cells at once take them. */

@@ -4,6 +4,7 @@
 #include "session_layers.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "memory.h"
 #include "session_agree.h"
@@ -64,7 +65,8 @@ static void fill_parts(const session_meshes *meshes, session_layers *layers)
     int part = 0;
     for (int i = 0; i < session_part_slots(meshes); i++) {
         const session_mesh *mesh = session_part(meshes, i);
-        if (is_part(mesh)) layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree};
+        const int64_t *loops = i < meshes->count ? NULL : meshes->items[i - meshes->count]->outer.loops;
+        if (is_part(mesh)) layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree, loops};
     }
 }
 
@@ -214,7 +216,9 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
                                   .root = RENDER_ROBUST,
-                                  .normal = RENDER_GRADIENT};
+                                  .normal = RENDER_GRADIENT,
+                                  .edge_width = layer->edge_width};
+    memcpy(out->edge_colour, layer->edge_colour, sizeof out->edge_colour);
     if (!layer->has_colour_by) return INSITU_OK;
     out->colour_map = &layers->transfers[surface].transfer;
     if (!place_gathered(basis->meshes, layers, 2 * surface + 1, layer, &out->colour_field))

@@ -116,8 +116,10 @@ typedef struct scene_volume {
 } scene_volume;
 
 typedef struct scene_surface {
-    scene_field on;  /* the meshes; no field: name is NULL */
-    float colour[3]; /* linear */
+    scene_field on;   /* the meshes; no field: name is NULL */
+    float colour[3];  /* linear */
+    float edge_width; /* pixels; 0: no edges are drawn */
+    float edge_colour[3];
     bool has_colour_by;
     scene_field colour_by;
     scene_colour_map colour_map;

@@ -316,6 +316,13 @@ DEFINE_MAPPING(clip, "clip", CLIP_KEYS);
       .by_default = "no light: the colours are those of the map", .child = &material_mapping)
 DEFINE_MAPPING(slice, "slice", SLICE_KEYS);
 
+#define EDGES_KEYS(X)                                                                                                  \
+    X(CYAML_FIELD_FLOAT_PTR("width", OPTIONAL, scene_file_edges, width), .help = "Width of the lines, in pixels.",     \
+      .by_default = "a 900th of the picture's height, but at least 1", .low = 0.5, .high = 100)                        \
+    X(NUMBERS("colour", scene_file_edges, colour, 3), .help = "Colour of the lines, sRGB, before light falls on it.",  \
+      .by_default = "`[0.1, 0.1, 0.1]`", .low = 0, .high = 1)
+DEFINE_MAPPING(edges, "edges", EDGES_KEYS);
+
 #define SURFACE_KEYS(X)                                                                                                \
     X(NAMES("mesh"), .help = "The mesh whose outer surface is drawn, or a list of meshes, as at an isosurface.",       \
       .by_default = "all meshes")                                                                                      \
@@ -325,6 +332,10 @@ DEFINE_MAPPING(slice, "slice", SLICE_KEYS);
       .help = "Colour the surface by a field. It is grey, with a warning, on meshes of the layer that do not have "    \
               "it, and where it is not a number.",                                                                     \
       .by_default = "by `colour`", .child = &colour_by_mapping)                                                        \
+    X(CYAML_FIELD_MAPPING_PTR("edges", OPTIONAL, scene_file_surface, edges, edges_fields),                             \
+      .help = "Lines along the edges of the cells' faces; `{}` takes all its defaults. They fade where faces are "     \
+              "hardly wider than lines.",                                                                              \
+      .by_default = "none", .child = &edges_mapping)                                                                   \
     X(CYAML_FIELD_FLOAT_PTR("opacity", OPTIONAL, scene_file_surface, opacity),                                         \
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_surface, material, material_fields),                    \

@@ -76,9 +76,14 @@ typedef struct scene_file_volume {
     double *unit_distance;
 } scene_file_volume;
 
+typedef struct scene_file_edges {
+    double *width, *colour; /* colour: 3 */
+} scene_file_edges;
+
 typedef struct scene_file_surface {
     double *colour; /* 3 */
     scene_file_colour_by *colour_by;
+    scene_file_edges *edges;
     double *opacity;
     scene_file_material *material;
 } scene_file_surface;

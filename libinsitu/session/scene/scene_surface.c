@@ -1,10 +1,20 @@
 /* Outer surfaces of meshes: what colours them. */
+#include <math.h>
+
 #include "colour_map.h"
 #include "scene_convert.h"
 
-insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in,
+static void convert_edges(const scene_file_edges *in, int height, scene_surface *out)
+{
+    if (!in) return;
+    out->edge_width = in->width ? (float)*in->width : fmaxf(1, (float)height / 900);
+    for (int c = 0; c < 3; c++) out->edge_colour[c] = colour_linear_from_srgb(in->colour ? (float)in->colour[c] : 0.1F);
+}
+
+insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
                                     scene_surface *out)
 {
+    convert_edges(in->edges, height, out);
     out->opacity = in->opacity ? (float)*in->opacity : 1;
     out->material = scene_convert_material(in->material);
     out->has_colour_by = in->colour_by != NULL;

@@ -1,0 +1,86 @@
+/* Lines along the edges of cells' faces that lie in the surface: of tets and pyramids which stand on faces of a mesh
+ * (the session's outer surfaces). A hit is as far from an edge as the picture shows it, so that lines have one width
+ * whatever way a face is turned. */
+#ifndef RENDER_KERNEL_EDGES_H
+#define RENDER_KERNEL_EDGES_H
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_packet.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
+
+/* Vertices a and b of a cell in rays' planes, and how far from the rays the edge between them comes, squared. */
+SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2], vf *length)
+{
+    const vf zero = vf_set(0), one = vf_set(1);
+    const vf ex = b[0] - a[0], ey = b[1] - a[1];
+    const vf square = ex * ex + ey * ey;
+    const vf along = -(a[0] * ex + a[1] * ey) / vf_select(vf_lt(zero, square), square, one);
+    const vf s = vf_clamp(along, zero, one);
+    const vf x = a[0] + s * ex, y = a[1] + s * ey;
+    *length = vf_max(*length, square);
+    return x * x + y * y;
+}
+
+/* Of a vertex from each ray, where the ray has the vertex's depth. */
+SIMD_INLINE void kernel_edge_place(const kernel_packet *p, float x, float y, float z, vf out[2])
+{
+    out[0] = x - (p->origin_x + p->slope_x * z);
+    out[1] = y - (p->origin_y + p->slope_y * z);
+}
+
+/* loop: the polygon's corner count, and its corners. */
+SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, const int64_t *loop, vf *length)
+{
+    vf last[2], next[2], nearest = vf_set(INFINITY);
+    for (int64_t i = 0; i <= loop[0]; i++) {
+        double world[3];
+        float x, y, z;
+        grid_vertex(g, loop[1 + i % loop[0]], world);
+        kernel_place(p, world, &x, &y, &z);
+        kernel_edge_place(p, x, y, z, next);
+        if (i > 0) nearest = vf_min(nearest, kernel_edge_distance(last, next, length));
+        last[0] = next[0];
+        last[1] = next[1];
+    }
+    return nearest;
+}
+
+/* The nearest edge's squared distance from each ray, and the longest edge's squared length. */
+SIMD_INLINE vf kernel_nearest_edge(const kernel_packet *p, const kernel_cell *c, vf *length)
+{
+    const render_part *part = &p->frame->job->parts[c->part];
+    vf places[4][2], nearest = vf_set(INFINITY);
+    int count = 0;
+    *length = vf_set(0);
+    if (part->loops && part->loops[c->index])
+        return kernel_nearest_of_loop(p, part->cells, part->loops + part->loops[c->index], length);
+    for (int i = 0; i < c->count && count < 4; i++)
+        if (c->f[i] == 0) kernel_edge_place(p, c->x[i], c->y[i], c->z[i], places[count++]);
+    for (int i = 0; i < count; i++)
+        nearest = vf_min(nearest, kernel_edge_distance(places[i], places[(i + 1) % count], length));
+    return nearest;
+}
+
+/* Hits at t, whose colours are not lit yet. A pixel is covered by as much of a line as goes through its middle; where
+ * faces are hardly wider than lines these fade, for else nothing but lines would be seen. */
+static __attribute__((noinline)) void kernel_draw_edges(const kernel_packet *p, const render_surface_layer *layer,
+                                                        const kernel_cell *c, vf t, vf colour[3])
+{
+    const kernel_frame *f = p->frame;
+    const vf zero = vf_set(0), one = vf_set(1);
+    const float pixel = (float)f->slope_dx, width = layer->edge_width;
+    const bool flat = f->job->camera.is_orthographic;
+    vf depth = t + (float)f->depth_shift;
+    if (flat) depth = vf_set((float)f->job->space.scale);
+    const vf inverse = 1.0f / (depth * pixel);
+    vf length;
+    const vf distance = vf_sqrt(kernel_nearest_edge(p, c, &length)) * inverse;
+    const vf covered = vf_clamp(0.5f * (width + 1) - distance, zero, one);
+    const vf fade = vf_clamp(0.25f * (vf_sqrt(length) * inverse / width - 2), zero, one);
+    for (int a = 0; a < 3; a++) colour[a] = colour[a] + covered * fade * (layer->edge_colour[a] - colour[a]);
+}
+
+#endif

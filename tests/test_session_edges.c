@@ -1,0 +1,320 @@
+/* Edges of outer surfaces: every pixel is covered by lines as far as the projected edges of the face that its ray hits
+ * say, for all types of cells and for faces of more than four corners; one picture on any ranks. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render.h"
+#include "session.h"
+#include "session_cell_faces.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, WIDTH = 240, HEIGHT = 180, PIXELS = WIDTH * HEIGHT, MOST_CORNERS = 8 };
+
+#define LINE_WIDTH 1.5
+#define IMAGE(size, camera, keys)                                                                                      \
+    "images:\n  - name: a\n    size: " size "\n    background: [0, 0, 0, 0]\n    camera: {" camera "}\n    layers:\n"  \
+    "      - surface: {colour: [1, 1, 1], edges: {width: 1.5, colour: [0, 0, 0]},"                                     \
+    " material: {ambient: 1, diffuse: 0, specular: 0}" keys "}\n    outputs: [{path: a.exr}]\n"
+#define EYE "position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40"
+#define FLAT "position: [3, 2.2, 4], focal: [0, 0, 0], projection: orthographic, height: 4"
+
+static render_camera camera_of(bool is_flat)
+{
+    render_camera out;
+    render_camera_look_at(&out, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0}, 40,
+                          WIDTH, HEIGHT);
+    out.is_orthographic = is_flat;
+    if (is_flat) out.half_height = 2;
+    return out;
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* ---- the truth ----------------------------------------------------------------------------------------------- */
+
+typedef struct polygon {
+    int count;
+    double corners[MOST_CORNERS][3];
+} polygon;
+
+typedef struct body {
+    int count;
+    polygon *faces;
+} body;
+
+/* The faces in the border of the cube from -1 to 1, or all faces of all cells. */
+static body make_body(const grid *g, bool is_cube)
+{
+    body out = {0};
+    out.faces = test_calloc((size_t)g->cell_count * 40, sizeof *out.faces);
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        const session_cell_faces faces = session_faces_of_cell(g, cell);
+        for (int64_t f = 0; f < faces.count; f++) {
+            const session_face_loop loop = session_face_of(&faces, f);
+            polygon face = {.count = (int)loop.size};
+            bool is_on = !is_cube;
+            for (int i = 0; i < face.count; i++) grid_vertex(g, session_face_vertex(&loop, i), face.corners[i]);
+            for (int side = 0; side < 6; side++) {
+                int count = 0;
+                for (int i = 0; i < face.count; i++) count += face.corners[i][side / 2] == side % 2 * 2 - 1;
+                is_on = is_on || count == face.count;
+            }
+            if (is_on) out.faces[out.count++] = face;
+        }
+    }
+    return out;
+}
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+}
+
+/* The depth at which a ray meets a convex face; infinity: it does not. */
+static double meet(const polygon *face, const double base[3], const double direction[3])
+{
+    double u[3], v[3], normal[3], from[3], at[3];
+    for (int a = 0; a < 3; a++) {
+        u[a] = face->corners[1][a] - face->corners[0][a];
+        v[a] = face->corners[2][a] - face->corners[0][a];
+        from[a] = face->corners[0][a] - base[a];
+    }
+    cross(u, v, normal);
+    const double depth = dot(from, normal) / dot(direction, normal);
+    for (int a = 0; a < 3; a++) at[a] = base[a] + depth * direction[a];
+    for (int i = 0; i < face->count; i++) {
+        double side[3], turned[3];
+        for (int a = 0; a < 3; a++) {
+            side[a] = face->corners[(i + 1) % face->count][a] - face->corners[i][a];
+            from[a] = at[a] - face->corners[i][a];
+        }
+        cross(side, from, turned);
+        if (dot(turned, normal) < 0) return INFINITY;
+    }
+    return depth;
+}
+
+/* A point in the picture, in pixels, and its depth. */
+static double project(const render_camera *c, const double point[3], double out[2])
+{
+    double from[3];
+    for (int a = 0; a < 3; a++) from[a] = point[a] - c->eye[a];
+    const double depth = dot(from, c->forward), pixel = 2 * c->half_height / HEIGHT * (c->is_orthographic ? 1 : depth);
+    out[0] = dot(from, c->right) / pixel + 0.5 * WIDTH;
+    out[1] = 0.5 * HEIGHT - dot(from, c->up) / pixel;
+    return depth;
+}
+
+/* How far a line's middle is from the pixel's, in pixels: from least to most. The library divides an edge's offset from
+ * the ray by the depth of the hit instead of the edge's own, which is off by no more than the edge's depths are from
+ * the hit's. */
+static void bound_distance(const render_camera *c, const polygon *face, const double pixel[2], double hit,
+                           double bounds[2])
+{
+    bounds[0] = bounds[1] = INFINITY;
+    for (int i = 0; i < face->count; i++) {
+        double a[2], b[2], depths[2];
+        depths[0] = project(c, face->corners[i], a);
+        depths[1] = project(c, face->corners[(i + 1) % face->count], b);
+        const double e[2] = {b[0] - a[0], b[1] - a[1]};
+        const double along = ((pixel[0] - a[0]) * e[0] + (pixel[1] - a[1]) * e[1]) / (e[0] * e[0] + e[1] * e[1]);
+        const double s = fmin(fmax(along, 0), 1);
+        const double distance = hypot(a[0] + s * e[0] - pixel[0], a[1] + s * e[1] - pixel[1]);
+        const double scale = c->is_orthographic ? 0 : 1 / hit;
+        bounds[0] = fmin(bounds[0], distance * (1 + scale * (fmin(depths[0], depths[1]) - hit)));
+        bounds[1] = fmin(bounds[1], distance * (1 + scale * (fmax(depths[0], depths[1]) - hit)));
+    }
+}
+
+/* The white that lines leave of a pixel, with room for single precision: places round by some 5e-7 of scenes of size 5,
+ * a 15,000th of a pixel, but more on a slant. */
+static bool is_pixel(const render_camera *c, const body *b, const caught_picture *picture, int pixel, bool *has_line)
+{
+    double base[3], direction[3], nearest = INFINITY, bounds[2];
+    const polygon *face = NULL;
+    render_camera_ray(c, pixel % WIDTH, pixel / WIDTH, base, direction);
+    for (int i = 0; i < b->count; i++) {
+        const double depth = meet(&b->faces[i], base, direction);
+        if (depth >= nearest) continue;
+        nearest = depth;
+        face = &b->faces[i];
+    }
+    const float *rgba = picture->rgba + 4 * pixel;
+    if (!face) return true;
+    bound_distance(c, face, (const double[]){pixel % WIDTH + 0.5, pixel / WIDTH + 0.5}, nearest, bounds);
+    const double least = fmin(fmax(bounds[0] - 0.5 * (LINE_WIDTH - 1), 0), 1);
+    const double most = fmin(fmax(bounds[1] - 0.5 * (LINE_WIDTH - 1), 0), 1);
+    *has_line = *has_line || most < 0.5;
+    const double white = (double)rgba[0];
+    if ((white > least - 2e-3 && white < most + 2e-3) || (rgba[3] == 0 && least < 0.3)) return true;
+    fprintf(stderr, "pixel %d: %g, expected from %g to %g\n", pixel, white, least, most);
+    return false;
+}
+
+static bool is_truth(const caught_picture *picture, const body *b, bool is_flat)
+{
+    const render_camera c = camera_of(is_flat);
+    bool has_line = false, is_well = true;
+    for (int pixel = 0; pixel < PIXELS && is_well; pixel++) is_well = is_pixel(&c, b, picture, pixel, &has_line);
+    return is_well && has_line;
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------ */
+
+/* The body is given where the caller wants it. */
+static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, body *b)
+{
+    caught_picture picture = {0};
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    if (b) *b = make_body(&session_find_mesh(&session->meshes, "m")->cells, in->part.cell_count > 1);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+static void check_truth(const session_input *in, bool is_flat)
+{
+    const char *scene = write_scene(is_flat ? IMAGE("[240, 180]", FLAT, "") : IMAGE("[240, 180]", EYE, ""));
+    bool is_well = true;
+    if (own_rank == 0) {
+        body b = {0};
+        caught_picture picture = draw(MPI_COMM_SELF, scene, in, &b);
+        is_well = is_truth(&picture, &b, is_flat);
+        free_picture(&picture);
+        test_free(b.faces);
+    }
+    everywhere(is_well);
+}
+
+static void lines_are_where_edges_are(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input whole = {0};
+        test_mesh_lattice(kind, SIDE, 0, test_linear, &whole.part);
+        input_describe(&whole);
+        check_truth(&whole, kind % 2);
+        input_free(&whole);
+    }
+}
+
+/* A prism over a regular polygon of six corners, whose fan has three inner lines; turned, so that its least corner is
+ * now this and now that. */
+static void faces_of_many_corners_have_no_other_lines(void **state)
+{
+    (void)state;
+    for (int turn = 0; turn < 5; turn++) {
+        double coordinates[12][3];
+        int64_t faces[2 * 6 + 6 * 4], offsets[9] = {0}, all[8], cells[2] = {0, 8}, count = 0;
+        const unsigned char type = 42;
+        for (int i = 0; i < 12; i++) {
+            const double angle = 0.3 * turn + 1.0471975511965976 * (i % 6);
+            coordinates[i][0] = cos(angle);
+            coordinates[i][1] = sin(angle);
+            coordinates[i][2] = i < 6 ? -0.5 : 0.7;
+        }
+        for (int f = 0; f < 8; f++) {
+            for (int i = 0; i < 6 && f < 2; i++) faces[count++] = f ? 6 + i : 5 - i;
+            const int next = (f - 1) % 6, corners[4] = {f - 2, next, 6 + next, 4 + f};
+            for (int i = 0; i < 4 && f >= 2; i++) faces[count++] = corners[i];
+            offsets[f + 1] = count;
+            all[f] = f;
+        }
+        session_input in = {0};
+        test_mesh_lattice(TEST_HEXES, 1, 0, test_linear, &in.part);
+        input_describe(&in);
+        double values[12] = {0};
+        insitu_mesh_defaults(&in.mesh);
+        in.mesh.vertex_count = 12;
+        insitu_mesh_interleaved(&in.mesh, coordinates, INSITU_FLOAT64);
+        in.mesh.cell_count = 1;
+        in.mesh.connectivity_count = 8;
+        in.mesh.connectivity = (insitu_array){all, INSITU_INT64, 0};
+        in.mesh.offsets = (insitu_array){cells, INSITU_INT64, 0};
+        in.mesh.cell_types = (insitu_array){&type, INSITU_UINT8, 0};
+        in.mesh.face_count = 8;
+        in.mesh.face_offsets = (insitu_array){offsets, INSITU_INT64, 0};
+        in.mesh.face_connectivity_count = count;
+        in.mesh.face_connectivity = (insitu_array){faces, INSITU_INT64, 0};
+        in.field.count = 12;
+        in.field.values = (insitu_array){values, INSITU_FLOAT64, 0};
+        check_truth(&in, turn % 2);
+        input_free(&in);
+    }
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
+           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
+}
+
+static void any_ranks_draw_one_picture(void **state)
+{
+    (void)state;
+    const char *scene = write_scene(IMAGE("[240, 180]", EYE, ", opacity: 0.5"));
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input whole = {0}, part = {0};
+        caught_picture alone = {0};
+        input_create(&whole, kind, SIDE, TEST_BLOCK, 0, 1);
+        if (own_rank == 0) alone = draw(MPI_COMM_SELF, scene, &whole, NULL);
+        input_create(&part, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+        test_mesh_turn(&part.part, 3 + (uint64_t)own_rank);
+        test_mesh_shuffle(&part.part, 7 + (uint64_t)own_rank);
+        input_describe(&part);
+        caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
+        everywhere(own_rank != 0 || are_same(&picture, &alone));
+        free_picture(&picture);
+        free_picture(&alone);
+        input_free(&part);
+        input_free(&whole);
+    }
+}
+
+/* 24 squares a side on some 10 pixels: white as without lines. */
+static void lines_fade_on_small_faces(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    const char *scene = write_scene(IMAGE("[24, 18]", EYE, ""));
+    test_mesh_lattice(TEST_HEXES, 24, 0, test_linear, &in.part);
+    input_describe(&in);
+    bool is_well = true;
+    if (own_rank == 0) {
+        caught_picture picture = draw(MPI_COMM_SELF, scene, &in, NULL);
+        for (int i = 0; i < 24 * 18; i++) is_well = is_well && picture.rgba[4 * i] == picture.rgba[4 * i + 3];
+        free_picture(&picture);
+    }
+    everywhere(is_well);
+    input_free(&in);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lines_are_where_edges_are), cmocka_unit_test(faces_of_many_corners_have_no_other_lines),
+        cmocka_unit_test(any_ranks_draw_one_picture), cmocka_unit_test(lines_fade_on_small_faces)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
