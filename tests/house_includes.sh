@@ -63,7 +63,7 @@ BEGIN {
     allowed["common"] = " base public "
     allowed["meshes"] = " common mmbvh base public "
     allowed["scalars"] = " meshes scene common mmbvh base public "
-    allowed["outer"] = " scalars meshes common mmbvh base public "
+    allowed["outer"] = " scalars meshes scene common mmbvh base public "
     allowed["plan"] = " outer scalars meshes scene render render_face common mmbvh base public "
     allowed["pictures"] = " plan compositing" allowed["plan"]
     allowed["session"] = " pictures" allowed["pictures"]

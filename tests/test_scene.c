@@ -85,7 +85,9 @@ static const char every_key[] =
     "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}]}\n"
     "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5,\n"
     "                  edges: {width: 2, colour: [0, 0.5, 1]}}\n"
-    "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}, edges: {}}\n"
+    "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}, edges: {},\n"
+    "                  threshold: {field: q, component: 1, from: 1, to: 2.5}}\n"
+    "      - surface: {threshold: {field: q, from: -3}}\n"
     "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
     "               max_seconds: 10, method: segments}\n"
     "    clip: {planes: [{normal: [0, 0, -2], point: [1, 2, 3]}], box: [[0, 0, 0], [1, 2, 3]]}\n"
@@ -375,6 +377,12 @@ static void surfaces_have_their_colours(void **state)
     const scene_surface *surface = s.images[0].surfaces;
     check_colour(surface[0].colour, linear(1), linear(0.5), linear(0));
     assert_true(surface[0].opacity == 0.5F && !surface[0].has_colour_by && !surface[0].on.name);
+    const scene_threshold *threshold = &surface[1].threshold;
+    assert_false(surface[0].threshold.is_given);
+    assert_true(threshold->is_given && threshold->low == 1 && threshold->high == 2.5);
+    assert_string_equal(threshold->field.name, "q");
+    assert_true(threshold->field.component == 1 && !threshold->field.at_vertices);
+    assert_true(surface[2].threshold.low == -3 && isinf(surface[2].threshold.high));
     assert_true(surface[0].edge_width == 2 && surface[1].edge_width >= 1);
     check_colour(surface[0].edge_colour, linear(0), linear(0.5), linear(1));
     check_colour(surface[1].edge_colour, linear(0.1), linear(0.1), linear(0.1));
@@ -562,6 +570,10 @@ static const struct bad_file {
     {5, "    every: 2\n    every_time: 1", 6, {"every_time: given beside every"}},
     {10, "      - surface: {edges: {width: 0}}", 10, {"layers[0].surface.edges.width: \"0\"", "0.5 to 100"}},
     {10, "      - surface: {edges: {colour: [0, 0, 2]}}", 10, {"surface.edges.colour[2]: \"2\"", "from 0 to 1"}},
+    {10, "      - surface: {threshold: {field: f}}", 10, {"layers[0].surface.threshold: has no bounds", "from, to"}},
+    {10, "      - surface: {threshold: {from: 1}}", 10, {"surface.threshold.field: missing"}},
+    {10, "      - surface: {threshold: {field: f, from: 2, to: 1}}", 10, {"threshold.to: is 1", "no less than from"}},
+    {10, "      - surface: {threshold: {field: f, from: nan}}", 10, {"threshold.from: \"nan\"", "a number"}},
     {10, "      - surface: {edges: true}", 10, {"surface.edges: \"true\"", "a mapping"}},
     {6, "    antialias: 3", 6, {"antialias: is 3", "1, 2, 4, 8 or 16"}},
     {6, "    antialias: 32", 6, {"antialias: \"32\"", "from 1 to 16"}},

@@ -103,7 +103,7 @@ static double area_of(const double *a, const double *b, const double *c)
 static double outer_area(const insitu_session *session)
 {
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
-    const session_outer *outer = &mesh->outer;
+    const session_outer *outer = mesh->outers[0];
     double sum = 0;
     for (int64_t cell = 0; cell < outer->mesh->cells.cell_count; cell++) {
         const int64_t *entries = outer->connectivity + outer->offsets[cell];
@@ -424,23 +424,23 @@ static void faces_are_found_once_for_the_cells(void **state)
     take_part(&whole, TEST_BLOCK, false, &part);
     insitu_session *session = open_with(MPI_COMM_WORLD, write_scene(IMAGE(COLOURED(""))), &part);
     const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
-    const session_face *faces = mesh->outer.faces;
-    everywhere(insitu_last_report(session)->bytes_copied >= mesh->outer.bytes && mesh->tree.node_count == 0);
+    const session_face *faces = mesh->outers[0]->faces;
+    everywhere(insitu_last_report(session)->bytes_copied >= mesh->outers[0]->bytes && mesh->tree.node_count == 0);
     for (int64_t v = 0; v < part.part.vertex_count; v++) part.part.coordinates[3 * v + 1] *= 2;
     part.mesh.changed = INSITU_CHANGED_GEOMETRY;
     everywhere(insitu_set_mesh(session, "m", &part.mesh) == INSITU_OK);
     step_is_good(session, 1);
-    everywhere(mesh->outer.faces == faces);
+    everywhere(mesh->outers[0]->faces == faces);
     double highest = 0;
-    for (int64_t v = 0; v < mesh->outer.mesh->cells.vertex_count; v++)
-        highest = fmax(highest, mesh->outer.coordinates[3 * v + 1]);
+    for (int64_t v = 0; v < mesh->outers[0]->mesh->cells.vertex_count; v++)
+        highest = fmax(highest, mesh->outers[0]->coordinates[3 * v + 1]);
     MPI_Allreduce(MPI_IN_PLACE, &highest, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
     everywhere(highest == 2);
     part.mesh.changed = INSITU_CHANGED_ALL;
     everywhere(hand_over(session, &part) == INSITU_OK);
-    everywhere(!mesh->outer.are_faces_known);
+    everywhere(mesh->outer_count == 0);
     step_is_good(session, 2);
-    everywhere(mesh->outer.are_faces_known);
+    everywhere(mesh->outers[0]->are_faces_known);
     insitu_destroy(&session);
     input_free(&part);
     input_free(&whole);

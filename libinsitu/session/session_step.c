@@ -64,11 +64,11 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
     if (!status) status = session_make_plan(&basis, &s->meshes, team->comm, &s->report, &plan, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
+    if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) status = session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count)
         status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, extent->half_diagonal, error);
     s->report.numbers.prepare_ms = milliseconds_since(start);
-    if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status)
         status =
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);

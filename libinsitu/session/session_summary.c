@@ -61,11 +61,16 @@ static void report_scalar(session_report *out, const session_mesh *mesh, const s
 
 static void report_outer(session_report *out, const session_mesh *mesh)
 {
-    if (!mesh->outer.mesh) return;
-    out->numbers.bytes_copied += mesh->outer.bytes;
-    session_text_add(&out->copied_why, "mesh \"%s\": its outer faces: %lld bytes", mesh->name,
-                     (long long)mesh->outer.bytes);
-    out->numbers.bytes_trees += mesh->outer.mesh->has_tree ? mmbvh_bytes(&mesh->outer.mesh->tree) : 0;
+    int64_t bytes = 0;
+    for (int i = 0; i < mesh->outer_count; i++) {
+        const session_outer *outer = mesh->outers[i];
+        if (!outer->mesh) continue;
+        bytes += outer->bytes;
+        out->numbers.bytes_trees += outer->mesh->has_tree ? mmbvh_bytes(&outer->mesh->tree) : 0;
+    }
+    if (!bytes) return;
+    out->numbers.bytes_copied += bytes;
+    session_text_add(&out->copied_why, "mesh \"%s\": its outer faces: %lld bytes", mesh->name, (long long)bytes);
 }
 
 static void report_mesh(session_report *out, const session_mesh *mesh)
@@ -88,7 +93,9 @@ static void report_mesh(session_report *out, const session_mesh *mesh)
     }
     report->cells_unusable += unusable;
     report_outer(out, mesh);
-    if (report->images && !mesh->is_needed && !mesh->is_outer_wanted)
+    bool is_shown = mesh->is_needed;
+    for (int i = 0; i < mesh->outer_count; i++) is_shown = is_shown || mesh->outers[i]->is_wanted;
+    if (report->images && !is_shown)
         session_text_add(&out->left_out, "mesh \"%s\" is in no picture: no tree is built", mesh->name);
     if (report->images && mesh->is_needed && mesh->is_partial)
         session_text_add(

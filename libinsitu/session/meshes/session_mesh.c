@@ -41,9 +41,9 @@ void session_drop_fields(session_mesh *mesh)
     mesh->field_count = 0;
 }
 
-void session_drop_outer(session_mesh *mesh, bool with_faces)
+void session_drop_outer(session_outer *outer, bool with_faces)
 {
-    session_outer *outer = &mesh->outer;
+    const session_outer last = *outer;
     if (outer->mesh) {
         session_drop_scalars(outer->mesh);
         session_drop_tree(outer->mesh);
@@ -57,15 +57,59 @@ void session_drop_outer(session_mesh *mesh, bool with_faces)
     base_free(outer->vertex_origins);
     base_free(outer->cell_origins);
     if (with_faces) base_free(outer->faces);
-    *outer = with_faces ? (session_outer){0}
-                        : (session_outer){.are_faces_known = outer->are_faces_known,
-                                          .face_count = outer->face_count,
-                                          .faces = outer->faces};
+    *outer = (session_outer){.threshold = last.threshold, .version = last.version, .is_wanted = last.is_wanted};
+    if (with_faces) return;
+    outer->are_faces_known = last.are_faces_known;
+    outer->face_count = last.face_count;
+    outer->faces = last.faces;
+}
+
+void session_drop_outers(session_mesh *mesh, bool are_cells_new)
+{
+    for (int i = 0; i < mesh->outer_count; i++) {
+        session_drop_outer(mesh->outers[i], are_cells_new);
+        if (are_cells_new) base_free(mesh->outers[i]);
+    }
+    if (!are_cells_new) return;
+    base_free(mesh->outers);
+    mesh->outers = NULL;
+    mesh->outer_count = 0;
+}
+
+int session_part_slots(const session_meshes *meshes)
+{
+    int slots = meshes->count;
+    for (int i = 0; i < meshes->count; i++) slots += meshes->items[i]->outer_count;
+    return slots;
+}
+
+session_mesh *session_part_of(const session_meshes *meshes, int slot, session_mesh **whole, session_outer **outer)
+{
+    *whole = NULL;
+    *outer = NULL;
+    if (slot < meshes->count) return meshes->items[slot];
+    slot -= meshes->count;
+    for (int i = 0; i < meshes->count; i++) {
+        *whole = meshes->items[i];
+        if (slot < (*whole)->outer_count) {
+            *outer = (*whole)->outers[slot];
+            return (*outer)->mesh;
+        }
+        slot -= (*whole)->outer_count;
+    }
+    return NULL;
+}
+
+session_mesh *session_part(const session_meshes *meshes, int slot)
+{
+    session_mesh *whole;
+    session_outer *outer;
+    return session_part_of(meshes, slot, &whole, &outer);
 }
 
 void session_drop_contents(session_mesh *mesh)
 {
-    session_drop_outer(mesh, true);
+    session_drop_outers(mesh, true);
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     session_drop_fields(mesh);

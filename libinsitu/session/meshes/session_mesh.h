@@ -47,6 +47,7 @@ typedef struct session_scalar {
     bool is_suspect;       /* the values were set anew: they may have changed */
     bool has_checksum;
     uint64_t checksum;
+    int64_t version;     /* of the values: one more after each change that checksums have seen */
     bool has_own_ranges; /* the tree nodes' own, else pairs */
     float *pairs;        /* NULL until computed */
     bool are_ranges_stale;
@@ -63,9 +64,20 @@ typedef struct session_face {
 
 struct session_mesh;
 
-/* The faces of a mesh that one cell alone has, over all ranks, and a mesh of tets and pyramids on them; a declared copy
- * (session_outer_mesh.h). */
+/* The cells whose values of a scalar lie within bounds, all vertices' where the field is at vertices. */
+typedef struct session_threshold {
+    bool is_given; /* else all cells */
+    int field;     /* in the mesh's fields; -1: the mesh does not have it, so that no cell is within */
+    int component; /* as grid_field.component */
+    double low, high;
+} session_threshold;
+
+/* The faces of a mesh that one cell alone has, of the cells of a threshold over all ranks, and a mesh of tets and
+ * pyramids on them; a declared copy (session_outer_mesh.h). */
 typedef struct session_outer {
+    session_threshold threshold;
+    int64_t version; /* of the values that the faces are of, where there is a threshold */
+    bool is_wanted;  /* by an image of this step */
     bool are_faces_known;
     int64_t face_count;
     session_face *faces;       /* in the order of the cells */
@@ -106,8 +118,8 @@ typedef struct session_mesh {
     int scalar_count;
     session_scalar *scalars;
 
-    bool is_outer_wanted; /* by an image of this step */
-    session_outer outer;
+    int outer_count; /* one for each threshold, and one without */
+    session_outer **outers;
 } session_mesh;
 
 /* All meshes of this rank. */
@@ -144,21 +156,18 @@ void session_remove_mesh(session_meshes *meshes, const char *name);
 void session_drop_scalars(session_mesh *mesh);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_fields(session_mesh *mesh);
-/* Free the mesh of outer faces, and with faces what is known of them as well. */
-void session_drop_outer(session_mesh *mesh, bool with_faces);
+/* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */
+void session_drop_outer(session_outer *outer, bool with_faces);
+/* Of all of a mesh; where cells are new, thresholds go too. */
+void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
 /* What may become parts of a picture: the meshes, then the meshes of their outer faces, some NULL. */
-static inline int session_part_slots(const session_meshes *meshes)
-{
-    return 2 * meshes->count;
-}
-
-static inline session_mesh *session_part(const session_meshes *meshes, int slot)
-{
-    return slot < meshes->count ? meshes->items[slot] : meshes->items[slot - meshes->count]->outer.mesh;
-}
+int session_part_slots(const session_meshes *meshes);
+/* whole: set to the mesh whose outer faces they are, NULL where it is a mesh itself. */
+session_mesh *session_part_of(const session_meshes *meshes, int slot, session_mesh **whole, session_outer **outer);
+session_mesh *session_part(const session_meshes *meshes, int slot);
 
 /* The first error that a set call left behind, or NULL. */
 const base_error *session_pending_error(const session_meshes *meshes);

@@ -251,7 +251,7 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
     if (!mesh->given.vertex_ids.data != !given->vertex_ids.data) meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
         mesh->is_check_stale = true;
-        session_drop_outer(mesh, (changed & INSITU_CHANGED_TOPOLOGY) != 0);
+        session_drop_outers(mesh, (changed & INSITU_CHANGED_TOPOLOGY) != 0);
         mesh->is_geometry_stale = true;
         meshes->are_cells_changed = true;
         for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;

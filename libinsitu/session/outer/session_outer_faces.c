@@ -13,13 +13,15 @@
 #include "session_agree.h"
 #include "session_cell_faces.h"
 #include "session_neighbours.h"
+#include "session_thresholds.h"
 
 enum { LEAST_SLOTS = 1 << 10, MOST_SLOTS = 1 << 22 };
 
 typedef struct face_search {
     const session_mesh *mesh;
     int threads;
-    uint64_t *hashes; /* of the mesh's vertices */
+    unsigned char *is_hidden; /* a byte a cell: those beyond the threshold; NULL: there is none */
+    uint64_t *hashes;         /* of the mesh's vertices */
     uint64_t *slots;
     uint64_t mask;
     int64_t count;
@@ -31,6 +33,7 @@ typedef struct face_search {
 
 static void search_free(face_search *s)
 {
+    base_free(s->is_hidden);
     base_free(s->hashes);
     base_free(s->slots);
     base_free(s->faces);
@@ -63,6 +66,11 @@ static bool make_key(const face_search *s, const session_face_loop *loop, sessio
 
 /* ---- this rank's part ---------------------------------------------------------------------------------------- */
 
+static bool has_faces(const face_search *s, int64_t cell)
+{
+    return !grid_is_ghost(&s->mesh->cells, cell) && !(s->is_hidden && s->is_hidden[cell]);
+}
+
 static void hash_vertices(face_search *s, bool by_id)
 {
     const int64_t count = s->mesh->cells.vertex_count;
@@ -78,7 +86,7 @@ static void cancel_faces(face_search *s)
     const grid *g = &s->mesh->cells;
 #pragma omp parallel for num_threads(s->threads) schedule(static)
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (grid_is_ghost(g, cell)) continue;
+        if (!has_faces(s, cell)) continue;
         const session_cell_faces faces = session_faces_of_cell(g, cell);
         for (int64_t f = 0; f < faces.count; f++) {
             const session_face_loop loop = session_face_of(&faces, f);
@@ -97,7 +105,7 @@ static int64_t take_faces(const face_search *s, int64_t cell, session_face *face
 {
     const session_cell_faces of_cell = session_faces_of_cell(&s->mesh->cells, cell);
     int64_t count = 0;
-    if (grid_is_ghost(&s->mesh->cells, cell)) return 0;
+    if (!has_faces(s, cell)) return 0;
     for (int64_t f = 0; f < of_cell.count; f++) {
         const session_face_loop loop = session_face_of(&of_cell, f);
         session_key key;
@@ -152,9 +160,13 @@ static void keep_single_faces(face_search *s)
 }
 
 /* No faces where this rank has no part of the mesh. */
-static insitu_status search_own(face_search *s, bool by_id, base_error *error)
+static insitu_status search_own(face_search *s, const session_outer *outer, bool by_id, base_error *error)
 {
     if (!s->mesh) return INSITU_OK;
+    if (outer->threshold.is_given) {
+        s->is_hidden = session_hidden_cells(s->mesh, &outer->threshold, s->threads);
+        if (!s->is_hidden) return session_no_memory(error, s->mesh->cells.cell_count, "cells of a threshold");
+    }
     const grid *g = &s->mesh->cells;
     uint64_t slots = LEAST_SLOTS;
     while (slots < MOST_SLOTS && slots < (uint64_t)g->cell_count) slots *= 2;
@@ -289,18 +301,18 @@ static insitu_status search_shared(face_search *s, double margin, const session_
     return status;
 }
 
-insitu_status session_find_outer_faces(session_mesh *mesh, bool by_id, double half_diagonal, const session_team *team,
-                                       base_error *error)
+insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, bool by_id, double half_diagonal,
+                                       const session_team *team, base_error *error)
 {
     face_search search = {.mesh = mesh, .threads = team->threads};
-    search_own(&search, by_id, error);
+    search_own(&search, outer, by_id, error);
     insitu_status status = session_agree(team->comm, error);
     if (!status && team->ranks > 1) status = search_shared(&search, by_id ? 1e-6 * half_diagonal : 0, team, error);
     if (!status && mesh) {
-        session_drop_outer(mesh, true);
-        mesh->outer.face_count = search.count;
-        mesh->outer.faces = search.faces;
-        mesh->outer.are_faces_known = true;
+        session_drop_outer(outer, true);
+        outer->face_count = search.count;
+        outer->faces = search.faces;
+        outer->are_faces_known = true;
         search.faces = NULL;
     }
     search_free(&search);

@@ -206,12 +206,12 @@ static void add_face(outer_work *w, const session_face *face)
 }
 
 /* The most cells and entries of connectivity; and what loops of polygons take. */
-static void count_most(const session_mesh *mesh, int64_t *cells, int64_t *entries, int64_t *loops)
+static void count_most(const grid *g, const session_outer *outer, int64_t *cells, int64_t *entries, int64_t *loops)
 {
     *cells = *entries = *loops = 0;
-    for (int64_t i = 0; i < mesh->outer.face_count; i++) {
-        const session_face *face = &mesh->outer.faces[i];
-        const session_cell_faces faces = session_faces_of_cell(&mesh->cells, face->cell);
+    for (int64_t i = 0; i < outer->face_count; i++) {
+        const session_face *face = &outer->faces[i];
+        const session_cell_faces faces = session_faces_of_cell(g, face->cell);
         const int64_t size = session_face_of(&faces, face->face).size;
         *cells += size > 4 ? size - 2 : 1;
         *loops += size > 4 ? size + 1 : 0;
@@ -219,12 +219,10 @@ static void count_most(const session_mesh *mesh, int64_t *cells, int64_t *entrie
     }
 }
 
-static bool work_create(session_mesh *mesh, outer_work *w)
+static bool work_create(const grid *g, session_outer *out, outer_work *w)
 {
-    session_outer *out = &mesh->outer;
-    const grid *g = &mesh->cells;
     int64_t cells, entries, loops;
-    count_most(mesh, &cells, &entries, &loops);
+    count_most(g, out, &cells, &entries, &loops);
     *w = (outer_work){.cells = g, .out = out};
     out->bytes = entries * (int64_t)(5 * sizeof(int64_t) + sizeof(float)) + cells * 17;
     if (loops) out->bytes += (cells + loops) * (int64_t)sizeof *out->loops;
@@ -263,10 +261,10 @@ static grid describe(const outer_work *w)
 }
 
 /* The scalar takes the heights. */
-static bool finish(const session_mesh *mesh, outer_work *w)
+static bool finish(const session_mesh *whole, outer_work *w)
 {
-    session_mesh *out = mesh->outer.mesh;
-    out->name = mesh->name;
+    session_mesh *out = w->out->mesh;
+    out->name = whole->name;
     out->is_given = true;
     out->is_topology_stale = true;
     out->cells = describe(w);
@@ -281,27 +279,26 @@ static bool finish(const session_mesh *mesh, outer_work *w)
     return true;
 }
 
-insitu_status session_make_outer_mesh(session_mesh *mesh, base_error *error)
+insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, base_error *error)
 {
     outer_work work;
-    if (mesh->outer.mesh) return INSITU_OK;
-    bool is_made = work_create(mesh, &work);
+    if (outer->mesh) return INSITU_OK;
+    bool is_made = work_create(&whole->cells, outer, &work);
     if (is_made) {
-        for (int64_t v = 0; v < mesh->cells.vertex_count; v++) work.places[v] = -1;
-        for (int64_t i = 0; i < mesh->outer.face_count; i++) add_face(&work, &mesh->outer.faces[i]);
-        mesh->outer.offsets[work.cell_count] = work.entry_count;
-        is_made = finish(mesh, &work);
+        for (int64_t v = 0; v < whole->cells.vertex_count; v++) work.places[v] = -1;
+        for (int64_t i = 0; i < outer->face_count; i++) add_face(&work, &outer->faces[i]);
+        outer->offsets[work.cell_count] = work.entry_count;
+        is_made = finish(whole, &work);
     }
     base_free(work.places);
     base_free(work.heights);
     if (is_made) return INSITU_OK;
-    session_drop_outer(mesh, false);
-    return session_no_memory(error, mesh->outer.face_count * 250, "the mesh of outer faces");
+    session_drop_outer(outer, false);
+    return session_no_memory(error, outer->face_count * 250, "the mesh of outer faces");
 }
 
-double *session_gather_outer_values(const session_mesh *mesh, const grid_field *field)
+double *session_gather_outer_values(const session_outer *outer, const grid_field *field)
 {
-    const session_outer *outer = &mesh->outer;
     const grid *g = &outer->mesh->cells;
     const int64_t *origins = field->is_cell_centred ? outer->cell_origins : outer->vertex_origins;
     const int64_t count = field->is_cell_centred ? g->cell_count : g->vertex_count;

@@ -10,10 +10,10 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Make mesh->outer.mesh of the faces, and the scalar, ready to be drawn. Nothing is done where it is there. Local. */
-insitu_status session_make_outer_mesh(session_mesh *mesh, base_error *error);
+/* Make outer->mesh of the faces, and the scalar, ready to be drawn. Nothing is done where it is there. Local. */
+insitu_status session_make_outer_mesh(const session_mesh *whole, session_outer *outer, base_error *error);
 
 /* The values of a field of the whole mesh on the mesh of its outer faces, from base_alloc(). NULL: no memory. */
-double *session_gather_outer_values(const session_mesh *mesh, const grid_field *field);
+double *session_gather_outer_values(const session_outer *outer, const grid_field *field);
 
 #endif

@@ -12,6 +12,7 @@
 #include "session_outer_mesh.h"
 #include "session_ranges.h"
 #include "session_scalars.h"
+#include "session_thresholds.h"
 
 static bool is_part(const session_mesh *mesh)
 {
@@ -64,9 +65,11 @@ static void fill_parts(const session_meshes *meshes, session_layers *layers)
 {
     int part = 0;
     for (int i = 0; i < session_part_slots(meshes); i++) {
-        const session_mesh *mesh = session_part(meshes, i);
-        const int64_t *loops = i < meshes->count ? NULL : meshes->items[i - meshes->count]->outer.loops;
-        if (is_part(mesh)) layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree, loops};
+        session_mesh *whole;
+        session_outer *outer;
+        const session_mesh *mesh = session_part_of(meshes, i, &whole, &outer);
+        if (is_part(mesh))
+            layers->parts[part++] = (render_part){&mesh->cells, &mesh->tree, outer ? outer->loops : NULL};
     }
 }
 
@@ -152,12 +155,13 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
 
 /* ---- outer surfaces ------------------------------------------------------------------------------------------ */
 
-/* NULL: the slot is none of a mesh of outer faces that the layer shows. */
-static const session_mesh *find_whole(const session_meshes *meshes, int slot, const scene_surface *layer)
+/* Are the slot's faces those that the layer shows? Then whole is set to the mesh that has them. */
+static bool is_shown(const session_meshes *meshes, int slot, const scene_surface *layer, session_mesh **whole,
+                     session_outer **outer)
 {
-    if (slot < meshes->count) return NULL;
-    const session_mesh *whole = meshes->items[slot - meshes->count];
-    return scene_field_is_on(&layer->on, whole->name) ? whole : NULL;
+    session_part_of(meshes, slot, whole, outer);
+    return *outer && scene_field_is_on(&layer->on, (*whole)->name) &&
+           session_find_outer(*whole, &layer->threshold) == *outer;
 }
 
 static render_field place_faces(const session_meshes *meshes, session_layers *layers, int slot,
@@ -166,20 +170,25 @@ static render_field place_faces(const session_meshes *meshes, session_layers *la
     const ptrdiff_t first = (ptrdiff_t)slot * layers->part_count;
     ptrdiff_t at = first;
     for (int i = 0; i < session_part_slots(meshes); i++) {
+        session_mesh *whole;
+        session_outer *outer;
         const session_mesh *mesh = session_part(meshes, i);
         if (!is_part(mesh)) continue;
-        const bool is_shown = find_whole(meshes, i, layer) != NULL;
-        layers->fields[at] = is_shown ? session_scalar_field(mesh, &mesh->scalars[0]) : absent_field();
-        if (is_shown) layers->ranges[at] = session_scalar_ranges(mesh, &mesh->scalars[0]);
+        layers->fields[at] = absent_field();
+        if (is_shown(meshes, i, layer, &whole, &outer)) {
+            layers->fields[at] = session_scalar_field(mesh, &mesh->scalars[0]);
+            layers->ranges[at] = session_scalar_ranges(mesh, &mesh->scalars[0]);
+        }
         at++;
     }
     return (render_field){layers->fields + first, layers->ranges + first};
 }
 
-static bool gather(const session_mesh *whole, const session_scalar *scalar, double **values, grid_field *out)
+static bool gather(const session_mesh *whole, const session_outer *outer, const session_scalar *scalar, double **values,
+                   grid_field *out)
 {
     const grid_field field = session_scalar_field(whole, scalar);
-    *values = session_gather_outer_values(whole, &field);
+    *values = session_gather_outer_values(outer, &field);
     *out = (grid_field){.values = {(const char *)*values, (int64_t)sizeof **values, true, false},
                         .component_stride = (int64_t)sizeof **values,
                         .component_count = 1,
@@ -194,11 +203,13 @@ static bool place_gathered(const session_meshes *meshes, session_layers *layers,
     ptrdiff_t at = (ptrdiff_t)slot * layers->part_count;
     *out = (render_field){layers->fields + at, layers->ranges + at};
     for (int i = 0; i < session_part_slots(meshes); i++) {
+        session_mesh *whole;
+        session_outer *outer;
         if (!is_part(session_part(meshes, i))) continue;
-        const session_mesh *whole = find_whole(meshes, i, layer);
-        const session_scalar *scalar = whole ? session_find_scalar(whole, &layer->colour_by) : NULL;
+        const bool is_layer_s = is_shown(meshes, i, layer, &whole, &outer);
+        const session_scalar *scalar = is_layer_s ? session_find_scalar(whole, &layer->colour_by) : NULL;
         layers->fields[at] = absent_field();
-        if (scalar && !gather(whole, scalar, &layers->gathered[at], &layers->fields[at])) return false;
+        if (scalar && !gather(whole, outer, scalar, &layers->gathered[at], &layers->fields[at])) return false;
         at++;
     }
     return true;

@@ -7,6 +7,7 @@
 #include "session_distances.h"
 #include "session_hash.h"
 #include "session_scalars.h"
+#include "session_thresholds.h"
 #include "session_transfer.h"
 
 /* ---- which values show ---------------------------------------------------------------------------------------- */
@@ -88,7 +89,7 @@ static bool mark_outer(session_mesh *mesh, const scene_surface *layer)
 {
     session_scalar *scalar;
     if (!scene_field_is_on(&layer->on, mesh->name)) return true;
-    mesh->is_outer_wanted = true;
+    if (!session_mark_outer(mesh, &layer->threshold)) return false;
     return !layer->has_colour_by || session_mark_scalar(mesh, &layer->colour_by, false, &scalar);
 }
 
@@ -109,8 +110,11 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
 {
     for (int m = 0; m < meshes->count; m++) {
         session_mesh *mesh = meshes->items[m];
-        mesh->is_needed = mesh->is_outer_wanted = false;
-        if (mesh->outer.mesh) mesh->outer.mesh->is_needed = false;
+        mesh->is_needed = false;
+        for (int i = 0; i < mesh->outer_count; i++) {
+            mesh->outers[i]->is_wanted = false;
+            if (mesh->outers[i]->mesh) mesh->outers[i]->mesh->is_needed = false;
+        }
         for (int i = 0; i < mesh->scalar_count; i++) {
             mesh->scalars[i].is_used = mesh->scalars[i].wants_ranges = false;
             mesh->scalars[i].needs_all = false;
@@ -118,6 +122,7 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
         }
         for (int i = 0; i < count && mesh->is_given; i++)
             if (!mark_image(mesh, images[i], extent)) return false;
+        session_drop_thresholds(mesh);
     }
     return true;
 }

@@ -137,6 +137,7 @@ static insitu_status check_surface(const session_plan_basis *basis, const scene_
     insitu_status status = INSITU_OK;
     for (int i = 0; i < layer->on.mesh_count && !status; i++)
         status = check_named_mesh(basis, &layer->on, layer->on.meshes[i], error);
+    if (!status && layer->threshold.is_given) status = check_field(basis, &layer->threshold.field, error);
     return status || !layer->has_colour_by ? status : check_field(basis, &layer->colour_by, error);
 }
 

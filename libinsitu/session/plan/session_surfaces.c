@@ -1,53 +1,96 @@
 #include "session_surfaces.h"
 
+#include <string.h>
+
 #include "memory.h"
 #include "session_agree.h"
 #include "session_outer_faces.h"
 #include "session_outer_mesh.h"
+#include "session_thresholds.h"
 
-static bool is_wanted(const session_plan *plan, const char *mesh)
+/* The faces of a layer on one mesh, of which this rank may have no part. */
+typedef struct surface_wish {
+    const session_catalogue_mesh *mesh;
+    const scene_threshold *threshold;
+} surface_wish;
+
+/* This rank's; NULL: it has no part of the mesh. */
+static session_outer *find_own(const session_meshes *meshes, const surface_wish *wish, session_mesh **mesh)
 {
+    *mesh = session_find_mesh(meshes, wish->mesh->name);
+    return *mesh && (*mesh)->is_given ? session_find_outer(*mesh, wish->threshold) : NULL;
+}
+
+static bool is_same(const scene_threshold *a, const scene_threshold *b)
+{
+    if (!a->is_given || !b->is_given) return a->is_given == b->is_given;
+    return strcmp(a->field.name, b->field.name) == 0 && a->field.component == b->field.component && a->low == b->low &&
+           a->high == b->high;
+}
+
+static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
+{
+    for (int i = 0; i < count; i++)
+        if (wishes[i].mesh == wish->mesh && is_same(wishes[i].threshold, wish->threshold)) return count;
+    wishes[count] = *wish;
+    return count + 1;
+}
+
+/* Of all layers and the meshes that they are on, in an order that is the same on all ranks. Returns how many. */
+static int list_wishes(const session_plan *plan, const session_catalogue *catalogue, surface_wish *wishes)
+{
+    int count = 0;
     for (int i = 0; i < plan->image_count; i++)
         for (int n = 0; n < plan->images[i]->surface_count; n++)
-            if (scene_field_is_on(&plan->images[i]->surfaces[n].on, mesh)) return true;
-    return false;
+            for (int m = 0; m < catalogue->mesh_count; m++) {
+                const scene_surface *layer = &plan->images[i]->surfaces[n];
+                const surface_wish wish = {&catalogue->meshes[m], &layer->threshold};
+                if (scene_field_is_on(&layer->on, wish.mesh->name)) count = add_wish(wishes, count, &wish);
+            }
+    return count;
 }
 
-/* This rank's part; NULL: it has none. */
-static session_mesh *find_part(const session_meshes *meshes, const char *name)
+/* Which faces are not known on some rank. Collective. */
+static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
+                                const session_team *team, int *stale, base_error *error)
 {
-    session_mesh *mesh = session_find_mesh(meshes, name);
-    return mesh && mesh->is_given ? mesh : NULL;
-}
-
-/* The meshes whose faces are not known on some rank. Collective. */
-static insitu_status find_stale(const session_plan *plan, const session_catalogue *catalogue,
-                                const session_meshes *meshes, const session_team *team, int *stale, base_error *error)
-{
-    for (int m = 0; m < catalogue->mesh_count; m++) {
-        const session_mesh *mesh = find_part(meshes, catalogue->meshes[m].name);
-        stale[m] = mesh && is_wanted(plan, mesh->name) && !mesh->outer.are_faces_known;
+    for (int i = 0; i < count; i++) {
+        session_mesh *mesh;
+        const session_outer *outer = find_own(meshes, &wishes[i], &mesh);
+        stale[i] = outer && session_is_outer_stale(mesh, outer);
     }
-    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, catalogue->mesh_count, MPI_INT, MPI_MAX, team->comm),
-                       "MPI_Allreduce");
+    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+}
+
+static insitu_status find_faces(const session_meshes *meshes, const surface_wish *wish, const session_team *team,
+                                double half_diagonal, base_error *error)
+{
+    session_mesh *mesh;
+    session_outer *outer = find_own(meshes, wish, &mesh);
+    const insitu_status status =
+        session_find_outer_faces(outer ? mesh : NULL, outer, wish->mesh->has_ids, half_diagonal, team, error);
+    if (!status && outer) session_set_outer_fresh(mesh, outer);
+    return status;
 }
 
 /* All cells of it have a face that is drawn. */
-static insitu_status make_ready(session_mesh *mesh, base_error *error)
+static insitu_status make_ready(const session_mesh *mesh, session_outer *outer, base_error *error)
 {
-    const insitu_status status = session_make_outer_mesh(mesh, error);
+    const insitu_status status = session_make_outer_mesh(mesh, outer, error);
     if (status) return status;
-    session_mesh *outer = mesh->outer.mesh;
-    outer->is_needed = true;
-    outer->scalars[0].is_used = outer->scalars[0].wants_ranges = outer->scalars[0].needs_all = true;
+    outer->mesh->is_needed = true;
+    outer->mesh->scalars[0].is_used = outer->mesh->scalars[0].wants_ranges = true;
+    outer->mesh->scalars[0].needs_all = true;
     return INSITU_OK;
 }
 
 static void make_meshes(const session_meshes *meshes, base_error *error)
 {
-    for (int i = 0; i < meshes->count && !error->status; i++) {
-        session_mesh *mesh = meshes->items[i];
-        if (mesh->is_outer_wanted && mesh->outer.are_faces_known) make_ready(mesh, error);
+    for (int i = 0; i < meshes->count; i++) {
+        const session_mesh *mesh = meshes->items[i];
+        for (int k = 0; k < mesh->outer_count && !error->status; k++)
+            if (mesh->outers[k]->is_wanted && mesh->outers[k]->are_faces_known)
+                make_ready(mesh, mesh->outers[k], error);
     }
 }
 
@@ -55,17 +98,19 @@ insitu_status session_update_surfaces(const session_plan *plan, const session_ca
                                       const session_meshes *meshes, const session_team *team, double half_diagonal,
                                       base_error *error)
 {
-    const size_t count = (size_t)catalogue->mesh_count;
-    int *stale = base_calloc(count, sizeof *stale);
-    if (!stale) session_no_memory(error, (int64_t)(count * sizeof *stale), "flags");
+    const size_t most = (size_t)plan->surface_count * (size_t)catalogue->mesh_count;
+    int count = 0, *stale = base_calloc(most, sizeof *stale);
+    surface_wish *wishes = base_calloc(most, sizeof *wishes);
+    if (!stale || !wishes) session_no_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
     insitu_status status = session_agree(team->comm, error);
-    if (!status) status = find_stale(plan, catalogue, meshes, team, stale, error);
-    for (size_t m = 0; m < count && !status; m++) {
-        const session_catalogue_mesh *of = &catalogue->meshes[m];
-        if (stale[m])
-            status = session_find_outer_faces(find_part(meshes, of->name), of->has_ids, half_diagonal, team, error);
+    if (!status) {
+        count = list_wishes(plan, catalogue, wishes);
+        status = find_stale(meshes, wishes, count, team, stale, error);
     }
+    for (int i = 0; i < count && !status; i++)
+        if (stale[i]) status = find_faces(meshes, &wishes[i], team, half_diagonal, error);
     base_free(stale);
+    base_free(wishes);
     if (status) return status;
     make_meshes(meshes, error);
     return session_agree(team->comm, error);

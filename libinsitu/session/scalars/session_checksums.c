@@ -87,6 +87,7 @@ static void compare(const session_mesh *mesh, session_scalar *scalar, int thread
     scalar->has_checksum = true;
     scalar->checksum = checksum;
     scalar->are_ranges_stale = true;
+    scalar->version++;
     scalar->extremes.is_known = scalar->positive.is_known = false;
 }
 

@@ -278,6 +278,7 @@ static void free_image(scene_image *image)
     for (int i = 0; i < image->surface_count; i++) {
         free_field(&image->surfaces[i].on);
         free_field(&image->surfaces[i].colour_by);
+        free_field(&image->surfaces[i].threshold.field);
         free_colour_map(&image->surfaces[i].colour_map);
     }
     for (int i = 0; i < image->slice_count; i++) {

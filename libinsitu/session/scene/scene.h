@@ -115,11 +115,19 @@ typedef struct scene_volume {
     double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */
 } scene_volume;
 
+/* Cells whose values of a field lie from low to high. */
+typedef struct scene_threshold {
+    bool is_given; /* else all cells */
+    scene_field field;
+    double low, high; /* may be infinite */
+} scene_threshold;
+
 typedef struct scene_surface {
     scene_field on;   /* the meshes; no field: name is NULL */
     float colour[3];  /* linear */
     float edge_width; /* pixels; 0: no edges are drawn */
     float edge_colour[3];
+    scene_threshold threshold;
     bool has_colour_by;
     scene_field colour_by;
     scene_colour_map colour_map;

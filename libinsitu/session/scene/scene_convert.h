@@ -59,8 +59,8 @@ scene_material scene_convert_material(const scene_file_material *in);
 /* in: NULL where nothing is clipped. */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in, scene_clip *out);
 /* height: of the picture. */
-insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in,
-                                    int height, scene_surface *out);
+insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
+                                    scene_surface *out);
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,
                                   scene_slice *out);
 

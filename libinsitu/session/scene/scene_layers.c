@@ -248,7 +248,8 @@ static insitu_status convert_layer(const scene_document *d, const char *path, co
 {
     if (in->volume) return convert_volume(d, path, in->volume, &out->volumes[out->volume_count++]);
     if (in->slice) return scene_convert_slice(d, path, in->slice, &out->slices[out->slice_count++]);
-    if (in->surface) return scene_convert_surface(d, path, in->surface, out->height, &out->surfaces[out->surface_count++]);
+    if (in->surface)
+        return scene_convert_surface(d, path, in->surface, out->height, &out->surfaces[out->surface_count++]);
     return convert_isosurface(d, path, in->isosurface, values, &out->isosurfaces[out->isosurface_count++]);
 }
 

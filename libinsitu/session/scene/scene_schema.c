@@ -323,6 +323,17 @@ DEFINE_MAPPING(slice, "slice", SLICE_KEYS);
       .by_default = "`[0.1, 0.1, 0.1]`", .low = 0, .high = 1)
 DEFINE_MAPPING(edges, "edges", EDGES_KEYS);
 
+#define THRESHOLD_KEYS(X)                                                                                              \
+    X(TEXT("field", REQUIRED, scene_file_threshold, field, 255),                                                       \
+      .help = "Name of the field; at most 255 bytes. Meshes that do not have it show nothing of the layer.")           \
+    X(TEXT("component", OPTIONAL, scene_file_threshold, component, 16), .help = COMPONENT_HELP,                        \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(CYAML_FIELD_FLOAT_PTR("from", OPTIONAL, scene_file_threshold, from), .help = "The least value that is shown.",   \
+      .by_default = "none")                                                                                            \
+    X(CYAML_FIELD_FLOAT_PTR("to", OPTIONAL, scene_file_threshold, to), .help = "The greatest value that is shown.",    \
+      .by_default = "none")
+DEFINE_MAPPING(threshold, "threshold", THRESHOLD_KEYS);
+
 #define SURFACE_KEYS(X)                                                                                                \
     X(NAMES("mesh"), .help = "The mesh whose outer surface is drawn, or a list of meshes, as at an isosurface.",       \
       .by_default = "all meshes")                                                                                      \
@@ -336,6 +347,11 @@ DEFINE_MAPPING(edges, "edges", EDGES_KEYS);
       .help = "Lines along the edges of the cells' faces; `{}` takes all its defaults. They fade where faces are "     \
               "hardly wider than lines.",                                                                              \
       .by_default = "none", .child = &edges_mapping)                                                                   \
+    X(CYAML_FIELD_MAPPING_PTR("threshold", OPTIONAL, scene_file_surface, threshold, threshold_fields),                 \
+      .help = "Only cells whose value lies within bounds are there, with the field at vertices those all of whose "    \
+              "vertices' values do; what is drawn is the outer surface of these. It is found anew when the values "    \
+              "have changed.",                                                                                         \
+      .by_default = "all cells", .child = &threshold_mapping)                                                          \
     X(CYAML_FIELD_FLOAT_PTR("opacity", OPTIONAL, scene_file_surface, opacity),                                         \
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_surface, material, material_fields),                    \

@@ -80,10 +80,16 @@ typedef struct scene_file_edges {
     double *width, *colour; /* colour: 3 */
 } scene_file_edges;
 
+typedef struct scene_file_threshold {
+    char *field, *component;
+    double *from, *to;
+} scene_file_threshold;
+
 typedef struct scene_file_surface {
     double *colour; /* 3 */
     scene_file_colour_by *colour_by;
     scene_file_edges *edges;
+    scene_file_threshold *threshold;
     double *opacity;
     scene_file_material *material;
 } scene_file_surface;

@@ -1,5 +1,6 @@
 /* Outer surfaces of meshes: what colours them. */
 #include <math.h>
+#include <stdio.h>
 
 #include "colour_map.h"
 #include "scene_convert.h"
@@ -9,6 +10,21 @@ static void convert_edges(const scene_file_edges *in, int height, scene_surface 
     if (!in) return;
     out->edge_width = in->width ? (float)*in->width : fmaxf(1, (float)height / 900);
     for (int c = 0; c < 3; c++) out->edge_colour[c] = colour_linear_from_srgb(in->colour ? (float)in->colour[c] : 0.1F);
+}
+
+static insitu_status convert_threshold(const scene_document *d, const char *layer, const scene_file_threshold *in,
+                                       scene_threshold *out)
+{
+    char path[SCENE_PATH_SIZE];
+    if (!in) return INSITU_OK;
+    snprintf(path, sizeof path, "%s.threshold", layer);
+    out->is_given = true;
+    out->low = in->from ? *in->from : -(double)INFINITY;
+    out->high = in->to ? *in->to : (double)INFINITY;
+    if (!in->from && !in->to) return scene_bad(d, path, "", "has no bounds, expected from, to or both");
+    if (out->low > out->high)
+        return scene_bad(d, path, "to", "is %g, expected no less than from, which is %g", out->high, out->low);
+    return scene_convert_field(d, layer, path, in->field, in->component, &out->field);
 }
 
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
@@ -21,7 +37,8 @@ insitu_status scene_convert_surface(const scene_document *d, const char *path, c
     for (int c = 0; c < 3; c++) out->colour[c] = colour_linear_from_srgb(in->colour ? (float)in->colour[c] : 0.8F);
     if (in->colour && in->colour_by)
         return scene_bad(d, path, "colour", "given beside colour_by, expected one of the two");
-    const insitu_status status = scene_convert_meshes(d, path, &out->on);
+    insitu_status status = scene_convert_meshes(d, path, &out->on);
+    if (!status) status = convert_threshold(d, path, in->threshold, &out->threshold);
     if (status || !in->colour_by) return status;
     return scene_convert_colour_by(d, path, in->colour_by, &out->colour_by, &out->colour_map);
 }

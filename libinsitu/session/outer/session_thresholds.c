@@ -1,0 +1,105 @@
+#include "session_thresholds.h"
+
+#include "memory.h"
+#include "mmbvh_fetch.h"
+#include "session_scalars.h"
+
+static session_threshold resolve(const session_mesh *mesh, const scene_threshold *in)
+{
+    if (!in->is_given) return (session_threshold){0};
+    session_threshold out = {true, session_find_field(mesh, in->field.name), 0, in->low, in->high};
+    if (out.field >= 0)
+        out.component = session_resolve_component(&in->field, mesh->fields[out.field].given.component_count);
+    return out;
+}
+
+static bool is_same(const session_threshold *a, const session_threshold *b)
+{
+    if (!a->is_given || !b->is_given) return a->is_given == b->is_given;
+    return a->field == b->field && a->component == b->component && a->low == b->low && a->high == b->high;
+}
+
+session_outer *session_find_outer(const session_mesh *mesh, const scene_threshold *threshold)
+{
+    const session_threshold wanted = resolve(mesh, threshold);
+    for (int i = 0; i < mesh->outer_count; i++)
+        if (is_same(&mesh->outers[i]->threshold, &wanted)) return mesh->outers[i];
+    return NULL;
+}
+
+static session_outer *add_outer(session_mesh *mesh, const scene_threshold *threshold)
+{
+    session_outer **outers = base_realloc(mesh->outers, (size_t)(mesh->outer_count + 1) * sizeof *outers);
+    if (!outers) return NULL;
+    mesh->outers = outers;
+    session_outer *out = base_calloc(1, sizeof *out);
+    if (!out) return NULL;
+    out->threshold = resolve(mesh, threshold);
+    outers[mesh->outer_count++] = out;
+    return out;
+}
+
+bool session_mark_outer(session_mesh *mesh, const scene_threshold *threshold)
+{
+    session_scalar *scalar;
+    session_outer *outer = session_find_outer(mesh, threshold);
+    if (!outer) outer = add_outer(mesh, threshold);
+    if (!outer) return false;
+    outer->is_wanted = true;
+    return !threshold->is_given || session_mark_scalar(mesh, &threshold->field, false, &scalar);
+}
+
+void session_drop_thresholds(session_mesh *mesh)
+{
+    int kept = 0;
+    for (int i = 0; i < mesh->outer_count; i++) {
+        session_outer *outer = mesh->outers[i];
+        if (outer->threshold.is_given && !outer->is_wanted) {
+            session_drop_outer(outer, true);
+            base_free(outer);
+        } else {
+            mesh->outers[kept++] = outer;
+        }
+    }
+    mesh->outer_count = kept;
+}
+
+/* NULL: there is none, or the mesh does not have the field. */
+static const session_scalar *find_scalar(const session_mesh *mesh, const session_threshold *threshold)
+{
+    for (int i = 0; i < mesh->scalar_count && threshold->is_given && threshold->field >= 0; i++) {
+        const session_scalar *scalar = &mesh->scalars[i];
+        if (scalar->field == threshold->field && scalar->component == threshold->component && !scalar->is_recentred)
+            return scalar;
+    }
+    return NULL;
+}
+
+bool session_is_outer_stale(const session_mesh *mesh, const session_outer *outer)
+{
+    const session_scalar *scalar = find_scalar(mesh, &outer->threshold);
+    return !outer->are_faces_known || (scalar && scalar->version != outer->version);
+}
+
+void session_set_outer_fresh(const session_mesh *mesh, session_outer *outer)
+{
+    const session_scalar *scalar = find_scalar(mesh, &outer->threshold);
+    outer->version = scalar ? scalar->version : 0;
+}
+
+unsigned char *session_hidden_cells(const session_mesh *mesh, const session_threshold *threshold, int threads)
+{
+    const int64_t count = mesh->cells.cell_count;
+    const session_scalar *scalar = find_scalar(mesh, threshold);
+    unsigned char *is_hidden = base_alloc((size_t)(count ? count : 1));
+    if (!is_hidden) return NULL;
+    const grid_field field = scalar ? session_scalar_field(mesh, scalar) : (grid_field){0};
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t cell = 0; cell < count; cell++) {
+        is_hidden[cell] = true;
+        if (!scalar) continue;
+        const fetch_range of_cell = fetch_any_cell_range(&mesh->cells, &field, cell);
+        is_hidden[cell] = !of_cell.is_finite || of_cell.low < threshold->low || of_cell.high > threshold->high;
+    }
+    return is_hidden;
+}

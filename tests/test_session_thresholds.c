@@ -1,0 +1,260 @@
+/* Surfaces of thresholds: the faces between cells within the bounds and all others, by brute force over all pairs of
+ * faces; found anew when the values change; one picture on any ranks. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session.h"
+#include "session_cell_faces.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, PIXELS = 48 * 36 };
+
+#define LOW (-0.6)
+#define HIGH 0.9
+#define IMAGE(threshold)                                                                                               \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n"                                         \
+    "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n    layers:\n"                                  \
+    "      - surface: {colour_by: {field: f, map: turbo}, edges: {}, threshold: {" threshold "}}\n"                    \
+    "    outputs: [{path: a.exr}]\n"
+
+/* ---- faces ---------------------------------------------------------------------------------------------------- */
+
+/* Of corners in any order: a sum of hashes of their places. */
+static uint64_t mix(uint64_t h)
+{
+    h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
+    h = (h ^ h >> 27) * 0x94d049bb133111ebu;
+    return h ^ h >> 31;
+}
+
+static uint64_t hash_place(const double place[3])
+{
+    uint64_t out = 0;
+    for (int a = 0; a < 3; a++) {
+        uint64_t bits;
+        memcpy(&bits, &place[a], sizeof bits);
+        out = mix(out + mix(bits + 0x9e3779b97f4a7c15u));
+    }
+    return out;
+}
+
+/* Faces as sets of corners: how many, and a sum over them that tells one set of faces from another. */
+typedef struct face_set {
+    uint64_t count, sum;
+} face_set;
+
+static void add_face(face_set *set, uint64_t face)
+{
+    set->count++;
+    set->sum += mix(face);
+}
+
+static bool is_within(const test_mesh *mesh, const grid *g, int64_t cell, bool is_cell_centred)
+{
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t vertex;
+    if (is_cell_centred) return mesh->values[cell] >= LOW && mesh->values[cell] <= HIGH;
+    while (grid_walk_next(&walk, &vertex))
+        if (!(mesh->values[vertex] >= LOW && mesh->values[vertex] <= HIGH)) return false;
+    return true;
+}
+
+/* Those that one of the cells within alone has: each face is held against each other. */
+static face_set find_truth(const test_mesh *mesh, const grid *g, bool is_cell_centred)
+{
+    face_set out = {0};
+    int64_t count = 0;
+    uint64_t *faces = test_calloc((size_t)g->cell_count * 40, sizeof *faces);
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (!is_within(mesh, g, cell, is_cell_centred)) continue;
+        const session_cell_faces of = session_faces_of_cell(g, cell);
+        for (int64_t f = 0; f < of.count; f++) {
+            const session_face_loop loop = session_face_of(&of, f);
+            double place[3];
+            for (int64_t i = 0; i < loop.size; i++) {
+                grid_vertex(g, session_face_vertex(&loop, i), place);
+                faces[count] += hash_place(place);
+            }
+            count++;
+        }
+    }
+    for (int64_t i = 0; i < count; i++) {
+        int times = 0;
+        for (int64_t k = 0; k < count; k++) times += faces[k] == faces[i];
+        if (times == 1) add_face(&out, faces[i]);
+    }
+    test_free(faces);
+    return out;
+}
+
+/* Of the pyramids and tets on this rank's faces, whose last vertex is the apex; the sum over all ranks. */
+static face_set find_drawn(const insitu_session *session)
+{
+    face_set out = {0};
+    const session_mesh *mesh = session_find_mesh(&session->meshes, "m");
+    const session_outer *outer = mesh->outers[0];
+    for (int64_t cell = 0; cell < outer->mesh->cells.cell_count; cell++) {
+        uint64_t face = 0;
+        for (int64_t i = outer->offsets[cell]; i < outer->offsets[cell + 1] - 1; i++)
+            face += hash_place(outer->coordinates + 3 * outer->connectivity[i]);
+        add_face(&out, face);
+    }
+    MPI_Allreduce(MPI_IN_PLACE, &out, 2, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
+    return out;
+}
+
+/* ---- sessions ------------------------------------------------------------------------------------------------- */
+
+/* A wave that wanders by the step; of cells at their first vertices. */
+static void set_values(session_input *in, bool is_cell_centred, double step)
+{
+    test_mesh *part = &in->part;
+    const int64_t count = is_cell_centred ? part->cell_count : part->vertex_count;
+    free(part->values);
+    part->values = calloc((size_t)count + 1, sizeof *part->values);
+    assert_non_null(part->values);
+    for (int64_t i = 0; i < count; i++) {
+        /* A polyhedron's entries are faces. */
+        int64_t vertex = is_cell_centred ? part->connectivity[part->offsets[i]] : i;
+        if (is_cell_centred && part->types[i] == 42)
+            vertex = part->face_connectivity[part->face_offsets[part->connectivity[part->offsets[i]]]];
+        const double *p = part->coordinates + 3 * vertex;
+        part->values[i] = sin(2 * p[0] + step) * cos(1.5 * p[1] - p[2]);
+    }
+    input_describe(in);
+    if (!is_cell_centred) return;
+    in->field.centring = INSITU_CELL;
+    in->field.count = count;
+}
+
+static insitu_session *begin(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    return session;
+}
+
+static face_set truth_of(const char *scene, const session_input *whole, bool is_cell_centred)
+{
+    face_set out = {0};
+    if (own_rank == 0) {
+        insitu_session *session = begin(MPI_COMM_SELF, scene, whole);
+        out = find_truth(&whole->part, &session_find_mesh(&session->meshes, "m")->cells, is_cell_centred);
+        insitu_destroy(&session);
+    }
+    MPI_Bcast(&out, 2, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+    return out;
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float)) == 0 &&
+           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
+}
+
+static void keep(caught_picture *out)
+{
+    *out = (caught_picture){0};
+    if (own_rank == 0) *out = caught[0];
+    caught_count = 0;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+}
+
+/* With ghosts: all cells, of which the others' are ghosts. */
+static void take_part(const test_mesh *whole, bool with_ghosts, test_mesh *out)
+{
+    int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
+    int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
+    test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
+    for (int64_t cell = 0; cell < out->cell_count && with_ghosts; cell++) out->ghosts[cell] = owners[cell] != own_rank;
+    test_free(owners);
+    test_free(all);
+}
+
+/* Two steps, each of values of its own. */
+static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
+{
+    session_input whole = {0}, part = {0};
+    insitu_session *session = NULL;
+    const char *scene = write_scene(IMAGE("field: f, from: -0.6, to: 0.9"));
+    test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
+    take_part(&whole.part, with_ghosts, &part.part);
+    for (int step = 0; step < 2; step++) {
+        caught_picture alone = {0}, picture;
+        set_values(&whole, is_cell_centred, step);
+        const face_set truth = truth_of(scene, &whole, is_cell_centred);
+        keep(&alone);
+        set_values(&part, is_cell_centred, step);
+        part.mesh.changed = step ? 0 : INSITU_CHANGED_ALL;
+        if (step == 0) session = open_session(MPI_COMM_WORLD, scene);
+        forget_pictures();
+        assert_int_equal(hand_over(session, &part), INSITU_OK);
+        everywhere(insitu_step(session, step, step) == INSITU_OK);
+        const face_set drawn = find_drawn(session);
+        if ((!truth.count || drawn.sum != truth.sum) && own_rank == 0)
+            fprintf(stderr, "%s, step %d, cells %d: %d faces, expected %d\n", test_mesh_kind_name(kind), step,
+                    is_cell_centred, (int)drawn.count, (int)truth.count);
+        everywhere(truth.count > 0 && drawn.count == truth.count && drawn.sum == truth.sum);
+        keep(&picture);
+        everywhere(own_rank != 0 || are_same(&picture, &alone));
+        free_picture(&picture);
+        free_picture(&alone);
+    }
+    insitu_destroy(&session);
+    input_free(&part);
+    input_free(&whole);
+}
+
+static void faces_are_those_around_the_cells_within(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int way = 0; way < 3; way++) check(kind, way == 1, way == 2);
+}
+
+/* Everything is within, nothing is, and a mesh without the field. */
+static void bounds_may_show_all_or_nothing(void **state)
+{
+    (void)state;
+    static const char *const scenes[] = {IMAGE("field: f, from: -1e30"), IMAGE("field: f, to: -1e30"),
+                                         IMAGE("field: g, from: 0")};
+    session_input part = {0};
+    input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    for (int i = 0; i < 2; i++) {
+        insitu_session *session = begin(MPI_COMM_WORLD, write_scene(scenes[i]), &part);
+        everywhere(find_drawn(session).count == (i ? 0 : 6 * SIDE * SIDE));
+        caught_picture picture;
+        keep(&picture);
+        free_picture(&picture);
+        insitu_destroy(&session);
+    }
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scenes[2]));
+    assert_int_equal(hand_over(session, &part), INSITU_OK);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"");
+    insitu_destroy(&session);
+    input_free(&part);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(faces_are_those_around_the_cells_within),
+                                       cmocka_unit_test(bounds_may_show_all_or_nothing)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
