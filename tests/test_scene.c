@@ -373,7 +373,7 @@ static void surfaces_have_their_colours(void **state)
     (void)state;
     scene s;
     parse_good(every_key, &s);
-    assert_int_equal(s.images[0].surface_count, 2);
+    assert_int_equal(s.images[0].surface_count, 3);
     const scene_surface *surface = s.images[0].surfaces;
     check_colour(surface[0].colour, linear(1), linear(0.5), linear(0));
     assert_true(surface[0].opacity == 0.5F && !surface[0].has_colour_by && !surface[0].on.name);
