@@ -1,15 +1,13 @@
 #include "session_run_ranges.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "memory.h"
 #include "session_agree.h"
+#include "text_file.h"
 
 enum { longest_line = 512 };
 
@@ -38,10 +36,6 @@ static void list_layers(const scene_image *image, layer_list *list)
         const scene_surface *layer = &image->surfaces[i];
         if (layer->has_colour_by) add_layer(list, "surface", i, &layer->colour_by, &layer->colour_map);
     }
-    for (int i = 0; i < image->surface_count; i++) {
-        const scene_surface *layer = &image->surfaces[i];
-        if (layer->has_colour_by) add_layer(list, "surface", i, &layer->colour_by, &layer->colour_map);
-    }
     for (int i = 0; i < image->slice_count; i++)
         add_layer(list, "slice", i, &image->slices[i].field, &image->slices[i].colour_map);
     for (int i = 0; i < image->volume_count; i++)
@@ -56,20 +50,6 @@ static int count_layers(const scene_image *image)
 }
 
 /* ---- the file -------------------------------------------------------------------------------------------------- */
-
-/* The simulation may write numbers with a comma: false where memory runs out. */
-static bool use_c_numbers(locale_t *numbers, locale_t *before)
-{
-    *numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
-    if (*numbers) *before = uselocale(*numbers);
-    return *numbers != (locale_t)0;
-}
-
-static void use_numbers_again(locale_t numbers, locale_t before)
-{
-    uselocale(before);
-    freelocale(numbers);
-}
 
 /* reason: of errno. */
 static insitu_status fail(const session_image_ranges *ranges, const char *what, int reason, base_error *error)
@@ -129,25 +109,22 @@ static insitu_status read_lines(session_image_ranges *ranges, FILE *file, base_e
 /* What is there; nothing where there is no file. */
 static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
-    locale_t numbers, before;
-    const int number = open(ranges->path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    if (number < 0) return errno == ENOENT ? INSITU_OK : fail(ranges, "read", errno, error);
-    FILE *file = fdopen(number, "r");
-    if (!file || !use_c_numbers(&numbers, &before)) {
-        if (file)
-            fclose(file);
-        else
-            close(number);
+    c_numbers numbers;
+    FILE *file = text_file_open(ranges->path);
+    if (!file) return errno == ENOENT ? INSITU_OK : fail(ranges, "read", errno, error);
+    if (!c_numbers_begin(&numbers)) {
+        fclose(file);
         return fail(ranges, "read", ENOMEM, error);
     }
     const insitu_status status = read_lines(ranges, file, error);
-    use_numbers_again(numbers, before);
+    c_numbers_end(&numbers);
     fclose(file);
     return status;
 }
 
-static void write_lines(const session_image_ranges *ranges, FILE *file)
+static void write_lines(FILE *file, const void *what)
 {
+    const session_image_ranges *ranges = what;
     fprintf(file, "# The widest ranges of the run so far. Delete this file to begin anew.\n");
     for (int i = 0; i < ranges->count; i++) {
         const session_run_range *r = &ranges->items[i];
@@ -157,39 +134,12 @@ static void write_lines(const session_image_ranges *ranges, FILE *file)
     }
 }
 
-/* Into a file of a name of this process's, new, which then takes the place of the old one. */
-static bool write_file(const session_image_ranges *ranges, const char *temporary)
-{
-    unlink(temporary);
-    const int number = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-    FILE *file = number < 0 ? NULL : fdopen(number, "w");
-    if (!file) {
-        if (number >= 0) close(number);
-        return false;
-    }
-    write_lines(ranges, file);
-    const bool is_written = !ferror(file);
-    return fclose(file) == 0 && is_written && rename(temporary, ranges->path) == 0;
-}
-
 insitu_status session_write_run_ranges(session_image_ranges *ranges, base_error *error)
 {
-    locale_t numbers, before;
     if (!ranges->is_changed) return INSITU_OK;
-    const size_t size = strlen(ranges->path) + 24; /* . and a process */
-    char *temporary = base_alloc(size);
-    if (!temporary || !use_c_numbers(&numbers, &before)) {
-        base_free(temporary);
-        return fail(ranges, "written", ENOMEM, error);
-    }
-    snprintf(temporary, size, "%s.%ld", ranges->path, (long)getpid());
-    const bool is_written = write_file(ranges, temporary);
-    const int reason = errno;
-    use_numbers_again(numbers, before);
-    if (!is_written) unlink(temporary);
-    base_free(temporary);
-    ranges->is_changed = !is_written;
-    return is_written ? INSITU_OK : fail(ranges, "written", reason, error);
+    if (!text_file_replace(ranges->path, write_lines, ranges)) return fail(ranges, "written", errno, error);
+    ranges->is_changed = false;
+    return INSITU_OK;
 }
 
 /* ---- the list -------------------------------------------------------------------------------------------------- */

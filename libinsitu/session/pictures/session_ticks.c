@@ -1,6 +1,6 @@
 #include "session_ticks.h"
+#include "text_file.h"
 
-#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -152,12 +152,9 @@ static int fill_ticks(const session_scale *s, int most, insitu_tick *ticks)
 
 int session_make_ticks(const session_scale *scale, int most, insitu_tick ticks[SESSION_MAX_TICKS])
 {
-    const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
-    const locale_t before = c_numbers ? uselocale(c_numbers) : (locale_t)0;
+    c_numbers numbers;
+    const bool is_begun = c_numbers_begin(&numbers);
     const int count = fill_ticks(scale, most, ticks);
-    if (c_numbers) {
-        uselocale(before);
-        freelocale(c_numbers);
-    }
+    if (is_begun) c_numbers_end(&numbers);
     return count;
 }

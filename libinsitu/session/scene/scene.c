@@ -5,13 +5,13 @@
  * put into the C locale while a scene is read, and back. */
 #include "scene.h"
 
-#include <locale.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "colour_map.h"
 #include "memory.h"
 #include "scene_convert.h"
+#include "text_file.h"
 
 /* ---- libcyaml ---- */
 
@@ -226,12 +226,10 @@ insitu_status scene_parse(const char *text, size_t size, const char *file_name, 
 {
     base_error unheard = {.status = INSITU_OK};
     *out = (scene){0};
-    const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
-    if (!c_numbers) return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
-    const locale_t before = uselocale(c_numbers);
+    c_numbers numbers;
+    if (!c_numbers_begin(&numbers)) return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
     const insitu_status status = parse_in_c_locale(text, size, file_name, attachments, out, error ? error : &unheard);
-    uselocale(before);
-    freelocale(c_numbers);
+    c_numbers_end(&numbers);
     if (status != INSITU_OK) scene_free(out);
     return status;
 }

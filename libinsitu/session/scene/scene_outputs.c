@@ -1,13 +1,13 @@
 /* Where images go: file names with placeholders. */
 #include "scene_convert.h"
 
-#include <locale.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 #include "memory.h"
+#include "text_file.h"
 
 typedef enum placeholder_kind {
     PLACEHOLDER_NONE,
@@ -86,14 +86,12 @@ static size_t expand(const char *pattern, const scene_moment *moment, char *out,
 
 char *scene_expand(const char *pattern, const scene_moment *moment)
 {
-    const locale_t c_numbers = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
-    if (!c_numbers) return NULL;
-    const locale_t before = uselocale(c_numbers);
+    c_numbers numbers;
+    if (!c_numbers_begin(&numbers)) return NULL;
     const size_t size = expand(pattern, moment, NULL, 0) + 1;
     char *text = base_alloc(size);
     if (text) expand(pattern, moment, text, size);
-    uselocale(before);
-    freelocale(c_numbers);
+    c_numbers_end(&numbers);
     return text;
 }
 

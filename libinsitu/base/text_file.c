@@ -1,0 +1,66 @@
+#include "text_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "memory.h"
+
+bool c_numbers_begin(c_numbers *numbers)
+{
+    numbers->own = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
+    if (numbers->own) numbers->before = uselocale(numbers->own);
+    return numbers->own != (locale_t)0;
+}
+
+void c_numbers_end(c_numbers *numbers)
+{
+    uselocale(numbers->before);
+    freelocale(numbers->own);
+}
+
+static FILE *open_stream(int number, const char *mode)
+{
+    FILE *file = number < 0 ? NULL : fdopen(number, mode);
+    if (!file && number >= 0) {
+        close(number);
+        errno = ENOMEM;
+    }
+    return file;
+}
+
+static bool write_file(const char *path, const char *temporary, text_writer *write, const void *what)
+{
+    unlink(temporary);
+    FILE *file = open_stream(open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666), "w");
+    if (!file) return false;
+    write(file, what);
+    const bool is_written = !ferror(file);
+    return fclose(file) == 0 && is_written && rename(temporary, path) == 0;
+}
+
+bool text_file_replace(const char *path, text_writer *write, const void *what)
+{
+    c_numbers numbers;
+    const size_t size = strlen(path) + 24; /* . and a process */
+    char *temporary = base_alloc(size);
+    if (!temporary || !c_numbers_begin(&numbers)) {
+        base_free(temporary);
+        errno = ENOMEM;
+        return false;
+    }
+    snprintf(temporary, size, "%s.%ld", path, (long)getpid());
+    const bool is_written = write_file(path, temporary, write, what);
+    const int reason = errno;
+    c_numbers_end(&numbers);
+    if (!is_written) unlink(temporary);
+    base_free(temporary);
+    errno = reason;
+    return is_written;
+}
+
+FILE *text_file_open(const char *path)
+{
+    return open_stream(open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC), "r");
+}

@@ -1,0 +1,50 @@
+/* How the schema's lists are made, and what its two files share. One list a mapping holds each key twice over, as
+ * libcyaml's field and as our scene_key: the reader, the checks, the error messages and docs/scene.md all come from
+ * these lists, so that none can fall behind the others. */
+#ifndef SCENE_SCHEMA_LISTS_H
+#define SCENE_SCHEMA_LISTS_H
+
+#include "scene_schema.h"
+
+#define REQUIRED CYAML_FLAG_DEFAULT
+#define OPTIONAL CYAML_FLAG_OPTIONAL
+#define POINTER (CYAML_FLAG_OPTIONAL | CYAML_FLAG_POINTER)
+
+#define AS_FIELD(field, ...) field,
+#define AS_KEY(field, ...) {__VA_ARGS__},
+#define DEFINE_MAPPING(name, the_title, LIST)                                                                          \
+    static const cyaml_schema_field_t name##_fields[] = {LIST(AS_FIELD) CYAML_FIELD_END};                              \
+    static const scene_key name##_keys[] = {LIST(AS_KEY)};                                                             \
+    static const scene_mapping name##_mapping = {the_title, name##_fields, name##_keys}
+
+/* The same, for another file. */
+#define EXPORT_MAPPING(name, the_title, LIST)                                                                          \
+    const cyaml_schema_field_t scene_##name##_fields[] = {LIST(AS_FIELD) CYAML_FIELD_END};                             \
+    static const scene_key name##_keys[] = {LIST(AS_KEY)};                                                             \
+    const scene_mapping scene_##name##_mapping = {the_title, scene_##name##_fields, name##_keys}
+
+/* A required or optional text of at most `longest` bytes. */
+#define TEXT(key, flags, type, member, longest) CYAML_FIELD_STRING_PTR(key, flags, type, member, 1, longest)
+/* An optional list of exactly `count` numbers. */
+#define NUMBERS(key, type, member, count) CYAML_FIELD_SEQUENCE_FIXED(key, POINTER, type, member, &number, count)
+/* An optional name or list of names. */
+#define NAMES(key) CYAML_FIELD_IGNORE(key, OPTIONAL)
+#define CHOICE(key, type, member, words)                                                                               \
+    CYAML_FIELD_ENUM_PTR(key, CHOICE_FLAGS, type, member, words, CYAML_ARRAY_LEN(words))
+#define CHOICE_FLAGS (POINTER | CYAML_FLAG_STRICT)
+
+/* Not every file uses all of them. */
+#define SHARED static const __attribute__((unused)) cyaml_schema_value_t
+SHARED number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
+SHARED whole_number = {CYAML_VALUE_INT(CYAML_FLAG_DEFAULT, int)};
+SHARED colour = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 3)};
+#undef SHARED
+
+#define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
+#define COMPONENT_DEFAULT "`0` of a field of one component, else `magnitude`"
+
+/* Of scene_schema_layers.c. */
+extern const cyaml_schema_field_t scene_layer_fields[], scene_clip_fields[];
+extern const scene_mapping scene_layer_mapping, scene_clip_mapping;
+
+#endif
