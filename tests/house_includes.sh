@@ -64,7 +64,8 @@ BEGIN {
     allowed["meshes"] = " common mmbvh base public "
     allowed["scalars"] = " meshes scene common mmbvh base public "
     allowed["outer"] = " scalars meshes scene common mmbvh base public "
-    allowed["plan"] = " outer scalars meshes scene render render_face common mmbvh base public "
+    allowed["statistics"] = " scalars meshes scene common mmbvh base public "
+    allowed["plan"] = " statistics outer scalars meshes scene render render_face common mmbvh base public "
     allowed["pictures"] = " plan compositing" allowed["plan"]
     allowed["session"] = " pictures" allowed["pictures"]
     allowed["adaptor_headers"] = " public "

@@ -97,6 +97,8 @@ static const char every_key[] =
     "      - path: out/wave_{cycle}.EXR\n"
     "  - name: second\n"
     "    every_time: 0.25\n"
+    "    once: true\n"
+    "    when: {field: p, component: 2, mesh: [air, sea], of: mean, above: 1, below: 2.5}\n"
     "    antialias: 4\n"
     "    camera: {automatic: {direction: [0, 3, 4], zoom: 1.5, fit: box},\n"
     "             projection: orthographic, height: 2.5}\n"
@@ -123,7 +125,11 @@ static const char every_key[] =
     "      size: 0.04\n"
     "    outputs:\n"
     "      - {path: c.png, decorations: false}\n"
-    "      - {path: \"c{time:.1e}.exr\", decorations: true}\n";
+    "      - {path: \"c{time:.1e}.exr\", decorations: true}\n"
+    "statistics:\n"
+    "  - {field: p, mesh: air, component: x, path: out/p.csv, every: 3, histogram: {bins: 8, range: [-1, 1]}}\n"
+    "  - {field: q, path: q.CSV, histogram: {}}\n"
+    "  - {field: r, path: r.csv}\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -368,6 +374,26 @@ static void clips_are_planes(void **state)
     scene_free(&s);
 }
 
+static void statistics_and_conditions_are_read(void **state)
+{
+    (void)state;
+    scene s;
+    parse_good(every_key, &s);
+    assert_int_equal(s.statistics_count, 3);
+    const scene_statistics *first = s.statistics;
+    assert_string_equal(first->field.name, "p");
+    assert_string_equal(first->path, "out/p.csv");
+    assert_true(first->field.component == 0 && first->field.mesh_count == 1 && first->every == 3);
+    assert_true(first->bin_count == 8 && first->low == -1 && first->high == 1);
+    assert_true(first[1].bin_count == 32 && first[1].low > first[1].high && first[1].every == 1);
+    assert_true(first[2].bin_count == 0);
+    const scene_condition *when = &s.images[1].when;
+    assert_true(s.images[1].once && !s.images[0].once && !s.images[0].when.is_given);
+    assert_true(when->is_given && when->of == SCENE_MEAN && when->above == 1 && when->below == 2.5);
+    assert_true(when->field.component == 2 && when->field.mesh_count == 2);
+    scene_free(&s);
+}
+
 static void surfaces_have_their_colours(void **state)
 {
     (void)state;
@@ -541,7 +567,10 @@ static const struct bad_file {
     {1, "[[[[[[[[[[[[[[[[[[[[ ", 1, {"too deep", "16"}},
     {1, "threads: \x01", 1, {"not valid YAML", "control characters"}},
     {2, "pictures:", 2, {"the key \"pictures\" is unknown"}},
-    {3, "  - title: a", 3, {"images[0]: the key \"title\" is unknown", "name, size, every, every_time, camera"}},
+    {3,
+     "  - title: a",
+     3,
+     {"images[0]: the key \"title\" is unknown", "name, size, every, every_time, when, once, camera"}},
     {3, "  - every: 3\n    name: a", 6, {"images[0]: the key \"every\" is given twice"}},
     {3, "  - threads: 1", 3, {"the key \"threads\" is unknown"}},
     {3, "  - [a]: b", 3, {"the key a list is unknown"}},
@@ -574,6 +603,18 @@ static const struct bad_file {
     {10, "      - surface: {threshold: {from: 1}}", 10, {"surface.threshold.field: missing"}},
     {10, "      - surface: {threshold: {field: f, from: 2, to: 1}}", 10, {"threshold.to: is 1", "no less than from"}},
     {10, "      - surface: {threshold: {field: f, from: nan}}", 10, {"threshold.from: \"nan\"", "a number"}},
+    {1, "statistics: [{field: f}]", 1, {"statistics[0].path: missing"}},
+    {1, "statistics: [{path: a.csv}]", 1, {"statistics[0].field: missing"}},
+    {1, "statistics: [{field: f, path: a.txt}]", 1, {"statistics[0].path: \"a.txt\"", "expected .csv"}},
+    {1, "statistics: [{field: f, path: a.csv}, {field: g, path: a.csv}]", 1, {"statistics[1].path", "another one's"}},
+    {1, "statistics: [{field: f, path: a.csv, every: 0}]", 1, {"statistics[0].every: \"0\"", "1 to"}},
+    {1, "statistics: [{field: f, path: a.csv, histogram: {bins: 300}}]", 1, {"histogram.bins: \"300\"", "1 to 256"}},
+    {1, "statistics: [{field: f, path: a.csv, histogram: {range: [2, 2]}}]", 1, {"histogram.range: goes from 2"}},
+    {5, "    when: {field: f}", 5, {"images[0].when: has no bound", "above, below"}},
+    {5, "    when: {above: 1}", 5, {"images[0].when.field: missing"}},
+    {5, "    when: {field: f, above: 2, below: 1}", 5, {"when.below: is 1", "more than above"}},
+    {5, "    when: {field: f, of: median, above: 1}", 5, {"when.of: \"median\"", "minimum, maximum, mean"}},
+    {5, "    once: 1", 5, {"images[0].once: \"1\"", "true or false"}},
     {10, "      - surface: {edges: true}", 10, {"surface.edges: \"true\"", "a mapping"}},
     {6, "    antialias: 3", 6, {"antialias: is 3", "1, 2, 4, 8 or 16"}},
     {6, "    antialias: 32", 6, {"antialias: \"32\"", "from 1 to 16"}},
@@ -961,6 +1002,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_layer_defaults_hold),
         cmocka_unit_test(slices_have_planes_of_unit_normals),
         cmocka_unit_test(surfaces_have_their_colours),
+        cmocka_unit_test(statistics_and_conditions_are_read),
         cmocka_unit_test(clips_are_planes),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),

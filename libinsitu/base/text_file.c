@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "memory.h"
@@ -58,6 +59,22 @@ bool text_file_replace(const char *path, text_writer *write, const void *what)
     base_free(temporary);
     errno = reason;
     return is_written;
+}
+
+bool text_file_make_folders(const char *path)
+{
+    char *folder = base_strdup(path);
+    bool is_made = folder != NULL;
+    if (!folder) errno = ENOMEM;
+    for (char *end = folder ? strchr(folder + 1, '/') : NULL; end && is_made; end = strchr(end + 1, '/')) {
+        *end = '\0';
+        is_made = mkdir(folder, 0777) == 0 || errno == EEXIST;
+        *end = '/';
+    }
+    const int reason = errno;
+    base_free(folder);
+    errno = reason;
+    return is_made;
 }
 
 FILE *text_file_open(const char *path)

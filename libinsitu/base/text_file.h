@@ -19,6 +19,9 @@ typedef void text_writer(FILE *file, const void *what);
  * False with errno where that cannot be done; the old file is then as it was. */
 bool text_file_replace(const char *path, text_writer *write, const void *what);
 
+/* Make the folders of a path that are missing. False with errno where that cannot be done. */
+bool text_file_make_folders(const char *path);
+
 /* Open a file to read it. NULL with errno where that cannot be done; a pipe does not make the caller wait. */
 FILE *text_file_open(const char *path);
 

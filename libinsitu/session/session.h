@@ -7,6 +7,7 @@
 #include "error.h"
 #include "insitu/insitu.h"
 #include "session_catalogue.h"
+#include "session_events.h"
 #include "session_mesh.h"
 #include "session_picture.h"
 #include "session_report.h"
@@ -27,6 +28,7 @@ struct insitu_session {
     session_trees trees;
     session_picture picture; /* rank 0 */
     session_run_ranges run_ranges;
+    session_events events;
     session_report report;
     bool has_stepped;
     double last_time; /* of the last step */

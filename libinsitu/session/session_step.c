@@ -12,6 +12,7 @@
 #include "session_checksums.h"
 #include "session_distances.h"
 #include "session_draw.h"
+#include "session_events.h"
 #include "session_guard.h"
 #include "session_isovalues.h"
 #include "session_recentre.h"
@@ -30,6 +31,7 @@ static void reload_scene(insitu_session *s)
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_drop_picture(&s->picture);
     session_run_ranges_free(&s->run_ranges);
+    s->events = (session_events){0};
     session_forget_warnings(&s->report);
     for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
 }
@@ -44,14 +46,35 @@ static void use_common_kernels(int level, session_report *report)
                          cpu_isa_name((cpu_isa)level), cpu_isa_name((cpu_isa)render_isa_level()));
 }
 
-/* The phases of a step in which an image is due. What the plan does not name is not computed. */
+/* Statistics that are due, and which images their conditions let through. What fails here does not keep the others from
+ * being drawn: it is told when they are. Collective. */
+static void update_events(insitu_session *s, session_plan_basis *basis, base_error *error)
+{
+    const session_moment *moment = basis->moment;
+    const session_event_time now = {moment->cycle, moment->time};
+    const bool images = session_count_due(basis->scene, moment) > 0;
+    s->events.held = 0;
+    if (session_has_events(basis->scene, moment->cycle, images) &&
+        session_check_event_fields(basis, images, error) == INSITU_OK)
+        session_update_events(&s->events, basis->scene, &s->meshes, &s->team, &now, error);
+    basis->let_images = session_let_images(&s->events, basis->scene);
+}
+
+static void note_drawn(insitu_session *s, const session_plan *plan)
+{
+    for (int i = 0; i < plan->image_count; i++)
+        s->events.drawn |= (uint64_t)1 << (plan->images[i] - s->scene_file.scene.images);
+}
+
+/* The phases of a step in which something is due. What the plan does not name is not computed. */
 static insitu_status draw_due_images(insitu_session *s, const session_changes *changes, const session_moment *moment,
                                      base_error *error)
 {
     const double start = MPI_Wtime();
     const session_team *team = &s->team;
     const session_extent *extent = &s->space.extent;
-    const session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, &s->catalogue, extent};
+    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent};
+    base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
                                      &s->space, &s->run_ranges,     &s->report};
     session_plan plan = {0};
@@ -62,6 +85,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         status = session_update_catalogue(&s->catalogue, &s->meshes, team, changes->are_names_shared, error);
     if ((changes->of_cells || changes->of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+    if (!status) update_events(s, &basis, &of_events);
     if (!status) status = session_make_plan(&basis, &s->meshes, team->comm, &s->report, &plan, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
@@ -74,8 +98,10 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
     if (!status) status = session_check_isovalues(&plan, &s->meshes, team, &s->report, error);
     if (!status) status = session_draw_images(&drawing, &plan, &s->picture, error);
+    if (!status) note_drawn(s, &plan);
     session_plan_free(&plan);
-    return status;
+    if (!status) *error = of_events;
+    return error->status;
 }
 
 /* The phases of every step, then those above. */
@@ -90,7 +116,8 @@ static insitu_status step(insitu_session *s, int64_t cycle, double time, const s
     const session_moment moment = {changes.cycle, changes.time, s->last_time, !s->has_stepped};
     s->has_stepped = true;
     s->last_time = changes.time;
-    if (status || session_count_due(&s->scene_file.scene, &moment) == 0) return status;
+    const bool are_images_due = session_count_due(&s->scene_file.scene, &moment) > 0;
+    if (status || !(are_images_due || session_has_events(&s->scene_file.scene, moment.cycle, false))) return status;
     use_common_kernels(changes.isa_level, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
                                    changes.are_threads_lacking || changes.of_scene, guard, &s->report, error);

@@ -21,6 +21,10 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
  * cross themselves, which takes their volume. */
 void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed);
 
+/* The volume of a good cell: exact where its edges are parallel, and of tets and star-shaped polyhedra; else a mean.
+ */
+double tally_cell_volume(const grid *g, int64_t cell);
+
 /* Of a good cell: has it no volume but what rounding leaves? Never of a ghost. */
 bool tally_is_flat(const grid *g, int64_t cell);
 

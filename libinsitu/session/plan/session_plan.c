@@ -9,6 +9,7 @@
 #include "render.h"
 #include "session_agree.h"
 #include "session_candidates.h"
+#include "session_events.h"
 #include "session_scalars.h"
 
 /* ---- can the image be drawn? --------------------------------------------------------------------------------- */
@@ -233,6 +234,19 @@ static bool is_due(const scene_image *image, const session_moment *m)
     return image->every <= 1 || m->cycle % image->every == 0;
 }
 
+insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error)
+{
+    const scene *scene = basis->scene;
+    insitu_status status = INSITU_OK;
+    if (basis->extent->cell_count == 0) return INSITU_OK;
+    for (int i = 0; i < scene->statistics_count && !status; i++)
+        if (session_is_statistics_due(&scene->statistics[i], basis->moment->cycle))
+            status = check_layer_field(basis, &scene->statistics[i].field, error);
+    for (int i = 0; i < scene->image_count && images && !status; i++)
+        if (scene->images[i].when.is_given) status = check_layer_field(basis, &scene->images[i].when.field, error);
+    return status;
+}
+
 int session_count_due(const scene *scene, const session_moment *moment)
 {
     int count = 0;
@@ -283,7 +297,8 @@ static void take_images(const session_plan_basis *basis, session_report *report,
 {
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
-        if (!is_due(image, basis->moment) || !can_be_drawn(basis, image, report, &plan->refusal)) continue;
+        if (!(basis->let_images >> i & 1) || !is_due(image, basis->moment)) continue;
+        if (!can_be_drawn(basis, image, report, &plan->refusal)) continue;
         plan->images[plan->image_count++] = image;
         plan->slice_count += image->slice_count;
         plan->surface_count += image->surface_count;

@@ -37,12 +37,16 @@ typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* for messages */
     const session_moment *moment;
+    uint64_t let_images; /* a bit an image: those that no condition holds back */
     const session_catalogue *catalogue;
     const session_extent *extent;
 } session_plan_basis;
 
-/* How many images are due. Local. */
+/* How many images are due, but for conditions. Local. */
 int session_count_due(const scene *scene, const session_moment *moment);
+
+/* Are the fields there whose statistics the step wants? images: those of conditions too. Local, the same everywhere. */
+insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Find which of the due images can be drawn, and mark on this rank's meshes and scalars what they need. An image that
  * cannot be drawn is no error of this call. Collective. */

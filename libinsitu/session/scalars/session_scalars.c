@@ -57,6 +57,15 @@ static grid_field given_field(const session_mesh *mesh, const session_scalar *sc
                         .is_cell_centred = field->given.centring == INSITU_CELL};
 }
 
+bool session_find_values(const session_mesh *mesh, const scene_field *field, grid_field *out)
+{
+    session_scalar scalar = {.field = find_field(mesh, field)};
+    if (scalar.field < 0) return false;
+    scalar.component = session_resolve_component(field, mesh->fields[scalar.field].given.component_count);
+    *out = given_field(mesh, &scalar);
+    return true;
+}
+
 grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *scalar)
 {
     if (session_is_distance(scalar))

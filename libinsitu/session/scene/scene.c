@@ -162,6 +162,8 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
     if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, &out->clip);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
+    out->once = in->once && *in->once;
+    if (status == INSITU_OK) status = scene_convert_condition(d, path, in->when, &out->when);
     if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
     if (status == INSITU_OK) status = convert_antialias(d, path, in->antialias, out);
     char decorations_path[SCENE_PATH_SIZE];
@@ -185,6 +187,7 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
         snprintf(path, sizeof path, "images[%d]", i);
         status = convert_image(d, path, &in->images[i], out, &out->images[i]);
     }
+    if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
 
@@ -227,7 +230,8 @@ insitu_status scene_parse(const char *text, size_t size, const char *file_name, 
     base_error unheard = {.status = INSITU_OK};
     *out = (scene){0};
     c_numbers numbers;
-    if (!c_numbers_begin(&numbers)) return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
+    if (!c_numbers_begin(&numbers))
+        return base_fail(error, INSITU_ERROR_MEMORY, "%.300s: no memory for the scene", file_name);
     const insitu_status status = parse_in_c_locale(text, size, file_name, attachments, out, error ? error : &unheard);
     c_numbers_end(&numbers);
     if (status != INSITU_OK) scene_free(out);
@@ -286,6 +290,7 @@ static void free_image(scene_image *image)
     }
     for (int i = 0; i < image->output_count; i++) base_free(image->outputs[i].path);
     scene_free_decorations(&image->decorations);
+    free_field(&image->when.field);
     base_free(image->name);
     base_free(image->isosurfaces);
     base_free(image->volumes);
@@ -300,5 +305,10 @@ void scene_free(scene *s)
 {
     for (int i = 0; i < s->image_count; i++) free_image(&s->images[i]);
     base_free(s->images);
+    for (int i = 0; i < s->statistics_count; i++) {
+        free_field(&s->statistics[i].field);
+        base_free(s->statistics[i].path);
+    }
+    base_free(s->statistics);
     *s = (scene){0};
 }

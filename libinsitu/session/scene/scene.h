@@ -217,6 +217,25 @@ typedef struct scene_output {
     bool has_decorations; /* of the image, if that has any */
 } scene_output;
 
+typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_statistic;
+
+/* A statistic of a field lies above one bound and below another. */
+typedef struct scene_condition {
+    bool is_given; /* else it always holds */
+    scene_field field;
+    scene_statistic of;
+    double above, below; /* may be infinite */
+} scene_condition;
+
+/* Statistics that are written as a line of a file. */
+typedef struct scene_statistics {
+    scene_field field;
+    char *path;       /* relative to the working directory of rank 0 */
+    int every;        /* written at cycles that are multiples of it */
+    int bin_count;    /* of the histogram; 0: none */
+    double low, high; /* of the bins; low > high: of the values */
+} scene_statistics;
+
 typedef struct scene_image {
     char *name;
     int line;
@@ -248,6 +267,8 @@ typedef struct scene_image {
     scene_output *outputs;
     int every;         /* drawn at cycles that are multiples of it; 1 by default */
     double every_time; /* > 0: instead, when the time passes a multiple of it */
+    scene_condition when;
+    bool once; /* of the steps in which it is due, draw the first alone */
 } scene_image;
 
 /* What trees are built over: all cells, those that the images can show, or what costs less. */
@@ -256,8 +277,10 @@ typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL }
 typedef struct scene {
     int threads; /* per rank; 0: the cores there are, shared by the ranks of a node */
     scene_tree tree;
-    int image_count;
+    int image_count; /* 1 .. 64 */
     scene_image *images;
+    int statistics_count; /* 0 .. 64 */
+    scene_statistics *statistics;
 } scene;
 
 /* Parse text (size bytes; file_name for messages, and paths in the scene are relative to its folder). attachments: NULL

@@ -64,6 +64,11 @@ insitu_status scene_convert_surface(const scene_document *d, const char *path, c
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,
                                   scene_slice *out);
 
+/* in: NULL where there is none; image: its path. */
+insitu_status scene_convert_condition(const scene_document *d, const char *image, const scene_file_condition *in,
+                                      scene_condition *out);
+insitu_status scene_convert_statistics(const scene_document *d, const scene_file *in, scene *out);
+
 /* Refuse two outputs that would be one file. */
 insitu_status scene_check_outputs(const scene_document *d, const scene *s);
 

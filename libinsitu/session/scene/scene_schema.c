@@ -3,6 +3,8 @@
 #include "scene_schema_lists.h"
 
 static const cyaml_strval_t method_words[] = {{"samples", SCENE_SAMPLES}, {"segments", SCENE_SEGMENTS}};
+static const cyaml_strval_t statistic_words[] = {
+    {"minimum", SCENE_MINIMUM}, {"maximum", SCENE_MAXIMUM}, {"mean", SCENE_MEAN}};
 static const cyaml_strval_t tree_words[] = {
     {"auto", SCENE_TREE_AUTO}, {"full", SCENE_TREE_FULL}, {"partial", SCENE_TREE_PARTIAL}};
 static const cyaml_strval_t anchor_words[] = {{"top_left", SCENE_TOP_LEFT},   {"top", SCENE_TOP},
@@ -168,6 +170,51 @@ static const cyaml_schema_value_t layer = {
     CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_layer, scene_layer_fields)};
 static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_output, output_fields)};
 
+#define STATISTICS_MESH_HELP                                                                                           \
+    "The mesh whose cells count, or a list of meshes, by the names that the simulation gives them, as at a layer."
+#define STATISTICS_FIELD_HELP "Name of the field; at most 255 bytes. It is taken as it is, at cells or vertices."
+
+#define CONDITION_KEYS(X)                                                                                              \
+    X(TEXT("field", REQUIRED, scene_file_condition, field, 255), .help = STATISTICS_FIELD_HELP)                        \
+    X(TEXT("component", OPTIONAL, scene_file_condition, component, 16), .help = COMPONENT_HELP,                        \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(NAMES("mesh"), .help = STATISTICS_MESH_HELP, .by_default = "all meshes that have the field")                     \
+    X(CHOICE("of", scene_file_condition, of, statistic_words),                                                         \
+      .help = "Which number of the field is looked at; the mean is weighted by the cells' volumes.",                   \
+      .by_default = "`maximum`")                                                                                       \
+    X(CYAML_FIELD_FLOAT_PTR("above", OPTIONAL, scene_file_condition, above), .help = "It is to be greater than this.", \
+      .by_default = "no bound")                                                                                        \
+    X(CYAML_FIELD_FLOAT_PTR("below", OPTIONAL, scene_file_condition, below), .help = "It is to be less than this.",    \
+      .by_default = "no bound")
+DEFINE_MAPPING(condition, "when", CONDITION_KEYS);
+
+#define HISTOGRAM_KEYS(X)                                                                                              \
+    X(CYAML_FIELD_INT_PTR("bins", OPTIONAL, scene_file_histogram, bins), .help = "How many, of equal width.",          \
+      .by_default = "`32`", .low = 1, .high = 256)                                                                     \
+    X(NUMBERS("range", scene_file_histogram, range, 2),                                                                \
+      .help = "The values `[low, high]` that the bins cover, low < high. Cells beyond are in no bin.",                 \
+      .by_default = "the least and the greatest value of each step")
+DEFINE_MAPPING(histogram, "histogram", HISTOGRAM_KEYS);
+
+#define STATISTICS_KEYS(X)                                                                                             \
+    X(TEXT("field", REQUIRED, scene_file_statistics, field, 255), .help = STATISTICS_FIELD_HELP)                       \
+    X(TEXT("component", OPTIONAL, scene_file_statistics, component, 16), .help = COMPONENT_HELP,                       \
+      .by_default = COMPONENT_DEFAULT)                                                                                 \
+    X(NAMES("mesh"), .help = STATISTICS_MESH_HELP, .by_default = "all meshes that have the field")                     \
+    X(TEXT("path", REQUIRED, scene_file_statistics, path, 1023),                                                       \
+      .help = "File to write, ending in `.csv`; relative to the working directory of rank 0; missing folders are "     \
+              "made. A run that begins in a folder which has the file drops the lines of its first cycle and of "      \
+              "later ones, and goes on.")                                                                              \
+    X(CYAML_FIELD_INT_PTR("every", OPTIONAL, scene_file_statistics, every),                                            \
+      .help = "Write at the cycles that are multiples of this.", .by_default = "`1`", .low = 1, .high = 1000000000)    \
+    X(CYAML_FIELD_MAPPING_PTR("histogram", OPTIONAL, scene_file_statistics, histogram, histogram_fields),              \
+      .help = "The share of the volume whose cells' values lie in each of some bins.", .by_default = "none",           \
+      .child = &histogram_mapping)
+DEFINE_MAPPING(statistics, "statistics", STATISTICS_KEYS);
+
+static const cyaml_schema_value_t statistics = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_statistics, statistics_fields)};
+
 #define IMAGE_KEYS(X)                                                                                                  \
     X(TEXT("name", REQUIRED, scene_file_image, name, 64),                                                              \
       .help = "Name of the image, its own among the images; at most 64 bytes, no `/`.")                                \
@@ -180,6 +227,12 @@ static const cyaml_schema_value_t output = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAU
           "Draw at the first step, and whenever the time has passed a multiple of this since the step before. Not "    \
           "with `every`.",                                                                                             \
       .by_default = "by `every`", .low = 0, .is_low_excluded = true, .high = 1e30)                                     \
+    X(CYAML_FIELD_MAPPING_PTR("when", OPTIONAL, scene_file_image, when, condition_fields),                             \
+      .help = "Of the steps of `every` or `every_time`, draw only those in which this holds.", .by_default = "always", \
+      .child = &condition_mapping)                                                                                     \
+    X(CYAML_FIELD_BOOL_PTR("once", OPTIONAL, scene_file_image, once),                                                  \
+      .help = "Draw only at the first of the steps in which the image is due. An edited scene begins anew.",           \
+      .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, camera_fields),                            \
       .help = "Where the image is seen from.", .by_default = "automatic", .child = &camera_mapping)                    \
     X(CYAML_FIELD_SEQUENCE("background", POINTER, scene_file_image, background, &number, 3, 4),                        \
@@ -235,7 +288,15 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
           "value, normals by gradient, share the work of finding its cells, where these are tets or hexes in arrays "  \
           "of float32 and int32 and the images have most of a rank's mesh in view: 64 bytes a crossed tet and 128 a "  \
           "hex, at most 64 MiB a rank, are held while the step is drawn.",                                             \
-      .child = &image_mapping)
+      .child = &image_mapping)                                                                                         \
+    X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \
+      .help =                                                                                                          \
+          "Numbers of fields, a file each and a line a step: cycle, time, how many cells, their volume, the least "    \
+          "and the greatest value, mean and standard deviation, the last two of cells' values (their own, or the "     \
+          "mean of their vertices') weighted by volume; then the histogram. Ghost cells, cells of no volume and "      \
+          "those with values that are not finite do not count. The same on any partition. Without any cell no "        \
+          "line is written.",                                                                                          \
+      .by_default = "none", .child = &statistics_mapping)
 static const cyaml_schema_field_t top_fields[] = {TOP_KEYS(AS_FIELD) CYAML_FIELD_END};
 static const scene_key top_keys[] = {TOP_KEYS(AS_KEY)};
 

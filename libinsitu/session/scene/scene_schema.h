@@ -157,11 +157,30 @@ typedef struct scene_file_output {
     bool *decorations;
 } scene_file_output;
 
+typedef struct scene_file_condition {
+    char *field, *component;
+    int *of; /* scene_statistic */
+    double *above, *below;
+} scene_file_condition;
+
+typedef struct scene_file_histogram {
+    int *bins;
+    double *range; /* 2 */
+} scene_file_histogram;
+
+typedef struct scene_file_statistics {
+    char *field, *component, *path;
+    int *every;
+    scene_file_histogram *histogram;
+} scene_file_statistics;
+
 typedef struct scene_file_image {
     char *name;
     int *size; /* 2 */
     int *every;
     double *every_time;
+    scene_file_condition *when;
+    bool *once;
     int *antialias;
     scene_file_camera *camera;
     double *background; /* 3 or 4 */
@@ -182,6 +201,8 @@ typedef struct scene_file {
     int *tree; /* scene_tree */
     scene_file_image *images;
     int images_count;
+    scene_file_statistics *statistics;
+    int statistics_count;
 } scene_file;
 
 struct scene_mapping;

@@ -1,0 +1,112 @@
+#include "session_events.h"
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_statistics_file.h"
+
+bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle)
+{
+    return statistics->every <= 1 || cycle % statistics->every == 0;
+}
+
+bool session_has_events(const scene *scene, int64_t cycle, bool images)
+{
+    for (int i = 0; i < scene->statistics_count; i++)
+        if (session_is_statistics_due(&scene->statistics[i], cycle)) return true;
+    for (int i = 0; i < scene->image_count && images; i++)
+        if (scene->images[i].when.is_given) return true;
+    return false;
+}
+
+/* What is found in a step: the statistics that are due, then those of conditions. */
+typedef struct event_work {
+    int count;
+    session_statistics_wish *wishes;
+    session_statistics *found;
+    int *of; /* index of the statistics, or of the image and the count of statistics */
+} event_work;
+
+static void work_free(event_work *w)
+{
+    base_free(w->wishes);
+    base_free(w->found);
+    base_free(w->of);
+}
+
+static bool work_create(const scene *scene, int64_t cycle, event_work *w)
+{
+    const size_t most = (size_t)(scene->statistics_count + scene->image_count);
+    *w = (event_work){0, base_calloc(most, sizeof *w->wishes), base_calloc(most, sizeof *w->found),
+                      base_calloc(most, sizeof *w->of)};
+    if (!w->wishes || !w->found || !w->of) return false;
+    for (int i = 0; i < scene->statistics_count; i++) {
+        const scene_statistics *s = &scene->statistics[i];
+        if (!session_is_statistics_due(s, cycle)) continue;
+        w->wishes[w->count] = (session_statistics_wish){&s->field, s->bin_count, s->low, s->high};
+        w->of[w->count++] = i;
+    }
+    for (int i = 0; i < scene->image_count; i++) {
+        if (!scene->images[i].when.is_given) continue;
+        w->wishes[w->count] = (session_statistics_wish){&scene->images[i].when.field, 0, 0, -1};
+        w->of[w->count++] = scene->statistics_count + i;
+    }
+    return true;
+}
+
+/* Without any value nothing holds. */
+static bool holds(const scene_condition *c, const session_statistics *s)
+{
+    const double value = c->of == SCENE_MEAN ? s->mean : c->of == SCENE_MINIMUM ? s->least : s->most;
+    return s->cells > 0 && value > c->above && value < c->below;
+}
+
+/* All of them, though some fail; the first error is told. */
+static void write_due(session_events *events, const scene *scene, const event_work *w, const session_event_time *now,
+                      base_error *error)
+{
+    for (int i = 0; i < w->count; i++) {
+        const int at = w->of[i];
+        base_error own = {.status = INSITU_OK};
+        if (at >= scene->statistics_count || w->found[i].cells == 0) continue;
+        session_write_statistics(scene->statistics[at].path, !(events->begun >> at & 1), now->cycle, now->time,
+                                 &w->found[i], &own);
+        if (!own.status) events->begun |= (uint64_t)1 << at;
+        if (own.status && !error->status) *error = own;
+    }
+}
+
+static void note_conditions(session_events *events, const scene *scene, const event_work *w)
+{
+    events->held = 0;
+    for (int i = 0; i < w->count; i++) {
+        const int image = w->of[i] - scene->statistics_count;
+        if (image >= 0 && holds(&scene->images[image].when, &w->found[i])) events->held |= (uint64_t)1 << image;
+    }
+}
+
+insitu_status session_update_events(session_events *events, const scene *scene, const session_meshes *meshes,
+                                    const session_team *team, const session_event_time *now, base_error *error)
+{
+    event_work work;
+    if (!work_create(scene, now->cycle, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
+    insitu_status status = session_agree(team->comm, error);
+    if (!status) status = session_find_statistics(meshes, team, work.wishes, work.count, work.found, error);
+    if (!status) {
+        note_conditions(events, scene, &work);
+        if (team->rank == 0) write_due(events, scene, &work, now, error);
+        status = session_agree_as_is(team->comm, error);
+    }
+    work_free(&work);
+    return status;
+}
+
+uint64_t session_let_images(const session_events *events, const scene *scene)
+{
+    uint64_t let = 0;
+    for (int i = 0; i < scene->image_count; i++) {
+        const uint64_t bit = (uint64_t)1 << i;
+        const bool is_let = !scene->images[i].when.is_given || events->held & bit;
+        if (is_let && !(scene->images[i].once && events->drawn & bit)) let |= bit;
+    }
+    return let;
+}

@@ -1,0 +1,224 @@
+/* Sums are of whole numbers, which add up to the same in any order: shares of the largest cell's volume, from 0 to 1,
+ * times 2^52. A sum is kept in two parts, so that 2^34 cells fit: what is above 2^28, and the rest. Each cell is off by
+ * 2^-53 of the largest at most. */
+#include "session_statistics.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_scalars.h"
+#include "session_tally.h"
+
+/* ---- one cell ------------------------------------------------------------------------------------------------ */
+
+typedef struct cell_value {
+    bool is_there;
+    double least, most, mean, volume;
+} cell_value;
+
+static cell_value value_of(const grid *g, const grid_field *field, int64_t cell)
+{
+    cell_value out = {grid_is_drawn(g, cell), INFINITY, -INFINITY, 0, 0};
+    if (!out.is_there) return out;
+    grid_walk walk = grid_walk_cell(g, cell);
+    int64_t place = cell, count = 0;
+    while (field->is_cell_centred ? count == 0 : grid_walk_next(&walk, &place)) {
+        const double value = grid_field_value(field, place);
+        out.is_there = out.is_there && isfinite(value);
+        out.least = fmin(out.least, value);
+        out.most = fmax(out.most, value);
+        out.mean += value;
+        count++;
+    }
+    out.mean /= (double)(count ? count : 1);
+    out.volume = tally_cell_volume(g, cell);
+    out.is_there = out.is_there && count > 0 && isfinite(out.mean) && isfinite(out.volume);
+    return out;
+}
+
+/* ---- sums ---------------------------------------------------------------------------------------------------- */
+
+enum { LOW_BITS = 28, VOLUME = 1, MOMENT = 3, BINS = 5, MAX_SUMS = BINS + 2 * SESSION_MAX_BINS };
+
+static void add_share(int64_t sum[2], double share)
+{
+    const int64_t whole = llrint(share * 0x1p52);
+    sum[0] += whole >> LOW_BITS;
+    sum[1] += whole & ((1 << LOW_BITS) - 1);
+}
+
+static double sum_of(const int64_t sum[2])
+{
+    return ((double)sum[0] * (1 << LOW_BITS) + (double)sum[1]) * 0x1p-52;
+}
+
+/* What a pass needs of those before it. */
+typedef struct sum_basis {
+    const session_statistics *known;
+    double largest; /* volume */
+    double about;   /* second pass: the mean as a share of the range */
+    bool is_second;
+} sum_basis;
+
+/* From 0 at the least value to 1 at the greatest; without overflow. */
+static double share_of_range(double value, double low, double high)
+{
+    const double share = high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;
+    return fmin(fmax(share, 0), 1);
+}
+
+static int bin_of(const session_statistics *s, double value)
+{
+    if (value < s->low || value > s->high) return -1;
+    return (int)fmin(share_of_range(value, s->low, s->high) * s->bin_count, s->bin_count - 1);
+}
+
+static void add_cell(const sum_basis *b, const cell_value *cell, int64_t *sums)
+{
+    const session_statistics *s = b->known;
+    const double volume = b->largest > 0 ? cell->volume / b->largest : 0;
+    const double place = share_of_range(cell->mean, s->least, s->most) - b->about;
+    if (b->is_second) {
+        add_share(sums, volume * place * place);
+        return;
+    }
+    sums[0]++;
+    add_share(sums + VOLUME, volume);
+    add_share(sums + MOMENT, volume * place);
+    const int bin = s->bin_count ? bin_of(s, cell->mean) : -1;
+    if (bin >= 0) add_share(sums + BINS + 2 * bin, volume);
+}
+
+static void add_cells(const grid *g, const grid_field *field, const sum_basis *b, int threads, int64_t *sums, int count)
+{
+#pragma omp parallel for num_threads(threads) schedule(static) reduction(+ : sums[:count])
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        const cell_value value = value_of(g, field, cell);
+        if (value.is_there) add_cell(b, &value, sums);
+    }
+}
+
+/* Of least and most: least, -most, -largest volume. */
+static void find_ends(const grid *g, const grid_field *field, int threads, double ends[3])
+{
+    double least = ends[0], most = -ends[1], largest = -ends[2];
+#pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most, largest)
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        const cell_value value = value_of(g, field, cell);
+        if (!value.is_there) continue;
+        least = fmin(least, value.least);
+        most = fmax(most, value.most);
+        largest = fmax(largest, value.volume);
+    }
+    ends[0] = least;
+    ends[1] = -most;
+    ends[2] = -largest;
+}
+
+/* ---- passes -------------------------------------------------------------------------------------------------- */
+
+typedef struct statistics_work {
+    const session_meshes *meshes;
+    const session_team *team;
+    const session_statistics_wish *wishes;
+    int count;
+    double *ends;  /* three a wish */
+    int64_t *sums; /* MAX_SUMS a wish, then two */
+} statistics_work;
+
+/* The wish's field on a mesh of this rank. */
+static bool find_values(const statistics_work *w, int wish, int mesh, grid_field *field)
+{
+    const session_mesh *of = w->meshes->items[mesh];
+    return of->is_given && session_find_values(of, w->wishes[wish].field, field);
+}
+
+static insitu_status reduce_ends(const statistics_work *w, base_error *error)
+{
+    for (int i = 0; i < w->count; i++) {
+        double *ends = w->ends + 3 * i;
+        ends[0] = ends[1] = INFINITY;
+        ends[2] = 0;
+        for (int m = 0; m < w->meshes->count; m++) {
+            grid_field field;
+            if (find_values(w, i, m, &field)) find_ends(&w->meshes->items[m]->cells, &field, w->team->threads, ends);
+        }
+    }
+    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, w->ends, 3 * w->count, MPI_DOUBLE, MPI_MIN, w->team->comm),
+                       "MPI_Allreduce");
+}
+
+static insitu_status reduce_sums(const statistics_work *w, const session_statistics *known, bool is_second,
+                                 base_error *error)
+{
+    const int size = is_second ? 2 : MAX_SUMS;
+    memset(w->sums, 0, (size_t)(size * w->count) * sizeof *w->sums);
+    for (int i = 0; i < w->count; i++) {
+        const double range = known[i].most - known[i].least;
+        const double about = is_second && range > 0 ? share_of_range(known[i].mean, known[i].least, known[i].most) : 0;
+        const sum_basis basis = {&known[i], -w->ends[3 * i + 2], about, is_second};
+        for (int m = 0; m < w->meshes->count; m++) {
+            grid_field field;
+            if (find_values(w, i, m, &field))
+                add_cells(&w->meshes->items[m]->cells, &field, &basis, w->team->threads, w->sums + size * i, size);
+        }
+    }
+    return session_mpi(error,
+                       MPI_Allreduce(MPI_IN_PLACE, w->sums, size * w->count, MPI_INT64_T, MPI_SUM, w->team->comm),
+                       "MPI_Allreduce");
+}
+
+static void begin(const statistics_work *w, int wish, session_statistics *out)
+{
+    const session_statistics_wish *of = &w->wishes[wish];
+    const double *ends = w->ends + 3 * wish;
+    const bool has_range = of->low <= of->high;
+    *out = (session_statistics){.least = ends[0], .most = -ends[1], .bin_count = of->bin_count};
+    out->low = has_range ? of->low : out->least;
+    out->high = has_range ? of->high : out->most;
+}
+
+static void take_sums(const statistics_work *w, int wish, session_statistics *out)
+{
+    const int64_t *sums = w->sums + MAX_SUMS * wish;
+    const double largest = -w->ends[3 * wish + 2], volume = sum_of(sums + VOLUME);
+    const double place = volume > 0 ? sum_of(sums + MOMENT) / volume : 0;
+    out->cells = sums[0];
+    out->volume = volume * largest;
+    out->mean = (1 - place) * out->least + place * out->most;
+    for (int bin = 0; bin < out->bin_count; bin++)
+        out->shares[bin] = volume > 0 ? sum_of(sums + BINS + 2 * bin) / volume : 0;
+}
+
+static insitu_status find_all(const statistics_work *w, session_statistics *out, base_error *error)
+{
+    insitu_status status = reduce_ends(w, error);
+    for (int i = 0; i < w->count && !status; i++) begin(w, i, &out[i]);
+    if (!status) status = reduce_sums(w, out, false, error);
+    for (int i = 0; i < w->count && !status; i++) take_sums(w, i, &out[i]);
+    if (!status) status = reduce_sums(w, out, true, error);
+    for (int i = 0; i < w->count && !status; i++) {
+        const double volume = out[i].volume / -w->ends[3 * i + 2], range = out[i].most - out[i].least;
+        out[i].deviation = volume > 0 ? range * sqrt(sum_of(w->sums + 2 * i) / volume) : 0;
+    }
+    return status;
+}
+
+insitu_status session_find_statistics(const session_meshes *meshes, const session_team *team,
+                                      const session_statistics_wish *wishes, int count, session_statistics *out,
+                                      base_error *error)
+{
+    statistics_work work = {meshes, team, wishes, count, NULL, NULL};
+    if (count == 0) return INSITU_OK;
+    work.ends = base_alloc((size_t)count * 3 * sizeof *work.ends);
+    work.sums = base_alloc((size_t)count * MAX_SUMS * sizeof *work.sums);
+    if (!work.ends || !work.sums)
+        session_no_memory(error, count * MAX_SUMS * (int64_t)sizeof *work.sums, "statistics of fields");
+    insitu_status status = session_agree(team->comm, error);
+    if (!status) status = find_all(&work, out, error);
+    base_free(work.ends);
+    base_free(work.sums);
+    return status;
+}

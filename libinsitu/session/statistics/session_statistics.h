@@ -1,0 +1,33 @@
+/* Statistics of fields over all cells that are drawn: they do not depend on how cells are dealt out to ranks. */
+#ifndef SESSION_STATISTICS_H
+#define SESSION_STATISTICS_H
+
+#include "scene.h"
+#include "session_mesh.h"
+#include "session_team.h"
+
+enum { SESSION_MAX_BINS = 256 };
+
+typedef struct session_statistics_wish {
+    const scene_field *field;
+    int bin_count;    /* of a histogram; 0: none */
+    double low, high; /* what the bins cover; low > high: what the values do */
+} session_statistics_wish;
+
+/* A cell's value is its own, or the mean of its vertices'. Cells whose values are not all finite do not count. */
+typedef struct session_statistics {
+    int64_t cells;
+    double volume;          /* of the cells */
+    double least, most;     /* values, of vertices where the field is there; least > most: there are none */
+    double mean, deviation; /* of cells' values, weighted by volume */
+    int bin_count;
+    double low, high;                /* of the first and last bin */
+    double shares[SESSION_MAX_BINS]; /* of the volume, by cells' values; the ends count to the outer bins */
+} session_statistics;
+
+/* Of the fields on all meshes that have them and that they are for: three reductions. Collective. */
+insitu_status session_find_statistics(const session_meshes *meshes, const session_team *team,
+                                      const session_statistics_wish *wishes, int count, session_statistics *out,
+                                      base_error *error);
+
+#endif

@@ -1,0 +1,295 @@
+/* Statistics of fields: closed forms and sums by hand; files to the byte the same on any ranks, and gone on with by
+ * runs that begin again; images that wait for a condition, or are drawn once. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, MOST = 1 << 16 };
+
+#define PICTURE(keys)                                                                                                  \
+    "images:\n  - name: a\n    size: [8, 6]\n" keys "    layers: [{isosurface: {field: f, values: [0.1]}}]\n"          \
+    "    outputs: [{path: a.png}]\n"
+#define NEVER PICTURE("    when: {field: f, above: 1e9}\n")
+
+/* ---- inputs and files ------------------------------------------------------------------------------------------ */
+
+/* Cell-centred: a value for each cell that is random, but the cell's own wherever it is. */
+static void make_part(test_mesh_kind kind, double jitter, bool is_cell_centred, session_input *out)
+{
+    test_mesh whole;
+    test_mesh_lattice(kind, SIDE, jitter, test_linear, &whole);
+    int *owners = test_calloc((size_t)whole.cell_count, sizeof *owners);
+    test_partition(&whole, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_part(&whole, owners, own_rank, &out->part);
+    if (is_cell_centred) {
+        int64_t count = 0;
+        free(out->part.values);
+        out->part.values = calloc((size_t)whole.cell_count, sizeof(double));
+        assert_non_null(out->part.values);
+        for (int64_t cell = 0; cell < whole.cell_count; cell++)
+            if (owners[cell] == own_rank) out->part.values[count++] = test_uniform_in((uint64_t)cell, 5, -3, 7);
+    }
+    input_describe(out);
+    if (is_cell_centred) {
+        out->field.centring = INSITU_CELL;
+        out->field.count = out->part.cell_count;
+    }
+    test_free(owners);
+    test_mesh_free(&whole);
+}
+
+/* Rank 0's file; empty where there is none. */
+static void read_file(const char *path, char text[MOST])
+{
+    text[0] = '\0';
+    FILE *file = fopen(path, "r");
+    if (!file) return;
+    text[fread(text, 1, MOST - 1, file)] = '\0';
+    fclose(file);
+}
+
+static void put_file(const char *path, const char *text)
+{
+    if (own_rank != 0) return;
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    fclose(file);
+}
+
+/* A field of the last line. */
+static double number_at(const char *text, int column)
+{
+    const char *line = text, *end;
+    while ((end = strchr(line, '\n')) && end[1]) line = end + 1;
+    for (; column > 0 && line; column--) line = strchr(line, ',') ? strchr(line, ',') + 1 : NULL;
+    return line ? strtod(line, NULL) : NAN;
+}
+
+enum { CELLS = 2, VOLUME, LEAST, MOST_VALUE, MEAN, DEVIATION, LOW, HIGH, FIRST_BIN };
+
+static void run_steps(const char *scene, const session_input *in, int first, int end)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    forget_pictures();
+    for (int cycle = first; cycle < end; cycle++) {
+        assert_int_equal(hand_over(session, in), INSITU_OK);
+        const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
+        if (status) fprintf(stderr, "%s\n", insitu_error(session));
+        everywhere(status == INSITU_OK);
+    }
+    insitu_destroy(&session);
+}
+
+/* ---- numbers --------------------------------------------------------------------------------------------------- */
+
+static bool is_near(double a, double b)
+{
+    if (fabs(a - b) <= 1e-8 * fmax(1, fabs(b))) return true; /* nine digits are written */
+    fprintf(stderr, "%.9g, expected %.9g\n", a, b);
+    return false;
+}
+
+/* A linear field over the cube from -1 to 1: its mean is the middle's value, its ends are at corners. Polyhedra are
+ * cubes here: those of the lattice are not star-shaped, and their volume is that of tets which overlap. In mixed
+ * lattices pyramids are not in pairs, whose vertices' means are not their middles. */
+static void numbers_of_linear_fields_are_closed_forms(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input in = {0};
+        make_part(kind == TEST_POLYHEDRA ? TEST_HEXES : kind, 0, false, &in);
+        if (kind == TEST_POLYHEDRA) test_mesh_to_polyhedra(&in.part, 1);
+        input_describe(&in);
+        if (own_rank == 0) unlink("linear.csv");
+        run_steps(NEVER "statistics: [{field: f, path: linear.csv}]\n", &in, 0, 1);
+        read_file("linear.csv", text);
+        everywhere(own_rank != 0 || (is_near(number_at(text, VOLUME), 8) && is_near(number_at(text, LEAST), -1.4) &&
+                                     is_near(number_at(text, MOST_VALUE), 1.6) &&
+                                     (kind == TEST_MIXED || is_near(number_at(text, MEAN), 0.1))));
+        input_free(&in);
+    }
+}
+
+/* Cubes of one size, whose values are known: sums by hand. Bins from -2 to 6, so that some cells are in none. */
+static void numbers_of_cells_are_sums(void **state)
+{
+    (void)state;
+    enum { COUNT = SIDE * SIDE * SIDE, BINS = 5 };
+    static char text[MOST];
+    session_input in = {0};
+    double sum = 0, squares = 0, least = 7, most = -3, bins[BINS] = {0};
+    for (int cell = 0; cell < COUNT; cell++) {
+        const double value = test_uniform_in((uint64_t)cell, 5, -3, 7);
+        sum += value / COUNT;
+        least = fmin(least, value);
+        most = fmax(most, value);
+        if (value >= -2 && value <= 6) bins[(int)fmin((value + 2) / 8 * BINS, BINS - 1)] += 1.0 / COUNT;
+    }
+    for (int cell = 0; cell < COUNT; cell++) squares += pow(test_uniform_in((uint64_t)cell, 5, -3, 7) - sum, 2) / COUNT;
+    make_part(TEST_HEXES, 0, true, &in);
+    if (own_rank == 0) unlink("folder/cells.csv"), rmdir("folder");
+    run_steps(NEVER "statistics: [{field: f, path: folder/cells.csv, histogram: {bins: 5, range: [-2, 6]}}]\n", &in, 0,
+              1);
+    read_file("folder/cells.csv", text);
+    bool is_well = number_at(text, CELLS) == COUNT && is_near(number_at(text, VOLUME), 8);
+    is_well = is_well && is_near(number_at(text, LEAST), least) && is_near(number_at(text, MOST_VALUE), most);
+    is_well = is_well && is_near(number_at(text, MEAN), sum) && is_near(number_at(text, DEVIATION), sqrt(squares));
+    is_well = is_well && number_at(text, LOW) == -2 && number_at(text, HIGH) == 6;
+    for (int bin = 0; bin < BINS; bin++) is_well = is_well && is_near(number_at(text, FIRST_BIN + bin), bins[bin]);
+    everywhere(own_rank != 0 || is_well);
+    input_free(&in);
+}
+
+/* The same bytes by all ranks and by one, of cells whose volumes all differ. */
+static void files_do_not_depend_on_the_partition(void **state)
+{
+    (void)state;
+    static char text[MOST], alone[MOST];
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (int way = 0; way < 2; way++) {
+            session_input in = {0}, whole = {0};
+            make_part(kind, 0.2, way == 1, &in);
+            if (own_rank == 0) unlink("parts.csv"), unlink("whole.csv");
+            run_steps(NEVER "statistics: [{field: f, path: parts.csv, histogram: {bins: 100}}]\n", &in, 0, 1);
+            const char *scene =
+                write_scene(NEVER "statistics: [{field: f, path: whole.csv, histogram: {bins: 100}}]\n");
+            const int ranks = rank_count;
+            if (own_rank == 0) {
+                rank_count = 1;
+                make_part(kind, 0.2, way == 1, &whole);
+                insitu_session *session = open_session(MPI_COMM_SELF, scene);
+                assert_int_equal(hand_over(session, &whole), INSITU_OK);
+                assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
+                insitu_destroy(&session);
+                input_free(&whole);
+                rank_count = ranks;
+            }
+            read_file("parts.csv", text);
+            read_file("whole.csv", alone);
+            everywhere(own_rank != 0 || (strlen(text) > 900 && strcmp(text, alone) == 0));
+            input_free(&in);
+        }
+}
+
+/* ---- files ----------------------------------------------------------------------------------------------------- */
+
+static void runs_that_begin_again_go_on_with_the_file(void **state)
+{
+    (void)state;
+    static char first[MOST], text[MOST];
+    static const char scene[] = NEVER "statistics: [{field: f, path: runs.csv, every: 2}]\n";
+    session_input in = {0};
+    make_part(TEST_TETS, 0.1, false, &in);
+    if (own_rank == 0) unlink("runs.csv");
+    run_steps(scene, &in, 0, 7);
+    read_file("runs.csv", first);
+    everywhere(own_rank != 0 || (number_at(first, 0) == 6 && number_at(first, 1) == 3));
+    run_steps(scene, &in, 3, 7);
+    read_file("runs.csv", text);
+    everywhere(own_rank != 0 || strcmp(first, text) == 0);
+    if (own_rank == 0) first[strlen(first) - 20] = '\0'; /* the last line is torn */
+    put_file("runs.csv", first);
+    run_steps(scene, &in, 6, 7);
+    read_file("runs.csv", first);
+    everywhere(own_rank != 0 || strcmp(first, text) == 0);
+    input_free(&in);
+}
+
+/* The error is told on all ranks, and the picture is drawn. */
+static void files_that_cannot_be_written_are_told(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    session_input in = {0};
+    make_part(TEST_TETS, 0.1, false, &in);
+    put_file("other.csv", "a,b\n1,2\n");
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: f, path: other.csv}]\n"));
+    forget_pictures();
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "other.csv", "other columns", "cycle,time");
+    everywhere(caught_count == (own_rank == 0));
+    read_file("other.csv", text);
+    everywhere(own_rank != 0 || strcmp(text, "a,b\n1,2\n") == 0);
+    insitu_destroy(&session);
+    session = open_session(MPI_COMM_WORLD, write_scene(PICTURE("") "statistics: [{field: g, path: g.csv}]\n"));
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "\"g\"", "there are", "f");
+    everywhere(caught_count == 2 * (own_rank == 0));
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* ---- conditions ------------------------------------------------------------------------------------------------ */
+
+/* The field's greatest value is the cycle's; pictures drawn at cycles 0 to 9, as bits. */
+static unsigned cycles_drawn(const char *scene)
+{
+    unsigned drawn = 0;
+    session_input in = {0};
+    make_part(TEST_TETS, 0.1, false, &in);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    for (int cycle = 0; cycle < 10; cycle++) {
+        for (int64_t v = 0; v < in.part.vertex_count; v++)
+            in.part.values[v] = cycle / 1.6 * test_linear(in.part.coordinates + 3 * v);
+        forget_pictures();
+        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        const insitu_status status = insitu_step(session, cycle, cycle);
+        if (status) fprintf(stderr, "%s\n", insitu_error(session));
+        everywhere(status == INSITU_OK);
+        everywhere(insitu_last_report(session)->images <= 1);
+        drawn |= (unsigned)insitu_last_report(session)->images << cycle;
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+    return drawn;
+}
+
+static void conditions_hold_images_back(void **state)
+{
+    (void)state;
+    everywhere(cycles_drawn(PICTURE("    when: {field: f, above: 5.5}\n")) == 0x3c0);
+    everywhere(cycles_drawn(PICTURE("    when: {field: f, above: 5.5, below: 8.5}\n")) == 0x1c0);
+    everywhere(cycles_drawn(PICTURE("    when: {field: f, of: minimum, above: -2}\n")) == 0x7);
+    everywhere(cycles_drawn(PICTURE("    when: {field: f, of: mean, below: 0.2}\n")) == 0xf);
+    everywhere(cycles_drawn(PICTURE("    every: 2\n    when: {field: f, above: 2.5}\n")) == 0x150);
+    everywhere(cycles_drawn(PICTURE("    once: true\n    when: {field: f, above: 5.5}\n")) == 0x40);
+    everywhere(cycles_drawn(PICTURE("    once: true\n")) == 0x1);
+}
+
+static const char *work_folder = ".";
+
+/* Files are written where the program runs: each count of ranks has a folder of its own. */
+static bool enter_folder(void)
+{
+    char name[512];
+    snprintf(name, sizeof name, "%s/statistics_np%d", work_folder, rank_count);
+    mkdir(name, 0777);
+    return chdir(name) == 0;
+}
+
+static int run(void)
+{
+    if (!enter_folder()) return 1;
+    const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_linear_fields_are_closed_forms),
+                                       cmocka_unit_test(numbers_of_cells_are_sums),
+                                       cmocka_unit_test(files_do_not_depend_on_the_partition),
+                                       cmocka_unit_test(runs_that_begin_again_go_on_with_the_file),
+                                       cmocka_unit_test(files_that_cannot_be_written_are_told),
+                                       cmocka_unit_test(conditions_hold_images_back)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1) work_folder = argv[1];
+    return run_session_tests(argc, argv, run);
+}
