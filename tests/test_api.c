@@ -166,6 +166,73 @@ static void sessions_of_split_ranks_live_side_by_side(void **context)
     insitu_destroy(&session);
 }
 
+static bool are_same_files(const char *one, const char *other)
+{
+    static char bytes[2][1 << 16];
+    size_t sizes[2];
+    const char *const names[2] = {one, other};
+    for (int i = 0; i < 2; i++) {
+        char path[8192];
+        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+        FILE *file = fopen(path, "rb");
+        sizes[i] = file ? fread(bytes[i], 1, sizeof bytes[i], file) : 0;
+        if (file) fclose(file);
+    }
+    return sizes[0] > 60 && sizes[0] == sizes[1] && memcmp(bytes[0], bytes[1], sizes[0]) == 0;
+}
+
+static const char scene_words[] =
+    "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - isosurface: {field: x, values: [0.4]}\n"
+    "    outputs:\n      - path: %s\n";
+
+static void draw_once(insitu_session *session)
+{
+    hand_over(session);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    insitu_destroy(&session);
+}
+
+static void scene_given_as_text_draws_what_its_file_draws(void **context)
+{
+    (void)context;
+    char output[2][2048], names[2][64], text[4096];
+    for (int i = 0; i < 2; i++) {
+        snprintf(names[i], sizeof names[i], "api_np%d_%s.png", rank_count, i ? "text" : "file");
+        snprintf(output[i], sizeof output[i], "%s/%s", folder, names[i]);
+    }
+    insitu_session *session = NULL;
+    write_scene(output[0]);
+    everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
+    draw_once(session);
+    snprintf(text, sizeof text, scene_words, output[1]);
+    /* Rank 0's text counts, and is not looked at later. */
+    const insitu_status status = insitu_create_from_text(MPI_COMM_WORLD, own_rank ? NULL : text, &session);
+    memset(text, '!', sizeof text);
+    everywhere(status == INSITU_OK);
+    draw_once(session);
+    everywhere(own_rank != 0 || are_same_files(names[0], names[1]));
+}
+
+static void wrong_scene_text_is_told_with_its_line(void **context)
+{
+    (void)context;
+    insitu_session *session = NULL;
+    const char *text = own_rank ? NULL : "images:\n  - name: a\n    sise: [24, 16]\n";
+    everywhere(insitu_create_from_text(MPI_COMM_WORLD, text, &session) == INSITU_ERROR_SCENE && !session);
+    everywhere(strstr(insitu_error(NULL), "scene text:3: images[0]: the key \"sise\""));
+    everywhere(insitu_create_from_text(MPI_COMM_WORLD, NULL, &session) == INSITU_ERROR_ARGUMENT && !session);
+    everywhere(strstr(insitu_error(NULL), "insitu_create_from_text: no scene is given"));
+    everywhere(insitu_create_from_text(MPI_COMM_NULL, text, &session) == INSITU_ERROR_ARGUMENT);
+    /* Longer than any scene may be: refused, not cut. */
+    const size_t size = (size_t)5 << 20;
+    char *comment = malloc(size);
+    memset(comment, '#', size);
+    comment[size - 1] = '\0';
+    const insitu_status status = insitu_create_from_text(MPI_COMM_WORLD, comment, &session);
+    free(comment);
+    everywhere(status == INSITU_ERROR_SCENE && strstr(insitu_error(NULL), "scene text:1: "));
+}
+
 static void calls_on_no_session_are_errors(void **context)
 {
     (void)context;
@@ -193,6 +260,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(folder_that_cannot_be_written_is_named),
         cmocka_unit_test(callers_error_handler_stays),
         cmocka_unit_test(sessions_of_split_ranks_live_side_by_side),
+        cmocka_unit_test(scene_given_as_text_draws_what_its_file_draws),
+        cmocka_unit_test(wrong_scene_text_is_told_with_its_line),
         cmocka_unit_test(calls_on_no_session_are_errors),
     };
     insitu_session *early = NULL, *late = NULL;

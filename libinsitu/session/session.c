@@ -57,18 +57,19 @@ static void free_session(insitu_session *session)
 }
 
 /* On all ranks or on none. The team's communicators are freed by the caller where this fails. */
-static insitu_status create(const session_team *team, const char *scene_path, insitu_session **out, base_error *error)
+static insitu_status create(const session_team *team, const session_scene_source *source, insitu_session **out,
+                            base_error *error)
 {
     insitu_session *session = base_calloc(1, sizeof *session);
     if (!session) session_no_memory(error, (int64_t)sizeof *session, "the session");
-    if (!out) base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_create: no place for the session");
+    if (!out) base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no place for the session", source->call);
     insitu_status status = session_agree(team->comm, error);
     if (status) goto fail;
     session->team = *team;
     session_team_count_node(&session->team);
     session->space.scale = 1;
     session_report_create(&session->report);
-    status = session_load_scene(&session->scene_file, &session->team, scene_path, error);
+    status = session_load_scene(&session->scene_file, &session->team, source, error);
     if (status) goto fail;
     *out = session;
     return INSITU_OK;
@@ -77,26 +78,36 @@ fail:
     return status;
 }
 
-insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out)
+static insitu_status open_session(MPI_Comm comm, const session_scene_source *source, insitu_session **out)
 {
     base_error *error = &thread_error;
     *error = (base_error){0};
     if (out) *out = NULL;
-    if (!is_mpi_running()) return base_fail(error, INSITU_ERROR_MPI, "insitu_create: MPI is not running");
+    if (!is_mpi_running()) return base_fail(error, INSITU_ERROR_MPI, "%s: MPI is not running", source->call);
     if (comm == MPI_COMM_NULL)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_create: the communicator is MPI_COMM_NULL");
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "%s: the communicator is MPI_COMM_NULL", source->call);
     int is_inter = 0;
     MPI_Comm_test_inter(comm, &is_inter);
     if (is_inter)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_create: an inter-communicator is not supported");
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "%s: an inter-communicator is not supported", source->call);
     session_guard guard;
     session_guard_begin(&guard);
     session_team team;
     insitu_status status = session_team_create(comm, &team, error);
-    if (!status) status = create(&team, scene_file, out, error);
+    if (!status) status = create(&team, source, out, error);
     if (status) session_team_free(&team);
     session_guard_end(&guard);
     return status;
+}
+
+insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out)
+{
+    return open_session(comm, &(session_scene_source){"insitu_create", scene_file, NULL}, out);
+}
+
+insitu_status insitu_create_from_text(MPI_Comm comm, const char *scene_text, insitu_session **out)
+{
+    return open_session(comm, &(session_scene_source){"insitu_create_from_text", NULL, scene_text}, out);
 }
 
 insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, const insitu_mesh *mesh)

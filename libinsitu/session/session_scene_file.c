@@ -1,6 +1,6 @@
-/* The scene file: rank 0 reads it and everyone parses the same text, so that all ranks come to the same scene without a
- * word about its structure. A file edited while the simulation runs is taken at the next step; an edit that does not
- * parse leaves the old scene in place and a warning in the reports until it is mended. */
+/* The scene: rank 0 reads its file, or is given its text, and everyone parses the same text, so that all ranks come to
+ * the same scene without a word about its structure. A file edited while the simulation runs is taken at the next step;
+ * an edit that does not parse leaves the old scene in place and a warning in the reports until it is mended. */
 #include "session_scene_file.h"
 
 #include <errno.h>
@@ -135,11 +135,28 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* Read, share and parse. Where memory ran out the file counts as unread, and the next step tries again. */
-static insitu_status read_scene(session_scene_file *file, const session_team *team, scene *out, base_error *error)
+/* The caller's text as if it had been read. One that is too long is cut behind the limit, and so refused as such. */
+static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
+{
+    text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);
+    text->data = base_alloc((size_t)text->size + 1);
+    if (!text->data) return session_no_memory(error, text->size, "scene text");
+    memcpy(text->data, given, (size_t)text->size);
+    return INSITU_OK;
+}
+
+/* Read, share and parse. Where memory ran out the file counts as unread, and the next step tries again. given: the
+ * scene's text; NULL: it is in the file. */
+static insitu_status read_scene(session_scene_file *file, const session_team *team, const char *given, scene *out,
+                                base_error *error)
 {
     scene_file_text text = {0};
-    if (team->rank == 0) read_file(file->path, &text, error);
+    if (team->rank == 0) {
+        if (given)
+            copy_text(given, &text, error);
+        else
+            read_file(file->path, &text, error);
+    }
     insitu_status status = session_agree_as_is(team->comm, error);
     if (status == INSITU_OK) status = parse_shared(file->path, team, &text, out, error);
     if (team->rank == 0 && text.has_stamp && status != INSITU_ERROR_MEMORY) {
@@ -150,12 +167,14 @@ static insitu_status read_scene(session_scene_file *file, const session_team *te
     return status;
 }
 
-static insitu_status share_path(session_scene_file *file, const session_team *team, const char *path, base_error *error)
+static insitu_status share_path(session_scene_file *file, const session_team *team, const session_scene_source *source,
+                                base_error *error)
 {
+    const char *path = source->text ? SESSION_SCENE_TEXT : source->path;
     int64_t size = 0;
     if (team->rank == 0) {
         if (!path)
-            base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_create: no scene file is given");
+            base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no scene is given", source->call);
         else if (!(file->path = base_strdup(path)))
             session_no_memory(error, (int64_t)strlen(path), "the scene file's name");
         else
@@ -166,18 +185,19 @@ static insitu_status share_path(session_scene_file *file, const session_team *te
     return share_bytes(team, &file->path, &size, error);
 }
 
-insitu_status session_load_scene(session_scene_file *file, const session_team *team, const char *path,
+insitu_status session_load_scene(session_scene_file *file, const session_team *team, const session_scene_source *source,
                                  base_error *error)
 {
-    const insitu_status status = share_path(file, team, path, error);
-    return status ? status : read_scene(file, team, &file->scene, error);
+    file->is_text = source->text;
+    const insitu_status status = share_path(file, team, source, error);
+    return status ? status : read_scene(file, team, source->text, &file->scene, error);
 }
 
 bool session_is_scene_edited(const session_scene_file *file, int rank)
 {
     struct stat now;
     /* An editor may have taken the file away for a moment: it is back at a later step. */
-    if (rank != 0 || stat(file->path, &now) != 0) return false;
+    if (rank != 0 || file->is_text || stat(file->path, &now) != 0) return false;
     return !file->has_stamp || !is_same_file(&now, &file->stamp);
 }
 
@@ -187,7 +207,7 @@ bool session_reload_scene(session_scene_file *file, const session_team *team)
     base_error error = {0};
     base_free(file->warning);
     file->warning = NULL;
-    if (read_scene(file, team, &edited, &error) != INSITU_OK) {
+    if (read_scene(file, team, NULL, &edited, &error) != INSITU_OK) {
         file->warning = base_strdup(error.message);
         return false;
     }

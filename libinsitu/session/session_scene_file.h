@@ -1,4 +1,4 @@
-/* The scene file of a session, and the scene as it was last read. */
+/* The scene of a session: read from a file, and again where that is edited, or given as text. */
 #ifndef SESSION_SCENE_FILE_H
 #define SESSION_SCENE_FILE_H
 
@@ -8,18 +8,29 @@
 #include "session_team.h"
 
 typedef struct session_scene_file {
-    char *path;     /* the same on every rank */
+    char *path;     /* the same on every rank; SESSION_SCENE_TEXT of a scene given as text */
+    bool is_text;   /* rank 0: there is no file to be edited */
     scene scene;    /* the same on every rank */
     char *warning;  /* NULL, or why the last edit of the file was not taken */
     bool has_stamp; /* rank 0 */
     struct stat stamp;
 } session_scene_file;
 
-/* Read the file for the first time. *file is empty before, and to be freed whatever happens. Collective. */
-insitu_status session_load_scene(session_scene_file *file, const session_team *team, const char *path,
+/* What messages call a scene given as text, in place of a file's path. */
+#define SESSION_SCENE_TEXT "scene text"
+
+/* Where a scene comes from. Rank 0's counts. */
+typedef struct session_scene_source {
+    const char *call; /* the public call, for messages */
+    const char *path; /* of a file; NULL where text is given, or nothing is */
+    const char *text; /* YAML; NULL where a path is given, or nothing is */
+} session_scene_source;
+
+/* Read the scene for the first time. *file is empty before, and to be freed whatever happens. Collective. */
+insitu_status session_load_scene(session_scene_file *file, const session_team *team, const session_scene_source *source,
                                  base_error *error);
 
-/* Was the file edited since it was read? False on ranks other than 0. Local. */
+/* Was the file edited since it was read? False on ranks other than 0, and where there is no file. Local. */
 bool session_is_scene_edited(const session_scene_file *file, int rank);
 
 /* Read the file again. False: it keeps the old scene, and warning says why. Collective. */

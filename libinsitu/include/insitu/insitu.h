@@ -175,6 +175,11 @@ INSITU_API void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insi
  * message is insitu_error(NULL). MPI must be initialized; MPI_THREAD_SINGLE or FUNNELED suffices. */
 INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, insitu_session **out);
 
+/* Open a session by a scene given as text: YAML, as a scene file has it, ended by a zero. Collective, and as
+ * insitu_create() in all else. Rank 0's text counts, the others may give NULL; it is not needed when the call has
+ * returned. Messages call it "scene text:line". Files that it names are relative to rank 0's working directory. */
+INSITU_API insitu_status insitu_create_from_text(MPI_Comm comm, const char *scene_text, insitu_session **out);
+
 /* Hand over this rank's part of the mesh called name: borrowed arrays. Local. Ranks that have no part of it need not
  * call it; meshes of different names are drawn together, a layer of the scene on those that have its field, or that it
  * names. A mesh with INSITU_CHANGED_TOPOLOGY, or of other counts, drops the fields set on it before. NULL for mesh takes
@@ -205,7 +210,8 @@ INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, dou
 INSITU_API const insitu_report *insitu_last_report(const insitu_session *session);
 
 /* The message of the last call on the session that failed, "" if none did. Local. Valid until the next call on the
- * session. NULL: the message of the last insitu_create() or insitu_destroy() of this thread that failed. */
+ * session. NULL: the message of the last insitu_create(), insitu_create_from_text() or insitu_destroy() of this
+ * thread that failed. */
 INSITU_API const char *insitu_error(const insitu_session *session);
 
 /* Close a session and set *session to NULL. Collective. NULL, or a pointer to NULL, is fine. */
