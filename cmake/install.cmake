@@ -15,6 +15,11 @@ install(EXPORT insituTargets NAMESPACE insitu:: DESTINATION ${insitu_package_dir
 # Loaded at run time, from beside libinsitu; nobody links it.
 install(TARGETS insitu_image LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 
+# Python's module finds the library in ../.. or where the loader looks. In the build tree it stands beside the library.
+set(INSITU_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Where insitu.py is installed, below the prefix")
+install(FILES ${PROJECT_SOURCE_DIR}/libinsitu/python/insitu.py DESTINATION ${INSITU_PYTHON_DIR})
+configure_file(${PROJECT_SOURCE_DIR}/libinsitu/python/insitu.py ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/insitu.py COPYONLY)
+
 if(TARGET insitu_vtk)
   add_library(insitu::vtk ALIAS insitu_vtk)
   set_target_properties(insitu_vtk PROPERTIES EXPORT_NAME vtk)

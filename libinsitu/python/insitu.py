@@ -1,0 +1,315 @@
+"""libinsitu from Python: pictures of a running simulation, from its own unstructured cells.
+
+    with insitu.Session(MPI.COMM_WORLD, "scene.yaml") as session:
+        session.set_mesh("domain", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+        session.set_field("domain", "pressure", pressure)
+        session.step(cycle, time)
+
+Arrays are borrowed as they are, with their strides: nothing is copied here, and what cannot be borrowed is refused. A
+session holds references to what it borrows until the mesh or field is set again and a step has returned, or until it is
+closed. Errors are exceptions. insitu.h says more of each argument; docs/python.md is the page about this file.
+"""
+
+import ctypes
+import os
+
+import numpy
+from mpi4py import MPI
+
+TET, HEX, WEDGE, PYRAMID, POLYHEDRON = 10, 12, 13, 14, 42
+CHANGED_NOTHING, CHANGED_TOPOLOGY, CHANGED_GEOMETRY, CHANGED_VALUES, CHANGED_ALL = 0, 1, 2, 4, 7
+VERTEX, CELL = 0, 1
+
+_TYPES = {"float32": 1, "float64": 2, "int32": 3, "int64": 4, "uint8": 5, "bool": 5}
+_CORNERS = {TET: 4, HEX: 8, WEDGE: 6, PYRAMID: 5}
+_MPI_Comm = ctypes.c_void_p if MPI._sizeof(MPI.Comm) == ctypes.sizeof(ctypes.c_void_p) else ctypes.c_int
+
+
+class Error(RuntimeError):
+    """A call that failed: status is its name, as in "INSITU_ERROR_MESH"; on_all_ranks says that every rank has it."""
+
+    def __init__(self, status, message, on_all_ranks):
+        super().__init__(message)
+        self.status, self.on_all_ranks = status, on_all_ranks
+
+
+class _Array(ctypes.Structure):
+    _fields_ = [("data", ctypes.c_void_p), ("type", ctypes.c_int), ("stride_bytes", ctypes.c_int64)]
+
+
+class _Mesh(ctypes.Structure):
+    _fields_ = [
+        ("vertex_count", ctypes.c_int64),
+        ("coordinates", _Array * 3),
+        ("vertex_ids", _Array),
+        ("cell_count", ctypes.c_int64),
+        ("cell_type", ctypes.c_int),
+        ("cell_types", _Array),
+        ("connectivity_count", ctypes.c_int64),
+        ("connectivity", _Array),
+        ("offsets", _Array),
+        ("face_count", ctypes.c_int64),
+        ("face_offsets", _Array),
+        ("face_connectivity_count", ctypes.c_int64),
+        ("face_connectivity", _Array),
+        ("ghosts", _Array),
+        ("changed", ctypes.c_uint),
+    ]
+
+
+class _Field(ctypes.Structure):
+    _fields_ = [
+        ("name", ctypes.c_char_p),
+        ("centring", ctypes.c_int),
+        ("count", ctypes.c_int64),
+        ("component_count", ctypes.c_int),
+        ("component_stride_bytes", ctypes.c_int64),
+        ("values", _Array),
+        ("changed", ctypes.c_uint),
+    ]
+
+
+class _Report(ctypes.Structure):
+    _fields_ = [
+        ("cycle", ctypes.c_int64),
+        ("time", ctypes.c_double),
+        ("images", ctypes.c_int),
+        ("total_ms", ctypes.c_double),
+        ("prepare_ms", ctypes.c_double),
+        ("build_ms", ctypes.c_double),
+        ("refit_ms", ctypes.c_double),
+        ("surface_ms", ctypes.c_double),
+        ("volume_ms", ctypes.c_double),
+        ("composite_ms", ctypes.c_double),
+        ("write_ms", ctypes.c_double),
+        ("cells", ctypes.c_int64),
+        ("cells_ghost", ctypes.c_int64),
+        ("cells_unusable", ctypes.c_int64),
+        ("cells_inverted", ctypes.c_int64),
+        ("cells_flat", ctypes.c_int64),
+        ("rays", ctypes.c_int64),
+        ("fragments", ctypes.c_int64),
+        ("map_failures", ctypes.c_int64),
+        ("bytes_borrowed", ctypes.c_int64),
+        ("bytes_copied", ctypes.c_int64),
+        ("bytes_trees", ctypes.c_int64),
+        ("bytes_pictures", ctypes.c_int64),
+        ("bytes_peak", ctypes.c_int64),
+        ("copied_why", ctypes.c_char_p),
+        ("left_out", ctypes.c_char_p),
+        ("warnings", ctypes.c_char_p),
+    ]
+
+
+def _load():
+    """The library that stands beside this file or where the installation puts it, else where the loader looks."""
+    folder = os.path.dirname(os.path.realpath(__file__))
+    name = "libinsitu.so.0"
+    paths = [os.path.join(folder, name), os.path.join(folder, "..", "..", name)]
+    library = ctypes.CDLL(next((path for path in paths if os.path.exists(path)), name))
+    pointer, text = ctypes.c_void_p, ctypes.c_char_p
+    for call, result, arguments in [
+        ("insitu_create", ctypes.c_int, [_MPI_Comm, text, ctypes.POINTER(pointer)]),
+        ("insitu_create_from_text", ctypes.c_int, [_MPI_Comm, text, ctypes.POINTER(pointer)]),
+        ("insitu_mesh_defaults", None, [ctypes.POINTER(_Mesh)]),
+        ("insitu_field_defaults", None, [ctypes.POINTER(_Field)]),
+        ("insitu_set_mesh", ctypes.c_int, [pointer, text, ctypes.POINTER(_Mesh)]),
+        ("insitu_set_field", ctypes.c_int, [pointer, text, ctypes.POINTER(_Field)]),
+        ("insitu_step", ctypes.c_int, [pointer, ctypes.c_int64, ctypes.c_double]),
+        ("insitu_last_report", ctypes.POINTER(_Report), [pointer]),
+        ("insitu_error", text, [pointer]),
+        ("insitu_destroy", ctypes.c_int, [ctypes.POINTER(pointer)]),
+        ("insitu_status_name", text, [ctypes.c_int]),
+    ]:
+        function = getattr(library, call)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+_library = _load()
+
+
+def _check(status, session, on_all_ranks):
+    if status != 0:
+        message = _library.insitu_error(session).decode(errors="replace")
+        name = _library.insitu_status_name(status).decode()
+        raise Error(name, message or name, on_all_ranks)
+
+
+def _view(what, given, dimensions):
+    """The caller's array, or a view of its memory. Lists and the like would be copied: they are refused."""
+    is_array = isinstance(given, numpy.ndarray) or hasattr(given, "__array_interface__")
+    if isinstance(given, numpy.ma.MaskedArray) or not (is_array or isinstance(given, memoryview)):
+        raise TypeError(f"{what}: a {type(given).__name__} cannot be borrowed, expected a numpy array")
+    array = numpy.asarray(given)
+    if array.ndim not in dimensions:
+        raise ValueError(f"{what}: has {array.ndim} dimensions, expected {' or '.join(map(str, dimensions))}")
+    if array.dtype.name not in _TYPES or not array.dtype.isnative or not array.flags.aligned:
+        raise TypeError(f"{what}: is of type {array.dtype}, expected one of {', '.join(_TYPES)}, native and aligned")
+    return array
+
+
+def _strided(what, array, stride):
+    """An array of the C interface; stride: bytes from one element to the next."""
+    if array.size < 2:
+        stride = 0  # numpy's stride of so few elements means nothing
+    elif stride == 0:
+        raise ValueError(f"{what}: repeats one element (a stride of 0), expected an array with memory of its own")
+    return _Array(array.ctypes.data if array.size else _nothing.ctypes.data, _TYPES[array.dtype.name], stride)
+
+
+_nothing = numpy.zeros(1)  # Where arrays without elements point: to be given, an array must have an address.
+
+
+def _list(what, given):
+    array = _view(what, given, (1,))
+    return _strided(what, array, array.strides[0]), array.size, array
+
+
+def _rows(what, given):
+    """A list, or rows of equal length that follow one another as a list would."""
+    array = _view(what, given, (1, 2))
+    if array.ndim == 2 and array.shape[0] > 1 and array.strides[0] != array.shape[1] * array.strides[1]:
+        raise ValueError(f"{what}: there are gaps between its rows, or they are columns; expected rows that follow one another")
+    return _strided(what, array, array.strides[-1]), array.size, array
+
+
+def _axes(given):
+    """Coordinates: vertices x 3, or one array each of x, y and z."""
+    if isinstance(given, (tuple, list)):
+        axes = [_list(f"coordinates[{i}]", axis) for i, axis in enumerate(given)]
+    else:
+        array = _view("coordinates", given, (2,))
+        axes = [_list("coordinates", array[:, i]) for i in range(array.shape[1])]
+    if len(axes) != 3 or len({size for _, size, _ in axes}) != 1:
+        raise ValueError("coordinates: expected vertices x 3, or x, y and z of equal length")
+    return [array for array, _, _ in axes], axes[0][1], [held for _, _, held in axes]
+
+
+def _expect_rows_of(cell_type, connectivity):
+    corners = _CORNERS.get(cell_type)
+    if connectivity.ndim == 2 and corners and connectivity.shape[1] != corners:
+        raise ValueError(f"connectivity: has {connectivity.shape[1]} columns, expected {corners} for this cell_type")
+
+
+class Session:
+    """A session. Opening and closing it and step() are collective: every rank of the communicator calls them."""
+
+    def __init__(self, comm, scene=None, *, scene_text=None):
+        """scene: the path of a scene file; scene_text: a scene's YAML itself. Rank 0's counts."""
+        if scene is not None and scene_text is not None:
+            raise TypeError("scene, scene_text: both are given, expected one of them")
+        self._session = ctypes.c_void_p()
+        self._held = {}  # mesh: {None: what the mesh borrows, field: what that borrows}
+        self._retired = []  # borrowed before it was set again: until a step has returned
+        create = _library.insitu_create if scene_text is None else _library.insitu_create_from_text
+        text = scene_text if scene_text is not None else scene
+        text = os.fsencode(text) if text is not None else None
+        handle = _MPI_Comm.from_address(MPI._addressof(comm))
+        _check(create(handle, text, ctypes.byref(self._session)), None, True)
+
+    def set_mesh(self, name, *, coordinates, connectivity, cell_type=TET, cell_types=None, offsets=None, faces=None,
+                 face_offsets=None, ghosts=None, vertex_ids=None, changed=CHANGED_ALL):
+        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h)."""
+        mesh, held = _Mesh(), []
+        _library.insitu_mesh_defaults(ctypes.byref(mesh))
+        axes, mesh.vertex_count, arrays = _axes(coordinates)
+        mesh.coordinates[:] = axes
+        mesh.connectivity, mesh.connectivity_count, array = _rows("connectivity", connectivity)
+        held += arrays + [array]
+        if cell_types is None and offsets is None:
+            _expect_rows_of(cell_type, array)
+        mesh.cell_type, mesh.changed = cell_type, changed
+        counts = {}
+        for key, given in [("cell_types", cell_types), ("offsets", offsets), ("face_offsets", face_offsets),
+                           ("ghosts", ghosts), ("vertex_ids", vertex_ids)]:
+            if given is not None:
+                borrowed, counts[key], array = _list(key, given)
+                setattr(mesh, key, borrowed)
+                held.append(array)
+        if faces is not None:
+            mesh.face_connectivity, mesh.face_connectivity_count, array = _rows("faces", faces)
+            held.append(array)
+        mesh.face_count = max(counts.get("face_offsets", 0) - 1, 0)
+        mesh.cell_count = self._cell_count(mesh, counts)
+        self._expect_counts(mesh, counts)
+        self._hand_over(_library.insitu_set_mesh, name, mesh, None, held)
+
+    def remove_mesh(self, name):
+        """Take this rank's part of a mesh away, and its fields. Local."""
+        _check(_library.insitu_set_mesh(self._open(), name.encode(), None), self._session, False)
+        self._retired.append(self._held.pop(name, None))
+
+    def set_field(self, mesh, name, values, *, centring=VERTEX, changed=CHANGED_ALL):
+        """Hand over this rank's part of a field: values of n tuples, or n x components. Local."""
+        array = _view("values", values, (1, 2))
+        field = _Field()
+        _library.insitu_field_defaults(ctypes.byref(field))
+        field.name, field.centring, field.count, field.changed = name.encode(), centring, array.shape[0], changed
+        if array.ndim == 2:
+            field.component_count = array.shape[1]
+            if array.shape[1] > 1:
+                field.component_stride_bytes = _strided("values", array[:1], array.strides[1]).stride_bytes
+        field.values = _strided("values", array, array.strides[0] if array.shape[0] > 1 else -1)
+        if array.shape[0] < 2:
+            field.values.stride_bytes = 0
+        self._hand_over(_library.insitu_set_field, mesh, field, name, [array])
+
+    def step(self, cycle, time):
+        """Draw what is due. Collective; after an error, which every rank has, the session stays usable."""
+        status = _library.insitu_step(self._open(), cycle, time)
+        self._retired.clear()
+        _check(status, self._session, True)
+
+    @property
+    def report(self):
+        """What the last step did, as a dict with the keys of insitu_report."""
+        report = _library.insitu_last_report(self._open()).contents
+        values = {key: getattr(report, key) for key, _ in _Report._fields_}
+        return {key: (value or b"").decode(errors="replace") if kind is ctypes.c_char_p else value
+                for (key, kind), value in zip(_Report._fields_, values.values())}
+
+    def close(self):
+        """End the session and let go of what it borrowed. Collective. A closed session may be closed again."""
+        if self._session:
+            _library.insitu_destroy(ctypes.byref(self._session))
+        self._held.clear()
+        self._retired.clear()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        # Where an exception is this rank's alone, the others are not closing theirs, and this one would wait for them.
+        if error is None or getattr(error, "on_all_ranks", False):
+            self.close()
+
+    def _open(self):
+        if not self._session:
+            raise ValueError("the session is closed")
+        return self._session
+
+    def _hand_over(self, call, mesh, description, key, arrays):
+        """What was borrowed before stays so until a step has returned; where the call is refused, for as long as this."""
+        fields = self._held.setdefault(mesh, {})
+        before = fields.get(key, [])
+        fields[key] = before + arrays
+        _check(call(self._open(), mesh.encode(), ctypes.byref(description)), self._session, False)
+        self._retired.append(before)
+        fields[key] = arrays
+
+    @staticmethod
+    def _cell_count(mesh, counts):
+        if "cell_types" in counts:
+            return counts["cell_types"]
+        if "offsets" in counts:
+            return max(counts["offsets"] - 1, 0)
+        return mesh.connectivity_count // _CORNERS.get(mesh.cell_type, 1)
+
+    @staticmethod
+    def _expect_counts(mesh, counts):
+        """Lengths that the C interface is not told, and would read beyond."""
+        cells, vertices = mesh.cell_count, mesh.vertex_count
+        for key, expected in [("offsets", cells + 1), ("ghosts", cells), ("vertex_ids", vertices)]:
+            if key in counts and counts[key] != expected:
+                raise ValueError(f"{key}: has {counts[key]} elements, expected {expected}")

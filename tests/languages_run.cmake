@@ -1,0 +1,22 @@
+# cmake -DPROGRAM=<command, a list> -DTRUTH=... -DSCENE=... -DFOLDER=... -DMPIRUN=<command, a list> -P languages_run.cmake:
+# PROGRAM writes the pictures that TRUTH writes, to the byte, on 2 ranks, and nothing on the standard output.
+foreach(who TRUTH PROGRAM)
+  file(REMOVE_RECURSE ${FOLDER}/${who})
+  file(MAKE_DIRECTORY ${FOLDER}/${who})
+  execute_process(COMMAND ${MPIRUN} 2 ${${who}} ${SCENE} WORKING_DIRECTORY ${FOLDER}/${who}
+    RESULT_VARIABLE status OUTPUT_VARIABLE out ERROR_VARIABLE complaints)
+  if(NOT status EQUAL 0 OR NOT "${out}${complaints}" STREQUAL "")
+    message(FATAL_ERROR "${who}: status ${status}, output: ${out}${complaints}")
+  endif()
+  file(GLOB_RECURSE ${who}_pictures RELATIVE ${FOLDER}/${who} ${FOLDER}/${who}/*)
+endforeach()
+if(NOT TRUTH_pictures OR NOT "${TRUTH_pictures}" STREQUAL "${PROGRAM_pictures}")
+  message(FATAL_ERROR "other pictures than expected: ${PROGRAM_pictures}")
+endif()
+foreach(picture ${TRUTH_pictures})
+  file(SHA256 ${FOLDER}/TRUTH/${picture} truth)
+  file(SHA256 ${FOLDER}/PROGRAM/${picture} found)
+  if(NOT truth STREQUAL found)
+    message(FATAL_ERROR "${picture} differs from the C program's")
+  endif()
+endforeach()

@@ -1,0 +1,136 @@
+"""mpirun -n N python3 test_python.py FOLDER insitu.h: what is borrowed stays alive, every layout draws the same picture,
+and what cannot be borrowed, or is wrong, is an exception. Verdicts are reduced, so that no rank waits for one that failed."""
+
+import gc
+import os
+import re
+import sys
+
+import numpy
+from mpi4py import MPI
+
+import insitu
+
+comm = MPI.COMM_WORLD
+folder = sys.argv[1]
+SCENE = """
+images:
+  - name: {name}
+    size: [48, 32]
+    layers:
+      - isosurface: {{field: f, values: [1.3]}}
+      - volume: {{field: f, map: cool_to_warm, opacity: [[0, 0.2], [1, 0.4]]}}
+    outputs: [{{path: {folder}/{name}.png}}]
+"""
+
+
+def everywhere(is_well, what):
+    if not comm.allreduce(bool(is_well), MPI.LAND):
+        raise SystemExit(f"rank {comm.rank}: {what}: {'another rank failed' if is_well else 'not so'}")
+
+
+def raises(kind, words, call, *arguments, **named):
+    try:
+        call(*arguments, **named)
+    except kind as error:
+        everywhere(words in str(error), f"{error}: expected {words}")
+        return error
+    everywhere(False, f"nothing was raised, expected {kind.__name__}: {words}")
+
+
+def lattice():
+    """A block of 4 x 4 x 4 hexes for each rank, side by side along x."""
+    n = 5
+    k, j, i = numpy.meshgrid(range(n), range(n), range(n), indexing="ij")
+    xyz = numpy.stack([i + comm.rank * (n - 1), j, k], axis=-1).reshape(-1, 3).astype(float)
+    v = numpy.arange(n**3).reshape(n, n, n)
+    low, high = slice(None, -1), slice(1, None)
+    around = [(low, low), (low, high), (high, high), (high, low)]
+    hexes = numpy.stack([v[z][:, y, x] for z in (low, high) for y, x in around], axis=-1).reshape(-1, 8)
+    return xyz, hexes, numpy.sqrt(xyz[:, 1] + xyz[:, 2])
+
+
+def picture(name, coordinates, connectivity, values, **named):
+    """Draw once, when the caller's own references are gone and other arrays have been where they were."""
+    with insitu.Session(comm, scene_text=SCENE.format(name=name, folder=folder)) as session:
+        session.set_mesh("m", coordinates=coordinates(), connectivity=connectivity(), cell_type=insitu.HEX, **named)
+        session.set_field("m", "f", values())
+        gc.collect()
+        rubbish = [numpy.full(n, numpy.nan) for n in (125, 375, 64, 512) for _ in range(64)]
+        session.step(0, 0.0)
+        del rubbish
+        everywhere(session.report["images"] == 1 and session.report["bytes_copied"] == 0, f"{name}: {session.report}")
+    comm.Barrier()
+    with open(f"{folder}/{name}.png", "rb") as file:
+        return file.read()
+
+
+def layouts_draw_the_same_picture():
+    # Each array is made anew in the call, and nobody but the session knows it afterwards.
+    xyz, hexes, f = (lambda: lattice()[0]), (lambda: lattice()[1]), (lambda: lattice()[2])
+    plain = picture("plain", xyz, hexes, f)
+    everywhere(len(plain) > 500, "the picture shows something")
+
+    def in_rows_of(array, width):
+        wide = numpy.full((array.shape[0], width), numpy.nan)
+        wide[:, 1:1 + array.shape[1]] = array
+        return wide[:, 1:1 + array.shape[1]]
+
+    others = {
+        "axes": (lambda: tuple(xyz().T.copy()), hexes, f),
+        "columns": (lambda: numpy.asfortranarray(xyz()), hexes, f),
+        "wide": (lambda: in_rows_of(xyz(), 6), hexes, lambda: in_rows_of(f()[:, None], 3)[:, 0]),
+        "backwards": (lambda: xyz()[::-1].copy()[::-1], hexes, lambda: f()[::-1].copy()[::-1]),
+        "int32": (xyz, lambda: hexes().astype(numpy.int32), f),
+        "flat": (xyz, lambda: hexes().ravel(), f),
+        "every_other": (xyz, lambda: numpy.repeat(hexes().ravel(), 2)[::2], f),
+        "component": (xyz, hexes, lambda: f()[:, None]),
+    }
+    for name, (coordinates, connectivity, values) in others.items():
+        everywhere(picture(name, coordinates, connectivity, values) == plain, f"{name} is the plain picture")
+    everywhere(picture("ghosts", xyz, hexes, f, ghosts=numpy.zeros(64, bool)) == plain, "ghosts of type bool")
+
+
+def what_cannot_be_borrowed_is_refused():
+    xyz, hexes, f = lattice()
+    with insitu.Session(comm, scene_text=SCENE.format(name="refused", folder=folder)) as s:
+        mesh = dict(coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+        for changed, kind, words in [
+            (dict(coordinates=xyz.tolist()), TypeError, "a list cannot be borrowed"),
+            (dict(coordinates=xyz.astype(">f8")), TypeError, "native"),
+            (dict(coordinates=xyz[:, :2]), ValueError, "vertices x 3"),
+            (dict(connectivity=hexes.astype("uint64")), TypeError, "uint64"),
+            (dict(connectivity=numpy.asfortranarray(hexes)), ValueError, "rows that follow one another"),
+            (dict(connectivity=hexes[:, :7].copy()), ValueError, "expected 8"),
+            (dict(ghosts=numpy.zeros(63, "u1")), ValueError, "63 elements, expected 64"),
+            (dict(ghosts=numpy.broadcast_to(numpy.uint8(0), 64)), ValueError, "repeats one element"),
+        ]:
+            raises(kind, words, s.set_mesh, "m", **{**mesh, **changed})
+        s.set_mesh("m", **mesh)
+        raises(TypeError, "MaskedArray", s.set_field, "m", "f", numpy.ma.masked_array(f))
+        raises(insitu.Error, "", s.set_field, "m", "f", f[:-1])
+        raises(insitu.Error, "rank", s.step, 0, 0.0)
+        s.set_field("m", "f", f)
+        s.step(1, 0.0)
+        everywhere(s.report["images"] == 1 and s.report["cycle"] == 1, "the session goes on after errors")
+    raises(ValueError, "closed", s.step, 2, 0.0)
+    error = raises(insitu.Error, "scene text:1", insitu.Session, comm, scene_text="imags: []")
+    everywhere(error.status == "INSITU_ERROR_SCENE" and error.on_all_ranks, "a scene's error")
+    raises(insitu.Error, "no/such.yaml", insitu.Session, comm, "no/such.yaml")
+
+
+def structures_are_those_of_the_header():
+    with open(sys.argv[2]) as file:
+        header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
+    for name, ours in [("array", insitu._Array), ("mesh", insitu._Mesh), ("field", insitu._Field), ("report", insitu._Report)]:
+        body = re.search(r"typedef struct insitu_%s \{(.*?)\}" % name, header, flags=re.S)[1]
+        theirs = [re.search(r"(\w+)(\[\d+\])?$", line.strip())[1] for line in body.split(";") if line.strip()]
+        everywhere(theirs == [field[0] for field in ours._fields_], f"insitu_{name}: {theirs}")
+
+
+if comm.rank == 0:
+    os.makedirs(folder, exist_ok=True)
+comm.Barrier()
+layouts_draw_the_same_picture()
+what_cannot_be_borrowed_is_refused()
+structures_are_those_of_the_header()
