@@ -15,6 +15,9 @@ install(EXPORT insituTargets NAMESPACE insitu:: DESTINATION ${insitu_package_dir
 # Loaded at run time, from beside libinsitu; nobody links it.
 install(TARGETS insitu_image LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 
+# Fortran's is compiled with the user's own code: modules are read by the compiler that wrote them alone.
+install(FILES ${PROJECT_SOURCE_DIR}/libinsitu/fortran/insitu.f90 DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/insitu)
+
 # Python's module finds the library in ../.. or where the loader looks. In the build tree it stands beside the library.
 set(INSITU_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Where insitu.py is installed, below the prefix")
 install(FILES ${PROJECT_SOURCE_DIR}/libinsitu/python/insitu.py DESTINATION ${INSITU_PYTHON_DIR})
@@ -32,6 +35,7 @@ endif()
 if(TARGET insitu-render)
   set_target_properties(insitu-render PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
   install(TARGETS insitu-render RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(FILES ${PROJECT_SOURCE_DIR}/docs/insitu-render.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
 endif()
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/insituConfig.cmake.in

@@ -180,8 +180,8 @@ fetch_box bounds_guess(const bounds_source *source, int threads)
             span_of(a, source->g->vertex_count, threads, &box.lower[axis], &box.upper[axis]);
         } else {
             double unused;
-            const grid_array lower = {(const char *)(source->lower + axis), 3 * size, false, false};
-            const grid_array upper = {(const char *)(source->upper + axis), 3 * size, false, false};
+            const grid_array lower = {(const char *)(source->lower + axis), 3 * size, false, false, 0};
+            const grid_array upper = {(const char *)(source->upper + axis), 3 * size, false, false, 0};
             span_of(&lower, source->box_count, 1, &box.lower[axis], &unused);
             span_of(&upper, source->box_count, 1, &unused, &box.upper[axis]);
         }

@@ -25,7 +25,7 @@ static inline fetch_shape fetch_grid_shape(const grid *g)
 MMBVH_INLINE int64_t fetch_index(const grid_array *a, int64_t i, const bool wide)
 {
     const char *p = a->data + i * a->stride;
-    return wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
+    return (wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p) - a->base;
 }
 
 /* Reads a number of an array of floats or doubles. */

@@ -7,21 +7,53 @@ function(insitu_add_same_pictures_test name)
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 PROCESSORS 2)
 endfunction()
 
-# Python: one that has numpy and mpi4py. The address sanitizer would have to be loaded before the interpreter.
-find_program(INSITU_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH)
-find_program(INSITU_PYTHON NAMES python3)
-if(INSITU_PYTHON)
-  execute_process(COMMAND ${INSITU_PYTHON} -c "import numpy, mpi4py" RESULT_VARIABLE python_lacks OUTPUT_QUIET ERROR_QUIET)
+# C++: from the header alone, under more warnings than our own code has. MPI's header is the system's, and not asked.
+add_executable(six_calls_cpp ${PROJECT_SOURCE_DIR}/examples/six_calls.cpp)
+set_target_properties(six_calls_cpp PROPERTIES CXX_EXTENSIONS OFF) # -std=c++17
+target_link_libraries(six_calls_cpp PRIVATE insitu)
+target_compile_options(six_calls_cpp PRIVATE -Wall -Wextra -Wold-style-cast -Wpedantic -Werror -ffp-contract=off)
+insitu_add_same_pictures_test(cpp_example_draws_on_2_ranks $<TARGET_FILE:six_calls_cpp>)
+
+# Fortran, where there is a compiler whose MPI module it reads: with every check that gfortran has.
+include(CheckLanguage)
+check_language(Fortran)
+if(CMAKE_Fortran_COMPILER)
+  enable_language(Fortran)
+  find_package(MPI COMPONENTS Fortran)
 endif()
-if(NOT INSITU_PYTHON OR python_lacks OR CMAKE_PROJECT_INCLUDE)
+if(NOT MPI_Fortran_HAVE_F08_MODULE)
+  add_test(NAME fortran COMMAND ${CMAKE_COMMAND} -E echo "skipped: no Fortran compiler, or no mpi_f08 for it")
+  set_tests_properties(fortran PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped")
+else()
+  add_library(insitu_fortran STATIC ${PROJECT_SOURCE_DIR}/libinsitu/fortran/insitu.f90)
+  target_link_libraries(insitu_fortran PUBLIC insitu MPI::MPI_Fortran)
+  set_target_properties(insitu_fortran PROPERTIES Fortran_MODULE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/fortran)
+  target_include_directories(insitu_fortran PUBLIC ${CMAKE_CURRENT_BINARY_DIR}/fortran)
+  add_executable(six_calls_fortran ${PROJECT_SOURCE_DIR}/examples/six_calls.f90)
+  add_executable(test_fortran test_fortran.f90)
+  foreach(target insitu_fortran six_calls_fortran test_fortran)
+    if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
+      target_compile_options(${target} PRIVATE -std=f2008 -Wall -Wextra -Wno-function-elimination -Werror
+        -fcheck=all -ffp-contract=off)
+    endif()
+  endforeach()
+  foreach(target six_calls_fortran test_fortran)
+    target_link_libraries(${target} PRIVATE insitu_fortran)
+  endforeach()
+  insitu_add_same_pictures_test(fortran_example_draws_on_2_ranks $<TARGET_FILE:six_calls_fortran>)
+  insitu_add_mpi_test(fortran test_fortran 1 2 ARGS ${CMAKE_CURRENT_BINARY_DIR}/fortran_)
+endif()
+
+# Python. The address sanitizer would have to be loaded before the interpreter.
+if(NOT INSITU_TEST_PYTHON)
   add_test(NAME python COMMAND ${CMAKE_COMMAND} -E echo "skipped: no python3 with numpy and mpi4py, or sanitizers are on")
   set_tests_properties(python PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped")
 else()
   set(python_path PYTHONPATH=${CMAKE_LIBRARY_OUTPUT_DIRECTORY} PYTHONDONTWRITEBYTECODE=1)
-  insitu_add_same_pictures_test(python_example_draws_on_2_ranks ${INSITU_PYTHON}
+  insitu_add_same_pictures_test(python_example_draws_on_2_ranks ${INSITU_TEST_PYTHON}
     ${PROJECT_SOURCE_DIR}/examples/six_calls.py)
   foreach(ranks 1 2)
-    add_test(NAME python_np${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${INSITU_PYTHON}
+    add_test(NAME python_np${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${INSITU_TEST_PYTHON}
       ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py ${CMAKE_CURRENT_BINARY_DIR}/python_np${ranks}
       ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu/insitu.h)
   endforeach()

@@ -23,6 +23,12 @@ if(WITH_VTK)
   run(${FOLDER}/project/outside_vtk)
 endif()
 
+# Python's module finds the library from where it is installed.
+if(PYTHON)
+  set(ENV{PYTHONPATH} ${prefix}/${PYTHON_DIR})
+  run(${PYTHON} -c "import insitu\nassert insitu.__file__.startswith('${prefix}/')")
+endif()
+
 # By pkg-config, as a makefile would.
 set(ENV{PKG_CONFIG_PATH} ${prefix}/${LIBDIR}/pkgconfig)
 execute_process(COMMAND ${PKG_CONFIG} --cflags --libs insitu

@@ -22,6 +22,9 @@ insitu_add_mpi_test(session_surfaces test_session_surfaces 1 2 3 4 7 TIMEOUT 120
 insitu_session_program(test_session_clips)
 insitu_add_mpi_test(session_clips test_session_clips 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_index_base)
+insitu_add_mpi_test(session_index_base test_session_index_base 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_statistics)
 insitu_add_mpi_test(session_statistics test_session_statistics 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

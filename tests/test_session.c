@@ -540,7 +540,7 @@ static void bad_scene_opens_no_session(void **context)
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? "/nowhere/at/all.yaml" : NULL, &session);
     told_everywhere(NULL, status, INSITU_ERROR_SCENE, "/nowhere/at/all.yaml: cannot be read");
     status = insitu_create(MPI_COMM_WORLD, own_rank == 0 ? NULL : "x", &session);
-    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no scene file");
+    told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "insitu_create: no scene is given");
     write_scene(plain_scene);
     status = insitu_create(MPI_COMM_WORLD, write_scene(plain_scene), own_rank == rank_count - 1 ? NULL : &session);
     told_everywhere(NULL, status, INSITU_ERROR_ARGUMENT, "no place for the session");

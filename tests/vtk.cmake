@@ -56,6 +56,11 @@ target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 set_tests_properties(vtk_tool vtk_images PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
 
+# The manual page names the options of --help, and is well formed.
+add_test(NAME manual_page COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/manual_page.sh $<TARGET_FILE:insitu-render>
+  ${PROJECT_SOURCE_DIR}/docs/insitu-render.1)
+set_tests_properties(manual_page PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+
 # Every scene of the gallery is drawn, where its grids are to be had.
 add_test(NAME gallery COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/gallery.sh $<TARGET_FILE:insitu-render>
   ${PROJECT_SOURCE_DIR}/docs/gallery ${CMAKE_CURRENT_BINARY_DIR}/gallery)

@@ -26,6 +26,7 @@ typedef struct grid_array {
     int64_t stride; /* bytes, never 0 */
     bool is_wide;
     bool is_integer;
+    int64_t base; /* of indices and offsets: what counts as 0 */
 } grid_array;
 
 typedef struct grid {
@@ -68,7 +69,7 @@ static inline double grid_array_number(const grid_array *a, int64_t i)
 static inline int64_t grid_array_index(const grid_array *a, int64_t i)
 {
     const char *p = a->data + i * a->stride;
-    return a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p;
+    return (a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p) - a->base;
 }
 
 /* 0 for a polyhedron, whose number is its own, and for what is no type. */

@@ -54,6 +54,7 @@ class _Mesh(ctypes.Structure):
         ("face_connectivity", _Array),
         ("ghosts", _Array),
         ("changed", ctypes.c_uint),
+        ("index_base", ctypes.c_int),
     ]
 
 
@@ -209,7 +210,7 @@ class Session:
         _check(create(handle, text, ctypes.byref(self._session)), None, True)
 
     def set_mesh(self, name, *, coordinates, connectivity, cell_type=TET, cell_types=None, offsets=None, faces=None,
-                 face_offsets=None, ghosts=None, vertex_ids=None, changed=CHANGED_ALL):
+                 face_offsets=None, ghosts=None, vertex_ids=None, index_base=0, changed=CHANGED_ALL):
         """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h)."""
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
@@ -219,7 +220,7 @@ class Session:
         held += arrays + [array]
         if cell_types is None and offsets is None:
             _expect_rows_of(cell_type, array)
-        mesh.cell_type, mesh.changed = cell_type, changed
+        mesh.cell_type, mesh.changed, mesh.index_base = cell_type, changed, index_base
         counts = {}
         for key, given in [("cell_types", cell_types), ("offsets", offsets), ("face_offsets", face_offsets),
                            ("ghosts", ghosts), ("vertex_ids", vertex_ids)]:

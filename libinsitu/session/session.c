@@ -110,6 +110,12 @@ insitu_status insitu_create_from_text(MPI_Comm comm, const char *scene_text, ins
     return open_session(comm, &(session_scene_source){"insitu_create_from_text", NULL, scene_text}, out);
 }
 
+insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_text, insitu_session **out)
+{
+    const MPI_Comm of_c = is_mpi_running() ? MPI_Comm_f2c(comm) : MPI_COMM_NULL;
+    return is_text ? insitu_create_from_text(of_c, scene, out) : insitu_create(of_c, scene, out);
+}
+
 insitu_status insitu_set_mesh(insitu_session *session, const char *mesh_name, const insitu_mesh *mesh)
 {
     if (!session) return INSITU_ERROR_ARGUMENT;

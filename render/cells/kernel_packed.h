@@ -15,11 +15,12 @@
 /* A mesh of tets alone, or of hexes, whose indices are int32 one after the other, and whose coordinates and values
  * float32, within reach of a gather: strides in elements. */
 typedef struct kernel_packed {
-    bool is_tets;                /* of tets; */
-    bool is_hexes;               /* of hexes */
-    bool is_interleaved;         /* a vertex's coordinates are side by side */
-    const int32_t *connectivity; /* NULL: the cells' vertices are one after the other */
-    const float *coordinates[3], *values;
+    bool is_tets;                         /* of tets; */
+    bool is_hexes;                        /* of hexes */
+    bool is_interleaved;                  /* a vertex's coordinates are side by side */
+    const int32_t *connectivity;          /* NULL: the cells' vertices are one after the other */
+    int32_t base;                         /* of the indices */
+    const float *coordinates[3], *values; /* of the vertex of index 0, which there may not be */
     int32_t stride, value_stride;
     float eye[3][2], scale; /* in two parts: the nearest float, and what is left */
 } kernel_packed;
@@ -42,18 +43,21 @@ static inline void kernel_packed_begin(kernel_packed *p, const kernel_frame *f, 
         field->component < 0)
         return;
     p->connectivity = (const int32_t *)(const void *)g->connectivity.data;
-    p->stride = kernel_packed_stride(&c[0], g->vertex_count);
-    p->value_stride = kernel_packed_stride(&field->values, g->vertex_count);
-    p->values = (const float *)(const void *)(field->values.data + field->component * field->component_stride);
+    const int64_t base = g->connectivity.base, count = g->vertex_count + base;
+    p->base = (int32_t)base;
+    p->stride = kernel_packed_stride(&c[0], count);
+    p->value_stride = kernel_packed_stride(&field->values, count);
+    p->values = (const float *)(const void *)(field->values.data + field->component * field->component_stride -
+                                              base * field->values.stride);
     p->scale = (float)f->job->space.scale;
     p->is_tets = p->stride && p->value_stride && p->scale > 1e-25f && p->scale < 1e25f;
     p->is_interleaved = true;
     for (int a = 0; a < 3; a++) {
         const double eye = f->job->camera.eye[a];
-        p->coordinates[a] = (const float *)(const void *)c[a].data;
+        p->coordinates[a] = (const float *)(const void *)(c[a].data - base * c[a].stride);
         p->eye[a][0] = (float)eye;
         p->eye[a][1] = (float)(eye - (double)p->eye[a][0]);
-        p->is_tets = p->is_tets && kernel_packed_stride(&c[a], g->vertex_count) == p->stride && fabs(eye) < 1e15;
+        p->is_tets = p->is_tets && kernel_packed_stride(&c[a], count) == p->stride && fabs(eye) < 1e15;
         p->is_interleaved = p->is_interleaved && c[a].data == c[0].data + a * (int64_t)sizeof(float);
     }
     p->is_hexes = p->is_tets && g->cell_type == GRID_HEX;
@@ -74,6 +78,7 @@ static inline void kernel_packed_surface(kernel_packed *p, const kernel_frame *f
     kernel_packed_begin(p, f, f->job->parts[part].cells, &f->surfaces[surface].layer->field.fields[part]);
     if (!active) return;
     p->connectivity = NULL;
+    p->base = 0;
     for (int a = 0; a < 3; a++) p->coordinates[a] = active->records + a;
     p->values = active->records + 3;
     p->stride = p->value_stride = KERNEL_ACTIVE_FLOATS;
@@ -108,7 +113,8 @@ SIMD_INLINE void kernel_packed_fetch(kernel_cell *c, const kernel_packed *p, uin
     c->is_finite = c->is_placed = true;
     c->has_lines = c->has_normal = false;
     for (int i = 0; i < vertices; i++) {
-        const int64_t vertex = c->vertices[i] = kernel_packed_vertex(p, index, vertices, i);
+        const int64_t vertex = kernel_packed_vertex(p, index, vertices, i);
+        c->vertices[i] = vertex - p->base;
         c->values[i] = (double)p->values[vertex * p->value_stride];
         for (int a = 0; a < 3; a++) c->world[i][a] = (double)p->coordinates[a][vertex * p->stride];
     }

@@ -88,8 +88,8 @@ typedef struct insitu_mesh {
     insitu_cell_type cell_type;  /* of every cell, where cell_types is not given */
     insitu_array cell_types;     /* optional, uint8, int32 or int64, cell_count: VTK's ids, for mixed cells */
     int64_t connectivity_count;  /* elements in connectivity */
-    insitu_array connectivity;   /* int32 or int64, connectivity_count: the cells' vertex indices from 0, one cell
-                                    after the other */
+    insitu_array connectivity;   /* int32 or int64, connectivity_count: the cells' vertex indices from index_base,
+                                    one cell after the other */
     insitu_array offsets;        /* int32 or int64, cell_count + 1: where each cell begins in connectivity, the last
                                     is connectivity_count. Not needed where all cells are of one type that is not
                                     INSITU_POLYHEDRON. */
@@ -105,6 +105,8 @@ typedef struct insitu_mesh {
                                         least 3 a face, around it in either direction, beginning anywhere */
     insitu_array ghosts;             /* optional, uint8, cell_count: cells with a nonzero flag are not drawn */
     unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
+    int index_base;                  /* 0 by default, or 1, as Fortran counts: what the first vertex, face and element
+                                        are called in connectivity, offsets, face_offsets and face_connectivity */
 } insitu_mesh;
 
 /* Whether a field has one value a vertex or one a cell. Of cells, volumes and colours show each value as it is, unless
@@ -179,6 +181,10 @@ INSITU_API insitu_status insitu_create(MPI_Comm comm, const char *scene_file, in
  * insitu_create() in all else. Rank 0's text counts, the others may give NULL; it is not needed when the call has
  * returned. Messages call it "scene text:line". Files that it names are relative to rank 0's working directory. */
 INSITU_API insitu_status insitu_create_from_text(MPI_Comm comm, const char *scene_text, insitu_session **out);
+
+/* insitu_create(), or insitu_create_from_text() where is_text is not 0, by a communicator as Fortran has it: what the
+ * Fortran module calls (docs/fortran.md). Collective. */
+INSITU_API insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene, int is_text, insitu_session **out);
 
 /* Hand over this rank's part of the mesh called name: borrowed arrays. Local. Ranks that have no part of it need not
  * call it; meshes of different names are drawn together, a layer of the scene on those that have its field, or that it

@@ -147,7 +147,8 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
                                     base_error *error)
 {
     const char *name = mesh->name;
-    const long long at = cell, face = place->face, vertex = place->vertex;
+    const long long base = mesh->given.index_base; /* indices and offsets are told as the caller has them */
+    const long long at = cell, face = place->face + base, vertex = place->vertex + base;
     switch (fault) {
     case FACES_NO_MEMORY:
         return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory to check cell %lld", name, at);
@@ -157,22 +158,22 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
                          (long long)place->count);
     case FACE_BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
-                         "mesh \"%s\": cell %lld (polyhedron): face index %lld is outside 0..%lld", name, at, face,
-                         (long long)mesh->given.face_count - 1);
+                         "mesh \"%s\": cell %lld (polyhedron): face index %lld is outside %lld..%lld", name, at, face,
+                         base, (long long)mesh->given.face_count - 1 + base);
     case FACE_BAD_OFFSETS:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: offsets %lld and %lld do not rise within "
-                         "0..%lld",
-                         name, at, face, (long long)place->first, (long long)place->next,
-                         (long long)mesh->given.face_connectivity_count);
+                         "%lld..%lld",
+                         name, at, face, place->first + base, place->next + base, base,
+                         mesh->given.face_connectivity_count + base);
     case FACE_TOO_SMALL:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld has %lld vertices, at least 3 are needed",
                          name, at, face, (long long)(place->next - place->first));
     case FACE_BAD_VERTEX:
         return base_fail(error, INSITU_ERROR_MESH,
-                         "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex index %lld is outside 0..%lld", name,
-                         at, face, vertex, (long long)mesh->given.vertex_count - 1);
+                         "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex index %lld is outside %lld..%lld",
+                         name, at, face, vertex, base, (long long)mesh->given.vertex_count - 1 + base);
     case FACE_BAD_COORDINATE:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: vertex %lld has a coordinate that is not "
@@ -182,7 +183,7 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: the edge from vertex %lld to %lld occurs %d "
                          "times, not once in each of two faces: the surface is not closed",
-                         name, at, face, vertex, (long long)place->other, place->sharing);
+                         name, at, face, vertex, place->other + base, place->sharing);
     case FACES_GOOD: break;
     }
     return INSITU_OK;
@@ -253,7 +254,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
 static long long given_type(const grid *g, int64_t cell)
 {
     if (!g->cell_types || g->cell_types_bytes < 8) return grid_cell_type(g, cell);
-    const grid_array types = {g->cell_types, g->cell_types_stride, true, true};
+    const grid_array types = {g->cell_types, g->cell_types_stride, true, true, 0};
     return grid_array_index(&types, cell);
 }
 
@@ -272,7 +273,7 @@ static const char *type_name(int type)
 static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_place *place,
                                       base_error *error)
 {
-    const long long first = place->first, next = place->next;
+    const long long base = mesh->given.index_base, first = place->first + base, next = place->next + base;
     if (place->type == GRID_POLYHEDRON && next < first)
         return base_fail(
             error, INSITU_ERROR_MESH,
@@ -282,11 +283,11 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
         place->next < place->first
             ? "mesh \"%s\": cell %lld (%s): offsets fall from %lld to %lld; a cell of its type has %d vertices"
             : "mesh \"%s\": cell %lld (%s): offsets %lld and %lld do not lie %d apart, the vertices of its type";
-    if (first < 0 || (next >= first && next > mesh->given.connectivity_count))
+    if (place->first < 0 || (next >= first && place->next > mesh->given.connectivity_count))
         return base_fail(error, INSITU_ERROR_MESH,
-                         "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside 0..%lld", mesh->name,
-                         (long long)cell, type_name(place->type), first, next,
-                         (long long)mesh->given.connectivity_count);
+                         "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside %lld..%lld", mesh->name,
+                         (long long)cell, type_name(place->type), first, next, base,
+                         mesh->given.connectivity_count + base);
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
     return base_fail(error, INSITU_ERROR_MESH, format, mesh->name, (long long)cell, type_name(place->type), first, next,
@@ -301,7 +302,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     face_room room = {0};
     const cell_fault fault = check_cell(mesh, cell, &room, &place);
     free_room(&room);
-    const long long at = cell, vertex = place.vertex;
+    const long long base = mesh->given.index_base, at = cell, vertex = place.vertex + base;
     const char *type = type_name(place.type);
     switch (fault) {
     case BAD_FACES: return describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
@@ -316,8 +317,8 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
         return base_fail(error, INSITU_ERROR_MESH,
-                         "mesh \"%s\": cell %lld (%s): vertex index %lld is outside 0..%lld (indices count from 0)",
-                         mesh->name, at, type, vertex, (long long)mesh->given.vertex_count - 1);
+                         "mesh \"%s\": cell %lld (%s): vertex index %lld is outside %lld..%lld (index_base is %lld)",
+                         mesh->name, at, type, vertex, base, (long long)mesh->given.vertex_count - 1 + base, base);
     case BAD_COORDINATE:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): vertex %lld has a coordinate that is not finite: (%g, %g, %g)",
@@ -369,8 +370,9 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
     if (!g->offsets.data || g->cell_count == 0) return INSITU_OK;
     const int64_t last = grid_array_index(&g->offsets, g->cell_count);
     if (last == mesh->given.connectivity_count) return INSITU_OK;
-    return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": the last offset is %lld, not connectivity_count, %lld",
-                     mesh->name, (long long)last, (long long)mesh->given.connectivity_count);
+    const long long base = mesh->given.index_base;
+    return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld",
+                     mesh->name, last + base, base ? " + 1" : "", mesh->given.connectivity_count + base);
 }
 
 /* The squares and volumes of larger ones, and what follows from them, would leave double. */
@@ -392,8 +394,8 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
                     error, INSITU_ERROR_MESH,
                     "mesh \"%s\": cell %lld (%s): vertex %lld is at (%g, %g, %g), coordinates of at most %g "
                     "are supported",
-                    mesh->name, (long long)cell, type_name(grid_cell_type(g, cell)), (long long)vertex, p[0], p[1],
-                    p[2], largest_coordinate);
+                    mesh->name, (long long)cell, type_name(grid_cell_type(g, cell)),
+                    (long long)vertex + mesh->given.index_base, p[0], p[1], p[2], largest_coordinate);
         }
     }
     return INSITU_OK;

@@ -138,6 +138,8 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
 {
     if (mesh->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", mesh->changed);
+    if (mesh->index_base != 0 && mesh->index_base != 1)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "index_base is %d, expected 0 or 1", mesh->index_base);
     if (mesh->cell_count == 0) return INSITU_OK;
     if (mesh->cell_types.data) {
         if (!mesh->offsets.data)
@@ -187,6 +189,7 @@ static grid as_grid(const insitu_mesh *mesh)
     g.face_count = mesh->face_count;
     g.face_offsets = as_grid_array(&mesh->face_offsets);
     g.face_connectivity = as_grid_array(&mesh->face_connectivity);
+    g.connectivity.base = g.offsets.base = g.face_offsets.base = g.face_connectivity.base = mesh->index_base;
     if (mesh->cell_types.data) {
         const grid_array types = as_grid_array(&mesh->cell_types);
         g.cell_types = types.data;
@@ -205,9 +208,9 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 {
     return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||
            a->connectivity_count != b->connectivity_count || a->cell_type != b->cell_type ||
-           !a->cell_types.data != !b->cell_types.data || !a->offsets.data != !b->offsets.data ||
-           !a->ghosts.data != !b->ghosts.data || a->face_count != b->face_count ||
-           a->face_connectivity_count != b->face_connectivity_count;
+           a->index_base != b->index_base || !a->cell_types.data != !b->cell_types.data ||
+           !a->offsets.data != !b->offsets.data || !a->ghosts.data != !b->ghosts.data ||
+           a->face_count != b->face_count || a->face_connectivity_count != b->face_connectivity_count;
 }
 
 static bool is_same_array(const insitu_array *a, const insitu_array *b)

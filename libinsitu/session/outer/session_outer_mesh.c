@@ -249,12 +249,12 @@ static grid describe(const outer_work *w)
     const int64_t size = (int64_t)sizeof(double);
     grid g = {.vertex_count = w->vertex_count,
               .cell_count = w->cell_count,
-              .connectivity = {(const char *)out->connectivity, size, true, true},
+              .connectivity = {(const char *)out->connectivity, size, true, true, 0},
               .cell_type = w->pyramid_count ? GRID_PYRAMID : GRID_TET};
     for (int axis = 0; axis < 3; axis++)
-        g.coordinates[axis] = (grid_array){(const char *)(out->coordinates + axis), 3 * size, true, false};
+        g.coordinates[axis] = (grid_array){(const char *)(out->coordinates + axis), 3 * size, true, false, 0};
     if (w->pyramid_count == 0 || w->pyramid_count == w->cell_count) return g;
-    g.offsets = (grid_array){(const char *)out->offsets, size, true, true};
+    g.offsets = (grid_array){(const char *)out->offsets, size, true, true, 0};
     g.cell_types = (const char *)out->types;
     g.cell_types_stride = g.cell_types_bytes = 1;
     return g;

@@ -10,7 +10,7 @@ session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by
     if (by_id) {
         const insitu_array *ids = &mesh->given.vertex_ids;
         const int64_t size = session_type_size(ids->type);
-        const grid_array a = {ids->data, ids->stride_bytes ? ids->stride_bytes : size, size == 8, true};
+        const grid_array a = {ids->data, ids->stride_bytes ? ids->stride_bytes : size, size == 8, true, 0};
         key.words[0] = (uint64_t)grid_array_index(&a, vertex);
         return key;
     }

@@ -1,0 +1,556 @@
+! libinsitu from Fortran: pictures of a running simulation, from its own unstructured cells.
+!
+!     type(insitu_session) :: pictures
+!     call pictures%create(MPI_COMM_WORLD, 'scene.yaml', status)
+!     call pictures%set_mesh('domain', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
+!     call pictures%set_field('domain', 'pressure', insitu_borrow(pressure), status)
+!     call pictures%step(cycle, time, status)
+!     if (status /= INSITU_OK) write (error_unit, '(a)') pictures%error()
+!     call pictures%destroy(status)
+!
+! Arrays are borrowed as they are, with their strides: nothing is copied. They must stay where they are until the next
+! step has returned or they are set again, whichever is later; give them the attribute target, and pass no expressions.
+! Indices count from 1. insitu.h says more of each argument; docs/fortran.md is the page about this file.
+module insitu
+    use, intrinsic :: iso_c_binding
+    use, intrinsic :: iso_fortran_env, only: int32, int64, int8, real32, real64
+    use mpi_f08, only: MPI_Comm
+    implicit none
+    private
+
+    integer, parameter, public :: INSITU_OK = 0, INSITU_ERROR_ARGUMENT = 1, INSITU_ERROR_SCENE = 2, &
+        INSITU_ERROR_MESH = 3, INSITU_ERROR_FIELD = 4, INSITU_ERROR_IO = 5, INSITU_ERROR_MEMORY = 6, &
+        INSITU_ERROR_MPI = 7, INSITU_ERROR_INTERNAL = 8
+    integer, parameter, public :: INSITU_TET = 10, INSITU_HEX = 12, INSITU_WEDGE = 13, INSITU_PYRAMID = 14, &
+        INSITU_POLYHEDRON = 42
+    integer, parameter, public :: INSITU_CHANGED_NOTHING = 0, INSITU_CHANGED_TOPOLOGY = 1, &
+        INSITU_CHANGED_GEOMETRY = 2, INSITU_CHANGED_VALUES = 4, INSITU_CHANGED_ALL = 7
+    integer, parameter, public :: INSITU_VERTEX = 0, INSITU_CELL = 1
+
+    integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 5
+
+    ! A borrowed array: elements one after the other, in so many rows of equal length.
+    type, public :: insitu_array
+        private
+        type(c_ptr) :: data = c_null_ptr
+        integer(c_int) :: kind = float32
+        integer(c_int64_t) :: rows = 1, columns = 0      ! rows: 1, or the first extent of a matrix
+        integer(c_int64_t) :: row_stride = 0, stride = 0 ! bytes, along the first extent and along the last
+    end type insitu_array
+
+    type, bind(C) :: c_array
+        type(c_ptr) :: data
+        integer(c_int) :: kind
+        integer(c_int64_t) :: stride
+    end type c_array
+
+    type, bind(C) :: c_mesh
+        integer(c_int64_t) :: vertex_count
+        type(c_array) :: coordinates(3)
+        type(c_array) :: vertex_ids
+        integer(c_int64_t) :: cell_count
+        integer(c_int) :: cell_type
+        type(c_array) :: cell_types
+        integer(c_int64_t) :: connectivity_count
+        type(c_array) :: connectivity, offsets
+        integer(c_int64_t) :: face_count
+        type(c_array) :: face_offsets
+        integer(c_int64_t) :: face_connectivity_count
+        type(c_array) :: face_connectivity, ghosts
+        integer(c_int) :: changed, index_base
+    end type c_mesh
+
+    type, bind(C) :: c_field
+        type(c_ptr) :: name
+        integer(c_int) :: centring
+        integer(c_int64_t) :: count
+        integer(c_int) :: component_count
+        integer(c_int64_t) :: component_stride
+        type(c_array) :: values
+        integer(c_int) :: changed
+    end type c_field
+
+    ! What the last step did, on this rank: as insitu_report in insitu.h.
+    type, bind(C), public :: insitu_report
+        integer(c_int64_t) :: cycle = 0
+        real(c_double) :: time = 0
+        integer(c_int) :: images = 0
+        real(c_double) :: total_ms = 0, prepare_ms = 0, build_ms = 0, refit_ms = 0, surface_ms = 0, volume_ms = 0, &
+            composite_ms = 0, write_ms = 0
+        integer(c_int64_t) :: cells = 0, cells_ghost = 0, cells_unusable = 0, cells_inverted = 0, cells_flat = 0
+        integer(c_int64_t) :: rays = 0, fragments = 0, map_failures = 0
+        integer(c_int64_t) :: bytes_borrowed = 0, bytes_copied = 0, bytes_trees = 0, bytes_pictures = 0, bytes_peak = 0
+        type(c_ptr) :: copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr ! texts: insitu_text()
+    end type insitu_report
+
+    ! A session. create, step and destroy are collective, the others local. status: INSITU_OK, or what error() explains.
+    type, public :: insitu_session
+        private
+        type(c_ptr) :: handle = c_null_ptr
+        character(:), allocatable :: own_error ! of an argument that C was not told
+    contains
+        procedure, private :: create_integer, create_f08, text_integer, text_f08
+        generic :: create => create_integer, create_f08                   ! (comm, scene_file, status)
+        generic :: create_from_text => text_integer, text_f08             ! (comm, scene_text, status)
+        procedure :: set_mesh, remove_mesh, set_field, step, report, error, destroy
+    end type insitu_session
+
+    ! An array of any kind that the library takes: reals and integers of 4 and 8 bytes, integers of 1 byte; a list, or a
+    ! matrix: connectivity (corners, cells), values (components, tuples).
+    interface insitu_borrow
+        module procedure borrow_r4, borrow_r8, borrow_i1, borrow_i4, borrow_i8
+        module procedure borrow_r4_2, borrow_r8_2, borrow_i4_2, borrow_i8_2
+    end interface insitu_borrow
+
+    ! Coordinates (3, vertices), or x, y and z.
+    interface insitu_points
+        module procedure points_of_matrix_r4, points_of_matrix_r8, points_of_axes_r4, points_of_axes_r8
+    end interface insitu_points
+
+    public :: insitu_borrow, insitu_points, insitu_text
+
+    interface
+        integer(c_int) function c_create(comm, scene, is_text, session) bind(C, name='insitu_create_fortran')
+            import :: c_int, c_char, c_ptr
+            integer(c_int), value :: comm, is_text
+            character(kind=c_char), intent(in) :: scene(*)
+            type(c_ptr), intent(out) :: session
+        end function c_create
+        subroutine c_mesh_defaults(mesh) bind(C, name='insitu_mesh_defaults')
+            import :: c_mesh
+            type(c_mesh), intent(out) :: mesh
+        end subroutine c_mesh_defaults
+        subroutine c_field_defaults(field) bind(C, name='insitu_field_defaults')
+            import :: c_field
+            type(c_field), intent(out) :: field
+        end subroutine c_field_defaults
+        integer(c_int) function c_set_mesh(session, name, mesh) bind(C, name='insitu_set_mesh')
+            import :: c_int, c_char, c_ptr
+            type(c_ptr), value :: session, mesh
+            character(kind=c_char), intent(in) :: name(*)
+        end function c_set_mesh
+        integer(c_int) function c_set_field(session, mesh, field) bind(C, name='insitu_set_field')
+            import :: c_int, c_char, c_ptr, c_field
+            type(c_ptr), value :: session
+            character(kind=c_char), intent(in) :: mesh(*)
+            type(c_field), intent(in) :: field
+        end function c_set_field
+        integer(c_int) function c_step(session, cycle, time) bind(C, name='insitu_step')
+            import :: c_int, c_ptr, c_int64_t, c_double
+            type(c_ptr), value :: session
+            integer(c_int64_t), value :: cycle
+            real(c_double), value :: time
+        end function c_step
+        type(c_ptr) function c_report(session) bind(C, name='insitu_last_report')
+            import :: c_ptr
+            type(c_ptr), value :: session
+        end function c_report
+        type(c_ptr) function c_error(session) bind(C, name='insitu_error')
+            import :: c_ptr
+            type(c_ptr), value :: session
+        end function c_error
+        integer(c_int) function c_destroy(session) bind(C, name='insitu_destroy')
+            import :: c_int, c_ptr
+            type(c_ptr), intent(inout) :: session
+        end function c_destroy
+        integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
+            import :: c_size_t, c_ptr
+            type(c_ptr), value :: text
+        end function c_strlen
+    end interface
+
+contains
+
+    ! ---- arrays ---------------------------------------------------------------------------------------------------
+
+    ! Bytes from one element to another.
+    integer(c_int64_t) function bytes_between(from, to)
+        type(c_ptr), intent(in) :: from, to
+        bytes_between = transfer(to, 0_c_intptr_t) - transfer(from, 0_c_intptr_t)
+    end function bytes_between
+
+    function list_of(kind, count, first, second) result(out)
+        integer(c_int), intent(in) :: kind
+        integer, intent(in) :: count
+        type(c_ptr), intent(in) :: first, second
+        type(insitu_array) :: out
+        out%data = first
+        out%kind = kind
+        out%columns = count
+        if (count > 1) out%stride = bytes_between(first, second)
+    end function list_of
+
+    function borrow_r4(a) result(out)
+        real(real32), intent(in), target :: a(:)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = list_of(float32, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
+        out%kind = float32
+    end function borrow_r4
+
+    function borrow_r8(a) result(out)
+        real(real64), intent(in), target :: a(:)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = list_of(float64, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
+        out%kind = float64
+    end function borrow_r8
+
+    function borrow_i1(a) result(out)
+        integer(int8), intent(in), target :: a(:)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = list_of(bytes, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
+        out%kind = bytes
+    end function borrow_i1
+
+    function borrow_i4(a) result(out)
+        integer(int32), intent(in), target :: a(:)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = list_of(integer32, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
+        out%kind = integer32
+    end function borrow_i4
+
+    function borrow_i8(a) result(out)
+        integer(int64), intent(in), target :: a(:)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = list_of(integer64, size(a), c_loc(a(1)), c_loc(a(min(2, size(a)))))
+        out%kind = integer64
+    end function borrow_i8
+
+    ! below, beside: the elements after the first along both extents, or the first itself.
+    function matrix_of(kind, extents, first, below, beside) result(out)
+        integer(c_int), intent(in) :: kind
+        integer, intent(in) :: extents(2)
+        type(c_ptr), intent(in) :: first, below, beside
+        type(insitu_array) :: out
+        out = list_of(kind, extents(2), first, beside)
+        out%rows = extents(1)
+        if (extents(1) > 1) out%row_stride = bytes_between(first, below)
+    end function matrix_of
+
+    function borrow_r4_2(a) result(out)
+        real(real32), intent(in), target :: a(:, :)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = matrix_of(float32, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2)))))
+        out%kind = float32
+        out%rows = size(a, 1)
+    end function borrow_r4_2
+
+    function borrow_r8_2(a) result(out)
+        real(real64), intent(in), target :: a(:, :)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = matrix_of(float64, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2)))))
+        out%kind = float64
+        out%rows = size(a, 1)
+    end function borrow_r8_2
+
+    function borrow_i4_2(a) result(out)
+        integer(int32), intent(in), target :: a(:, :)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = matrix_of(integer32, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2)))))
+        out%kind = integer32
+        out%rows = size(a, 1)
+    end function borrow_i4_2
+
+    function borrow_i8_2(a) result(out)
+        integer(int64), intent(in), target :: a(:, :)
+        type(insitu_array) :: out
+        if (size(a) > 0) out = matrix_of(integer64, shape(a), c_loc(a(1, 1)), c_loc(a(min(2, size(a, 1)), 1)), &
+            c_loc(a(1, min(2, size(a, 2)))))
+        out%kind = integer64
+        out%rows = size(a, 1)
+    end function borrow_i8_2
+
+    ! Three lists of a matrix of three rows; of another matrix an array that set_mesh refuses.
+    function points_of_matrix_r4(xyz) result(out)
+        real(real32), intent(in), target :: xyz(:, :)
+        type(insitu_array) :: out(3)
+        integer :: axis
+        out%rows = size(xyz, 1)
+        if (size(xyz, 1) /= 3) return
+        do axis = 1, 3
+            out(axis) = borrow_r4(xyz(axis, :))
+        end do
+    end function points_of_matrix_r4
+
+    function points_of_matrix_r8(xyz) result(out)
+        real(real64), intent(in), target :: xyz(:, :)
+        type(insitu_array) :: out(3)
+        integer :: axis
+        out%rows = size(xyz, 1)
+        if (size(xyz, 1) /= 3) return
+        do axis = 1, 3
+            out(axis) = borrow_r8(xyz(axis, :))
+        end do
+    end function points_of_matrix_r8
+
+    function points_of_axes_r4(x, y, z) result(out)
+        real(real32), intent(in), target :: x(:), y(:), z(:)
+        type(insitu_array) :: out(3)
+        out = [borrow_r4(x), borrow_r4(y), borrow_r4(z)]
+    end function points_of_axes_r4
+
+    function points_of_axes_r8(x, y, z) result(out)
+        real(real64), intent(in), target :: x(:), y(:), z(:)
+        type(insitu_array) :: out(3)
+        out = [borrow_r8(x), borrow_r8(y), borrow_r8(z)]
+    end function points_of_axes_r8
+
+    ! As C is told of a list. An array without elements is given all the same.
+    function as_c(a, nothing) result(out)
+        type(insitu_array), intent(in) :: a
+        real(real64), intent(in), target :: nothing
+        type(c_array) :: out
+        out%data = a%data
+        if (a%rows * a%columns == 0) out%data = c_loc(nothing)
+        out%kind = a%kind
+        out%stride = merge(a%row_stride, a%stride, a%rows > 1)
+    end function as_c
+
+    ! Rows follow one another as a list would.
+    logical function is_list(a)
+        type(insitu_array), intent(in) :: a
+        is_list = a%rows <= 1 .or. a%columns <= 1 .or. a%stride == a%rows * a%row_stride
+    end function is_list
+
+    ! ---- texts ----------------------------------------------------------------------------------------------------
+
+    ! A text of C's, as those of a report; valid as long as they are.
+    function insitu_text(from) result(out)
+        type(c_ptr), intent(in) :: from
+        character(:), allocatable :: out
+        character(kind=c_char), pointer :: letters(:)
+        integer :: i, length
+        length = 0
+        if (c_associated(from)) length = int(c_strlen(from))
+        allocate (character(length) :: out)
+        if (length == 0) return
+        call c_f_pointer(from, letters, [length])
+        do i = 1, length
+            out(i:i) = letters(i)
+        end do
+    end function insitu_text
+
+    function as_c_text(text) result(out)
+        character(*), intent(in) :: text
+        character(kind=c_char) :: out(len_trim(text) + 1)
+        integer :: i
+        do i = 1, len_trim(text)
+            out(i) = text(i:i)
+        end do
+        out(len_trim(text) + 1) = c_null_char
+    end function as_c_text
+
+    ! ---- sessions -------------------------------------------------------------------------------------------------
+
+    subroutine create_integer(self, comm, scene_file, status)
+        class(insitu_session), intent(inout) :: self
+        integer, intent(in) :: comm
+        character(*), intent(in) :: scene_file
+        integer, intent(out) :: status
+        self%own_error = ''
+        status = c_create(int(comm, c_int), as_c_text(scene_file), 0_c_int, self%handle)
+    end subroutine create_integer
+
+    subroutine create_f08(self, comm, scene_file, status)
+        class(insitu_session), intent(inout) :: self
+        type(MPI_Comm), intent(in) :: comm
+        character(*), intent(in) :: scene_file
+        integer, intent(out) :: status
+        call self%create_integer(comm%MPI_VAL, scene_file, status)
+    end subroutine create_f08
+
+    subroutine text_integer(self, comm, scene_text, status)
+        class(insitu_session), intent(inout) :: self
+        integer, intent(in) :: comm
+        character(*), intent(in) :: scene_text
+        integer, intent(out) :: status
+        self%own_error = ''
+        status = c_create(int(comm, c_int), as_c_text(scene_text), 1_c_int, self%handle)
+    end subroutine text_integer
+
+    subroutine text_f08(self, comm, scene_text, status)
+        class(insitu_session), intent(inout) :: self
+        type(MPI_Comm), intent(in) :: comm
+        character(*), intent(in) :: scene_text
+        integer, intent(out) :: status
+        call self%text_integer(comm%MPI_VAL, scene_text, status)
+    end subroutine text_f08
+
+    ! The first of the arguments that C cannot be told of; '' where there is none.
+    function find_fault(points, connectivity, lists) result(out)
+        type(insitu_array), intent(in) :: points(3), connectivity, lists(:)
+        character(:), allocatable :: out
+        out = ''
+        if (points(1)%rows /= 1) then
+            out = 'points have another first extent than 3'
+        else if (any(points%columns /= points(1)%columns)) then
+            out = 'x, y and z are of different lengths'
+        else if (.not. is_list(connectivity)) then
+            out = 'connectivity has gaps between its columns, which must follow one another'
+        else if (any(lists%rows > 1)) then
+            out = 'cell_types, offsets, face_offsets, ghosts and vertex_ids are lists, one is a matrix'
+        end if
+    end function find_fault
+
+    ! This rank's part of a mesh. connectivity: a list, or (corners, cells). faces, face_offsets: the faces' vertices, and
+    ! where each begins, of polyhedra, whose connectivity is of faces. Every index and offset counts from 1, or from
+    ! index_base.
+    subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
+        ghosts, vertex_ids, changed, index_base)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        type(insitu_array), intent(in) :: points(3), connectivity
+        integer, intent(out) :: status
+        integer, intent(in), optional :: cell_type, changed, index_base
+        type(insitu_array), intent(in), optional :: cell_types, offsets, faces, face_offsets, ghosts, vertex_ids
+        type(insitu_array) :: given(6)
+        type(c_mesh), target :: mesh
+        real(real64), target :: nothing
+        integer :: axis, corners
+        nothing = 0
+        call c_mesh_defaults(mesh)
+        mesh%index_base = 1
+        if (present(cell_type)) mesh%cell_type = cell_type
+        if (present(changed)) mesh%changed = changed
+        if (present(index_base)) mesh%index_base = index_base
+        if (present(cell_types)) given(1) = cell_types
+        if (present(offsets)) given(2) = offsets
+        if (present(face_offsets)) given(3) = face_offsets
+        if (present(ghosts)) given(4) = ghosts
+        if (present(vertex_ids)) given(5) = vertex_ids
+        if (present(faces)) given(6) = faces
+        self%own_error = find_fault(points, connectivity, given(1:5))
+        status = INSITU_ERROR_ARGUMENT
+        if (len(self%own_error) > 0) return
+        mesh%vertex_count = points(1)%columns
+        do axis = 1, 3
+            mesh%coordinates(axis) = as_c(points(axis), nothing)
+        end do
+        mesh%connectivity_count = connectivity%rows * connectivity%columns
+        mesh%connectivity = as_c(connectivity, nothing)
+        if (present(cell_types)) mesh%cell_types = as_c(cell_types, nothing)
+        if (present(offsets)) mesh%offsets = as_c(offsets, nothing)
+        if (present(ghosts)) mesh%ghosts = as_c(ghosts, nothing)
+        if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
+        if (present(face_offsets)) mesh%face_offsets = as_c(face_offsets, nothing)
+        if (present(face_offsets)) mesh%face_count = max(0_c_int64_t, face_offsets%columns - 1)
+        if (present(faces)) mesh%face_connectivity = as_c(faces, nothing)
+        mesh%face_connectivity_count = given(6)%rows * given(6)%columns
+        corners = corners_of(mesh%cell_type)
+        if (present(cell_types)) then
+            mesh%cell_count = cell_types%columns
+        else if (present(offsets)) then
+            mesh%cell_count = max(0_c_int64_t, offsets%columns - 1)
+        else
+            mesh%cell_count = mesh%connectivity_count / max(1, corners)
+        end if
+        self%own_error = find_length(mesh%cell_count, mesh%vertex_count, connectivity%rows, corners, given(1:5))
+        if (len(self%own_error) > 0) return
+        status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
+    end subroutine set_mesh
+
+    ! Lengths that C is not told, and would read beyond. given: cell_types, offsets, face_offsets, ghosts, vertex_ids.
+    function find_length(cells, vertices, rows, corners, given) result(out)
+        integer(c_int64_t), intent(in) :: cells, vertices, rows
+        integer, intent(in) :: corners
+        type(insitu_array), intent(in) :: given(5)
+        character(:), allocatable :: out
+        logical :: is_given(5)
+        is_given = given%columns > 0
+        out = ''
+        if (.not. any(is_given(1:2)) .and. rows > 1 .and. rows /= corners) then
+            out = 'connectivity has another first extent than cells of its type have vertices'
+        else if (is_given(2) .and. given(2)%columns /= cells + 1) then
+            out = 'offsets are not one more than the cells'
+        else if (is_given(4) .and. given(4)%columns /= cells) then
+            out = 'ghosts are not as many as the cells'
+        else if (is_given(5) .and. given(5)%columns /= vertices) then
+            out = 'vertex_ids are not as many as the vertices'
+        end if
+    end function find_length
+
+    pure integer function corners_of(cell_type)
+        integer(c_int), intent(in) :: cell_type
+        select case (cell_type)
+        case (INSITU_TET); corners_of = 4
+        case (INSITU_HEX); corners_of = 8
+        case (INSITU_WEDGE); corners_of = 6
+        case (INSITU_PYRAMID); corners_of = 5
+        case default; corners_of = 1
+        end select
+    end function corners_of
+
+    ! Take this rank's part of a mesh away.
+    subroutine remove_mesh(self, name, status)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        integer, intent(out) :: status
+        self%own_error = ''
+        status = c_set_mesh(self%handle, as_c_text(name), c_null_ptr)
+    end subroutine remove_mesh
+
+    ! This rank's part of a field: a list, or (components, tuples).
+    subroutine set_field(self, mesh, name, values, status, centring, changed)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: mesh, name
+        type(insitu_array), intent(in) :: values
+        integer, intent(out) :: status
+        integer, intent(in), optional :: centring, changed
+        character(kind=c_char), target :: c_name(len_trim(name) + 1)
+        type(c_field) :: field
+        real(real64), target :: nothing
+        nothing = 0
+        c_name = as_c_text(name)
+        call c_field_defaults(field)
+        field%name = c_loc(c_name)
+        if (present(centring)) field%centring = centring
+        if (present(changed)) field%changed = changed
+        field%count = values%columns
+        field%component_count = int(values%rows, c_int)
+        field%component_stride = values%row_stride
+        field%values = as_c(values, nothing)
+        field%values%stride = values%stride
+        self%own_error = ''
+        status = c_set_field(self%handle, as_c_text(mesh), field)
+    end subroutine set_field
+
+    ! Draw what is due. Collective; after an error, which every rank has, the session stays usable.
+    subroutine step(self, cycle, time, status)
+        class(insitu_session), intent(inout) :: self
+        integer, intent(in) :: cycle
+        real(real64), intent(in) :: time
+        integer, intent(out) :: status
+        self%own_error = ''
+        status = c_step(self%handle, int(cycle, c_int64_t), real(time, c_double))
+    end subroutine step
+
+    ! What the last step did. All zero before the first.
+    function report(self) result(out)
+        class(insitu_session), intent(in) :: self
+        type(insitu_report) :: out
+        type(insitu_report), pointer :: last
+        type(c_ptr) :: at
+        at = c_report(self%handle)
+        if (.not. c_associated(at)) return
+        call c_f_pointer(at, last)
+        out = last
+    end function report
+
+    ! Why the last call failed.
+    function error(self) result(out)
+        class(insitu_session), intent(in) :: self
+        character(:), allocatable :: out
+        out = ''
+        if (allocated(self%own_error)) out = self%own_error
+        if (len(out) == 0) out = insitu_text(c_error(self%handle))
+    end function error
+
+    subroutine destroy(self, status)
+        class(insitu_session), intent(inout) :: self
+        integer, intent(out) :: status
+        self%own_error = ''
+        status = c_destroy(self%handle)
+    end subroutine destroy
+end module insitu

@@ -1,0 +1,185 @@
+! test_fortran PREFIX: every kind of array that insitu_borrow takes draws the same picture, whose file is compared to the
+! byte; what cannot be borrowed, and what the library refuses, is a status and a text on every rank.
+program test_fortran
+    use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32, real64, error_unit
+    use mpi_f08
+    use insitu
+    implicit none
+    integer, parameter :: n = 5, vertices = n**3, cells = (n - 1)**3
+    real(real64), target :: xyz(3, vertices), axes(vertices, 3), gaps(6, 2*vertices), pressure(vertices)
+    real(real32), target :: xyz_4(3, vertices), vector_4(2, vertices)
+    integer(int32), target :: hexes(8, cells)
+    integer(int64), target :: hexes_8(8, cells), offsets_8(cells + 1), wide_8(16, cells)
+    integer(int8), target :: types(cells), ghosts(cells)
+    character(:), allocatable :: prefix, plain
+    integer :: rank, status
+
+    call MPI_Init()
+    call MPI_Comm_rank(MPI_COMM_WORLD, rank)
+    call take_prefix()
+    call make_mesh()
+    plain = picture('plain', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(pressure))
+    call expect(len(plain) > 300 .or. rank /= 0, 'the picture shows something')
+    call same(picture('axes', insitu_points(axes(:, 1), axes(:, 2), axes(:, 3)), insitu_borrow(hexes), &
+        insitu_borrow(pressure)), 'x, y, z')
+    call same(picture('gaps', insitu_points(gaps(1:6:2, 1:2*vertices:2)), insitu_borrow(hexes), &
+        insitu_borrow(pressure)), 'gaps between coordinates')
+    call same(picture('single', insitu_points(xyz_4), insitu_borrow(hexes_8), insitu_borrow(pressure)), 'single precision')
+    call same(picture('vector', insitu_points(xyz), insitu_borrow(reshaped()), insitu_borrow(vector_4), 'x'), 'components')
+    call same(picture('mixed', insitu_points(xyz), insitu_borrow(hexes_8), insitu_borrow(pressure), with_types=.true.), &
+        'types, offsets, ghosts')
+    call errors_are_told()
+    call MPI_Finalize()
+
+contains
+
+    subroutine take_prefix()
+        integer :: length
+        call get_command_argument(1, length=length)
+        allocate (character(length) :: prefix)
+        call get_command_argument(1, prefix)
+    end subroutine take_prefix
+
+    ! A block of hexes for each rank, side by side along x; sums of few bits, so that float32 holds all of it.
+    subroutine make_mesh()
+        integer :: i, j, k, v
+        do k = 0, n - 1
+            do j = 0, n - 1
+                do i = 0, n - 1
+                    v = 1 + i + n*(j + n*k)
+                    xyz(:, v) = [i + rank*(n - 1), j, k]
+                    pressure(v) = 0.25_real64*j + 0.5_real64*k
+                end do
+            end do
+        end do
+        do k = 0, n - 2
+            do j = 0, n - 2
+                do i = 0, n - 2
+                    v = 1 + i + n*(j + n*k)
+                    hexes(:, 1 + i + (n - 1)*(j + (n - 1)*k)) = &
+                        [v, v + 1, v + 1 + n, v + n, v + n*n, v + 1 + n*n, v + 1 + n + n*n, v + n + n*n]
+                end do
+            end do
+        end do
+        axes = transpose(xyz)
+        gaps = -1e9_real64
+        gaps(1:6:2, 1:2*vertices:2) = xyz
+        xyz_4 = real(xyz, real32)
+        vector_4(1, :) = real(pressure, real32)
+        vector_4(2, :) = -7
+        hexes_8 = hexes
+        wide_8 = -1
+        wide_8(1:8, :) = hexes
+        offsets_8 = [(int(1 + 8*(i - 1), int64), i=1, cells + 1)]
+        types = int(INSITU_HEX, int8)
+        ghosts = 0_int8
+    end subroutine make_mesh
+
+    ! The connectivity as a list.
+    function reshaped()
+        integer(int32), pointer :: reshaped(:)
+        reshaped(1:size(hexes)) => hexes
+    end function reshaped
+
+    subroutine expect(is_well, what)
+        logical, intent(in) :: is_well
+        character(*), intent(in) :: what
+        logical :: is_well_everywhere
+        call MPI_Allreduce(is_well, is_well_everywhere, 1, MPI_LOGICAL, MPI_LAND, MPI_COMM_WORLD)
+        if (is_well_everywhere) return
+        if (.not. is_well) write (error_unit, '(a, i0, 2a)') 'rank ', rank, ': not so: ', what
+        call MPI_Abort(MPI_COMM_WORLD, 1)
+    end subroutine expect
+
+    subroutine same(other, what)
+        character(*), intent(in) :: other, what
+        call expect(rank /= 0 .or. other == plain, what//' draw the same picture')
+    end subroutine same
+
+    function scene_of(name, component) result(out)
+        character(*), intent(in) :: name, component
+        character(:), allocatable :: out
+        out = 'images: [{name: a, size: [48, 32], layers: [{isosurface: {field: p, component: '//component// &
+            ', values: [1.3]}}, {surface: {opacity: 0.3}}], outputs: [{path: '//prefix//name//'.png}]}]'
+    end function scene_of
+
+    ! The file's bytes, on rank 0.
+    function picture(name, points, connectivity, values, component, with_types) result(out)
+        character(*), intent(in) :: name
+        type(insitu_array), intent(in) :: points(3), connectivity, values
+        character(*), intent(in), optional :: component
+        logical, intent(in), optional :: with_types
+        character(:), allocatable :: out
+        type(insitu_session) :: session
+        type(insitu_report) :: report
+        integer :: unit, size
+        if (present(component)) then
+            call session%create_from_text(MPI_COMM_WORLD%MPI_VAL, scene_of(name, component), status)
+        else
+            call session%create_from_text(MPI_COMM_WORLD, scene_of(name, 'magnitude'), status)
+        end if
+        call expect(status == INSITU_OK, session%error())
+        if (present(with_types)) then
+            call session%set_mesh('m', points, connectivity, status, cell_types=insitu_borrow(types), &
+                offsets=insitu_borrow(offsets_8), ghosts=insitu_borrow(ghosts))
+        else
+            call session%set_mesh('m', points, connectivity, status, cell_type=INSITU_HEX)
+        end if
+        call expect(status == INSITU_OK, session%error())
+        call session%set_field('m', 'p', values, status)
+        call expect(status == INSITU_OK, session%error())
+        call session%step(7, 0.5_real64, status)
+        call expect(status == INSITU_OK, session%error())
+        report = session%report()
+        call expect(report%images == 1 .and. report%cycle == 7 .and. abs(report%time - 0.5_real64) < 1e-9, &
+            'the report is of the step')
+        call expect(report%cells == cells .and. index(insitu_text(report%copied_why), 'outer faces') > 0, 'and its texts')
+        call session%destroy(status)
+        call expect(status == INSITU_OK, 'the session ends')
+        out = ''
+        if (rank /= 0) return
+        open (newunit=unit, file=prefix//name//'.png', access='stream', form='unformatted', status='old')
+        inquire (unit, size=size)
+        deallocate (out)
+        allocate (character(size) :: out)
+        read (unit) out
+        close (unit)
+    end function picture
+
+    subroutine refused(session, words)
+        type(insitu_session), intent(in) :: session
+        character(*), intent(in) :: words
+        call expect(status /= INSITU_OK .and. index(session%error(), words) > 0, words//', not: '//session%error())
+    end subroutine refused
+
+    subroutine errors_are_told()
+        type(insitu_session) :: session
+        call session%create(MPI_COMM_WORLD, prefix//'no.yaml', status)
+        call refused(session, 'no.yaml')
+        call session%create_from_text(MPI_COMM_WORLD, 'images: 3', status)
+        call refused(session, 'scene text:1')
+        call session%create_from_text(MPI_COMM_WORLD, scene_of('none', 'x'), status)
+        call session%set_mesh('m', insitu_points(axes), insitu_borrow(hexes), status)
+        call refused(session, 'first extent than 3')
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), status, cell_type=INSITU_HEX)
+        call refused(session, 'gaps between its columns')
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_TET)
+        call refused(session, 'another first extent than cells')
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX, &
+            ghosts=insitu_borrow(ghosts(2:)))
+        call refused(session, 'ghosts are not as many')
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
+        call expect(status == INSITU_OK, session%error())
+        call session%set_field('m', 'p', insitu_borrow(pressure(2:)), status)
+        call refused(session, 'p')
+        call session%set_field('m', 'p', insitu_borrow(pressure), status)
+        hexes(3, 2) = 0
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
+        call session%set_field('m', 'p', insitu_borrow(pressure), status)
+        call session%step(0, 0.0_real64, status)
+        call refused(session, 'vertex index 0 is outside 1..125')
+        call session%remove_mesh('m', status)
+        call expect(status == INSITU_OK, session%error())
+        call session%destroy(status)
+    end subroutine errors_are_told
+end program test_fortran

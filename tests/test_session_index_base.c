@@ -1,0 +1,154 @@
+/* Meshes whose indices begin at 1, as Fortran has them: the same pictures to the bit as from 0, of all types of cells,
+ * in arrays of 8 bytes with offsets and of 4 bytes without; and errors that tell indices as the caller has them. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, PIXELS = 64 * 48 };
+
+static const char scene_text[] =
+    "images:\n  - name: a\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n"
+    "      - isosurface: {field: f, values: [0.1, 0.7], opacity: 0.6, colour_by: {field: f, map: turbo}}\n"
+    "      - surface: {opacity: 0.2, edges: {}}\n      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n"
+    "      - volume: {field: f, map: viridis}\n    outputs: [{path: a.exr}]\n"
+    "  - name: b\n    size: [64, 48]\n    layers: [{isosurface: {field: f, values: [0.1]}}]\n"
+    "    outputs: [{path: b.exr}]\n"
+    "  - name: c\n    size: [64, 48]\n    layers: [{volume: {field: f}}]\n    sampling: {method: samples}\n"
+    "    outputs: [{path: c.exr}]\n";
+enum { PICTURES = 3 };
+
+static void add_to(int64_t *indices, int64_t count, int64_t base)
+{
+    for (int64_t i = 0; i < count; i++) indices[i] += base;
+}
+
+/* Of the whole part: connectivity and offsets, of polyhedra faces too. */
+static void count_from_one(session_input *in)
+{
+    test_mesh *part = &in->part;
+    add_to(part->connectivity, part->connectivity_count, 1);
+    add_to(part->offsets, part->cell_count + 1, 1);
+    if (part->face_count) add_to(part->face_offsets, part->face_count + 1, 1);
+    add_to(part->face_connectivity, part->face_connectivity_count, 1);
+    in->mesh.index_base = 1;
+}
+
+/* The arrays that kernels for many cells at once take. */
+typedef struct narrow_arrays {
+    float *coordinates, *values;
+    int32_t *connectivity;
+} narrow_arrays;
+
+static narrow_arrays make_narrow(session_input *in)
+{
+    const test_mesh *part = &in->part;
+    narrow_arrays out = {test_calloc((size_t)part->vertex_count * 3 + 1, sizeof(float)),
+                         test_calloc((size_t)part->vertex_count + 1, sizeof(float)),
+                         test_calloc((size_t)part->connectivity_count + 1, sizeof(int32_t))};
+    for (int64_t i = 0; i < 3 * part->vertex_count; i++) out.coordinates[i] = (float)part->coordinates[i];
+    for (int64_t i = 0; i < part->vertex_count; i++) out.values[i] = (float)part->values[i];
+    for (int64_t i = 0; i < part->connectivity_count; i++) out.connectivity[i] = (int32_t)part->connectivity[i];
+    insitu_mesh_interleaved(&in->mesh, out.coordinates, INSITU_FLOAT32);
+    in->mesh.cell_type = in->kind == TEST_TETS ? INSITU_TET : INSITU_HEX;
+    in->mesh.cell_types = in->mesh.offsets = in->mesh.ghosts = (insitu_array){0};
+    in->mesh.connectivity = (insitu_array){out.connectivity, INSITU_INT32, 0};
+    in->field.values = (insitu_array){out.values, INSITU_FLOAT32, 0};
+    return out;
+}
+
+static void free_narrow(narrow_arrays *n)
+{
+    test_free(n->coordinates);
+    test_free(n->values);
+    test_free(n->connectivity);
+}
+
+static void draw(const char *scene, const session_input *in, caught_picture out[PICTURES])
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+    forget_pictures();
+    everywhere(hand_over(session, in) == INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+    for (int i = 0; i < PICTURES; i++) out[i] = own_rank == 0 ? caught[i] : (caught_picture){0};
+    caught_count = 0;
+    insitu_destroy(&session);
+}
+
+static void check(test_mesh_kind kind, bool is_narrow)
+{
+    session_input from_zero = {0}, from_one = {0};
+    narrow_arrays narrow[2];
+    caught_picture pictures[2][PICTURES];
+    const char *scene = write_scene(scene_text);
+    input_create(&from_zero, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    input_create(&from_one, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    count_from_one(&from_one);
+    if (is_narrow) {
+        narrow[0] = make_narrow(&from_zero);
+        narrow[1] = make_narrow(&from_one);
+    }
+    draw(scene, &from_zero, pictures[0]);
+    draw(scene, &from_one, pictures[1]);
+    bool are_same = true;
+    for (int i = 0; i < PICTURES && own_rank == 0; i++) {
+        are_same = are_same && memcmp(pictures[0][i].rgba, pictures[1][i].rgba, PIXELS * 4 * sizeof(float)) == 0 &&
+                   memcmp(pictures[0][i].depth, pictures[1][i].depth, PIXELS * sizeof(float)) == 0;
+        for (int n = 0; n < 2; n++) free(pictures[n][i].rgba), free(pictures[n][i].depth);
+    }
+    everywhere(are_same);
+    for (int n = 0; n < 2 && is_narrow; n++) free_narrow(&narrow[n]);
+    input_free(&from_zero);
+    input_free(&from_one);
+}
+
+static void pictures_are_those_from_zero(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) check(kind, false);
+    check(TEST_TETS, true);
+    check(TEST_HEXES, true);
+}
+
+/* Each is wrong on the last rank alone. */
+static void errors_count_from_one_too(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    const bool is_last = own_rank == rank_count - 1;
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
+    count_from_one(&in);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    if (is_last) in.part.connectivity[3] = 0;
+    hand_over(session, &in);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_MESH, "vertex index 0 is outside 1..",
+                    "index_base is 1");
+    if (is_last) in.part.connectivity[3] = in.part.vertex_count + 1;
+    hand_over(session, &in);
+    told_everywhere(session, insitu_step(session, 1, 0), INSITU_ERROR_MESH, "is outside 1..");
+    if (is_last) in.part.connectivity[3] = in.part.vertex_count;
+    if (is_last) in.part.offsets[in.part.cell_count]--;
+    hand_over(session, &in);
+    told_everywhere(session, insitu_step(session, 2, 0), INSITU_ERROR_MESH, "offsets");
+    if (is_last) in.part.offsets[in.part.cell_count]++;
+    in.mesh.index_base = is_last ? 2 : 1;
+    everywhere((insitu_set_mesh(session, "m", &in.mesh) == INSITU_ERROR_ARGUMENT) == is_last);
+    told_everywhere(session, insitu_step(session, 3, 0), INSITU_ERROR_ARGUMENT, "index_base is 2, expected 0 or 1");
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_are_those_from_zero),
+                                       cmocka_unit_test(errors_count_from_one_too)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
