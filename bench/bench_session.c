@@ -12,6 +12,8 @@ enum { WARM_UP = 8, MOST_WARM_UP = 60 };
 
 static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};
 
+const double bench_plane[3] = {0.4, 0.6, 0.7};
+
 /* The depths of the last picture, where it came with them. */
 static float *caught_depths;
 
@@ -36,7 +38,9 @@ const char *bench_change_name(bench_change change)
 
 const char *bench_picture_name(bench_picture picture)
 {
-    static const char *const names[BENCH_PICTURE_COUNT] = {"isosurface", "isosurfaces", "volume"};
+    static const char *const names[BENCH_PICTURE_COUNT] = {
+        "isosurface",         "isosurfaces",        "volume", "slice", "surface", "clipped surface",
+        "surface with edges", "antialiased surface"};
     return names[picture];
 }
 
@@ -107,8 +111,28 @@ static void set_field(bench_session *s, insitu_session *to)
     must(s, insitu_set_field(to, "cube", &s->field));
 }
 
+/* Slices and outer surfaces, coloured as VTK's are; false where the picture is neither. */
+static bool write_plane_or_faces(const bench_session *s, FILE *file)
+{
+    const char *colours = "field: f, map: cool_to_warm, range: [-1.5, 1.5]";
+    const char *no_light = "material: {ambient: 1, diffuse: 0, specular: 0}";
+    if (s->picture < BENCH_SLICE) return false;
+    if (s->picture == BENCH_SLICE)
+        fprintf(file, "      - slice: {%s, planes: [{normal: [%g, %g, %g], point: [0, 0, 0]}]}\n", colours,
+                bench_plane[0], bench_plane[1], bench_plane[2]);
+    else
+        fprintf(file, "      - surface: {colour_by: {%s}, %s%s}\n", colours, no_light,
+                s->picture == BENCH_EDGES ? ", edges: {}" : "");
+    if (s->picture == BENCH_CLIPPED)
+        fprintf(file, "    clip: {planes: [{normal: [%g, %g, %g], point: [0, 0, 0]}]}\n", bench_plane[0],
+                bench_plane[1], bench_plane[2]);
+    if (s->picture == BENCH_ANTIALIASED) fprintf(file, "    antialias: 4\n");
+    return true;
+}
+
 static void write_layer(const bench_session *s, FILE *file)
 {
+    if (write_plane_or_faces(s, file)) return;
     if (s->picture == BENCH_VOLUME) {
         fprintf(file, "      - volume: {field: f, map: viridis, range: [%g, %g], unit_distance: %g, opacity: [",
                 bench_knots[0], bench_knots[BENCH_KNOTS - 1], bench_unit_distance);

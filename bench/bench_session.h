@@ -17,7 +17,19 @@ typedef enum bench_change {
 
 const char *bench_change_name(bench_change change);
 
-typedef enum bench_picture { BENCH_ISOSURFACE, BENCH_ISOSURFACES, BENCH_VOLUME, BENCH_PICTURE_COUNT } bench_picture;
+typedef enum bench_picture {
+    BENCH_ISOSURFACE,
+    BENCH_ISOSURFACES,
+    BENCH_VOLUME,
+    BENCH_SLICE,       /* by the plane through the origin with the normal bench_plane */
+    BENCH_SURFACE,     /* the outer one, coloured by the field */
+    BENCH_CLIPPED,     /* the same, cut by the plane */
+    BENCH_EDGES,       /* the outer surface with the cells' edges */
+    BENCH_ANTIALIASED, /* the outer surface by 4 samples a pixel */
+    BENCH_PICTURE_COUNT
+} bench_picture;
+
+extern const double bench_plane[3];
 
 const char *bench_picture_name(bench_picture picture);
 
