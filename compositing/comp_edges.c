@@ -1,32 +1,75 @@
 #include "comp_edges.h"
 
-/* Codes go nearly by the root of the light: |root a - root b| > c wherever (a - b)^2 > 2 c^2 (a + b), which takes no
- * root. */
-static bool differ(const float *a, const float *b)
+#include <string.h>
+
+#include "memory.h"
+
+/* Rows that a thread takes at a time. It marks pixels of the row after them too, the first of another's. */
+enum { ROWS = 32 };
+
+/* A byte a channel: do two rows of pixels differ there? Codes go nearly by the root of the light: |root a - root b| > c
+ * wherever (a - b)^2 > 2 c^2 (a + b), which takes no root. */
+static void compare(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;
-    bool any = false;
-    for (int i = 0; i < 4; i++) any = any || (a[i] - b[i]) * (a[i] - b[i]) > limit * (a[i] + b[i]);
-    return any;
+    for (int64_t i = 0; i < 4 * pixels; i++) out[i] = (a[i] - b[i]) * (a[i] - b[i]) > limit * (a[i] + b[i]);
 }
 
-static void compare(const image *picture, int64_t pixel, int64_t other, unsigned char *pixels)
+/* A byte a pixel; of a row that two threads may mark, both atomically. */
+static void mark(unsigned char *pixel, bool is_shared)
 {
-    if (!differ(picture->rgba + 4 * pixel, picture->rgba + 4 * other)) return;
-    pixel_set_add(pixels, pixel);
-    pixel_set_add(pixels, other);
+    if (is_shared) {
+#pragma omp atomic write
+        *pixel = 1;
+    } else {
+        *pixel = 1;
+    }
 }
 
-void comp_find_edges(const image *picture, unsigned char *pixels)
+static void mark_pairs(const unsigned char *differ, int64_t pixels, unsigned char *own, bool is_own_shared,
+                       unsigned char *other, bool is_other_shared)
+{
+    for (int64_t p = 0; p < pixels; p++) {
+        uint32_t channels;
+        memcpy(&channels, differ + 4 * p, sizeof channels);
+        if (!channels) continue;
+        mark(own + p, is_own_shared);
+        mark(other + p, is_other_shared);
+    }
+}
+
+/* The row's pixels beside each other, and those below: straight, to the left, to the right. differ: 4 bytes a pixel. */
+static void mark_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
 {
     const int64_t width = picture->width;
-    for (int64_t y = 0; y < picture->height; y++)
-        for (int64_t x = 0; x < width; x++) {
-            const int64_t pixel = y * width + x;
-            if (x + 1 < width) compare(picture, pixel, pixel + 1, pixels);
-            if (y + 1 == picture->height) continue;
-            compare(picture, pixel, pixel + width, pixels);
-            if (x > 0) compare(picture, pixel, pixel + width - 1, pixels);
-            if (x + 1 < width) compare(picture, pixel, pixel + width + 1, pixels);
-        }
+    const float *row = picture->rgba + 4 * width * y, *next = row + 4 * width;
+    unsigned char *own = marks + width * y, *below = own + width;
+    const bool is_shared = y % ROWS == 0, is_next_shared = (y + 1) % ROWS == 0;
+    compare(row, row + 4, width - 1, differ);
+    mark_pairs(differ, width - 1, own, is_shared, own + 1, is_shared);
+    if (y + 1 == picture->height) return;
+    compare(row, next, width, differ);
+    mark_pairs(differ, width, own, is_shared, below, is_next_shared);
+    compare(row + 4, next, width - 1, differ);
+    mark_pairs(differ, width - 1, own + 1, is_shared, below, is_next_shared);
+    compare(row, next + 4, width - 1, differ);
+    mark_pairs(differ, width - 1, own, is_shared, below + 1, is_next_shared);
+}
+
+bool comp_find_edges(const image *picture, int threads, unsigned char *pixels)
+{
+    const int64_t width = picture->width, count = width * picture->height, blocks = (picture->height + ROWS - 1) / ROWS;
+    unsigned char *marks = base_calloc((size_t)count, 1), *differ = base_alloc((size_t)(blocks * width) * 4);
+    const bool has_memory = marks && differ;
+    if (has_memory) {
+#pragma omp parallel for num_threads(threads) schedule(dynamic)
+        for (int64_t block = 0; block < blocks; block++)
+            for (int64_t y = block * ROWS; y < (block + 1) * ROWS && y < picture->height; y++)
+                mark_row(picture, y, differ + 4 * width * block, marks);
+        for (int64_t p = 0; p < count; p++)
+            if (marks[p]) pixel_set_add(pixels, p);
+    }
+    base_free(marks);
+    base_free(differ);
+    return has_memory;
 }

@@ -115,7 +115,8 @@ static void free_picture(caught_picture *picture)
 static bool is_truth(const caught_picture *picture, const caught_picture *plain, int count, int64_t rays)
 {
     unsigned char edges[PIXELS / 8] = {0};
-    comp_find_edges(&(image){.width = WIDTH, .height = HEIGHT, .rgba = plain->rgba}, edges);
+    const image picture_before = {.width = WIDTH, .height = HEIGHT, .rgba = plain->rgba};
+    if (!comp_find_edges(&picture_before, 2, edges)) return false;
     const int64_t edge_count = pixel_set_count(edges, PIXELS);
     bool is_well = rays == PIXELS + count * edge_count && edge_count > PIXELS / 50 && edge_count < PIXELS / 3;
     for (int pixel = 0; pixel < PIXELS && is_well; pixel++) {

@@ -34,7 +34,7 @@ typedef struct kernel_placed_hexes {
     int32_t quads[KERNEL_HEX_FACES * SIMD_WIDTH]; /* face by face: kernel_quad_corners(), four bits each */
     /* for kernel_placed_hex_cell() */
     float bound[KERNEL_HEX_LINES][SIMD_WIDTH], world[3][8][SIMD_WIDTH];
-    int32_t rank[8][SIMD_WIDTH];
+    int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_placed_hexes;
 
 /* ---- order ---- */
@@ -281,6 +281,7 @@ static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out,
         }
         rank[i] = h.rank[b];
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
+        memcpy(out->vertex[i], &h.vertex[b], sizeof h.vertex[b]);
     }
     kernel_lanes_relative(values, isovalues, relative);
     for (int i = 0; i < 8; i++) vf_store(out->at[3][i], relative[i]);

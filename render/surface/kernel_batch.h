@@ -262,11 +262,12 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
     return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, r->far)));
 }
 
-/* kernel_accept() of one ray, for two of a packet may be of one pixel. Returns its block, where something is nearer. */
-SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, int value, float depth, const float normal[3])
+/* kernel_accept() of one ray, for two of a packet may be of one pixel. colour: not lit. Returns its block, where
+ * something is nearer. */
+SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, int value, float depth, const float normal[3],
+                                       const float colour[3])
 {
     const kernel_surface *s = t->surface;
-    const float *colour = s->layer->colours + 3 * value;
     const int ray = at % SIMD_WIDTH;
     kernel_packet *p = &t->packets[at / SIMD_WIDTH];
     kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
@@ -297,7 +298,8 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, const
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
         const float normal[3] = {b->normal[0][n], b->normal[1][n], b->normal[2][n]};
-        blocks |= kernel_ray_accept(t, r->at[i], b->value[n], depth[i], normal);
+        blocks |=
+            kernel_ray_accept(t, r->at[i], b->value[n], depth[i], normal, t->surface->layer->colours + 3 * b->value[n]);
     }
     return blocks;
 }
@@ -388,8 +390,7 @@ SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
     const render_surface_layer *l = t->surface->layer;
     /* Rays that are clipped begin each at a depth of its own, which packets know. */
     if (t->frame->job->clip_count) return false;
-    const bool is_plain = !l->colour_map && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
-    return is_plain && t->layer < t->frame->opaque_count;
+    return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
 }
 
 /* What is added from now on is of the part and the layer under way: what waits, of others, is traced. */
@@ -405,7 +406,7 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     b->layer = layer;
     b->part = part;
     kernel_packed_surface(&b->packed, t->frame, layer, part);
-    b->takes_batches = b->packed.is_tets && kernel_tile_layer_batches(t);
+    b->takes_batches = b->packed.is_tets && !t->surface->layer->colour_map && kernel_tile_layer_batches(t);
 }
 
 /* The last ones. */

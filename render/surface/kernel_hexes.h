@@ -49,6 +49,7 @@ typedef struct kernel_hexes {
     int value[SIMD_WIDTH];
     float near[SIMD_WIDTH];
     kernel_placed_hexes placed;
+    float colours[8][SIMD_WIDTH]; /* values of the colours' field, as kernel_cell.g; only where there is one */
     kernel_hexes_bounds bounds;
     unsigned ready; /* lanes that are cells on their own as well */
     kernel_cell cells[SIMD_WIDTH];
@@ -62,6 +63,7 @@ static void kernel_hexes_begin(kernel_hexes *h)
 {
     h->count = h->rays.count = 0;
     h->layer = h->part = -1;
+    memset(h->colours, 0, sizeof h->colours);
 }
 
 /* ---- cells alone ---- */
@@ -73,6 +75,7 @@ SIMD_INLINE void kernel_hex_ready(kernel_hexes *h, int n)
     h->ready |= 1u << n;
     kernel_placed_hex_cell(&h->placed, n, &h->cells[n]);
     h->cells[n].index = h->cell[n];
+    for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
     h->polys[n].is_set_up = false;
 }
 
@@ -231,18 +234,59 @@ SIMD_INLINE void kernel_hex_maps(const kernel_hexes *h, vi lane, kernel_map_lane
     }
 }
 
+/* kernel_map_colour() of a hex a lane, and kernel_map_value() of it. */
+SIMD_INLINE vf kernel_hexes_colour_value(const kernel_hexes *h, vi lane, const vf r[3])
+{
+    vf v[8], c[8];
+    for (int i = 0; i < 8; i++) v[i] = kernel_hex_take(h->colours[i], lane);
+    for (int half = 0; half < 2; half++) {
+        kernel_half d[8], e[8];
+        for (int i = 0; i < 8; i++) d[i] = kernel_half_of(&v[i], half);
+        KERNEL_HEX_FIT(e, d);
+        for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
+    }
+    const kernel_product m = kernel_product_at(false, r);
+    return kernel_value_of(c, false, &m, r);
+}
+
+/* The colours' field of the lanes' cells, in the order of their vertices. */
+static __attribute__((noinline)) void kernel_hexes_fetch_colours(const kernel_tile_trace *t, kernel_hexes *h)
+{
+    const kernel_surface *s = t->surface;
+    const grid_field *field = &s->layer->colour_field.fields[h->part];
+    for (int n = 0; n < h->count; n++)
+        for (int i = 0; i < 8; i++) {
+            const int64_t vertex = h->placed.vertex[i][n] - h->packed.base;
+            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->cell[n] : vertex);
+            h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
+        }
+}
+
+/* Where lanes hit: r, of the cells' own coordinates, is looked at for colours alone. */
+typedef struct kernel_hexes_places {
+    vf t, normal[3], r[3];
+} kernel_hexes_places;
+
 /* Returns the blocks in which something is nearer. */
 static __attribute__((noinline)) unsigned kernel_hexes_accept(kernel_tile_trace *t, const kernel_hexes *h,
-                                                              const kernel_hex_rays *rays, int first, vi at_lanes,
-                                                              unsigned hit, vf depth, const vf normals[3])
+                                                              const kernel_hex_rays *rays, int first,
+                                                              const kernel_hex_packet *p, unsigned hit,
+                                                              const kernel_hexes_places *places)
 {
+    const render_surface_layer *layer = t->surface->layer;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
-    memcpy(at, &at_lanes, sizeof at);
+    vf colours[3];
+    if (layer->colour_map) kernel_base_colour(t->surface, 0, kernel_hexes_colour_value(h, p->lane, places->r), colours);
+    memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit);
-        const float normal[3] = {normals[0][i], normals[1][i], normals[2][i]};
-        blocks |= kernel_ray_accept(t, at[i], h->value[rays->lane[first + i]], depth[i], normal);
+        const int i = __builtin_ctz(hit), value = h->value[rays->lane[first + i]];
+        const float normal[3] = {places->normal[0][i], places->normal[1][i], places->normal[2][i]};
+        const float *plain = layer->colours + 3 * value;
+        const float colour[3] = {layer->colour_map ? colours[0][i] : plain[0],
+                                 layer->colour_map ? colours[1][i] : plain[1],
+                                 layer->colour_map ? colours[2][i] : plain[2]};
+        blocks |= kernel_ray_accept(t, at[i], value, places->t[i], normal, colour);
     }
     return blocks;
 }
@@ -263,7 +307,7 @@ static __attribute__((noinline)) unsigned kernel_hexes_hit(kernel_tile_trace *t,
         kernel_hex_packet p;
         kernel_map_lanes map;
         kernel_point ends[2], at;
-        vf normal[3];
+        kernel_hexes_places places;
         kernel_hex_packet_begin(&p, t, &h->found, n);
         for (int e = 0; e < 2; e++) {
             ends[e].t = vf_load(h->found_ends.t[e] + n);
@@ -275,8 +319,10 @@ static __attribute__((noinline)) unsigned kernel_hexes_hit(kernel_tile_trace *t,
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         if (__builtin_expect(vm_any(open), 0)) nearer |= kernel_hexes_alone(t, h, &h->found, n, p.at, vm_bits(open));
         if (!vm_any(hit)) continue;
-        kernel_hexes_normal(t, &map, at.r, normal);
-        nearer |= kernel_hexes_accept(t, h, &h->found, n, p.at, vm_bits(hit), at.t, normal);
+        kernel_hexes_normal(t, &map, at.r, places.normal);
+        places.t = at.t;
+        memcpy(places.r, at.r, sizeof places.r);
+        nearer |= kernel_hexes_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
     }
     return nearer;
 }
@@ -306,7 +352,7 @@ static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace 
     kernel_map_lanes map;
     kernel_limits limits;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
-    vf depth = vf_set(0), normals[3] = {depth, depth, depth};
+    kernel_hexes_places places = {.t = vf_set(0)};
     vm hits = vm_none();
     kernel_hex_packet_begin(&p, t, &h->others, n);
     i.mask = p.active;
@@ -336,12 +382,15 @@ static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace 
         kernel_polish(&s, &at);
         const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
         kernel_hexes_normal(t, &map, at.r, normal);
-        for (int a = 0; a < 3; a++) normals[a] = vf_select(hit, normal[a], normals[a]);
-        depth = vf_select(hit, at.t, depth);
+        for (int a = 0; a < 3; a++) {
+            places.normal[a] = vf_select(hit, normal[a], places.normal[a]);
+            places.r[a] = vf_select(hit, at.r[a], places.r[a]);
+        }
+        places.t = vf_select(hit, at.t, places.t);
         hits = vm_or(hits, hit);
         kernel_search_close(&s, hit);
     } while (kernel_search_on(&s));
-    return vm_any(hits) ? kernel_hexes_accept(t, h, &h->others, n, p.at, vm_bits(hits), depth, normals) : 0;
+    return vm_any(hits) ? kernel_hexes_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
 }
 
 /* ---- batches ---- */
@@ -381,6 +430,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
     }
     const vm collapsed = kernel_place_hexes(&h->placed, &h->packed, t->frame, &t->tile, h->vertex, h->isovalue);
     kernel_hexes_bound((const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
+    if (t->surface->layer->colour_map) kernel_hexes_fetch_colours(t, h);
     h->ready = 0;
     for (int n = 0; n < h->count; n++) {
         const unsigned blocks = h->blocks[n] & t->wanted & kernel_blocks_beyond(t, h->near[n]);
@@ -472,6 +522,7 @@ SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const k
     const int n = h->count++;
     h->cells[n] = *t->cell;
     h->polys[n] = *t->poly;
+    for (int i = 0; i < 8; i++) h->colours[i][n] = t->cell->g[i];
     h->ready |= 1u << n;
     h->value[n] = value;
     h->near[n] = candidate->near;

@@ -20,8 +20,11 @@ enum { overlap_fragments = 1 << 22 };
 
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
 typedef struct canvas {
-    image frame;                      /* its memory is the session's picture */
-    float *depth;                     /* the frame's, put by while it is drawn without */
+    image frame;   /* its memory is the session's picture */
+    float *depth;  /* the frame's, put by while it is drawn without */
+    image samples; /* where edges alone take more than one frame: those, and their sums */
+    int64_t edge_count, *edges;
+    double *edge_sums;
     double *sum;                      /* NULL: there is one frame */
     session_decorations *decorations; /* NULL: there are none, and the frame has its background */
 } canvas;
@@ -33,6 +36,9 @@ static void canvas_free(canvas *c, session_picture *picture)
 {
     if (picture->bytes > kept_bytes) session_drop_picture(picture);
     base_free(c->sum);
+    base_free(c->samples.rgba);
+    base_free(c->edges);
+    base_free(c->edge_sums);
     session_free_decorations(c->decorations);
 }
 
@@ -43,14 +49,19 @@ static bool wants_depth(const scene_image *image)
     return false;
 }
 
+static bool has_edges_alone(const scene_image *image)
+{
+    return image->antialias > 1 && image->volume_count == 0;
+}
+
 static insitu_status canvas_create(const scene_image *image, int rank, session_picture *picture, canvas *out,
                                    base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     const size_t bytes = pixels * (wants_depth(image) ? 5 : 4) * sizeof(float);
-    const bool is_summed = image->frames > 1;
-    out->frame.width = image->width;
-    out->frame.height = image->height;
+    const bool is_summed = image->frames > 1 && !has_edges_alone(image);
+    out->frame.width = out->samples.width = image->width;
+    out->frame.height = out->samples.height = image->height;
     if (rank != 0) return INSITU_OK;
     out->frame.rgba = session_reserve_picture(picture, bytes);
     if (wants_depth(image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
@@ -61,26 +72,39 @@ static insitu_status canvas_create(const scene_image *image, int rank, session_p
     return INSITU_OK;
 }
 
-/* pixels: NULL, or those that the frame has. */
-static void canvas_add(canvas *c, const unsigned char *pixels, int threads)
+static void canvas_add(canvas *c, int threads)
 {
     if (!c->sum) return;
-    const int64_t count = (int64_t)c->frame.width * c->frame.height;
+    const int64_t count = (int64_t)c->frame.width * c->frame.height * 4;
 #pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t p = 0; p < count; p++)
-        for (int i = 0; i < 4 && (!pixels || pixel_set_has(pixels, p)); i++)
-            c->sum[4 * p + i] += (double)c->frame.rgba[4 * p + i];
+    for (int64_t i = 0; i < count; i++) c->sum[i] += (double)c->frame.rgba[i];
 }
 
-/* As if the pixels outside of the set had so many frames, all like this one: their average is that frame to the bit. */
-static void canvas_begin_edges(canvas *c, const unsigned char *pixels, int frames, int threads)
+/* Room for the pixels of the set and the frames that they are in. False: no memory. */
+static bool canvas_begin_edges(canvas *c, const unsigned char *pixels)
 {
-    if (!c->sum) return;
-    const int64_t count = (int64_t)c->frame.width * c->frame.height;
-#pragma omp parallel for num_threads(threads) schedule(static)
+    const int64_t count = (int64_t)c->frame.width * c->frame.height, edges = pixel_set_count(pixels, count);
+    c->samples.rgba = base_alloc((size_t)count * 4 * sizeof *c->samples.rgba);
+    c->edges = base_alloc((size_t)edges * sizeof *c->edges);
+    c->edge_sums = base_calloc((size_t)edges * 4, sizeof *c->edge_sums);
+    if (!c->samples.rgba || !c->edges || !c->edge_sums) return false;
     for (int64_t p = 0; p < count; p++)
-        for (int i = 0; i < 4 && !pixel_set_has(pixels, p); i++)
-            c->sum[4 * p + i] = (double)c->frame.rgba[4 * p + i] * frames;
+        if (pixel_set_has(pixels, p)) c->edges[c->edge_count++] = p;
+    return true;
+}
+
+static void canvas_add_edges(canvas *c, int threads)
+{
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t i = 0; i < c->edge_count; i++)
+        for (int k = 0; k < 4; k++) c->edge_sums[4 * i + k] += (double)c->samples.rgba[4 * c->edges[i] + k];
+}
+
+static void average_edges(canvas *c, int frames, int threads)
+{
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t i = 0; i < c->edge_count; i++)
+        for (int k = 0; k < 4; k++) c->frame.rgba[4 * c->edges[i] + k] = (float)(c->edge_sums[4 * i + k] / frames);
 }
 
 static void average_frames(canvas *c, int frames, int threads)
@@ -102,6 +126,7 @@ static void scale_depths(canvas *c, const render_space *space, int threads)
 static void canvas_finish(canvas *c, int frames, const render_space *space, int threads)
 {
     if (c->sum) average_frames(c, frames, threads);
+    average_edges(c, frames, threads);
     if (c->frame.depth) scale_depths(c, space, threads);
 }
 
@@ -161,47 +186,62 @@ typedef struct frames_basis {
     int64_t overlaps; /* pixels, at most of any frame */
 } frames_basis;
 
-static insitu_status draw_frame(frames_basis *b, const render_job *job, base_error *error)
+static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
 {
     session_frame frame;
-    const insitu_status status = session_draw_frame(&b->target, job, &b->canvas->frame, &frame, error);
+    const insitu_status status = session_draw_frame(&b->target, job, out, &frame, error);
     report_frame(&b->drawing->report->numbers, &frame);
     if (!status && frame.overlaps > b->overlaps) b->overlaps = frame.overlaps;
     return status;
 }
 
-static bool has_edges_alone(const scene_image *image)
-{
-    return image->antialias > 1 && image->volume_count == 0;
-}
-
 /* Rank 0 knows the picture, and tells all ranks which pixels are at edges. *pixels is the caller's to free. */
 static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_error *error)
 {
-    const image *picture = &b->canvas->frame;
+    canvas *c = b->canvas;
     const session_team *team = b->drawing->team;
-    const size_t bytes = pixel_set_bytes((int64_t)picture->width * picture->height);
+    const size_t bytes = pixel_set_bytes((int64_t)c->frame.width * c->frame.height);
     *pixels = base_calloc(bytes, 1);
-    if (!*pixels) session_no_memory(error, (int64_t)bytes, "the pixels at edges");
+    bool has_memory = *pixels != NULL;
+    if (has_memory && team->rank == 0)
+        has_memory = comp_find_edges(&c->frame, team->threads, *pixels) && canvas_begin_edges(c, *pixels);
+    if (!has_memory) session_no_memory(error, (int64_t)bytes, "the pixels at edges");
     const insitu_status status = session_agree(team->comm, error);
     if (status) return status;
-    if (team->rank == 0) comp_find_edges(picture, *pixels);
     return session_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* A frame through the pixels' centres: its depth is kept, and it tells where edges are. Not one of those averaged. */
-static insitu_status draw_centres(frames_basis *b, const scene_image *image, render_job *job, unsigned char **pixels,
-                                  base_error *error)
+/* Frames through places in the pixels, in turn. Where they are of edges alone, these are those of the job. */
+static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
-    insitu_status status = draw_frame(b, job, error);
-    if (!status && has_edges_alone(image)) {
-        status = share_edges(b, pixels, error);
-        if (!status) canvas_begin_edges(c, *pixels, image->frames, b->drawing->team->threads);
-        job->pixels = *pixels;
+    insitu_status status = INSITU_OK;
+    for (job->frame = 0; job->frame < image->frames && !status; job->frame++) {
+        render_camera_sample(image->antialias, job->frame % image->antialias, job->camera.offset);
+        status = draw_frame(b, job, job->pixels ? &c->samples : &c->frame, error);
+        if (status) break;
+        canvas_add(c, b->drawing->team->threads);
+        canvas_add_edges(c, b->drawing->team->threads);
     }
+    return status;
+}
+
+/* Surfaces alone are drawn once through the pixels' centres, and then where edges are. With volumes that frame is for
+ * the depth, and not one of those averaged. */
+static insitu_status draw_all(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
+{
+    canvas *c = b->canvas;
+    unsigned char *pixels = NULL;
+    if (image->antialias == 1 || !(has_edges_alone(image) || wants_depth(image)))
+        return draw_samples(b, image, job, error);
+    insitu_status status = draw_frame(b, job, &c->frame, error);
+    if (!status && has_edges_alone(image)) status = share_edges(b, &pixels, error);
+    job->pixels = pixels;
     c->depth = c->frame.depth;
     c->frame.depth = NULL;
+    if (!status) status = draw_samples(b, image, job, error);
+    c->frame.depth = c->depth;
+    base_free(pixels);
     return status;
 }
 
@@ -212,17 +252,7 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     const float *background = image->decorations.is_given ? no_background : image->background;
     frames_basis basis = {d, {d->team->comm, d->team->compositing_comm, background, overlap_fragments}, canvas, 0};
     render_job job = make_job(d, image, view, layers);
-    unsigned char *pixels = NULL;
-    insitu_status status = INSITU_OK;
-    const bool has_centres = image->antialias > 1 && (has_edges_alone(image) || wants_depth(image));
-    if (has_centres) status = draw_centres(&basis, image, &job, &pixels, error);
-    for (job.frame = 0; job.frame < image->frames && !status; job.frame++) {
-        render_camera_sample(image->antialias, job.frame % image->antialias, job.camera.offset);
-        status = draw_frame(&basis, &job, error);
-        if (!status) canvas_add(canvas, pixels, d->team->threads);
-    }
-    if (has_centres) canvas->frame.depth = canvas->depth;
-    base_free(pixels);
+    const insitu_status status = draw_all(&basis, image, &job, error);
     if (status) return status;
     warn_of_overlaps(d->report, image, basis.overlaps);
     canvas_finish(canvas, image->frames, &view->space, d->team->threads);
