@@ -213,6 +213,52 @@ static void scene_given_as_text_draws_what_its_file_draws(void **context)
     everywhere(own_rank != 0 || are_same_files(names[0], names[1]));
 }
 
+/* The plane x = 0.4, seen along x from a distance of 5, in an image plain and in one with decorations. */
+static const char kept_words[] =
+    "images:\n"
+    "  - {name: plain, size: [24, 16], every: 2, background: [1, 0, 0], camera: {position: [5.4, %g, 0.5],\n"
+    "     focal: [0, %g, 0.5], projection: orthographic, height: %d}, layers: [isosurface: {field: x, values: "
+    "[0.4]}],\n"
+    "     outputs: [{path: \"%s/{name}.png\"}]}\n"
+    "  - {name: titled, size: [24, 16], every: 2, background: [1, 0, 0], decorations: {title: T},\n"
+    "     camera: {position: [5.4, %g, 0.5], focal: [0, %g, 0.5], projection: orthographic, height: %d},\n"
+    "     layers: [isosurface: {field: x, values: [0.4]}], outputs: [{path: \"%s/{name}.png\"}]}\n";
+
+static bool is_the_plane(const insitu_picture *p)
+{
+    static const float background[4] = {1, 0, 0, 1};
+    const int middle = 8 * p->width + 12;
+    return p->width == 24 && p->height == 16 && memcmp(p->rgba, background, sizeof background) == 0 &&
+           isinf(p->depth[0]) && memcmp(p->rgba + 4 * middle, background, sizeof background) != 0 &&
+           p->rgba[4 * middle + 3] == 1 && fabs(p->depth[middle] - 5.0) < 5e-6; /* float32's rounding of some steps */
+}
+
+static void pictures_are_kept_in_memory_where_asked_for(void **context)
+{
+    (void)context;
+    char text[8192];
+    const double y = rank_count / 2.0;
+    const int high = 2 * rank_count, here = own_rank == 0 ? 2 : 0;
+    snprintf(text, sizeof text, kept_words, y, y, high, folder, y, y, high, folder);
+    insitu_session *session = NULL;
+    int count = -1;
+    everywhere(insitu_create_from_text(MPI_COMM_WORLD, text, &session) == INSITU_OK);
+    hand_over(session);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK && !insitu_last_pictures(session, &count) && count == 0);
+    everywhere(insitu_keep_pictures(session, own_rank == 0) == INSITU_OK); /* rank 0's counts */
+    everywhere(insitu_step(session, 2, 0) == INSITU_OK);
+    const insitu_picture *p = insitu_last_pictures(session, &count);
+    everywhere(count == here && !p == !here);
+    everywhere(!p || (!strcmp(p[0].image, "plain") && !strcmp(p[1].image, "titled")));
+    everywhere(!p || (is_the_plane(&p[0]) && is_the_plane(&p[1])));
+    everywhere(!p || memcmp(p[0].rgba, p[1].rgba, 24 * 16 * 4 * sizeof(float)) == 0);
+    everywhere(insitu_step(session, 3, 0) == INSITU_OK && !insitu_last_pictures(session, &count) && count == 0);
+    everywhere(insitu_step(session, 4, 0) == INSITU_OK && !insitu_last_pictures(session, NULL) == !here);
+    everywhere(insitu_keep_pictures(session, 0) == INSITU_OK && !insitu_last_pictures(session, &count));
+    everywhere(insitu_step(session, 6, 0) == INSITU_OK && !insitu_last_pictures(session, &count) && count == 0);
+    insitu_destroy(&session);
+}
+
 static void wrong_scene_text_is_told_with_its_line(void **context)
 {
     (void)context;
@@ -249,6 +295,8 @@ static void calls_on_no_session_are_errors(void **context)
     assert_int_equal(insitu_set_field(NULL, "m", &field), INSITU_ERROR_ARGUMENT);
     assert_int_equal(insitu_step(NULL, 0, 0), INSITU_ERROR_ARGUMENT);
     assert_null(insitu_last_report(NULL));
+    assert_int_equal(insitu_keep_pictures(NULL, 1), INSITU_ERROR_ARGUMENT);
+    assert_null(insitu_last_pictures(NULL, NULL));
     assert_string_equal(insitu_status_name(INSITU_ERROR_MESH), "INSITU_ERROR_MESH");
     assert_int_equal(insitu_destroy(NULL), INSITU_OK);
 }
@@ -261,6 +309,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(callers_error_handler_stays),
         cmocka_unit_test(sessions_of_split_ranks_live_side_by_side),
         cmocka_unit_test(scene_given_as_text_draws_what_its_file_draws),
+        cmocka_unit_test(pictures_are_kept_in_memory_where_asked_for),
         cmocka_unit_test(wrong_scene_text_is_told_with_its_line),
         cmocka_unit_test(calls_on_no_session_are_errors),
     };

@@ -119,10 +119,29 @@ def what_cannot_be_borrowed_is_refused():
     raises(insitu.Error, "no/such.yaml", insitu.Session, comm, "no/such.yaml")
 
 
+def pictures_are_arrays():
+    xyz, hexes, f = lattice()
+    with insitu.Session(comm, scene_text=SCENE.format(name="kept", folder=folder)) as s:
+        s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+        s.set_field("m", "f", f)
+        s.step(0, 0.0)
+        everywhere(s.pictures == [], "nothing is kept that was not asked for")
+        s.keep_pictures()
+        s.step(1, 0.0)
+        pictures = s.pictures
+        everywhere(len(pictures) == (comm.rank == 0), "rank 0 has the picture")
+    # The session is closed: the arrays are the caller's own.
+    for name, rgba, depth in pictures:
+        well = name == "kept" and rgba.shape == (32, 48, 4) and depth.shape == (32, 48) and rgba.dtype == depth.dtype == "f4"
+        well = well and numpy.isinf(depth[0, 0]) and depth[16, 24] > 0 and (rgba[16, 24] != rgba[0, 0]).any()
+    everywhere(comm.rank or well, "the picture is in the arrays")
+
+
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
-    for name, ours in [("array", insitu._Array), ("mesh", insitu._Mesh), ("field", insitu._Field), ("report", insitu._Report)]:
+    for name, ours in [("array", insitu._Array), ("mesh", insitu._Mesh), ("field", insitu._Field), ("report", insitu._Report),
+                       ("picture", insitu._Picture)]:
         body = re.search(r"typedef struct insitu_%s \{(.*?)\}" % name, header, flags=re.S)[1]
         theirs = [re.search(r"(\w+)(\[\d+\])?$", line.strip())[1] for line in body.split(";") if line.strip()]
         everywhere(theirs == [field[0] for field in ours._fields_], f"insitu_{name}: {theirs}")
@@ -133,4 +152,5 @@ if comm.rank == 0:
 comm.Barrier()
 layouts_draw_the_same_picture()
 what_cannot_be_borrowed_is_refused()
+pictures_are_arrays()
 structures_are_those_of_the_header()

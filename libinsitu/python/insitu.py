@@ -10,6 +10,7 @@ session holds references to what it borrows until the mesh or field is set again
 closed. Errors are exceptions. insitu.h says more of each argument; docs/python.md is the page about this file.
 """
 
+import collections
 import ctypes
 import os
 
@@ -102,6 +103,20 @@ class _Report(ctypes.Structure):
     ]
 
 
+class _Picture(ctypes.Structure):
+    _fields_ = [
+        ("image", ctypes.c_char_p),
+        ("width", ctypes.c_int),
+        ("height", ctypes.c_int),
+        ("rgba", ctypes.POINTER(ctypes.c_float)),
+        ("depth", ctypes.POINTER(ctypes.c_float)),
+    ]
+
+
+# image: its name in the scene; rgba: height x width x 4, linear and premultiplied; depth: height x width, inf: nothing.
+Picture = collections.namedtuple("Picture", "image rgba depth")
+
+
 def _load():
     """The library that stands beside this file or where the installation puts it, else where the loader looks."""
     folder = os.path.dirname(os.path.realpath(__file__))
@@ -118,6 +133,8 @@ def _load():
         ("insitu_set_field", ctypes.c_int, [pointer, text, ctypes.POINTER(_Field)]),
         ("insitu_step", ctypes.c_int, [pointer, ctypes.c_int64, ctypes.c_double]),
         ("insitu_last_report", ctypes.POINTER(_Report), [pointer]),
+        ("insitu_keep_pictures", ctypes.c_int, [pointer, ctypes.c_int]),
+        ("insitu_last_pictures", ctypes.POINTER(_Picture), [pointer, ctypes.POINTER(ctypes.c_int)]),
         ("insitu_error", text, [pointer]),
         ("insitu_destroy", ctypes.c_int, [ctypes.POINTER(pointer)]),
         ("insitu_status_name", text, [ctypes.c_int]),
@@ -269,6 +286,20 @@ class Session:
         values = {key: getattr(report, key) for key, _ in _Report._fields_}
         return {key: (value or b"").decode(errors="replace") if kind is ctypes.c_char_p else value
                 for (key, kind), value in zip(_Report._fields_, values.values())}
+
+    def keep_pictures(self, keep=True):
+        """From now on keep the pictures of each step in memory, on rank 0. Collective; rank 0's keep counts."""
+        _check(_library.insitu_keep_pictures(self._open(), bool(keep)), self._session, True)
+
+    @property
+    def pictures(self):
+        """Those of the last step, a list of Picture: copies, which stay. Empty on other ranks, and where none are kept."""
+        count = ctypes.c_int()
+        kept = _library.insitu_last_pictures(self._open(), ctypes.byref(count))
+        return [Picture(kept[i].image.decode(),
+                        numpy.ctypeslib.as_array(kept[i].rgba, (kept[i].height, kept[i].width, 4)).copy(),
+                        numpy.ctypeslib.as_array(kept[i].depth, (kept[i].height, kept[i].width)).copy())
+                for i in range(count.value)]
 
     def close(self):
         """End the session and let go of what it borrowed. Collective. A closed session may be closed again."""

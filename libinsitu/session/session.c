@@ -51,6 +51,7 @@ static void free_session(insitu_session *session)
     session_trees_free(&session->trees);
     session_scene_file_free(&session->scene_file);
     session_drop_picture(&session->picture);
+    session_drop_kept(&session->kept);
     session_run_ranges_free(&session->run_ranges);
     session_report_free(&session->report);
     base_free(session);
@@ -126,6 +127,25 @@ insitu_status insitu_set_field(insitu_session *session, const char *mesh_name, c
 {
     if (!session) return INSITU_ERROR_ARGUMENT;
     return session_set_field(&session->meshes, mesh_name, field, &session->error);
+}
+
+insitu_status insitu_keep_pictures(insitu_session *session, int keep)
+{
+    if (!session) return INSITU_ERROR_ARGUMENT;
+    session_drop_kept(&session->kept);
+    session->error = (base_error){0};
+    int is_on = keep != 0;
+    const insitu_status status =
+        session_mpi(&session->error, MPI_Bcast(&is_on, 1, MPI_INT, 0, session->team.comm), "MPI_Bcast");
+    if (!status) session->kept.is_on = is_on;
+    return status;
+}
+
+const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count)
+{
+    const int kept = session ? session->kept.count : 0;
+    if (count) *count = kept;
+    return kept ? session->kept.items : NULL;
 }
 
 insitu_status insitu_destroy(insitu_session **session)

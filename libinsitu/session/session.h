@@ -27,6 +27,7 @@ struct insitu_session {
     session_space space;
     session_trees trees;
     session_picture picture; /* rank 0 */
+    session_kept_pictures kept;
     session_run_ranges run_ranges;
     session_events events;
     session_report report;

@@ -76,7 +76,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent};
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
-                                     &s->space, &s->run_ranges,     &s->report};
+                                     &s->space, &s->run_ranges,     &s->report,     &s->kept};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
@@ -134,6 +134,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session_guard_begin(&guard);
     const double start = MPI_Wtime();
     session->error = (base_error){0};
+    session_drop_kept(&session->kept);
     session_report_begin(&session->report, cycle, time);
     const insitu_status status = step(session, cycle, time, &guard, &session->error);
     session_summarize(&session->meshes, &session->trees.parent, session->picture.bytes, session->scene_file.warning,

@@ -144,11 +144,11 @@ typedef struct insitu_report {
     int64_t cells_ghost;    /* not drawn: flagged as ghosts */
     int64_t cells_unusable; /* not drawn: a field value, its own or a vertex's, that is not finite */
     int64_t cells_inverted; /* drawn right all the same: left-handed, by the sign of the corner volumes' sum */
-    int64_t cells_flat;   /* of no volume, not drawn: the corner volumes, each without its sign, sum to nothing beside the
-                             cell's box (at most 1.4e-14, rounding); polyhedra where all of one is in a plane. */
-    int64_t rays;         /* primary rays traced */
-    int64_t fragments;    /* sent to pixel owners, own ones included */
-    int64_t map_failures; /* inverse maps that did not converge and fell back to linear interpolation */
+    int64_t cells_flat; /* of no volume, not drawn: the corner volumes, each without its sign, sum to nothing beside the
+                           cell's box (at most 1.4e-14, rounding); polyhedra where all of one is in a plane. */
+    int64_t rays;       /* primary rays traced */
+    int64_t fragments;  /* sent to pixel owners, own ones included */
+    int64_t map_failures;   /* inverse maps that did not converge and fell back to linear interpolation */
     int64_t bytes_borrowed; /* of the caller's arrays in use */
     int64_t bytes_copied;   /* of the caller's data held in copies, with reasons in copied_why */
     int64_t bytes_trees;    /* of all trees held */
@@ -163,6 +163,16 @@ typedef struct insitu_report {
 } insitu_report;
 
 typedef struct insitu_session insitu_session;
+
+/* A picture in memory, as the last step drew it: without decorations, its background behind it. */
+typedef struct insitu_picture {
+    const char *image; /* its name in the scene */
+    int width;         /* pixels */
+    int height;
+    const float *rgba;  /* height x width x 4, row-major, the top row first: linear light, premultiplied by opacity */
+    const float *depth; /* height x width: distance along the camera's axis from the eye to the nearest opaque surface,
+                           as in EXR files; infinite where there is none */
+} insitu_picture;
 
 /* Fill in defaults: nothing given, everything changed. Local. */
 INSITU_API void insitu_mesh_defaults(insitu_mesh *mesh);
@@ -188,8 +198,8 @@ INSITU_API insitu_status insitu_create_fortran(MPI_Fint comm, const char *scene,
 
 /* Hand over this rank's part of the mesh called name: borrowed arrays. Local. Ranks that have no part of it need not
  * call it; meshes of different names are drawn together, a layer of the scene on those that have its field, or that it
- * names. A mesh with INSITU_CHANGED_TOPOLOGY, or of other counts, drops the fields set on it before. NULL for mesh takes
- * it away. A mesh that is not set again is taken as unchanged.
+ * names. A mesh with INSITU_CHANGED_TOPOLOGY, or of other counts, drops the fields set on it before. NULL for mesh
+ * takes it away. A mesh that is not set again is taken as unchanged.
  *
  * What can be seen at once (counts, types, strides) is checked here; the arrays' contents when a step first needs
  * them: every cell's vertex indices and type, and the coordinates that cells without a ghost flag use. Either way the
@@ -214,6 +224,17 @@ INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, dou
 
 /* What the last step did. Local. Valid until the next step; all zero before the first; NULL for a NULL session. */
 INSITU_API const insitu_report *insitu_last_report(const insitu_session *session);
+
+/* From now on keep (keep is not 0), or no longer keep, each step's pictures in memory on rank 0: 20 bytes a pixel of
+ * every image drawn in a step, beside the files that the scene asks for. Off at first. Collective; rank 0's keep
+ * counts. */
+INSITU_API insitu_status insitu_keep_pictures(insitu_session *session, int keep);
+
+/* The pictures that the last step drew, *count of them, in the order of the scene; an image that could not be drawn is
+ * left out, one whose file could not be written is there. The session owns them, and they are valid until the next
+ * step, insitu_keep_pictures() or insitu_destroy(). NULL and 0 where there are none: on other ranks than 0, where
+ * nothing was due, or where they are not kept. Local. */
+INSITU_API const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count);
 
 /* The message of the last call on the session that failed, "" if none did. Local. Valid until the next call on the
  * session. NULL: the message of the last insitu_create(), insitu_create_from_text() or insitu_destroy() of this

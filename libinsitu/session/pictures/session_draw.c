@@ -42,8 +42,9 @@ static void canvas_free(canvas *c, session_picture *picture)
     session_free_decorations(c->decorations);
 }
 
-static bool wants_depth(const scene_image *image)
+static bool wants_depth(const session_drawing *d, const scene_image *image)
 {
+    if (d->kept->is_on) return true;
     for (int i = 0; i < image->output_count; i++)
         if (image->outputs[i].format == SCENE_EXR) return true;
     return false;
@@ -54,17 +55,17 @@ static bool has_edges_alone(const scene_image *image)
     return image->antialias > 1 && image->volume_count == 0;
 }
 
-static insitu_status canvas_create(const scene_image *image, int rank, session_picture *picture, canvas *out,
-                                   base_error *error)
+static insitu_status canvas_create(const session_drawing *d, const scene_image *image, session_picture *picture,
+                                   canvas *out, base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
-    const size_t bytes = pixels * (wants_depth(image) ? 5 : 4) * sizeof(float);
+    const size_t bytes = pixels * (wants_depth(d, image) ? 5 : 4) * sizeof(float);
     const bool is_summed = image->frames > 1 && !has_edges_alone(image);
     out->frame.width = out->samples.width = image->width;
     out->frame.height = out->samples.height = image->height;
-    if (rank != 0) return INSITU_OK;
+    if (d->team->rank != 0) return INSITU_OK;
     out->frame.rgba = session_reserve_picture(picture, bytes);
-    if (wants_depth(image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
+    if (wants_depth(d, image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
     if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
     if (!out->frame.rgba || (is_summed && !out->sum))
         return session_no_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->sum : 0)),
@@ -232,7 +233,7 @@ static insitu_status draw_all(frames_basis *b, const scene_image *image, render_
 {
     canvas *c = b->canvas;
     unsigned char *pixels = NULL;
-    if (image->antialias == 1 || !(has_edges_alone(image) || wants_depth(image)))
+    if (image->antialias == 1 || !(has_edges_alone(image) || wants_depth(b->drawing, image)))
         return draw_samples(b, image, job, error);
     insitu_status status = draw_frame(b, job, &c->frame, error);
     if (!status && has_edges_alone(image)) status = share_edges(b, &pixels, error);
@@ -383,7 +384,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (!status) status = session_make_layers(&basis, image, &layers, error);
     if (status) return status;
     layers.active = active;
-    canvas_create(image, d->team->rank, picture, &canvas, error);
+    canvas_create(d, image, picture, &canvas, error);
     if (image->decorations.is_given && d->team->rank == 0) {
         const scene_moment moment = moment_of(d, image);
         canvas.decorations = session_make_decorations(image, &moment, &d->space->extent, &view, &layers);
@@ -392,6 +393,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     status = session_agree(d->team->comm, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
+        if (d->kept->is_on && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);
         status = write_outputs(d, image, &canvas, basis.run_ranges, error);
         d->report->numbers.images++;
     }

@@ -20,6 +20,7 @@ typedef struct session_drawing {
     const session_space *space;
     session_run_ranges *run_ranges;
     session_report *report;
+    session_kept_pictures *kept;
 } session_drawing;
 
 /* Is an isosurface of the image drawn so often in this step, by this and others of the plan's images or frame by frame,

@@ -2,7 +2,13 @@
 #ifndef SESSION_PICTURE_H
 #define SESSION_PICTURE_H
 
+#include <stdbool.h>
 #include <stddef.h>
+
+#include "error.h"
+#include "image.h"
+#include "insitu/insitu.h"
+#include "scene.h"
 
 typedef struct session_picture {
     float *pixels;
@@ -13,5 +19,18 @@ typedef struct session_picture {
 float *session_reserve_picture(session_picture *picture, size_t bytes);
 
 void session_drop_picture(session_picture *picture);
+
+/* The pictures of the last step, for the caller: rank 0's copies. */
+typedef struct session_kept_pictures {
+    bool is_on; /* the same on every rank, because depth is then drawn for all images */
+    int count;
+    insitu_picture items[SCENE_MAX_IMAGES]; /* names are the scene's; pixels and depth of each are one block */
+} session_kept_pictures;
+
+/* Copy a picture that has depth. Local. */
+insitu_status session_keep_picture(session_kept_pictures *kept, const scene_image *image, const struct image *picture,
+                                   base_error *error);
+
+void session_drop_kept(session_kept_pictures *kept);
 
 #endif

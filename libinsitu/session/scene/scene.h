@@ -274,10 +274,12 @@ typedef struct scene_image {
 /* What trees are built over: all cells, those that the images can show, or what costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
+enum { SCENE_MAX_IMAGES = 64 };
+
 typedef struct scene {
     int threads; /* per rank; 0: the cores there are, shared by the ranks of a node */
     scene_tree tree;
-    int image_count; /* 1 .. 64 */
+    int image_count; /* 1 .. SCENE_MAX_IMAGES */
     scene_image *images;
     int statistics_count; /* 0 .. 64 */
     scene_statistics *statistics;

@@ -282,7 +282,7 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .help = "What the trees are built over: all cells (`full`), those that the images can show (`partial`), or "     \
               "whichever has cost less so far (`auto`). Changes the speed, not the images.",                           \
       .by_default = "`auto`")                                                                                          \
-    X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, 64),                           \
+    X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, SCENE_MAX_IMAGES),             \
       .help =                                                                                                          \
           "The images to draw. Three frames or more of a step that show the same isosurface, opaque, in one colour a " \
           "value, normals by gradient, share the work of finding its cells, where these are tets or hexes in arrays "  \
