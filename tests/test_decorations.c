@@ -155,10 +155,81 @@ static void edges_that_data_hides_are_told(void **state)
     }
 }
 
+/* ---- lengths -------------------------------------------------------------------------------------------------- */
+
+/* The ray through a tick meets its edge where the coordinate is the number that it has; words are beyond the tick. */
+static void check_rulers(const render_camera *c, const double lower[3], const double upper[3])
+{
+    insitu_decorations all = {0};
+    insitu_stroke strokes[SESSION_RULER_STROKES];
+    insitu_label labels[SESSION_RULER_LABELS];
+    session_box_rulers(lower, upper, c, 10, &all, strokes, labels);
+    assert_in_range(all.stroke_count, 6, SESSION_RULER_STROKES);
+    assert_int_equal(all.label_count, all.stroke_count + 3);
+    for (int stroke = 0, label = 0, axis = 0; label < all.label_count; label++) {
+        const insitu_label *words = &labels[label];
+        assert_true(fabs(hypot(words->away[0], words->away[1]) - 1) < 1e-12);
+        if (strspn(words->text, "xyz") == 1) {
+            assert_int_equal(words->text[0], 'x' + axis++);
+            continue;
+        }
+        const insitu_stroke *tick = &strokes[stroke++];
+        double best = INFINITY, outward = 0;
+        for (int corner = 0; corner < 4; corner++) {
+            double p[3];
+            p[axis] = strtod(words->text, NULL);
+            p[(axis + 1) % 3] = corner & 1 ? upper[(axis + 1) % 3] : lower[(axis + 1) % 3];
+            p[(axis + 2) % 3] = corner & 2 ? upper[(axis + 2) % 3] : lower[(axis + 2) % 3];
+            best = fmin(best, off_ray(c, tick->from, p));
+        }
+        assert_true(best < 1e-9);
+        for (int a = 0; a < 2; a++) outward += (tick->to[a] - tick->from[a]) * words->away[a];
+        assert_true(outward > 3 && words->at[0] == tick->from[0] && words->at[1] == tick->from[1]);
+    }
+}
+
+static void rulers_stand_where_their_numbers_are(void **state)
+{
+    (void)state;
+    const double lower[3] = {-1, 2, 0}, upper[3] = {3, 3, 5}, focal[3] = {1, 2.5, 2.5}, up[3] = {0, 1, 0};
+    const double eyes[][3] = {{9, 8, 12}, {-20, 7, -15}, {1.5, 30, 2}};
+    for (int i = 0; i < 3; i++) {
+        render_camera c;
+        assert_true(render_camera_look_at(&c, eyes[i], focal, i == 2 ? (double[3]){1, 0, 0} : up, 40, 601, 400));
+        check_rulers(&c, lower, upper);
+        c.is_orthographic = true;
+        c.half_height = 4;
+        check_rulers(&c, lower, upper);
+    }
+}
+
+/* Rays through both ends of the bar, put at the middle of the picture, are as far from each other at the point's depth
+ * as the number says; and the bar is no longer than a fifth of the picture, and no shorter than half of that. */
+static void scale_bars_are_as_long_as_they_say(void **state)
+{
+    (void)state;
+    const double up[3] = {0, 1, 0}, focal[3] = {0, 0, 0};
+    for (int i = 0; i < 200; i++) {
+        render_camera c;
+        const double far = pow(10, i % 17 - 8) * (1 + 0.04 * i), eye[3] = {far, 0.3 * far, 0.7 * far};
+        assert_true(render_camera_look_at(&c, eye, focal, up, 10 + i % 100, 640, 480));
+        c.is_orthographic = i % 3 == 0;
+        if (c.is_orthographic) c.half_height *= far;
+        const insitu_scale_bar bar = session_make_scale_bar(&c, focal, i % 2 ? "mm" : NULL);
+        char *end;
+        const double length = strtod(bar.text, &end);
+        const double depth = c.is_orthographic ? 1 : sqrt(1 + 0.09 + 0.49) * far;
+        assert_string_equal(end, i % 2 ? " mm" : "");
+        assert_true(fabs(bar.length / 480 * 2 * c.half_height * depth / length - 1) < 1e-12);
+        assert_true(bar.length <= 128.001 && bar.length > 50);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ticks_are_at_round_numbers), cmocka_unit_test(ticks_stand_where_their_numbers_are),
-        cmocka_unit_test(edges_are_where_rays_see_them), cmocka_unit_test(edges_that_data_hides_are_told)};
+        cmocka_unit_test(ticks_are_at_round_numbers),           cmocka_unit_test(ticks_stand_where_their_numbers_are),
+        cmocka_unit_test(edges_are_where_rays_see_them),        cmocka_unit_test(edges_that_data_hides_are_told),
+        cmocka_unit_test(rulers_stand_where_their_numbers_are), cmocka_unit_test(scale_bars_are_as_long_as_they_say)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

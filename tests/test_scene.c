@@ -121,6 +121,8 @@ static const char every_key[] =
     "      colour_bar: {at: left, labels: [p in Pa, q], ticks: 4}\n"
     "      outline: true\n"
     "      axes: true\n"
+    "      rulers: true\n"
+    "      scale_bar: {unit: mm, at: bottom}\n"
     "      colour: [1, 0, 0.5]\n"
     "      size: 0.04\n"
     "    outputs:\n"
@@ -750,6 +752,9 @@ static const struct bad_file {
     {14, "      - path: a{time:2f}.png", 14, {"\"{time:2f}\" is unknown"}},
     {14, "      - path: a.png\n        decorations: 3", 15, {"outputs[0].decorations: \"3\"", "true or false"}},
     {12, "    decorations: true", 12, {"decorations: \"true\"", "a mapping with the keys title, text, colour_bar"}},
+    {12, "    decorations: {rulers: 3}", 12, {"decorations.rulers: \"3\"", "true or false"}},
+    {12, "    decorations: {scale_bar: {units: m}}", 12, {"scale_bar: the key \"units\" is unknown", "unit, at"}},
+    {12, "    decorations: {scale_bar: {at: middle}}", 12, {"scale_bar.at: \"middle\"", "bottom_right"}},
     {12, "    decorations: {titel: t}", 12, {"decorations: the key \"titel\" is unknown", "title"}},
     {12, "    decorations: {title: [a]}", 12, {"decorations.title: a list", "a text of 1 to 255 bytes"}},
     {12, "    decorations: {title: \"{times}\"}", 12, {"decorations.title: \"{times}\" is unknown", "{time}"}},
@@ -967,6 +972,8 @@ static void scene_decorations_are_read(void **state)
     scene s;
     parse_good(every_key, &s);
     const scene_decorations *d = &s.images[2].decorations;
+    assert_true(d->has_rulers && d->has_scale_bar && d->scale_at == SCENE_BOTTOM);
+    assert_string_equal(d->scale_unit, "mm");
     assert_true(d->is_given && d->has_outline && d->has_axes && d->has_bars && d->has_colour);
     assert_string_equal(d->title, "{name} at {time:.2f} s");
     assert_int_equal(d->words_count, 2);

@@ -269,6 +269,43 @@ void draw_bar(sheet &s, const insitu_colour_bar &bar)
     draw_ticks(s, bar, gradient);
 }
 
+bool are_apart(const area &a, const area &b, double gap)
+{
+    return a.x1 + gap <= b.x0 || b.x1 + gap <= a.x0 || a.y1 + gap <= b.y0 || b.y1 + gap <= a.y0;
+}
+
+/* ---- lengths ------------------------------------------------------------------------------------------------- */
+
+/* Words over the bar. */
+void draw_scale_bar(sheet &s)
+{
+    const insitu_scale_bar &bar = s.what.scale_bar;
+    if (!(bar.length > 0)) return;
+    const double words = width_of(s, bar.text, s.size), width = std::max(words, bar.length), tick = 0.25 * s.size;
+    const area block = place_block(s.image, {bar.at, 0}, width, 1.7 * s.size, s.margin, s.taken);
+    const double middle = 0.5 * (block.x0 + block.x1), y = block.y0 + 1.4 * s.size;
+    const double x0 = middle - 0.5 * bar.length, x1 = middle + 0.5 * bar.length;
+    put_plate(s, block);
+    write_text(s, bar.text, middle - 0.5 * words, block.y0 + 0.9 * s.size, s.size);
+    draw_stroke(s, {{x0, y}, {x1, y}, false}, 1.5 * line_width(s), s.what.colour);
+    draw_stroke(s, {{x0, y - tick}, {x0, y + tick}, false}, 1.5 * line_width(s), s.what.colour);
+    draw_stroke(s, {{x1, y - tick}, {x1, y + tick}, false}, 1.5 * line_width(s), s.what.colour);
+}
+
+/* Numbers along edges: the middle of the words is so far away that their box is a gap from the point. */
+void draw_label(sheet &s, const insitu_label &label)
+{
+    const double width = width_of(s, label.text, s.size), height = 0.75 * s.size;
+    const double reach =
+        label.gap * s.size + 0.5 * (std::abs(label.away[0]) * width + std::abs(label.away[1]) * height);
+    const double x = label.at[0] + reach * label.away[0], y = label.at[1] + reach * label.away[1];
+    const area block = {x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height};
+    for (const area &other : s.taken)
+        if (!are_apart(block, other, 0.2 * s.size)) return;
+    s.taken.push_back(block);
+    write_text(s, label.text, block.x0, block.y1, s.size);
+}
+
 /* ---- axes ---------------------------------------------------------------------------------------------------- */
 
 /* Red, green and blue for x, y and z, the one that points away from the eye first. */
@@ -327,12 +364,8 @@ const char *find_font(std::string &warning)
 
 bool has_words(const insitu_decorations &what)
 {
-    return what.words_count > 0 || what.bar_count > 0 || what.has_axes;
-}
-
-bool are_apart(const area &a, const area &b, double gap)
-{
-    return a.x1 + gap <= b.x0 || b.x1 + gap <= a.x0 || a.y1 + gap <= b.y0 || b.y1 + gap <= a.y0;
+    return what.words_count > 0 || what.bar_count > 0 || what.has_axes || what.label_count > 0 ||
+           what.scale_bar.length > 0;
 }
 
 bool is_at_right(insitu_anchor at)
@@ -388,5 +421,7 @@ void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &
     draw_strokes(s, false);
     for (int i = 0; i < what.words_count; i++) draw_words(s, what.words[i]);
     for (int i = 0; i < what.bar_count; i++) draw_bar(s, what.bars[i]);
+    draw_scale_bar(s);
     if (what.has_axes) draw_axes(s);
+    for (int i = 0; i < what.label_count; i++) draw_label(s, what.labels[i]);
 }

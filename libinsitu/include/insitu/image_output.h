@@ -61,6 +61,21 @@ typedef struct insitu_stroke {
     bool is_behind; /* whatever is drawn hides it */
 } insitu_stroke;
 
+/* Words beside a point of the picture, left out where they would lie over others. */
+typedef struct insitu_label {
+    double at[2];   /* pixels, as of a stroke */
+    double away[2]; /* of length 1: where from the point they are */
+    double gap;     /* between the two, in heights of words */
+    char text[32];
+} insitu_label;
+
+/* A bar whose length in the scene is told by its words. */
+typedef struct insitu_scale_bar {
+    double length; /* pixels; 0: there is none */
+    insitu_anchor at;
+    char text[300];
+} insitu_scale_bar;
+
 /* What is drawn over a picture, and its background, over which the picture is put first. Borrowed, all of it. */
 typedef struct insitu_decorations {
     float background[4]; /* linear, premultiplied */
@@ -72,6 +87,9 @@ typedef struct insitu_decorations {
     const insitu_colour_bar *bars;
     int stroke_count;
     const insitu_stroke *strokes;
+    int label_count;
+    const insitu_label *labels;
+    insitu_scale_bar scale_bar;
     bool has_axes;
     double axes[3][3]; /* the scene's axes, seen from the camera: right, up, towards the eye; unit lengths */
 } insitu_decorations;

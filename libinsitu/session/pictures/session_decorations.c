@@ -80,6 +80,110 @@ int session_box_strokes(const double lower[3], const double upper[3], const rend
     return count;
 }
 
+/* ---- rulers -------------------------------------------------------------------------------------------------- */
+
+/* An edge of the box along an axis, in the picture. */
+typedef struct ruled_edge {
+    double from[3], to[3];   /* scene */
+    double pixels[2][2];     /* the ends */
+    double away[2];          /* out of the box, across the edge; unit length */
+    bool is_there, is_outer; /* before the eye; between a face that is seen from outside and one that is not */
+} ruled_edge;
+
+static ruled_edge find_edge(const double lower[3], const double upper[3], const render_camera *c, int axis, int corner)
+{
+    const int b = (axis + 1) % 3, d = (axis + 2) % 3;
+    const bool high_b = corner & 1, high_d = corner & 2;
+    double middle[3], centre[2];
+    ruled_edge e = {.is_there = true};
+    e.from[axis] = lower[axis];
+    e.to[axis] = upper[axis];
+    e.from[b] = e.to[b] = high_b ? upper[b] : lower[b];
+    e.from[d] = e.to[d] = high_d ? upper[d] : lower[d];
+    for (int a = 0; a < 3; a++) middle[a] = 0.5 * lower[a] + 0.5 * upper[a];
+    const seen_point ends[3] = {see(c, e.from), see(c, e.to), see(c, middle)};
+    for (int i = 0; i < 3; i++) e.is_there = e.is_there && (c->is_orthographic || ends[i].at[2] > 0);
+    if (!e.is_there) return e;
+    project(c, &ends[0], e.pixels[0]);
+    project(c, &ends[1], e.pixels[1]);
+    project(c, &ends[2], centre);
+    const double x = e.pixels[1][0] - e.pixels[0][0], y = e.pixels[1][1] - e.pixels[0][1], length = hypot(x, y);
+    e.is_there = length > 1;
+    if (!e.is_there) return e;
+    const double side = (centre[0] - e.pixels[0][0]) * y - (centre[1] - e.pixels[0][1]) * x < 0 ? 1 : -1;
+    e.away[0] = side * y / length;
+    e.away[1] = -side * x / length;
+    e.is_outer = is_seen_outside(lower, upper, c, b, high_b) != is_seen_outside(lower, upper, c, d, high_d);
+    return e;
+}
+
+static bool is_lower(const ruled_edge *a, const ruled_edge *b)
+{
+    if (!a->is_there || !b->is_there) return a->is_there;
+    if (a->is_outer != b->is_outer) return a->is_outer;
+    return a->pixels[0][1] + a->pixels[1][1] > b->pixels[0][1] + b->pixels[1][1];
+}
+
+static insitu_label label_at(const double at[2], const double away[2], double gap, const char *text)
+{
+    insitu_label out = {{at[0], at[1]}, {away[0], away[1]}, gap, ""};
+    snprintf(out.text, sizeof out.text, "%s", text);
+    return out;
+}
+
+/* Ticks are as many as there is room for words. */
+static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, double size, insitu_decorations *out,
+                      insitu_stroke *strokes, insitu_label *labels)
+{
+    static const char *const names[] = {"x", "y", "z"};
+    insitu_tick ticks[SESSION_MAX_TICKS];
+    const double length = hypot(e->pixels[1][0] - e->pixels[0][0], e->pixels[1][1] - e->pixels[0][1]);
+    const int most = (int)fmin(fmax(length / (4 * size), 2), 8);
+    const session_scale scale = {RENDER_LINEAR, 0, e->from[axis], e->to[axis]};
+    const double middle[2] = {0.5 * (e->pixels[0][0] + e->pixels[1][0]), 0.5 * (e->pixels[0][1] + e->pixels[1][1])};
+    const int count = e->from[axis] < e->to[axis] ? session_make_ticks(&scale, most, ticks) : 0;
+    for (int i = 0; i < count; i++) {
+        double place[3], at[2];
+        for (int a = 0; a < 3; a++) place[a] = (1 - ticks[i].place) * e->from[a] + ticks[i].place * e->to[a];
+        const seen_point seen = see(c, place);
+        project(c, &seen, at);
+        strokes[out->stroke_count++] = (insitu_stroke){
+            {at[0], at[1]}, {at[0] + 0.35 * size * e->away[0], at[1] + 0.35 * size * e->away[1]}, false};
+        labels[out->label_count++] = label_at(at, e->away, 0.55, ticks[i].text);
+    }
+    labels[out->label_count++] = label_at(middle, e->away, 2.4, names[axis]);
+}
+
+void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
+                        insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        ruled_edge best = {.is_there = false};
+        for (int corner = 0; corner < 4; corner++) {
+            const ruled_edge e = find_edge(lower, upper, camera, axis, corner);
+            if (is_lower(&e, &best)) best = e;
+        }
+        if (best.is_there) rule_edge(&best, axis, camera, size, out, strokes, labels);
+    }
+}
+
+insitu_scale_bar session_make_scale_bar(const render_camera *camera, const double point[3], const char *unit)
+{
+    insitu_scale_bar out = {.length = 0};
+    const double depth = camera->is_orthographic ? 1 : see(camera, point).at[2];
+    const double pixel = 2 * camera->half_height * depth / camera->height;
+    if (!(pixel > 0)) return out;
+    const double room = 0.2 * camera->width * pixel, power = pow(10, floor(log10(room)));
+    const double length = power * (room >= 5 * power ? 5 : room >= 2 * power ? 2 : 1);
+    const session_scale scale = {RENDER_LINEAR, 0, 0, length};
+    insitu_tick ticks[SESSION_MAX_TICKS];
+    const int count = session_make_ticks(&scale, 2, ticks);
+    if (count < 2) return out;
+    out.length = length / pixel;
+    snprintf(out.text, sizeof out.text, "%s%s%s", ticks[count - 1].text, unit ? " " : "", unit ? unit : "");
+    return out;
+}
+
 /* ---- words and bars ------------------------------------------------------------------------------------------ */
 
 /* Light on a dark background, dark on a light one or on none. */
@@ -189,6 +293,19 @@ static void fill_axes(session_decorations *d, const render_camera *c)
     }
 }
 
+/* What tells how long things are. */
+static void fill_lengths(session_decorations *d, const scene_decorations *scene, const session_extent *extent,
+                         const render_camera *camera)
+{
+    double middle[3];
+    for (int a = 0; a < 3; a++) middle[a] = 0.5 * extent->lower[a] + 0.5 * extent->upper[a];
+    if (scene->has_rulers)
+        session_box_rulers(extent->lower, extent->upper, camera, scene->size * camera->height, &d->all, d->strokes,
+                           d->ruler_labels);
+    if (scene->has_scale_bar) d->all.scale_bar = session_make_scale_bar(camera, middle, scene->scale_unit);
+    d->all.scale_bar.at = (insitu_anchor)scene->scale_at;
+}
+
 session_decorations *session_make_decorations(const scene_image *image, const scene_moment *moment,
                                               const session_extent *extent, const session_view *view,
                                               const session_layers *layers)
@@ -196,8 +313,12 @@ session_decorations *session_make_decorations(const scene_image *image, const sc
     const scene_decorations *scene = &image->decorations;
     session_decorations *d = base_calloc(1, sizeof *d);
     if (!d) return NULL;
-    d->all = (insitu_decorations){
-        .size = scene->size, .words = d->words, .bars = d->bars, .strokes = d->strokes, .has_axes = scene->has_axes};
+    d->all = (insitu_decorations){.size = scene->size,
+                                  .words = d->words,
+                                  .bars = d->bars,
+                                  .strokes = d->strokes,
+                                  .labels = d->ruler_labels,
+                                  .has_axes = scene->has_axes};
     memcpy(d->all.background, image->background, sizeof d->all.background);
     d->background = d->all;
     d->background.has_axes = false;
@@ -206,6 +327,7 @@ session_decorations *session_make_decorations(const scene_image *image, const sc
     if (scene->has_bars) fill_bars(d, image, layers);
     if (scene->has_outline && extent->cell_count)
         d->all.stroke_count = session_box_strokes(extent->lower, extent->upper, &view->camera, d->strokes);
+    if (extent->cell_count) fill_lengths(d, scene, extent, &view->camera);
     if (fill_words(d, scene, moment)) return d;
     session_free_decorations(d);
     return NULL;

@@ -10,6 +10,7 @@
 #include "session_view.h"
 
 enum { SESSION_MAX_BARS = 20, SESSION_MAX_WORDS = 17, SESSION_BOX_EDGES = 12 };
+enum { SESSION_RULER_STROKES = 3 * SESSION_MAX_TICKS, SESSION_RULER_LABELS = 3 * SESSION_MAX_TICKS + 3 };
 
 typedef struct session_decorations {
     insitu_decorations all;        /* points into this and into the layers */
@@ -18,7 +19,8 @@ typedef struct session_decorations {
     insitu_colour_bar bars[SESSION_MAX_BARS];
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];
-    insitu_stroke strokes[SESSION_BOX_EDGES];
+    insitu_stroke strokes[SESSION_BOX_EDGES + SESSION_RULER_STROKES];
+    insitu_label ruler_labels[SESSION_RULER_LABELS];
 } session_decorations;
 
 /* Make them for an image that has some. NULL: no memory. Local. */
@@ -33,5 +35,14 @@ void session_free_decorations(session_decorations *decorations);
  * what is in the box where both of its faces are seen from within. Local. */
 int session_box_strokes(const double lower[3], const double upper[3], const render_camera *camera,
                         insitu_stroke strokes[SESSION_BOX_EDGES]);
+
+/* Ticks, numbers and names along three edges of the box, one of each axis: of those on the outline, the lowest in the
+ * picture. size: height of words, pixels. Local. */
+void session_box_rulers(const double lower[3], const double upper[3], const render_camera *camera, double size,
+                        insitu_decorations *out, insitu_stroke *strokes, insitu_label *labels);
+
+/* A round length that takes up to a fifth of the picture's width, at the depth of the point. unit: NULL: none. Local.
+ */
+insitu_scale_bar session_make_scale_bar(const render_camera *camera, const double point[3], const char *unit);
 
 #endif

@@ -203,7 +203,10 @@ typedef struct scene_decorations {
     int tick_count; /* about so many a bar */
     int label_count;
     char **labels; /* of the bars in turn; beyond them the fields' names */
-    bool has_outline, has_axes;
+    bool has_outline, has_rulers, has_axes;
+    bool has_scale_bar;
+    char *scale_unit; /* NULL: none */
+    scene_anchor scale_at;
     bool has_colour;
     float colour[3]; /* linear; where has_colour is not set, light on a dark background and dark on a light one */
     double size;     /* of words, a share of the picture's height */

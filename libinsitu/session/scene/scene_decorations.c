@@ -58,6 +58,11 @@ insitu_status scene_convert_decorations(const scene_document *d, const char *pat
     out->is_given = true;
     out->has_outline = in->outline && *in->outline;
     out->has_axes = in->axes && *in->axes;
+    out->has_rulers = in->rulers && *in->rulers;
+    out->has_scale_bar = in->scale_bar != NULL;
+    out->scale_at = in->scale_bar && in->scale_bar->at ? (scene_anchor)*in->scale_bar->at : SCENE_BOTTOM_RIGHT;
+    out->scale_unit = in->scale_bar && in->scale_bar->unit ? base_strdup(in->scale_bar->unit) : NULL;
+    if (in->scale_bar && in->scale_bar->unit && !out->scale_unit) return scene_no_memory(d);
     out->has_colour = in->colour != NULL;
     for (int i = 0; in->colour && i < 3; i++) out->colour[i] = colour_linear_from_srgb((float)in->colour[i]);
     out->size = in->size ? *in->size : 0.03;
@@ -73,4 +78,5 @@ void scene_free_decorations(scene_decorations *decorations)
     base_free(decorations->words);
     base_free(decorations->labels);
     base_free(decorations->title);
+    base_free(decorations->scale_unit);
 }

@@ -125,6 +125,12 @@ DEFINE_MAPPING(colour_bar, "colour_bar", COLOUR_BAR_KEYS);
 
 static const cyaml_schema_value_t words = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_words, words_fields)};
 
+#define SCALE_BAR_KEYS(X)                                                                                              \
+    X(TEXT("unit", OPTIONAL, scene_file_scale_bar, unit, 63),                                                          \
+      .help = "The unit of the coordinates, behind the number.", .by_default = "none")                                 \
+    X(CHOICE("at", scene_file_scale_bar, at, anchor_words), .help = "Where it stands.", .by_default = "`bottom_right`")
+DEFINE_MAPPING(scale_bar, "scale_bar", SCALE_BAR_KEYS);
+
 #define DECORATIONS_KEYS(X)                                                                                            \
     X(TEXT("title", OPTIONAL, scene_file_decorations, title, 255),                                                     \
       .help = "One line in the middle at the top, larger than other text, with the same placeholders.",                \
@@ -138,6 +144,13 @@ static const cyaml_schema_value_t words = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
     X(CYAML_FIELD_BOOL_PTR("outline", OPTIONAL, scene_file_decorations, outline),                                      \
       .help = "The edges of the box around all data; what is drawn hides those that lie behind it.",                   \
       .by_default = "`false`")                                                                                         \
+    X(CYAML_FIELD_BOOL_PTR("rulers", OPTIONAL, scene_file_decorations, rulers),                                        \
+      .help = "Round numbers along three edges of the box around all data. A `zoom` below 1 leaves room for them.",    \
+      .by_default = "`false`")                                                                                         \
+    X(CYAML_FIELD_MAPPING_PTR("scale_bar", OPTIONAL, scene_file_decorations, scale_bar, scale_bar_fields),             \
+      .help =                                                                                                          \
+          "A bar of a round length; by a perspective camera that of things as far away as the middle of the data.",    \
+      .by_default = "none", .child = &scale_bar_mapping)                                                               \
     X(CYAML_FIELD_BOOL_PTR("axes", OPTIONAL, scene_file_decorations, axes),                                            \
       .help = "The directions of x, y and z, in the lower left corner.", .by_default = "`false`")                      \
     X(NUMBERS("colour", scene_file_decorations, colour, 3), .help = "Colour of words and lines, sRGB.",                \

@@ -141,12 +141,18 @@ typedef struct scene_file_colour_bar {
     int *ticks;
 } scene_file_colour_bar;
 
+typedef struct scene_file_scale_bar {
+    char *unit;
+    int *at; /* scene_anchor */
+} scene_file_scale_bar;
+
 typedef struct scene_file_decorations {
     char *title;
     scene_file_words *text;
     int text_count;
     scene_file_colour_bar *colour_bar;
-    bool *outline, *axes;
+    bool *outline, *rulers, *axes;
+    scene_file_scale_bar *scale_bar;
     double *colour; /* 3 */
     double *size;
 } scene_file_decorations;
