@@ -91,7 +91,7 @@ typedef struct render_transfer {
 
 enum { RENDER_MAX_OPACITY_POINTS = 32, RENDER_MAX_ISOVALUES = 16, RENDER_MAX_VOLUMES = 4, RENDER_MAX_LIGHTS = 8 };
 enum { RENDER_MAX_GROUP = 64 };
-enum { RENDER_MAX_CLIP_PLANES = 16 };
+enum { RENDER_MAX_CLIPS = 32 };
 enum { RENDER_MAX_INTERVALS = RENDER_MAX_OPACITY_POINTS / 2 + 2 };
 
 typedef struct render_light {
@@ -139,6 +139,7 @@ typedef struct render_surface_layer {
     float edge_width;  /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
                           of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
+    uint32_t clips;       /* of the job's, a bit each */
 } render_surface_layer;
 
 typedef struct render_volume_layer {
@@ -194,11 +195,16 @@ void render_active_cells_free(render_active_cells *active);
 void render_active_cells_clear(render_active_cells *active);
 int64_t render_active_cells_bytes(const render_active_cells *active);
 
-/* What is drawn lies where normal . position <= distance. */
-typedef struct render_clip_plane {
-    double normal[3]; /* world, any length but 0 */
-    double distance;
-} render_clip_plane;
+typedef enum render_clip_kind { RENDER_CLIP_PLANE, RENDER_CLIP_BOX, RENDER_CLIP_SPHERE } render_clip_kind;
+
+/* A half space, box or sphere that cuts layers: what is drawn of them lies within it, or where is_outside without. */
+typedef struct render_clip {
+    render_clip_kind kind;
+    bool is_outside;
+    double normal[3], distance; /* plane: normal . position <= distance; world, any length but 0 */
+    double lower[3], upper[3];  /* box */
+    double centre[3], radius;   /* sphere */
+} render_clip;
 
 typedef struct render_job {
     render_camera camera;
@@ -212,8 +218,9 @@ typedef struct render_job {
     render_active_cells *active; /* NULL: nothing is kept */
     const render_volume_layer *volumes;
     int volume_count;
-    int clip_count;
-    const render_clip_plane *clips; /* all layers are drawn within all of them, at most RENDER_MAX_CLIP_PLANES */
+    int clip_count;           /* at most RENDER_MAX_CLIPS */
+    const render_clip *clips; /* layers have sets of them: bit i for clips[i] */
+    uint32_t volume_clips;    /* those of all volumes */
     const render_light *lights;
     int light_count;
     double step; /* distance between samples, scene units, > 0; volumes only */

@@ -37,10 +37,13 @@ typedef struct kernel_memory {
     kernel_finder finder;
 } kernel_memory;
 
-static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
+static int volume_turns(const kernel_frame *f)
 {
-    kernel_thread *thread = p->thread;
-    const double start = thread->now();
+    return f->volume_turns ? f->volume_turns : 1;
+}
+
+static void trace_packet_turn(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
+{
     if (p->frame->has_segments) {
         p->is_pencil = false; /* packet by packet, lines would not be used often enough to pay */
         if (p->frame->job->separate_samples)
@@ -49,6 +52,16 @@ static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int6
             kernel_trace_segments(p, first_fragment);
     } else {
         kernel_trace_volumes(p, hits);
+    }
+}
+
+static void trace_packet_volumes(kernel_packet *p, const kernel_hits *hits, int64_t first_fragment)
+{
+    kernel_thread *thread = p->thread;
+    const double start = thread->now();
+    for (int turn = 0; turn < volume_turns(p->frame); turn++) {
+        if (p->frame->volume_turns) kernel_packet_clip_volumes(p, turn);
+        trace_packet_turn(p, hits, first_fragment);
     }
     thread->volume_seconds += thread->now() - start;
 }
@@ -134,14 +147,14 @@ static void trace_tile_apart(kernel_tile_trace *t)
 static void trace_tile_segments(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    kernel_tile_segments_trace(t);
+    for (t->turn = 0; t->turn < volume_turns(t->frame); t->turn++) kernel_tile_segments_trace(t);
     t->thread->volume_seconds += t->thread->now() - start;
 }
 
 static void trace_tile_samples(kernel_tile_trace *t)
 {
     const double start = t->thread->now();
-    kernel_tile_volumes(t);
+    for (t->turn = 0; t->turn < volume_turns(t->frame); t->turn++) kernel_tile_volumes(t);
     t->thread->volume_seconds += t->thread->now() - start;
 }
 

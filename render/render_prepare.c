@@ -148,6 +148,20 @@ static double value_scale(const render_job *job, const render_surface_layer *lay
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
+/* Those that every layer has and that leave a ray in one piece; and how many pieces the volumes' others may leave. */
+static void prepare_clips(kernel_frame *f)
+{
+    const render_job *job = f->job;
+    uint32_t outside = 0;
+    for (int i = 0; i < job->clip_count; i++) outside |= (uint32_t)job->clips[i].is_outside << i;
+    f->common_clips = ~outside;
+    for (int i = 0; i < job->surface_count; i++) f->common_clips &= job->surfaces[i].clips;
+    if (job->volume_count) f->common_clips &= job->volume_clips;
+    if (!job->clip_count) f->common_clips = 0;
+    if (job->volume_count && job->volume_clips & ~f->common_clips)
+        f->volume_turns = 1 + __builtin_popcount(job->volume_clips & outside);
+}
+
 /* Opaque layers first; kinds number the isovalues in the job's order. */
 static void prepare_surfaces(kernel_frame *f)
 {
@@ -162,6 +176,7 @@ static void prepare_surfaces(kernel_frame *f)
                 kernel_surface *s = &f->surfaces[f->surface_count++];
                 s->layer = layer;
                 s->first_kind = kind;
+                s->own_clips = job->clip_count ? layer->clips & ~f->common_clips : 0;
                 prepare_isovalues(&s->interest, layer);
                 if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, layer);
                 f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
@@ -196,9 +211,9 @@ static insitu_status check_job(const render_job *job, base_error *error)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "%d isovalues, %d volumes, %d lights: at most %d, %d, %d",
                          values, job->volume_count, job->light_count, RENDER_MAX_ISOVALUES, RENDER_MAX_VOLUMES,
                          RENDER_MAX_LIGHTS);
-    if (job->clip_count < 0 || job->clip_count > RENDER_MAX_CLIP_PLANES)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "%d clipping planes, expected at most %d", job->clip_count,
-                         RENDER_MAX_CLIP_PLANES);
+    if (job->clip_count < 0 || job->clip_count > RENDER_MAX_CLIPS)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "%d clips, expected at most %d", job->clip_count,
+                         RENDER_MAX_CLIPS);
     if (!job->volume_count) return INSITU_OK;
     if (!(job->max_error >= 0) || !(job->extent >= 0))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "max_error of %g over %g, expected 0 or more", job->max_error,
@@ -289,6 +304,7 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     frame->surfaces = base_calloc((size_t)job->surface_count, sizeof *frame->surfaces);
     if (!frame->surfaces) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %d layers", job->surface_count);
     prepare_camera(frame);
+    prepare_clips(frame);
     prepare_surfaces(frame);
     frame->volume_count = job->volume_count;
     for (int i = 0; i < job->volume_count; i++)
@@ -300,6 +316,8 @@ insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_er
     const bool bins = frame->by_tiles && job->traversal == RENDER_BINNED && !job->pixels &&
                       job->camera.width <= UINT16_MAX && job->camera.height <= UINT16_MAX;
     frame->is_binned = bins && frame->surface_count;
-    frame->bins_volume = bins && job->volume_count == 1 && !(frame->has_segments && job->separate_samples);
+    /* A tile's list of cells is used up by one turn. */
+    frame->bins_volume =
+        bins && job->volume_count == 1 && frame->volume_turns <= 1 && !(frame->has_segments && job->separate_samples);
     return segments;
 }

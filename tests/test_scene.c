@@ -76,15 +76,19 @@ static const char every_key[] =
     "          range: [-2, 3]\n"
     "          opacity: [[0, 0], [0.4, 0.3], [0.4, 0.5], [1, 0.9]]\n"
     "          unit_distance: 0.1\n"
+    "          clip: {sphere: {centre: [1, -2, 3], radius: 2.5}, keep: outside}\n"
     "      - isosurface:\n"
     "          {field: q, values: [7], mesh: air, interpolate: vertex, colour_by:\n"
     "           {field: speed, component: 2, map: inferno, range: [0, 1],\n"
-    "            interpolate: vertex}}\n"
+    "            interpolate: vertex},\n"
+    "           clip: {sphere: {centre: [1, -2, 3], radius: 2.5}, keep: outside}}\n"
     "      - slice: {field: q, component: x, interpolate: vertex, mesh: air, map: grey,\n"
     "                range: [0, 2], opacity: 0.5, material: {specular: 0}, planes: [\n"
-    "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}]}\n"
+    "                {normal: [1, 0, 0], point: [1, 2, 3], offset: 1}],\n"
+    "                clip: {box: [[0, 0, 0], [9, 9, 9]], keep: inside}}\n"
     "      - surface: {mesh: [air, sea], colour: [1, 0.5, 0], opacity: 0.5,\n"
-    "                  edges: {width: 2, colour: [0, 0.5, 1]}}\n"
+    "                  edges: {width: 2, colour: [0, 0.5, 1]},\n"
+    "                  clip: {box: [[0, 0, 0], [1, 2, 3]]}}\n"
     "      - surface: {colour_by: {field: q, map: grey, interpolate: vertex}, edges: {},\n"
     "                  threshold: {field: q, component: 1, from: 1, to: 2.5}}\n"
     "      - surface: {threshold: {field: q, from: -3}}\n"
@@ -249,7 +253,7 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");
     assert_int_equal(second->colour_by.component, 2);
-    assert_int_equal(second->colour_by.line, 33);
+    assert_int_equal(second->colour_by.line, 34);
     assert_true(second->field.mesh_count == 1 && second->colour_by.mesh_count == 1 && first->field.mesh_count == 0);
     assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
     assert_true(scene_field_is_on(&first->field, "anything"));
@@ -356,23 +360,29 @@ static void sampling_is_by_what_is_said(void **state)
     }
 }
 
-static void clips_are_planes(void **state)
+static void clips_are_of_the_image_and_of_layers(void **state)
 {
     (void)state;
     scene s;
     parse_good(every_key, &s);
-    const scene_clip *clip = &s.images[0].clip;
-    assert_int_equal(clip->plane_count, 7);
-    check_vector(clip->planes[0].normal, 0, 0, -1);
-    check_vector(clip->planes[0].point, 1, 2, 3);
-    for (int i = 1; i < 7; i++) {
-        const scene_plane *plane = &clip->planes[i];
-        const int axis = (i - 1) / 2, side = (i - 1) % 2;
-        assert_true(plane->has_point && plane->offset == 0 && plane->normal[axis] == (side ? 1 : -1));
-        assert_true(plane->normal[(axis + 1) % 3] == 0 && plane->normal[(axis + 2) % 3] == 0);
-        assert_true(plane->point[axis] == (side ? axis + 1 : 0));
-    }
-    assert_int_equal(s.images[1].clip.plane_count, 0);
+    const scene_image *image = &s.images[0];
+    const scene_clip *clips = image->clips;
+    assert_int_equal(image->clip_count, 4);
+    assert_true(image->clips_of_all == 3);
+    assert_true(clips[0].kind == SCENE_CLIP_PLANE && !clips[0].is_outside);
+    check_vector(clips[0].plane.normal, 0, 0, -1);
+    check_vector(clips[0].plane.point, 1, 2, 3);
+    assert_true(clips[1].kind == SCENE_CLIP_BOX && !clips[1].is_outside);
+    check_vector(clips[1].lower, 0, 0, 0);
+    check_vector(clips[1].upper, 1, 2, 3);
+    assert_true(clips[2].kind == SCENE_CLIP_SPHERE && clips[2].is_outside && clips[2].radius == 2.5);
+    check_vector(clips[2].centre, 1, -2, 3);
+    assert_true(clips[3].kind == SCENE_CLIP_BOX && !clips[3].is_outside);
+    assert_true(image->isosurfaces[0].clips == 3 && image->isosurfaces[1].clips == 7);
+    assert_true(image->volumes[0].clips == 7); /* the same sphere stands once */
+    assert_true(image->slices[0].clips == 11);
+    assert_true(image->surfaces[0].clips == 3); /* the box is that of all */
+    assert_int_equal(s.images[1].clip_count, 0);
     scene_free(&s);
 }
 
@@ -685,12 +695,23 @@ static const struct bad_file {
     {11, "      - volume: {field: f, interpolate: face}", 11, {"interpolate: \"face\"", "one of cell, vertex"}},
     {11, "      - {}", 11, {"layers[1]: holds nothing", "isosurface, volume, slice and surface"}},
     {11, "      - {isosurface: {field: f, values: [1]}, volume: {field: f}}", 11, {"layers[1]: holds more than one"}},
-    {8, "    clip: {}", 8, {"images[0].clip: holds nothing", "planes or a box"}},
+    {8, "    clip: {}", 8, {"images[0].clip: holds nothing", "planes, a box or a sphere"}},
     {8, "    clip: {planes: []}", 8, {"clip.planes: a list of 0", "1 to 10"}},
     {8, "    clip: {planes: [{normal: [0, 0, 0]}]}", 8, {"clip.planes[0].normal: [0, 0, 0]", "any length but 0"}},
     {8, "    clip: {box: [[0, 0, 0]]}", 8, {"clip.box: a list of 1", "a list of 2"}},
     {8, "    clip: {box: [[0, 0, 0], [1, 0, 1]]}", 8, {"clip.box: from 0 to 0 along y", "first corner to be less"}},
-    {8, "    clip: {sphere: 1}", 8, {"clip: the key \"sphere\" is unknown", "planes, box"}},
+    {8, "    clip: {cone: 1}", 8, {"clip: the key \"cone\" is unknown", "planes, box, sphere, keep"}},
+    {8, "    clip: {sphere: 1}", 8, {"clip.sphere: \"1\"", "a mapping"}},
+    {8, "    clip: {sphere: {radius: 1}}", 8, {"clip.sphere.centre: missing", "a list of 3 numbers"}},
+    {8, "    clip: {sphere: {centre: [0, 0, 0], radius: 0}}", 8, {"clip.sphere.radius: \"0\"", "above 0"}},
+    {8, "    clip: {keep: outside}", 8, {"images[0].clip: holds nothing", "planes, a box or a sphere"}},
+    {8, "    clip: {planes: [{normal: [1, 0, 0]}], keep: outside}", 8, {"clip.keep: given without a box or a sphere"}},
+    {8, "    clip: {box: [[0, 0, 0], [1, 1, 1]], keep: both}", 8, {"clip.keep: \"both\"", "inside, outside"}},
+    {11,
+     "      - surface: {clip: {box: [[0, 0, 0], [0, 1, 1]]}}",
+     11,
+     {"layers[1].surface.clip.box: from 0 to 0 along x", "first corner to be less"}},
+    {11, "      - surface: {clip: {}}", 11, {"layers[1].surface.clip: holds nothing", "planes, a box or a sphere"}},
     {11, "      - surface: {field: f}", 11, {"surface: the key \"field\" is unknown", "colour_by"}},
     {11, "      - surface: {colour: red}", 11, {"surface.colour: \"red\"", "a list of 3 numbers from 0 to 1"}},
     {11, "      - surface: {colour: [1, 0, 0], colour_by: {field: f}}", 11, {"surface.colour: given beside colour_by"}},
@@ -1010,7 +1031,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(slices_have_planes_of_unit_normals),
         cmocka_unit_test(surfaces_have_their_colours),
         cmocka_unit_test(statistics_and_conditions_are_read),
-        cmocka_unit_test(clips_are_planes),
+        cmocka_unit_test(clips_are_of_the_image_and_of_layers),
         cmocka_unit_test(scene_up_defaults_to_z_where_the_view_is_along_y),
         cmocka_unit_test_prestate(scene_examples_are_good, argument_count > 1 ? arguments[1] : NULL),
         cmocka_unit_test(scene_that_bad_files_are_made_of_is_good),

@@ -1,6 +1,7 @@
-/* Clipping: every layer is drawn within the planes alone, by closed form: the cube's surface, isosurfaces that are
- * planes, a medium of one opacity by all methods. On cells of every type, and dealt at random the same picture as on
- * one rank. */
+/* Clipping: every layer is drawn within what planes, boxes and spheres leave of it alone, by closed form: the cube's
+ * surface, isosurfaces that are planes, a medium of one opacity by all methods; cut by the image's clip, by the layer's
+ * own, and beside a layer that is whole. On cells of every type, and dealt at random the same picture as on one rank.
+ */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,11 +14,8 @@
 enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
 #define EYE "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
-/* x + 2 y + 2 z <= 0.9, and a box that leaves out x < -0.7 and y > 0.8. */
-#define CLIP                                                                                                           \
-    "    clip: {planes: [{normal: [1, 2, 2], point: [0, 0, 0], offset: 0.3}], box: [[-0.7, -5, -5], [5, 0.8, 5]]}\n"
-#define IMAGE(layers, more)                                                                                            \
-    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE CLIP more "    layers:\n" layers    \
+#define IMAGE(more, layers)                                                                                            \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n" EYE "%s" more "    layers:\n" layers    \
     "    outputs: [{path: a.exr}]\n"
 
 typedef struct half_space {
@@ -26,6 +24,32 @@ typedef struct half_space {
 
 static const half_space clips[] = {
     {{1. / 3, 2. / 3, 2. / 3}, 0.3}, {{-1, 0, 0}, 0.7}, {{1, 0, 0}, 5}, {{0, -1, 0}, 5}, {{0, 1, 0}, 0.8}};
+static const half_space corner[] = {{{-1, 0, 0}, -0.1}, {{1, 0, 0}, 5},  {{0, -1, 0}, 0.2},
+                                    {{0, 1, 0}, 5},     {{0, 0, -1}, 0}, {{0, 0, 1}, 5}};
+
+/* What is left: within the half spaces and the ball, without the hole, which is the ball where that is left out. */
+typedef struct region {
+    const char *text; /* of the scene's clip */
+    const half_space *planes, *hole;
+    size_t plane_count, hole_count;
+    double radius; /* 0: there is no ball */
+    bool is_outside;
+} region;
+
+static const double ball[3] = {0.5, 0.4, 0.6};
+
+static const region regions[] = {
+    /* x + 2 y + 2 z <= 0.9, and a box that leaves out x < -0.7 and y > 0.8. */
+    {.text = "{planes: [{normal: [1, 2, 2], point: [0, 0, 0], offset: 0.3}], box: [[-0.7, -5, -5], [5, 0.8, 5]]}",
+     .planes = clips,
+     .plane_count = sizeof clips / sizeof *clips},
+    {.text = "{sphere: {centre: [0.5, 0.4, 0.6], radius: 0.9}}", .radius = 0.9},
+    {.text = "{sphere: {centre: [0.5, 0.4, 0.6], radius: 0.7}, keep: outside}", .radius = 0.7, .is_outside = true},
+    {.text = "{box: [[0.1, -0.2, 0], [5, 5, 5]], keep: outside}",
+     .hole = corner,
+     .hole_count = sizeof corner / sizeof *corner}};
+enum { REGIONS = sizeof regions / sizeof *regions };
+
 static const half_space cube[] = {{{1, 0, 0}, 1},  {{-1, 0, 0}, 1}, {{0, 1, 0}, 1},
                                   {{0, -1, 0}, 1}, {{0, 0, 1}, 1},  {{0, 0, -1}, 1}};
 /* test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1: its isosurface 0.2. */
@@ -72,9 +96,30 @@ static span cut(const ray *r, const half_space *planes, size_t count)
     return out;
 }
 
-static span clipped(const ray *r)
+static span meet_ball(const ray *r, double radius)
 {
-    return cut(r, clips, sizeof clips / sizeof *clips);
+    double from[3];
+    for (int a = 0; a < 3; a++) from[a] = ball[a] - r->base[a];
+    const double square = dot(r->direction, r->direction), nearest = dot(from, r->direction) / square;
+    const double left = (radius * radius - dot(from, from)) / square + nearest * nearest;
+    return left > 0 ? (span){nearest - sqrt(left), nearest + sqrt(left)} : (span){INFINITY, -INFINITY};
+}
+
+static span meet_both(span a, span b)
+{
+    return (span){fmax(a.begin, b.begin), fmin(a.end, b.end)};
+}
+
+static span kept_span(const region *g, const ray *r)
+{
+    const span within = cut(r, g->planes, g->plane_count);
+    return g->radius > 0 && !g->is_outside ? meet_both(within, meet_ball(r, g->radius)) : within;
+}
+
+static span hole_span(const region *g, const ray *r)
+{
+    if (g->is_outside) return meet_ball(r, g->radius);
+    return g->hole_count ? cut(r, g->hole, g->hole_count) : (span){INFINITY, -INFINITY};
 }
 
 static span cube_span(const ray *r)
@@ -86,46 +131,52 @@ static span cube_span(const ray *r)
 
 enum { MOST = 3 };
 
-/* Depths of crossings in the clipped space, in order; NaN first: rounding decides. */
-static int keep(const ray *r, const double *depths, int count, double out[MOST])
+static bool is_at(double depth, span s)
 {
-    const span s = clipped(r);
+    return fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4;
+}
+
+/* Depths of crossings in what is left, in order; -1: rounding decides. */
+static int keep(const region *g, const ray *r, const double *depths, int count, double out[MOST])
+{
+    const span within = kept_span(g, r), hole = hole_span(g, r);
     int kept = 0;
     for (int i = 0; i < count; i++) {
-        if (fabs(depths[i] - s.begin) < 1e-4 || fabs(depths[i] - s.end) < 1e-4) return -1;
-        if (depths[i] > s.begin && depths[i] < s.end) out[kept++] = depths[i];
+        if (is_at(depths[i], within) || is_at(depths[i], hole)) return -1;
+        if (depths[i] < within.begin || depths[i] > within.end) continue;
+        if (depths[i] < hole.begin || depths[i] > hole.end) out[kept++] = depths[i];
     }
     return kept;
 }
 
-static int see_cube(const ray *r, double out[MOST])
+static int see_cube(const region *g, const ray *r, double out[MOST])
 {
     const span s = cube_span(r);
     if (fabs(s.end - s.begin) < 1e-4) return -1;
     if (s.end < s.begin) return 0;
     const double depths[2] = {s.begin, s.end};
-    return keep(r, depths, 2, out);
+    return keep(g, r, depths, 2, out);
 }
 
-static int see_plane(const ray *r, double out[MOST])
+static int see_plane(const region *g, const ray *r, double out[MOST])
 {
     const span s = cube_span(r);
     const double depth = meet(r, &linear);
-    if (fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4) return -1;
+    if (is_at(depth, s)) return -1;
     if (!(depth > s.begin && depth < s.end)) return 0;
-    return keep(r, &depth, 1, out);
+    return keep(g, r, &depth, 1, out);
 }
 
-typedef int see_function(const ray *r, double out[MOST]);
+typedef int see_function(const region *g, const ray *r, double out[MOST]);
 
 /* Surfaces of an opacity: the nearest depth, and opacity by their number. */
-static bool has_surfaces(const caught_picture *picture, see_function *see, double opacity)
+static bool has_surfaces(const caught_picture *picture, const region *g, see_function *see, double opacity)
 {
     int hits = 0, behind = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const ray r = ray_of(pixel);
         double depths[MOST];
-        const int count = see(&r, depths);
+        const int count = see(g, &r, depths);
         if (count < 0) continue;
         const double alpha = 1 - pow(1 - opacity, count), depth = count ? depths[0] : (double)INFINITY;
         const double own = (double)picture->depth[pixel];
@@ -141,16 +192,21 @@ static bool has_surfaces(const caught_picture *picture, see_function *see, doubl
     return hits > PIXELS / 60 && behind > PIXELS / 80;
 }
 
-/* Half of the light goes through a length of 1. The planes are moved outwards by 2e-6 of half the diagonal, which is
- * 4e-6, over their slants. */
-static bool has_medium(const caught_picture *picture, double media, double tolerance)
+static double length_of(span s)
+{
+    return fmax(s.end - s.begin, 0);
+}
+
+/* Half of the light goes through a length of 1. What is kept reaches further by 2e-6 of half the diagonal, which is
+ * 4e-6, over its slant. */
+static bool has_medium(const caught_picture *picture, const region *g, double media, double tolerance)
 {
     int hits = 0;
     for (int pixel = 0; pixel < PIXELS; pixel++) {
         const ray r = ray_of(pixel);
-        const span s = cube_span(&r), c = clipped(&r);
+        const span within = meet_both(cube_span(&r), kept_span(g, &r));
         const double length =
-            fmax(fmin(s.end, c.end) - fmax(s.begin, c.begin), 0) * sqrt(dot(r.direction, r.direction));
+            (length_of(within) - length_of(meet_both(within, hole_span(g, &r)))) * sqrt(dot(r.direction, r.direction));
         const double alpha = 1 - pow(0.5, media * length), own = (double)picture->rgba[4 * pixel + 3];
         hits += alpha > 0.1;
         if (fabs(own - alpha) < tolerance) continue;
@@ -160,65 +216,90 @@ static bool has_medium(const caught_picture *picture, double media, double toler
     return hits > PIXELS / 20;
 }
 
-static bool is_clear_cube(const caught_picture *p)
+static bool is_clear_cube(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, see_cube, 0.5);
+    return has_surfaces(p, g, see_cube, 0.5);
 }
-static bool is_cube(const caught_picture *p)
+static bool is_cube(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, see_cube, 1);
+    return has_surfaces(p, g, see_cube, 1);
 }
-static bool is_plane(const caught_picture *p)
+static bool is_plane(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, see_plane, 1);
+    return has_surfaces(p, g, see_plane, 1);
 }
-static bool is_clear_plane(const caught_picture *p)
+static bool is_clear_plane(const caught_picture *p, const region *g)
 {
-    return has_surfaces(p, see_plane, 0.25);
+    return has_surfaces(p, g, see_plane, 0.25);
 }
-static bool is_exact_medium(const caught_picture *p)
+/* A ray that grazes the ball has its length to the square root of what the ball is moved by: 4e-6 of it is 0.004. */
+static bool is_exact_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, 1, 1e-4);
+    return has_medium(p, g, 1, g->radius > 0 ? 4e-3 : 1e-4);
 }
-/* A step of 0.01 is 0.0069 of the light, at either end of a ray. */
-static bool is_sampled_medium(const caught_picture *p)
+/* A step of 0.01 is 0.0069 of the light, at either end of a ray and of the hole. */
+static bool is_sampled_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, 1, 0.014);
+    return has_medium(p, g, 1, g->hole_count || g->is_outside ? 0.028 : 0.014);
 }
-static bool is_double_medium(const caught_picture *p)
+static bool is_double_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, 2, 2e-4);
+    return has_medium(p, g, 2, g->radius > 0 ? 8e-3 : 2e-4);
 }
-static bool is_double_sampled_medium(const caught_picture *p)
+static bool is_double_sampled_medium(const caught_picture *p, const region *g)
 {
-    return has_medium(p, 2, 0.028);
+    return has_medium(p, g, 2, g->hole_count || g->is_outside ? 0.056 : 0.028);
 }
 
-#define MEDIUM "      - volume: {field: f, range: [-9, 9], opacity: [[0, 0.5], [1, 0.5]], unit_distance: 1}\n"
+/* Each layer ends where its own clip may follow. */
+#define MEDIUM "      - volume: {field: f, range: [-9, 9], opacity: [[0, 0.5], [1, 0.5]], unit_distance: 1%s}\n"
+/* It shows nowhere, and keeps the others' clip from being that of all layers. */
+#define WHOLE "      - isosurface: {field: f, values: [99]}\n"
 
 typedef struct clip_case {
     const char *name, *scene;
-    bool (*is_right)(const caught_picture *picture);
+    bool (*is_right)(const caught_picture *picture, const region *g);
     double tolerance; /* between ranks; 0: the same bits */
 } clip_case;
 
 static const clip_case cases[] = {
-    {"surface", IMAGE("      - surface: {}\n", ""), is_cube, 0},
-    {"clear surface", IMAGE("      - surface: {opacity: 0.5}\n", ""), is_clear_cube, 0},
-    {"isosurface", IMAGE("      - isosurface: {field: f, values: [0.2]}\n", ""), is_plane, 0},
-    {"coloured", IMAGE("      - isosurface: {field: f, values: [0.2], colour_by: {field: f}}\n", ""), is_plane, 0},
-    {"clear isosurface", IMAGE("      - isosurface: {field: f, values: [0.2], opacity: 0.25}\n", ""), is_clear_plane,
+    {"surface", IMAGE("", "      - surface: {opacity: 1%s}\n"), is_cube, 0},
+    {"clear surface", IMAGE("", "      - surface: {opacity: 0.5%s}\n"), is_clear_cube, 0},
+    {"isosurface", IMAGE("", "      - isosurface: {field: f, values: [0.2]%s}\n"), is_plane, 0},
+    {"coloured", IMAGE("", "      - isosurface: {field: f, values: [0.2], colour_by: {field: f}%s}\n"), is_plane, 0},
+    {"clear isosurface", IMAGE("", "      - isosurface: {field: f, values: [0.2], opacity: 0.25%s}\n"), is_clear_plane,
      0},
-    {"to an error", IMAGE(MEDIUM, ""), is_exact_medium, 1e-6},
-    {"to a small error", IMAGE(MEDIUM, "    sampling: {max_error: 1e-4}\n"), is_exact_medium, 1e-6},
-    {"segments", IMAGE(MEDIUM, "    sampling: {method: segments}\n"), is_exact_medium, 1e-6},
-    {"samples", IMAGE(MEDIUM, "    sampling: {step: 0.01}\n"), is_sampled_medium, 1e-6},
-    {"two by segments", IMAGE(MEDIUM MEDIUM, "    sampling: {method: segments}\n"), is_double_medium, 1e-6},
-    {"two by samples", IMAGE(MEDIUM MEDIUM, "    sampling: {step: 0.01}\n"), is_double_sampled_medium, 1e-6},
-    {"clear surface in a medium", IMAGE(MEDIUM "      - isosurface: {field: f, values: [0.2], opacity: 0}\n", ""),
+    {"to an error", IMAGE("", MEDIUM), is_exact_medium, 1e-6},
+    {"to a small error", IMAGE("    sampling: {max_error: 1e-4}\n", MEDIUM), is_exact_medium, 1e-6},
+    {"segments", IMAGE("    sampling: {method: segments}\n", MEDIUM), is_exact_medium, 1e-6},
+    {"samples", IMAGE("    sampling: {step: 0.01}\n", MEDIUM), is_sampled_medium, 1e-6},
+    {"two by segments", IMAGE("    sampling: {method: segments}\n", MEDIUM MEDIUM), is_double_medium, 1e-6},
+    {"two by samples", IMAGE("    sampling: {step: 0.01}\n", MEDIUM MEDIUM), is_double_sampled_medium, 1e-6},
+    {"clear surface in a medium", IMAGE("", MEDIUM "      - isosurface: {field: f, values: [0.2], opacity: 0%s}\n"),
      is_exact_medium, 1e-6},
 };
 enum { CASES = sizeof cases / sizeof *cases };
+
+/* What carries the clip: the image, the layers, or the layers beside one that is whole. */
+typedef enum clip_place { OF_IMAGE, OF_LAYERS, BESIDE_A_WHOLE, PLACES } clip_place;
+
+static const char *scene_of(const clip_case *c, const region *g, clip_place place)
+{
+    char text[2048], filled[2048], own[256] = "", all[256] = "";
+    const char *outputs = strstr(c->scene, "    outputs");
+    if (place == OF_IMAGE)
+        snprintf(all, sizeof all, "    clip: %s\n", g->text);
+    else
+        snprintf(own, sizeof own, ", clip: %s", g->text);
+    snprintf(text, sizeof text, "%.*s%s%s", (int)(outputs - c->scene), c->scene, place == BESIDE_A_WHOLE ? WHOLE : "",
+             outputs);
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+#pragma GCC diagnostic ignored "-Wformat-extra-args"
+    snprintf(filled, sizeof filled, text, all, own, own);
+#pragma GCC diagnostic pop
+    return write_scene(filled);
+}
 
 /* ---- pictures ------------------------------------------------------------------------------------------------ */
 
@@ -250,37 +331,52 @@ static double difference(const caught_picture *a, const caught_picture *b)
     return memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0 ? worst : (double)INFINITY;
 }
 
-static void judge(test_mesh_kind kind, const clip_case *c, const session_input *whole, const session_input *part)
+static void judge(test_mesh_kind kind, const clip_case *c, const region *g, clip_place place,
+                  const session_input inputs[2])
 {
-    const char *scene = write_scene(c->scene);
-    caught_picture ours = draw(MPI_COMM_WORLD, scene, part), alone = {0};
+    const char *scene = scene_of(c, g, place);
+    caught_picture ours = draw(MPI_COMM_WORLD, scene, &inputs[1]), alone = {0};
     bool is_well = true;
     if (own_rank == 0) {
-        alone = draw(MPI_COMM_SELF, scene, whole);
+        alone = draw(MPI_COMM_SELF, scene, &inputs[0]);
         const double off = difference(&ours, &alone);
-        is_well = c->is_right(&alone) && off <= c->tolerance;
-        if (!is_well) fprintf(stderr, "%s, %s: ranks are off by %g\n", test_mesh_kind_name(kind), c->name, off);
+        is_well = c->is_right(&alone, g) && off <= c->tolerance;
+        if (!is_well)
+            fprintf(stderr, "%s, %s, clip %s of %d: ranks are off by %g\n", test_mesh_kind_name(kind), c->name, g->text,
+                    (int)place, off);
     }
     everywhere(is_well);
     free_picture(&ours);
     free_picture(&alone);
 }
 
+/* Two of the region and place pairs a case, others for each kind of mesh: over all kinds, every case has all of them.
+ */
+static void judge_all(test_mesh_kind kind, const session_input inputs[2])
+{
+    for (int i = 0; i < CASES; i++)
+        for (int turn = 0; turn < 2; turn++) {
+            const int pair = (2 * (int)kind + turn + i) % (REGIONS * PLACES);
+            judge(kind, &cases[i], &regions[pair / PLACES], (clip_place)(pair % PLACES), inputs);
+        }
+}
+
 static void layers_are_clipped(void **state)
 {
     (void)state;
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
-        session_input whole = {0}, part = {0};
-        test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
-        input_describe(&whole);
-        int *owners = test_calloc((size_t)whole.part.cell_count, sizeof *owners);
-        test_partition(&whole.part, TEST_RANDOM, SIDE, rank_count, owners);
-        test_mesh_part(&whole.part, owners, own_rank, &part.part);
+        session_input inputs[2]; /* whole, and this rank's */
+        memset(inputs, 0, sizeof inputs);
+        test_mesh_lattice(kind, SIDE, 0.2, test_linear, &inputs[0].part);
+        input_describe(&inputs[0]);
+        int *owners = test_calloc((size_t)inputs[0].part.cell_count, sizeof *owners);
+        test_partition(&inputs[0].part, TEST_RANDOM, SIDE, rank_count, owners);
+        test_mesh_part(&inputs[0].part, owners, own_rank, &inputs[1].part);
         test_free(owners);
-        input_describe(&part);
-        for (int i = 0; i < CASES; i++) judge(kind, &cases[i], &whole, &part);
-        input_free(&part);
-        input_free(&whole);
+        input_describe(&inputs[1]);
+        judge_all(kind, inputs);
+        input_free(&inputs[0]);
+        input_free(&inputs[1]);
     }
 }
 
@@ -288,11 +384,12 @@ static void layers_are_clipped(void **state)
 static void slices_in_the_clipping_plane_are_seen(void **state)
 {
     (void)state;
-    static const char *const text = IMAGE(
-        "      - slice: {field: f, planes: [{normal: [-1, -2, -2], point: [0.9, 0, 0]}]}\n      - surface: {}\n", "");
+    static const clip_case slice = {
+        .scene = IMAGE("", "      - slice: {field: f, planes: [{normal: [-1, -2, -2], point: [0.9, 0, 0]}]}\n"
+                           "      - surface: {}\n")};
     session_input in = {0};
     input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
-    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(text), &in);
+    caught_picture picture = draw(MPI_COMM_WORLD, scene_of(&slice, &regions[0], OF_IMAGE), &in);
     int hits = 0;
     bool is_well = true;
     for (int pixel = 0; pixel < PIXELS && own_rank == 0; pixel++) {

@@ -245,18 +245,27 @@ void draw_ticks(sheet &s, const insitu_colour_bar &bar, const area &where)
     }
 }
 
-/* The label, a gap, and the bar with its ticks at its right. Bars of one side share its height. */
+double width_of_bar(sheet &s, const insitu_colour_bar &bar, double thickness)
+{
+    int words = 0;
+    for (int i = 0; i < bar.tick_count; i++) words = std::max(words, width_of(s, bar.ticks[i].text, s.size));
+    return std::max<double>(width_of(s, bar.label, s.size), thickness + 0.5 * s.size + words);
+}
+
+/* The label, a gap, and the bar with its ticks at its right. Bars of one side share its height and are as wide as the
+ * widest, so that they stand in line. */
 void draw_bar(sheet &s, const insitu_colour_bar &bar)
 {
-    int sharing = 0, before = 0, words = 0;
-    for (int i = 0; i < s.what.bar_count; i++) {
-        sharing += s.what.bars[i].at == bar.at;
-        before += s.what.bars[i].at == bar.at && &s.what.bars[i] < &bar;
-    }
-    for (int i = 0; i < bar.tick_count; i++) words = std::max(words, width_of(s, bar.ticks[i].text, s.size));
+    int sharing = 0, before = 0;
+    double width = 0;
     const double thickness = 0.9 * s.size, head = 1.7 * s.size, foot = 0.5 * s.size;
+    for (int i = 0; i < s.what.bar_count; i++) {
+        if (s.what.bars[i].at != bar.at) continue;
+        sharing++;
+        before += &s.what.bars[i] < &bar;
+        width = std::max(width, width_of_bar(s, s.what.bars[i], thickness));
+    }
     const double length = std::max(2.0 * s.size, 0.62 * s.image.height / sharing - head - foot);
-    const double width = std::max<double>(width_of(s, bar.label, s.size), thickness + 0.5 * s.size + words);
     const double height = head + length + foot, gap = 0.5 * s.margin;
     const double above = (before - 0.5 * (sharing - 1)) * (height + gap); /* of the middle of the side */
     const area block = place_block(s.image, {bar.at, above}, width, height, s.margin, s.taken);

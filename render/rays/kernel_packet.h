@@ -14,6 +14,7 @@
 
 #include <math.h>
 
+#include "kernel_clip.h"
 #include "kernel_types.h"
 #include "mmbvh.h"
 #include "pixel_set.h"
@@ -57,8 +58,11 @@ typedef struct kernel_packet {
     /* samples: at t = sample_base + m * sample_step for whole numbers m >= sample_first */
     vf sample_base, sample_step, sample_inverse;
     int sample_first;
-    /* For volumes: where the job's clipping planes have the ray; -inf and +inf without them. */
+    /* For volumes: what clips leave of the ray; -inf and +inf without them. */
     vf clip_in, clip_out;
+    /* Where volumes have clips of their own: what surfaces have left of the rays. */
+    vm all_active;
+    vf surface_near, surface_far;
 } kernel_packet;
 
 /* Packets cover rectangles: 4 × 4, 4 × 2 or 2 × 2 pixels. */
@@ -230,44 +234,46 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
-/* Where the clipping planes have a ray; which is empty where begin > end. */
-static inline void kernel_clip_ray(const kernel_frame *f, double px, double py, float *begin, float *end)
+/* What the clips leave of each of the packet's rays, in front of the eye: the stretch of the number. */
+static __attribute__((noinline, cold)) void kernel_packet_part(const kernel_packet *p, uint32_t clips, int number,
+                                                               vf *begin, vf *end)
 {
-    const render_space *s = &f->job->space;
-    double base[3], direction[3], first = -INFINITY, last = INFINITY;
-    kernel_tree_ray(f, px, py, base, direction);
-    for (int i = 0; i < f->job->clip_count; i++) {
-        const render_clip_plane *plane = &f->job->clips[i];
-        double left = plane->distance, along = 0;
-        for (int a = 0; a < 3; a++) {
-            left -= plane->normal[a] * s->origin[a];
-            along += plane->normal[a] * direction[a];
-        }
-        left *= s->scale;
-        for (int a = 0; a < 3; a++) left -= plane->normal[a] * base[a];
-        if (along > 0)
-            last = fmin(last, left / along);
-        else if (along < 0)
-            first = fmax(first, left / along);
-        else if (left < 0)
-            last = -INFINITY;
+    const kernel_frame *f = p->frame;
+    kernel_lanes l;
+    float from[SIMD_WIDTH], to[SIMD_WIDTH];
+    kernel_packet_lanes(p, &l);
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        kernel_clip_ray ray;
+        kernel_tree_ray(f, l.px[i], l.py[i], ray.base, ray.direction);
+        const kernel_ray_part part = kernel_clip_part(f->job, clips, &ray, -f->depth_shift, number);
+        from[i] = (float)part.begin;
+        to[i] = (float)part.end;
     }
-    *begin = (float)first;
-    *end = (float)last;
+    *begin = vf_load(from);
+    *end = vf_load(to);
 }
 
-/* A function of the ray alone, in double: the same on all ranks. */
-static __attribute__((noinline, cold)) void kernel_packet_clip(kernel_packet *p)
+/* What all layers are cut by. */
+static inline void kernel_packet_clip(kernel_packet *p)
 {
-    kernel_lanes l;
-    float begin[SIMD_WIDTH], end[SIMD_WIDTH];
-    kernel_packet_lanes(p, &l);
-    for (int i = 0; i < SIMD_WIDTH; i++) kernel_clip_ray(p->frame, l.px[i], l.py[i], &begin[i], &end[i]);
-    p->clip_in = vf_load(begin);
-    p->clip_out = vf_load(end);
+    kernel_packet_part(p, p->frame->common_clips, 0, &p->clip_in, &p->clip_out);
     p->t_near = vf_max(p->t_near, p->clip_in);
     p->t_far = p->clip_out;
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
+}
+
+/* What volumes are cut by: the stretch of the turn's number. Surfaces are all there. */
+static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
+{
+    if (turn == 0) {
+        p->all_active = p->active;
+        p->surface_near = p->t_near;
+        p->surface_far = p->t_far;
+    }
+    kernel_packet_part(p, p->frame->job->volume_clips, turn, &p->clip_in, &p->clip_out);
+    p->t_near = vf_max(p->surface_near, p->clip_in);
+    p->t_far = vf_min(p->surface_far, p->clip_out);
+    p->active = vm_and(p->all_active, vf_le(p->t_near, p->t_far));
 }
 
 /* Sets up what rays need in cells. The tile's rays must be there. */
@@ -301,7 +307,7 @@ static inline void kernel_packet_begin(kernel_packet *p, const kernel_frame *f, 
         p->clip_in = vf_set(-INFINITY);
         p->clip_out = vf_set(INFINITY);
     }
-    if (f->job->clip_count) kernel_packet_clip(p);
+    if (f->common_clips) kernel_packet_clip(p);
 }
 
 /* Sets up what rays need besides to go down trees on their own, and for volumes. */

@@ -17,6 +17,7 @@ typedef struct kernel_tile_trace {
     kernel_planes tree_planes, tile_planes;
     unsigned wanted; /* blocks that have pixels to trace */
     unsigned begun;  /* blocks whose packets are set up */
+    int turn;        /* of volumes (kernel_clip.h) */
     float t_near;
     vf far[KERNEL_BLOCKS / SIMD_WIDTH]; /* each block's farthest t_far */
     /* of the surface under way */

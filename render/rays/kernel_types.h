@@ -54,6 +54,7 @@ typedef struct kernel_surface {
     const render_surface_layer *layer;
     kernel_interest interest; /* the isovalues */
     kernel_transfer colour;   /* where layer->colour_map */
+    uint32_t own_clips;       /* those of the layer that are not the frame's common ones */
     uint32_t first_kind;      /* fragment kind of the layer's first isovalue */
     double value_scale;       /* a power of two that brings the field's range near 1: for differences */
 } kernel_surface;
@@ -144,6 +145,8 @@ typedef struct kernel_frame {
     double slope_y0, slope_dy;
     double scaled_step;                          /* step * scale */
     float light_direction[RENDER_MAX_LIGHTS][3]; /* in camera axes */
+    uint32_t common_clips;                       /* those of all layers that leave one stretch of a ray */
+    int volume_turns; /* stretches that clips of volumes may leave of a ray; 0: they have none of their own */
     bool has_transparent;
     bool is_binned;     /* surfaces' cells are binned by tile, where that pays; */
     bool bins_volume;   /* those of the only volume */

@@ -285,8 +285,9 @@ static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *stat
     kernel_walk_begin(stay, wanted, &walk);
     do {
         const vm found = kernel_walk_next(r, stay, &walk);
-        kernel_polyhedron_accept(p, state, c, value, rays, r, kernel_visible(p, found, walk.t), &walk);
-        if (state->is_opaque) walk.open = vm_andnot(walk.open, vm_and(found, vf_le(p->t_near, walk.t)));
+        const vm kept = kernel_kept(p, state->surface, found, walk.t);
+        kernel_polyhedron_accept(p, state, c, value, rays, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
+        if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
     } while (layer->root == RENDER_ROBUST && vm_any(walk.open));
 }
 

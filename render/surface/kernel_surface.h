@@ -144,9 +144,33 @@ SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
     return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
-SIMD_INLINE vm kernel_visible(const kernel_packet *p, vm hit, vf t)
+/* The hits that clips leave. */
+static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
 {
-    return vm_and(hit, vm_and(vf_le(p->t_near, t), vf_le(t, p->t_far)));
+    kernel_lanes l;
+    unsigned kept = 0;
+    kernel_packet_lanes(p, &l);
+    vf_store(l.value, t);
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int i = __builtin_ctz(left);
+        kernel_clip_ray ray;
+        kernel_tree_ray(p->frame, l.px[i], l.py[i], ray.base, ray.direction);
+        kept |= (unsigned)kernel_clip_keeps(p->frame->job, clips, &ray, (double)l.value[i]) << i;
+    }
+    return vm_from_bits(kept);
+}
+
+/* Hits in front of the eye that the surface's clips leave. */
+SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
+{
+    const vm in_front = vm_and(hit, vf_le(p->t_near, t));
+    if (__builtin_expect(s->own_clips == 0, 1)) return in_front;
+    return kernel_clip_hits(p, s->own_clips, in_front, t);
+}
+
+SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
+{
+    return kernel_kept(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
 }
 
 /* The gradient of a tet's field, by Cramer's rule in double; its length and sign do not matter. */
@@ -184,7 +208,7 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
     const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
     if (!vm_any(change)) return;
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
-    const vm hit = kernel_visible(p, change, t);
+    const vm hit = kernel_visible(p, state->surface, change, t);
     if (!vm_any(hit)) return;
     kernel_hit_places at = {.t = t, .w = vf_set(0)};
     kernel_tet_normal(p, c, at.normal);
@@ -233,7 +257,7 @@ SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_c
 SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                   const kernel_poly *poly, vm found, const kernel_point *at)
 {
-    const vm hit = kernel_visible(p, found, at->t);
+    const vm hit = kernel_visible(p, state->surface, found, at->t);
     if (!vm_any(hit)) return hit;
     kernel_hit_places places = {.t = at->t, .w = vf_set(0)};
     kernel_map_normal(&poly->map, at->r, places.normal);

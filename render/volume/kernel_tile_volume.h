@@ -117,7 +117,11 @@ SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, 
     for (; blocks; blocks &= blocks - 1) {
         const int block = __builtin_ctz(blocks);
         kernel_block_begin(t, block);
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) packets[count++] = block * KERNEL_BLOCK_PACKETS + n;
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            const int i = block * KERNEL_BLOCK_PACKETS + n;
+            if (t->frame->volume_turns) kernel_packet_clip_volumes(&t->packets[i], t->turn);
+            packets[count++] = i;
+        }
     }
     if (count) kernel_block_rays_setup(&t->thread->tile_cells->block_rays, t->frame, &t->tile);
     return count;

@@ -229,14 +229,15 @@ static void write_label(const scene_decorations *scene, int bar, const scene_fie
         snprintf(label, 300, "%s%s", field->name, component);
 }
 
-/* Has an earlier bar the same label, colours and numbers? Several layers may show one field. */
+/* Has an earlier bar the same field, colours and numbers? Several layers may show one field. */
 static bool is_repeated(const session_decorations *d, int bar)
 {
     const insitu_colour_bar *b = &d->bars[bar];
     bool is_found = false;
     for (int i = 0; i < bar && !is_found; i++) {
         const insitu_colour_bar *a = &d->bars[i];
-        is_found = strcmp(a->label, b->label) == 0 && a->is_banded == b->is_banded &&
+        is_found = strcmp(d->fields[i]->name, d->fields[bar]->name) == 0 &&
+                   d->fields[i]->component == d->fields[bar]->component && a->is_banded == b->is_banded &&
                    a->colour_count == b->colour_count && a->tick_count == b->tick_count &&
                    memcmp(a->colours, b->colours, (size_t)a->colour_count * 3 * sizeof *a->colours) == 0 &&
                    memcmp(a->ticks, b->ticks, (size_t)a->tick_count * sizeof *a->ticks) == 0;
@@ -250,6 +251,7 @@ static void add_bar(session_decorations *d, const scene_decorations *scene, cons
     const int i = d->all.bar_count;
     if (i == SESSION_MAX_BARS) return;
     const session_scale scale = {transfer->transfer.scale, transfer->transfer.threshold, transfer->low, transfer->high};
+    d->fields[i] = field;
     write_label(scene, i, field, d->labels[i]);
     d->bars[i] = (insitu_colour_bar){.label = d->labels[i],
                                      .colours = map->colours,

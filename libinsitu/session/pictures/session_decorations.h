@@ -19,6 +19,7 @@ typedef struct session_decorations {
     insitu_colour_bar bars[SESSION_MAX_BARS];
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];
+    const scene_field *fields[SESSION_MAX_BARS]; /* of the bars */
     insitu_stroke strokes[SESSION_BOX_EDGES + SESSION_RULER_STROKES];
     insitu_label ruler_labels[SESSION_RULER_LABELS];
 } session_decorations;

@@ -146,6 +146,7 @@ static render_job make_job(const session_drawing *d, const scene_image *image, c
                         .active = view->clip_count ? NULL : layers->active,
                         .clip_count = view->clip_count,
                         .clips = view->clips,
+                        .volume_clips = image->volume_count ? image->volumes[0].clips : 0,
                         .volumes = layers->volumes,
                         .volume_count = image->volume_count,
                         .lights = view->lights,

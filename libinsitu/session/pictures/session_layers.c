@@ -146,7 +146,8 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
                                   .root = RENDER_ROBUST,
                                   .normal = layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES : RENDER_GRADIENT,
-                                  .difference = layer->difference};
+                                  .difference = layer->difference,
+                                  .clips = layer->clips};
     if (!layer->has_colour_by) return INSITU_OK;
     out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, false);
     out->colour_map = &layers->transfers[index].transfer;
@@ -228,7 +229,8 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
                                   .root = RENDER_ROBUST,
                                   .normal = RENDER_GRADIENT,
-                                  .edge_width = layer->edge_width};
+                                  .edge_width = layer->edge_width,
+                                  .clips = layer->clips};
     memcpy(out->edge_colour, layer->edge_colour, sizeof out->edge_colour);
     if (!layer->has_colour_by) return INSITU_OK;
     out->colour_map = &layers->transfers[surface].transfer;
@@ -273,7 +275,8 @@ static insitu_status fill_plane(const session_layer_basis *basis, const scene_im
         .opacity = layer->opacity,
         .material = {m->ambient, m->diffuse, m->specular, m->shininess},
         .root = RENDER_ROBUST,
-        .normal = RENDER_GRADIENT};
+        .normal = RENDER_GRADIENT,
+        .clips = layer->clips};
     return INSITU_OK;
 }
 

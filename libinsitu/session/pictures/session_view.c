@@ -165,18 +165,34 @@ static void warn_of_view(const session_extent *e, const scene_image *image, cons
 
 /* ---- clipping ------------------------------------------------------------------------------------------------ */
 
-/* Further out by twice what a slice's plane may be from its place, so that a slice in it is seen. */
+/* What is kept reaches further by twice what a slice's plane may be from its place, so that a slice in it is seen. */
+static render_clip make_clip(const session_extent *e, const scene_clip *clip)
+{
+    const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;
+    render_clip out = {.is_outside = clip->is_outside, .radius = fmax(clip->radius + grown, 0)};
+    double point[3];
+    memcpy(out.centre, clip->centre, sizeof out.centre);
+    for (int axis = 0; axis < 3; axis++) {
+        const double middle = 0.5 * (clip->lower[axis] + clip->upper[axis]);
+        out.lower[axis] = fmin(clip->lower[axis] - grown, middle);
+        out.upper[axis] = fmax(clip->upper[axis] + grown, middle);
+    }
+    switch (clip->kind) {
+    case SCENE_CLIP_BOX: out.kind = RENDER_CLIP_BOX; break;
+    case SCENE_CLIP_SPHERE: out.kind = RENDER_CLIP_SPHERE; break;
+    case SCENE_CLIP_PLANE:
+        out.kind = RENDER_CLIP_PLANE;
+        session_find_plane_point(&clip->plane, e, point);
+        memcpy(out.normal, clip->plane.normal, sizeof out.normal);
+        out.distance = along(point, out.normal) + grown;
+    }
+    return out;
+}
+
 static void fill_clips(const session_extent *e, const scene_image *image, session_view *out)
 {
-    out->clip_count = image->clip.plane_count;
-    for (int i = 0; i < out->clip_count; i++) {
-        const scene_plane *plane = &image->clip.planes[i];
-        render_clip_plane *clip = &out->clips[i];
-        double point[3];
-        session_find_plane_point(plane, e, point);
-        memcpy(clip->normal, plane->normal, sizeof clip->normal);
-        clip->distance = along(point, plane->normal) + 2 * SESSION_BORDER_SHARE * e->half_diagonal;
-    }
+    out->clip_count = image->clip_count;
+    for (int i = 0; i < out->clip_count; i++) out->clips[i] = make_clip(e, &image->clips[i]);
 }
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */

@@ -14,7 +14,7 @@ typedef struct session_view {
     render_light lights[RENDER_MAX_LIGHTS];
     double step;
     int clip_count;
-    render_clip_plane clips[RENDER_MAX_CLIP_PLANES];
+    render_clip clips[RENDER_MAX_CLIPS];
 } session_view;
 
 /* Fails where the camera looks nowhere, or where samples of the image's volumes would take longer than its max_seconds,

@@ -160,7 +160,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
         status = scene_bad(d, path, "every_time", "given beside every, expected one of the two");
     if (status == INSITU_OK) status = scene_convert_camera(d, camera_path, in->camera, &out->camera);
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
-    if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, &out->clip);
+    if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, out, &out->clips_of_all);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
     out->once = in->once && *in->once;
     if (status == INSITU_OK) status = scene_convert_condition(d, path, in->when, &out->when);
@@ -295,7 +295,7 @@ static void free_image(scene_image *image)
     base_free(image->isosurfaces);
     base_free(image->volumes);
     base_free(image->slices);
-    base_free(image->clip.planes);
+    base_free(image->clips);
     base_free(image->surfaces);
     base_free(image->lights);
     base_free(image->outputs);

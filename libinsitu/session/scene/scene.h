@@ -105,6 +105,7 @@ typedef struct scene_isosurface {
     scene_material material;
     scene_normal normals;
     double difference; /* in cell sizes, > 0; 1 by default */
+    uint32_t clips;    /* a set of the image's */
 } scene_isosurface;
 
 typedef struct scene_volume {
@@ -113,6 +114,7 @@ typedef struct scene_volume {
     int opacity_count; /* 1 .. 32 */
     scene_opacity_point *opacity;
     double unit_distance; /* > 0; 0: a twentieth of the diagonal of the bounds */
+    uint32_t clips;       /* a set of the image's, the same for all its volumes */
 } scene_volume;
 
 /* Cells whose values of a field lie from low to high. */
@@ -133,6 +135,7 @@ typedef struct scene_surface {
     scene_colour_map colour_map;
     float opacity;
     scene_material material;
+    uint32_t clips; /* a set of the image's */
 } scene_surface;
 
 typedef struct scene_plane {
@@ -142,10 +145,18 @@ typedef struct scene_plane {
     double offset; /* along the normal, from the point to the plane */
 } scene_plane;
 
-/* What is on the side of any of the planes that its normal points to is cut away. */
+typedef enum scene_clip_kind { SCENE_CLIP_PLANE, SCENE_CLIP_BOX, SCENE_CLIP_SPHERE } scene_clip_kind;
+typedef enum scene_keep { SCENE_KEEP_INSIDE, SCENE_KEEP_OUTSIDE } scene_keep;
+
+enum { SCENE_MAX_CLIPS = 32 };
+
+/* What is not within the half space, box or sphere is cut away; where is_outside, what is. */
 typedef struct scene_clip {
-    int plane_count; /* 0 .. 16 */
-    scene_plane *planes;
+    scene_clip_kind kind;
+    bool is_outside;
+    scene_plane plane; /* its normal points to what is cut away */
+    double lower[3], upper[3];
+    double centre[3], radius; /* > 0 */
 } scene_clip;
 
 typedef struct scene_slice {
@@ -155,6 +166,7 @@ typedef struct scene_slice {
     scene_colour_map colour_map;
     float opacity;
     scene_material material; /* no light by default: colours are those of the map */
+    uint32_t clips;          /* a set of the image's */
 } scene_slice;
 
 typedef struct scene_light {
@@ -254,8 +266,10 @@ typedef struct scene_image {
     int slice_count;
     scene_slice *slices;
     scene_decorations decorations;
-    scene_clip clip;
-    int light_count; /* 1 .. 8; a default head light and fill light where none is given */
+    int clip_count; /* 0 .. SCENE_MAX_CLIPS, each once */
+    scene_clip *clips;
+    uint32_t clips_of_all; /* a set of them, a bit each: those that cut all layers */
+    int light_count;       /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
     scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */
     double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */

@@ -56,8 +56,15 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 /* NULL: a slight gloss. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* in: NULL where nothing is clipped. */
-insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in, scene_clip *out);
+/* Adds what cuts to the image's list and to the set, a bit an entry of the list. in: NULL where nothing does. */
+insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
+                                 scene_image *image, uint32_t *set);
+/* The set of a layer: that of all layers, and its own. */
+insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
+                                       scene_image *image, uint32_t *set);
+/* The plane of the number in the list `planes` of the mapping at path. */
+insitu_status scene_convert_plane(const scene_document *d, const char *path, int index, const scene_file_plane *in,
+                                  scene_plane *out);
 /* height: of the picture. */
 insitu_status scene_convert_surface(const scene_document *d, const char *path, const scene_file_surface *in, int height,
                                     scene_surface *out);

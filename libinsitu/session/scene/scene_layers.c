@@ -242,6 +242,24 @@ static const char *layer_word(const scene_file_layer *layer)
     return layer->volume ? "volume" : layer->slice ? "slice" : layer->surface ? "surface" : "isosurface";
 }
 
+/* The layer was the last to be made of its kind. */
+static insitu_status convert_clip_of(const scene_document *d, const char *path, const scene_file_layer *in,
+                                     scene_image *out)
+{
+    scene_volume *volume = in->volume ? &out->volumes[out->volume_count - 1] : NULL;
+    if (in->slice)
+        return scene_convert_layer_clip(d, path, in->slice->clip, out, &out->slices[out->slice_count - 1].clips);
+    if (in->surface)
+        return scene_convert_layer_clip(d, path, in->surface->clip, out, &out->surfaces[out->surface_count - 1].clips);
+    if (!volume)
+        return scene_convert_layer_clip(d, path, in->isosurface->clip, out,
+                                        &out->isosurfaces[out->isosurface_count - 1].clips);
+    const insitu_status status = scene_convert_layer_clip(d, path, in->volume->clip, out, &volume->clips);
+    if (status || volume->clips == out->volumes[0].clips) return status;
+    return scene_bad(d, path, in->volume->clip ? "clip" : "",
+                     "cuts otherwise than the first volume does, expected all volumes of an image to have one clip");
+}
+
 /* values: isovalues of the layers before it. */
 static insitu_status convert_layer(const scene_document *d, const char *path, const scene_file_layer *in, int values,
                                    scene_image *out)
@@ -270,6 +288,7 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
         char layer_path[SCENE_PATH_SIZE - 16]; /* what comes below a layer is added */
         snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
         status = convert_layer(d, layer_path, layer, values, out);
+        if (!status) status = convert_clip_of(d, layer_path, layer, out);
         values += layer->isosurface ? layer->isosurface->values_count : 0;
     }
     return status;

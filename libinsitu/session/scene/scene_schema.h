@@ -53,6 +53,24 @@ typedef struct scene_file_colour_by {
     scene_file_colour_map colours;
 } scene_file_colour_by;
 
+typedef struct scene_file_plane {
+    double *normal, *point; /* 3 */
+    double *offset;
+} scene_file_plane;
+
+typedef struct scene_file_sphere {
+    double *centre; /* 3 */
+    double radius;
+} scene_file_sphere;
+
+typedef struct scene_file_clip {
+    scene_file_plane *planes;
+    int planes_count;
+    double (*box)[3]; /* 2 */
+    scene_file_sphere *sphere;
+    int *keep; /* scene_keep */
+} scene_file_clip;
+
 typedef struct scene_file_isosurface {
     char *field, *component;
     int *interpolate; /* scene_interpolation */
@@ -65,6 +83,7 @@ typedef struct scene_file_isosurface {
     scene_file_material *material;
     int *normals; /* scene_normal */
     double *difference;
+    scene_file_clip *clip;
 } scene_file_isosurface;
 
 typedef struct scene_file_volume {
@@ -74,6 +93,7 @@ typedef struct scene_file_volume {
     double (*opacity)[2];
     int opacity_count;
     double *unit_distance;
+    scene_file_clip *clip;
 } scene_file_volume;
 
 typedef struct scene_file_edges {
@@ -92,18 +112,8 @@ typedef struct scene_file_surface {
     scene_file_threshold *threshold;
     double *opacity;
     scene_file_material *material;
+    scene_file_clip *clip;
 } scene_file_surface;
-
-typedef struct scene_file_plane {
-    double *normal, *point; /* 3 */
-    double *offset;
-} scene_file_plane;
-
-typedef struct scene_file_clip {
-    scene_file_plane *planes;
-    int planes_count;
-    double (*box)[3]; /* 2 */
-} scene_file_clip;
 
 typedef struct scene_file_slice {
     char *field, *component;
@@ -113,6 +123,7 @@ typedef struct scene_file_slice {
     scene_file_colour_map colours;
     double *opacity;
     scene_file_material *material;
+    scene_file_clip *clip;
 } scene_file_slice;
 
 typedef struct scene_file_layer {

@@ -107,6 +107,47 @@ static const scene_form range_forms[] = {
               "first output's pictures, so that a run that is started again goes on with it (delete it to begin "      \
               "anew); or percentiles.",                                                                                \
       .by_default = RANGE_DEFAULT, TAKES(range_forms))
+#define PLANE_KEYS(X)                                                                                                  \
+    X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \
+      .help = "What the plane is at right angles to. Any length but 0.")                                               \
+    X(NUMBERS("point", scene_file_plane, point, 3), .help = "A point of the plane, in scene units.",                   \
+      .by_default = "the middle of the bounds of all the data, at each drawn step")                                    \
+    X(CYAML_FIELD_FLOAT_PTR("offset", OPTIONAL, scene_file_plane, offset),                                             \
+      .help = "How far the plane is moved from `point` along `normal`, in scene units.", .by_default = "`0`")
+DEFINE_MAPPING(plane, "planes", PLANE_KEYS);
+
+static const cyaml_schema_value_t plane = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_plane, plane_fields)};
+
+static const cyaml_strval_t keep_words[] = {{"inside", SCENE_KEEP_INSIDE}, {"outside", SCENE_KEEP_OUTSIDE}};
+
+#define SPHERE_KEYS(X)                                                                                                 \
+    X(CYAML_FIELD_SEQUENCE_FIXED("centre", CYAML_FLAG_POINTER, scene_file_sphere, centre, &number, 3),                 \
+      .help = "Its centre, in scene units.")                                                                           \
+    X(CYAML_FIELD_FLOAT("radius", REQUIRED, scene_file_sphere, radius), .help = "Its radius, in scene units.",         \
+      .low = 0, .is_low_excluded = true, .high = 1e30)
+DEFINE_MAPPING(sphere, "sphere", SPHERE_KEYS);
+
+#define CLIP_KEYS(X)                                                                                                   \
+    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_clip, planes, &plane, 1, 10),                                 \
+      .help = "Planes. What lies on the side of any of them that its `normal` points to is cut away. A slice in the "  \
+              "plane itself is not.",                                                                                  \
+      .by_default = "none", .child = &plane_mapping)                                                                   \
+    X(CYAML_FIELD_SEQUENCE_FIXED("box", POINTER, scene_file_clip, box, &colour, 2),                                    \
+      .help = "Two corners, `[[x, y, z], [x, y, z]]`, the first less than the other along each axis. What lies "       \
+              "outside of the box is cut away.",                                                                       \
+      .by_default = "none")                                                                                            \
+    X(CYAML_FIELD_MAPPING_PTR("sphere", OPTIONAL, scene_file_clip, sphere, sphere_fields),                             \
+      .help = "What lies outside of the sphere is cut away.", .by_default = "none", .child = &sphere_mapping)          \
+    X(CHOICE("keep", scene_file_clip, keep, keep_words),                                                               \
+      .help = "What of the box and of the sphere is kept; `outside`: what lies inside of either is cut away.",         \
+      .by_default = "`inside`")
+EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
+
+/* Of a layer of the type. */
+#define CLIP_KEY(X, type, more)                                                                                        \
+    X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, type, clip, scene_clip_fields),                                        \
+      .help = "Cuts parts of this layer away, beside what the image's `clip` cuts of all." more, .by_default = "none", \
+      .child = &scene_clip_mapping)
 #define MATERIAL_KEYS(X)                                                                                               \
     X(CYAML_FIELD_FLOAT_PTR("ambient", OPTIONAL, scene_file_material, ambient),                                        \
       .help = "Share of the colour that is seen without any light.", .by_default = "`0.15`", .low = 0, .high = 1)      \
@@ -159,7 +200,8 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .by_default = "`gradient`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
       .help = "Distance between the two samples of a difference, in sizes of the cell that is hit.",                   \
-      .by_default = "`1`", .low = 0, .is_low_excluded = true, .high = 100)
+      .by_default = "`1`", .low = 0, .is_low_excluded = true, .high = 100)                                             \
+    CLIP_KEY(X, scene_file_isosurface, "")
 DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
 
 #define VOLUME_KEYS(X)                                                                                                 \
@@ -179,30 +221,9 @@ DEFINE_MAPPING(isosurface, "isosurface", ISOSURFACE_KEYS);
       .by_default = "`[[0, 0], [1, 0.9]]`", .low = 0, .high = 1)                                                       \
     X(CYAML_FIELD_FLOAT_PTR("unit_distance", OPTIONAL, scene_file_volume, unit_distance),                              \
       .help = "The length in scene units that lets 1 - opacity of the light through.",                                 \
-      .by_default = "a twentieth of the diagonal of the bounds", .low = 0, .is_low_excluded = true, .high = 1e30)
+      .by_default = "a twentieth of the diagonal of the bounds", .low = 0, .is_low_excluded = true, .high = 1e30)      \
+    CLIP_KEY(X, scene_file_volume, " All volumes of an image have the same.")
 DEFINE_MAPPING(volume, "volume", VOLUME_KEYS);
-
-#define PLANE_KEYS(X)                                                                                                  \
-    X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \
-      .help = "What the plane is at right angles to. Any length but 0.")                                               \
-    X(NUMBERS("point", scene_file_plane, point, 3), .help = "A point of the plane, in scene units.",                   \
-      .by_default = "the middle of the bounds of all the data, at each drawn step")                                    \
-    X(CYAML_FIELD_FLOAT_PTR("offset", OPTIONAL, scene_file_plane, offset),                                             \
-      .help = "How far the plane is moved from `point` along `normal`, in scene units.", .by_default = "`0`")
-DEFINE_MAPPING(plane, "planes", PLANE_KEYS);
-
-static const cyaml_schema_value_t plane = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_plane, plane_fields)};
-
-#define CLIP_KEYS(X)                                                                                                   \
-    X(CYAML_FIELD_SEQUENCE("planes", POINTER, scene_file_clip, planes, &plane, 1, 10),                                 \
-      .help = "Planes. What lies on the side of any of them that its `normal` points to is cut away. A slice in the "  \
-              "plane itself is not.",                                                                                  \
-      .by_default = "none", .child = &plane_mapping)                                                                   \
-    X(CYAML_FIELD_SEQUENCE_FIXED("box", POINTER, scene_file_clip, box, &colour, 2),                                    \
-      .help = "Two corners, `[[x, y, z], [x, y, z]]`, the first less than the other along each axis. What lies "       \
-              "outside of the box is cut away.",                                                                       \
-      .by_default = "none")
-EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
 
 #define SLICE_KEYS(X)                                                                                                  \
     X(TEXT("field", REQUIRED, scene_file_slice, field, 255),                                                           \
@@ -225,7 +246,8 @@ EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_slice, material, material_fields),                      \
       .help = "How the planes take light, as an isosurface where it is given; `{}` for a slight gloss.",               \
-      .by_default = "no light: the colours are those of the map", .child = &material_mapping)
+      .by_default = "no light: the colours are those of the map", .child = &material_mapping)                          \
+    CLIP_KEY(X, scene_file_slice, "")
 DEFINE_MAPPING(slice, "slice", SLICE_KEYS);
 
 #define EDGES_KEYS(X)                                                                                                  \
@@ -268,7 +290,8 @@ DEFINE_MAPPING(threshold, "threshold", THRESHOLD_KEYS);
       .help = "1 hides what is behind; 0 shows nothing.", .by_default = "`1`", .low = 0, .high = 1)                    \
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_surface, material, material_fields),                    \
       .help = "How the surface takes light; `{ambient: 1, diffuse: 0, specular: 0}` shows the colours of the map.",    \
-      .by_default = "a slight gloss", .child = &material_mapping)
+      .by_default = "a slight gloss", .child = &material_mapping)                                                      \
+    CLIP_KEY(X, scene_file_surface, "")
 DEFINE_MAPPING(surface, "surface", SURFACE_KEYS);
 
 #define LAYER_KEYS(X)                                                                                                  \

@@ -1,4 +1,4 @@
-/* Slices of an image, which are planes and the field that colours them, and what is clipped, which is by planes too. */
+/* Slices of an image, which are planes and the field that colours them. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,8 +21,8 @@ static bool make_unit(const double in[3], double out[3])
     return true;
 }
 
-static insitu_status convert_plane(const scene_document *d, const char *path, int index, const scene_file_plane *in,
-                                   scene_plane *out)
+insitu_status scene_convert_plane(const scene_document *d, const char *path, int index, const scene_file_plane *in,
+                                  scene_plane *out)
 {
     char key[32];
     snprintf(key, sizeof key, "planes[%d].normal", index);
@@ -41,38 +41,8 @@ static insitu_status convert_planes(const scene_document *d, const char *path, c
     out->planes = base_calloc((size_t)in->planes_count, sizeof *out->planes);
     if (!out->planes) return scene_no_memory(d);
     for (int i = 0; i < in->planes_count && !status; i++)
-        status = convert_plane(d, path, i, &in->planes[i], &out->planes[out->plane_count++]);
+        status = scene_convert_plane(d, path, i, &in->planes[i], &out->planes[out->plane_count++]);
     return status;
-}
-
-/* Six planes. */
-static insitu_status convert_box(const scene_document *d, const char *path, const double box[2][3], scene_clip *out)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        if (!(box[0][axis] < box[1][axis]))
-            return scene_bad(d, path, "box",
-                             "from %g to %g along %c, expected the first corner to be less than the other",
-                             box[0][axis], box[1][axis], "xyz"[axis]);
-        for (int side = 0; side < 2; side++) {
-            scene_plane *plane = &out->planes[out->plane_count++];
-            plane->has_point = true;
-            plane->normal[axis] = side ? 1 : -1;
-            plane->point[axis] = box[side][axis];
-        }
-    }
-    return INSITU_OK;
-}
-
-insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in, scene_clip *out)
-{
-    insitu_status status = INSITU_OK;
-    if (!in) return INSITU_OK;
-    if (!in->planes && !in->box) return scene_bad(d, path, "", "holds nothing, expected planes or a box");
-    out->planes = base_calloc((size_t)in->planes_count + 6, sizeof *out->planes);
-    if (!out->planes) return scene_no_memory(d);
-    for (int i = 0; i < in->planes_count && !status; i++)
-        status = convert_plane(d, path, i, &in->planes[i], &out->planes[out->plane_count++]);
-    return status || !in->box ? status : convert_box(d, path, (const double(*)[3])in->box, out);
 }
 
 insitu_status scene_convert_slice(const scene_document *d, const char *path, const scene_file_slice *in,

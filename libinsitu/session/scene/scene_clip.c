@@ -1,0 +1,95 @@
+/* What is cut away of an image's layers: half spaces, boxes and spheres. An image has one list of them all, in which
+ * what is there twice stands once; each layer has a set of its entries. */
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+#include "scene_convert.h"
+
+/* Puts the clip into the image's list and the set. */
+static insitu_status add_clip(const scene_document *d, const char *path, const scene_clip *clip, scene_image *image,
+                              uint32_t *set)
+{
+    int at = 0;
+    while (at < image->clip_count && memcmp(&image->clips[at], clip, sizeof *clip) != 0) at++;
+    if (at == SCENE_MAX_CLIPS)
+        return scene_bad(d, path, "",
+                         "is one of more than %d planes, boxes and spheres that cut, expected at most %d "
+                         "in an image",
+                         SCENE_MAX_CLIPS, SCENE_MAX_CLIPS);
+    if (at == image->clip_count) image->clips[image->clip_count++] = *clip;
+    *set |= UINT32_C(1) << at;
+    return INSITU_OK;
+}
+
+/* Zeroed padding and all, so that two can be compared. */
+static scene_clip *clear_clip(scene_clip *clip, scene_clip_kind kind, bool is_outside)
+{
+    memset(clip, 0, sizeof *clip);
+    clip->kind = kind;
+    clip->is_outside = is_outside;
+    return clip;
+}
+
+static insitu_status add_planes(const scene_document *d, const char *path, const scene_file_clip *in,
+                                scene_image *image, uint32_t *set)
+{
+    scene_clip clip;
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < in->planes_count && !status; i++) {
+        status = scene_convert_plane(d, path, i, &in->planes[i], &clear_clip(&clip, SCENE_CLIP_PLANE, false)->plane);
+        if (!status) status = add_clip(d, path, &clip, image, set);
+    }
+    return status;
+}
+
+static insitu_status add_box(const scene_document *d, const char *path, const double box[2][3], bool is_outside,
+                             scene_image *image, uint32_t *set)
+{
+    scene_clip clip;
+    clear_clip(&clip, SCENE_CLIP_BOX, is_outside);
+    for (int axis = 0; axis < 3; axis++) {
+        clip.lower[axis] = box[0][axis];
+        clip.upper[axis] = box[1][axis];
+        if (!(box[0][axis] < box[1][axis]))
+            return scene_bad(d, path, "box",
+                             "from %g to %g along %c, expected the first corner to be less than the other",
+                             box[0][axis], box[1][axis], "xyz"[axis]);
+    }
+    return add_clip(d, path, &clip, image, set);
+}
+
+static insitu_status add_sphere(const scene_document *d, const char *path, const scene_file_sphere *in, bool is_outside,
+                                scene_image *image, uint32_t *set)
+{
+    scene_clip clip;
+    clear_clip(&clip, SCENE_CLIP_SPHERE, is_outside);
+    memcpy(clip.centre, in->centre, sizeof clip.centre);
+    clip.radius = in->radius;
+    return add_clip(d, path, &clip, image, set);
+}
+
+insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
+                                 scene_image *image, uint32_t *set)
+{
+    if (!in) return INSITU_OK;
+    const bool is_outside = in->keep && *in->keep == SCENE_KEEP_OUTSIDE;
+    if (!in->planes && !in->box && !in->sphere)
+        return scene_bad(d, path, "", "holds nothing, expected planes, a box or a sphere");
+    if (in->keep && !in->box && !in->sphere)
+        return scene_bad(d, path, "keep", "given without a box or a sphere, expected one of them beside it");
+    if (!image->clips) image->clips = base_calloc(SCENE_MAX_CLIPS, sizeof *image->clips);
+    if (!image->clips) return scene_no_memory(d);
+    insitu_status status = add_planes(d, path, in, image, set);
+    if (!status && in->box) status = add_box(d, path, (const double(*)[3])in->box, is_outside, image, set);
+    return status || !in->sphere ? status : add_sphere(d, path, in->sphere, is_outside, image, set);
+}
+
+insitu_status scene_convert_layer_clip(const scene_document *d, const char *layer, const scene_file_clip *in,
+                                       scene_image *image, uint32_t *set)
+{
+    char path[SCENE_PATH_SIZE];
+    snprintf(path, sizeof path, "%s.clip", layer);
+    *set = image->clips_of_all;
+    return scene_convert_clip(d, path, in, image, set);
+}

@@ -1,0 +1,144 @@
+/* Where a job's clips (render.h) have a ray, in double: functions of the ray alone, so the same on all ranks.
+ *
+ * The half spaces, boxes and spheres that cut every layer leave one stretch of a ray, which packets begin and end with.
+ * Surfaces that are cut by more are asked hit by hit. Volumes that are cut by more are traced in turns, a stretch of
+ * each ray a turn, because a body that is left out may divide a ray. */
+#ifndef RENDER_KERNEL_CLIP_H
+#define RENDER_KERNEL_CLIP_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "render.h"
+
+/* Of a ray, between two depths; empty where begin > end. */
+typedef struct kernel_ray_part {
+    double begin, end;
+} kernel_ray_part;
+
+/* What lies between is base + t * direction, in tree space. */
+typedef struct kernel_clip_ray {
+    double base[3], direction[3];
+} kernel_clip_ray;
+
+#define KERNEL_NO_PART ((kernel_ray_part){0, -1})
+
+static inline double kernel_clip_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The scaled distance that is left to the plane at t = 0. */
+static inline double kernel_clip_left(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
+{
+    return (c->distance - kernel_clip_dot(c->normal, s->origin)) * s->scale - kernel_clip_dot(c->normal, ray->base);
+}
+
+static inline kernel_ray_part kernel_clip_plane(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
+{
+    const double left = kernel_clip_left(c, s, ray), along = kernel_clip_dot(c->normal, ray->direction);
+    if (along > 0) return (kernel_ray_part){-INFINITY, left / along};
+    if (along < 0) return (kernel_ray_part){left / along, INFINITY};
+    return left < 0 ? KERNEL_NO_PART : (kernel_ray_part){-INFINITY, INFINITY};
+}
+
+static inline kernel_ray_part kernel_clip_box(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
+{
+    kernel_ray_part out = {-INFINITY, INFINITY};
+    for (int a = 0; a < 3; a++) {
+        const double low = (c->lower[a] - s->origin[a]) * s->scale - ray->base[a];
+        const double high = (c->upper[a] - s->origin[a]) * s->scale - ray->base[a], along = ray->direction[a];
+        if (along == 0 && (low > 0 || high < 0)) return KERNEL_NO_PART;
+        if (along == 0) continue;
+        out.begin = fmax(out.begin, fmin(low / along, high / along));
+        out.end = fmin(out.end, fmax(low / along, high / along));
+    }
+    return out;
+}
+
+static inline kernel_ray_part kernel_clip_sphere(const render_clip *c, const render_space *s,
+                                                 const kernel_clip_ray *ray)
+{
+    double from[3], across[3];
+    for (int a = 0; a < 3; a++) from[a] = (c->centre[a] - s->origin[a]) * s->scale - ray->base[a];
+    const double square = kernel_clip_dot(ray->direction, ray->direction);
+    const double nearest = kernel_clip_dot(from, ray->direction) / square;
+    for (int a = 0; a < 3; a++) across[a] = from[a] - nearest * ray->direction[a];
+    const double radius = c->radius * s->scale, left = radius * radius - kernel_clip_dot(across, across);
+    if (left < 0) return KERNEL_NO_PART;
+    const double half = sqrt(left / square);
+    return (kernel_ray_part){nearest - half, nearest + half};
+}
+
+/* Of the ray within the body. */
+static inline kernel_ray_part kernel_clip_body(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
+{
+    switch (c->kind) {
+    case RENDER_CLIP_PLANE: return kernel_clip_plane(c, s, ray);
+    case RENDER_CLIP_BOX: return kernel_clip_box(c, s, ray);
+    case RENDER_CLIP_SPHERE: return kernel_clip_sphere(c, s, ray);
+    }
+    return KERNEL_NO_PART;
+}
+
+/* Keeps the holes in the order of their begins; returns how many there are. */
+static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel_ray_part hole)
+{
+    int at = count;
+    if (!(hole.begin < hole.end)) return count;
+    for (; at > 0 && holes[at - 1].begin > hole.begin; at--) holes[at] = holes[at - 1];
+    holes[at] = hole;
+    return count + 1;
+}
+
+/* The stretch of the number, from 0, that a set of clips leaves of a ray behind the depth begin. */
+static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
+                                               double begin, int number)
+{
+    kernel_ray_part out = {begin, INFINITY}, holes[RENDER_MAX_CLIPS];
+    int hole_count = 0;
+    for (; clips; clips &= clips - 1) {
+        const render_clip *c = &job->clips[__builtin_ctz(clips)];
+        const kernel_ray_part within = kernel_clip_body(c, &job->space, ray);
+        if (c->is_outside) {
+            hole_count = kernel_clip_add_hole(holes, hole_count, within);
+        } else {
+            out.begin = fmax(out.begin, within.begin);
+            out.end = fmin(out.end, within.end);
+        }
+    }
+    for (int i = 0; i < hole_count && out.begin <= out.end; i++) {
+        if (holes[i].end <= out.begin) continue;
+        if (holes[i].begin > out.begin && number-- == 0)
+            return (kernel_ray_part){out.begin, fmin(out.end, holes[i].begin)};
+        out.begin = holes[i].end;
+    }
+    return number == 0 && out.begin <= out.end ? out : KERNEL_NO_PART;
+}
+
+static inline bool kernel_clip_has(const render_clip *c, const render_space *s, const kernel_clip_ray *ray, double t)
+{
+    double square = 0;
+    bool is_within = true;
+    if (c->kind == RENDER_CLIP_PLANE)
+        return kernel_clip_dot(c->normal, ray->direction) * t <= kernel_clip_left(c, s, ray);
+    for (int a = 0; a < 3; a++) {
+        const double place = (ray->base[a] + t * ray->direction[a]) / s->scale + s->origin[a];
+        is_within = is_within && c->lower[a] <= place && place <= c->upper[a];
+        square += (place - c->centre[a]) * (place - c->centre[a]);
+    }
+    return c->kind == RENDER_CLIP_BOX ? is_within : square <= c->radius * c->radius;
+}
+
+/* Is the place on the ray within what all of the clips leave? */
+static inline bool kernel_clip_keeps(const render_job *job, uint32_t clips, const kernel_clip_ray *ray, double t)
+{
+    for (; clips; clips &= clips - 1) {
+        const render_clip *c = &job->clips[__builtin_ctz(clips)];
+        if (kernel_clip_has(c, &job->space, ray, t) == c->is_outside) return false;
+    }
+    return true;
+}
+
+#endif
