@@ -58,7 +58,7 @@ static void offsets_end_early(session_input *in)
 }
 static void type_unknown(session_input *in)
 {
-    in->part.types[1] = 9;
+    in->part.types[1] = 11;
 }
 static void type_too_wide(session_input *in)
 {
@@ -182,7 +182,7 @@ static const spoilt_case cases[] = {
      false,
      {"cell 0 (hex): offsets 0 and 7 do not lie 8 apart"}},
     {"last offset", offsets_end_early, INSITU_ERROR_MESH, false, {"the last offset is ", "not connectivity_count"}},
-    {"unknown type", type_unknown, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 9"}},
+    {"unknown type", type_unknown, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 11"}},
     {"type of 33 bits", type_too_wide, INSITU_ERROR_MESH, false, {"cell 2: unknown cell type 4294967308"}},
     {"type below 32 bits", type_negative, INSITU_ERROR_MESH, false, {"cell 0: unknown cell type -1099511627776"}},
     {"far coordinate",

@@ -330,7 +330,7 @@ void voxel_becomes_a_right_handed_hexahedron(void **)
     assert_true(std::fabs(cell_volume(f.mesh().mesh, 1) - 1.0 / 6) < rounding);
     assert_ptr_equal(f.mesh().fields.at("id").values.data, id->GetPointer(0));
     assert_int_equal(f.report.bytes_copied, 2 + 3 * 8 + 12 * 8);
-    assert_non_null(strstr(f.report.copied_why, "voxels reordered"));
+    assert_non_null(strstr(f.report.copied_why, "voxels and pixels reordered"));
 }
 
 /* The set of points of a face, rising. */
@@ -423,10 +423,10 @@ void every_higher_order_type_has_its_linear_one(void **)
     }
 }
 
-void flat_cells_are_left_out_and_fields_follow(void **)
+void lines_are_left_out_and_fields_follow(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
-    add_cell(grid, VTK_TRIANGLE, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    add_cell(grid, VTK_VERTEX, {{0, 0, 0}});
     add_cell(grid, VTK_TETRA, corner);
     add_cell(grid, VTK_LINE, {{0, 0, 0}, {1, 0, 0}});
     add_cell(grid, VTK_PYRAMID, pyramid);
@@ -442,7 +442,38 @@ void flat_cells_are_left_out_and_fields_follow(void **)
     assert_true(c[0] == 1 && c[1] == 3);
     assert_true(std::fabs(cell_volume(f.mesh().mesh, 0) - 1.0 / 6) < rounding);
     assert_true(std::fabs(cell_volume(f.mesh().mesh, 1) - 1.0 / 3) < rounding);
-    assert_non_null(strstr(f.report.cells_why, "2 cells of less than 3 dimensions"));
+    assert_non_null(strstr(f.report.cells_why, "2 points and lines"));
+}
+
+/* Triangles, quads and polygons are borrowed as they are, pixels turned, quadratic ones drawn by their corners. */
+void shells_are_handed_over(void **)
+{
+    const std::vector<std::array<double, 3>> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    for (const bool has_pixel : {false, true}) {
+        vtkNew<vtkUnstructuredGrid> grid;
+        add_cell(grid, VTK_TETRA, corner);
+        add_cell(grid, VTK_TRIANGLE, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+        add_cell(grid, VTK_QUAD, square);
+        add_cell(grid, VTK_POLYGON, {{0, 0, 0}, {1, 0, 0}, {2, 1, 0}, {1, 2, 0}, {0, 1, 0}});
+        if (has_pixel) add_cell(grid, VTK_PIXEL, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+        if (has_pixel)
+            add_cell(grid, VTK_QUADRATIC_TRIANGLE, {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+        fixture f;
+        assert_int_equal(f.set(grid), INSITU_OK);
+        const insitu_mesh &mesh = f.mesh().mesh;
+        const int types[] = {INSITU_TET, INSITU_TRIANGLE, INSITU_QUAD, INSITU_POLYGON, INSITU_QUAD, INSITU_TRIANGLE};
+        const int ends[] = {4, 7, 11, 16, 20, 23};
+        assert_int_equal(mesh.cell_count, has_pixel ? 6 : 4);
+        assert_true((f.report.bytes_copied > 0) == has_pixel);
+        for (int i = 0; i < mesh.cell_count; i++) {
+            assert_int_equal(integer_at(mesh.cell_types, i), types[i]);
+            assert_int_equal(integer_at(mesh.offsets, i + 1), ends[i]);
+        }
+        if (!has_pixel) continue;
+        const int64_t first = integer_at(mesh.connectivity, 16), turned[] = {0, 1, 3, 2};
+        for (int i = 0; i < 4; i++) assert_int_equal(integer_at(mesh.connectivity, 16 + i), first + turned[i]);
+        assert_int_equal(f.report.cells_linear, 1);
+    }
 }
 
 void add_polyhedron(vtkUnstructuredGrid *grid)
@@ -523,7 +554,7 @@ void ghost_flags_follow_cells_left_out(void **)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     add_cell(grid, VTK_TETRA, corner);
-    add_cell(grid, VTK_TRIANGLE, {corner.begin(), corner.begin() + 3});
+    add_cell(grid, VTK_LINE, {corner.begin(), corner.begin() + 2});
     add_cell(grid, VTK_HEXAGONAL_PRISM, prism(6));
     vtkNew<vtkUnsignedCharArray> ghosts;
     ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
@@ -684,7 +715,8 @@ int main()
         cmocka_unit_test(prisms_are_polyhedra_of_their_faces),
         cmocka_unit_test(quadratic_cells_are_their_corners_with_a_warning),
         cmocka_unit_test(every_higher_order_type_has_its_linear_one),
-        cmocka_unit_test(flat_cells_are_left_out_and_fields_follow),
+        cmocka_unit_test(lines_are_left_out_and_fields_follow),
+        cmocka_unit_test(shells_are_handed_over),
         cmocka_unit_test(polyhedra_share_their_faces),
         cmocka_unit_test(polyhedra_without_faces_are_warned_about),
         cmocka_unit_test(ghost_flags_that_hide_are_handed_over),

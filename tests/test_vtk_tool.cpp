@@ -114,8 +114,8 @@ int make_files(void **)
 
     vtkNew<vtkUnstructuredGrid> flat;
     flat->SetPoints(row_of_tets(1)->GetPoints());
-    const vtkIdType triangle[3] = {0, 1, 2};
-    flat->InsertNextCell(VTK_TRIANGLE, 3, triangle);
+    const vtkIdType line[] = {0, 1};
+    flat->InsertNextCell(VTK_LINE, 2, line);
     write_vtu("flat.vtu", flat);
     return 0;
 }
@@ -227,7 +227,7 @@ void one_rank_failing_to_read_ends_all(void **)
 void nothing_to_draw_is_an_error(void **)
 {
     expect(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
-    expect(run_tool("scene.yaml flat.vtu"), 1, "flat.vtu: no cells to draw; 1 cells of less than 3 dimensions");
+    expect(run_tool("scene.yaml flat.vtu"), 1, "flat.vtu: no cells to draw; 1 points and lines");
     expect(run_ranks(2, "scene.yaml empty.vtu"), 1, "empty.vtu: no cells to draw");
 }
 

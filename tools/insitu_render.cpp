@@ -152,7 +152,7 @@ std::string cell_warnings(const int64_t sums[4])
 {
     std::string text;
     const char *const what[] = {"", " higher-order cells drawn by their corners as linear ones",
-                                " cells of less than 3 dimensions are not drawn",
+                                " points and lines are not drawn",
                                 " cells left out, of types that cannot be drawn (see --info)"};
     for (int i = 1; i < 4; i++)
         if (sums[i] > 0) text += std::to_string(sums[i]) + what[i] + "\n";
@@ -167,7 +167,7 @@ std::string check_cells(const world &w, const insitu_vtk_report &report, const s
     if (sums[0] > 0) return w.is_root() ? cell_warnings(sums) : "";
     std::string why = name + ": no cells to draw";
     if (sums[3] > 0) why += "; " + std::to_string(sums[3]) + " cells of types that cannot be drawn (see --info)";
-    if (sums[2] > 0) why += "; " + std::to_string(sums[2]) + " cells of less than 3 dimensions";
+    if (sums[2] > 0) why += "; " + std::to_string(sums[2]) + " points and lines";
     throw std::runtime_error(why);
 }
 

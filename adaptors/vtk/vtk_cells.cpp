@@ -22,7 +22,7 @@ namespace insitu_vtk
 namespace
 {
 
-enum class kind { not_drawn, flat, as_it_is, reordered, faces, linear };
+enum class kind { not_drawn, flat, as_it_is, polygon, reordered, faces, linear };
 
 struct piece {
     uint8_t type;
@@ -42,6 +42,9 @@ constexpr piece hex = {INSITU_HEX, 8, {0, 1, 2, 3, 4, 5, 6, 7}};
 constexpr piece wedge = {INSITU_WEDGE, 6, {0, 1, 2, 3, 4, 5}};
 constexpr piece pyramid = {INSITU_PYRAMID, 5, {0, 1, 2, 3, 4}};
 constexpr piece voxel = {INSITU_HEX, 8, {0, 1, 3, 2, 4, 5, 7, 6}};
+constexpr piece triangle = {INSITU_TRIANGLE, 3, {0, 1, 2}};
+constexpr piece quad = {INSITU_QUAD, 4, {0, 1, 2, 3}};
+constexpr piece pixel = {INSITU_QUAD, 4, {0, 1, 3, 2}};
 
 using recipe_table = std::array<recipe, 256>;
 
@@ -57,7 +60,10 @@ recipe_table make_recipes()
     add(table, kind::as_it_is, hex, {VTK_HEXAHEDRON});
     add(table, kind::as_it_is, wedge, {VTK_WEDGE});
     add(table, kind::as_it_is, pyramid, {VTK_PYRAMID});
+    add(table, kind::as_it_is, triangle, {VTK_TRIANGLE});
+    add(table, kind::as_it_is, quad, {VTK_QUAD});
     add(table, kind::reordered, voxel, {VTK_VOXEL});
+    add(table, kind::reordered, pixel, {VTK_PIXEL});
     add(table, kind::linear, tet, {VTK_QUADRATIC_TETRA, VTK_LAGRANGE_TETRAHEDRON, VTK_BEZIER_TETRAHEDRON});
     add(table, kind::linear, hex,
         {VTK_QUADRATIC_HEXAHEDRON, VTK_TRIQUADRATIC_HEXAHEDRON, VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON,
@@ -67,41 +73,18 @@ recipe_table make_recipes()
          VTK_BEZIER_WEDGE});
     add(table, kind::linear, pyramid,
         {VTK_QUADRATIC_PYRAMID, VTK_TRIQUADRATIC_PYRAMID, VTK_LAGRANGE_PYRAMID, VTK_BEZIER_PYRAMID});
+    add(table, kind::linear, triangle,
+        {VTK_QUADRATIC_TRIANGLE, VTK_BIQUADRATIC_TRIANGLE, VTK_LAGRANGE_TRIANGLE, VTK_BEZIER_TRIANGLE});
+    add(table, kind::linear, quad,
+        {VTK_QUADRATIC_QUAD, VTK_BIQUADRATIC_QUAD, VTK_QUADRATIC_LINEAR_QUAD, VTK_LAGRANGE_QUADRILATERAL,
+         VTK_BEZIER_QUADRILATERAL});
+    table[VTK_POLYGON] = {kind::polygon, 3, 1, {INSITU_POLYGON, 0, {}}};
     table[VTK_POLYHEDRON] = {kind::faces, 4, 0, piece{}};
     table[VTK_PENTAGONAL_PRISM] = {kind::faces, 10, 0, piece{}};
     table[VTK_HEXAGONAL_PRISM] = {kind::faces, 12, 0, piece{}};
-    for (const int type : {VTK_EMPTY_CELL,
-                           VTK_VERTEX,
-                           VTK_POLY_VERTEX,
-                           VTK_LINE,
-                           VTK_POLY_LINE,
-                           VTK_TRIANGLE,
-                           VTK_TRIANGLE_STRIP,
-                           VTK_POLYGON,
-                           VTK_PIXEL,
-                           VTK_QUAD,
-                           VTK_QUADRATIC_EDGE,
-                           VTK_QUADRATIC_TRIANGLE,
-                           VTK_QUADRATIC_QUAD,
-                           VTK_QUADRATIC_POLYGON,
-                           VTK_BIQUADRATIC_QUAD,
-                           VTK_QUADRATIC_LINEAR_QUAD,
-                           VTK_BIQUADRATIC_TRIANGLE,
-                           VTK_CUBIC_LINE,
-                           VTK_PARAMETRIC_CURVE,
-                           VTK_PARAMETRIC_SURFACE,
-                           VTK_PARAMETRIC_TRI_SURFACE,
-                           VTK_PARAMETRIC_QUAD_SURFACE,
-                           VTK_HIGHER_ORDER_EDGE,
-                           VTK_HIGHER_ORDER_TRIANGLE,
-                           VTK_HIGHER_ORDER_QUAD,
-                           VTK_HIGHER_ORDER_POLYGON,
-                           VTK_LAGRANGE_CURVE,
-                           VTK_LAGRANGE_TRIANGLE,
-                           VTK_LAGRANGE_QUADRILATERAL,
-                           VTK_BEZIER_CURVE,
-                           VTK_BEZIER_TRIANGLE,
-                           VTK_BEZIER_QUADRILATERAL})
+    for (const int type :
+         {VTK_EMPTY_CELL, VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE, VTK_POLY_LINE, VTK_QUADRATIC_EDGE, VTK_CUBIC_LINE,
+          VTK_PARAMETRIC_CURVE, VTK_HIGHER_ORDER_EDGE, VTK_LAGRANGE_CURVE, VTK_BEZIER_CURVE})
         table[static_cast<size_t>(type)].what = kind::flat;
     return table;
 }
@@ -120,6 +103,11 @@ template <typename Id> struct raw_cells {
     int64_t count;
 
     int64_t size(int64_t cell) const { return static_cast<int64_t>(offsets[cell + 1] - offsets[cell]); }
+    /* How many of its points the linear cell has that stands for it. */
+    int64_t linear_size(int64_t cell, const recipe &r) const
+    {
+        return r.what == kind::polygon ? size(cell) : r.part.vertex_count;
+    }
 };
 
 /* Sizes of the new list, and what is said of it. */
@@ -162,7 +150,7 @@ template <typename Id> new_size count_new(const raw_cells<Id> &raw, const faced_
         if (!is_drawn) size.is_one_to_one = false;
         if (!is_drawn) continue;
         size.cells++;
-        size.vertices += is_faced ? faced.faces.cell_size(number++) : r.part.vertex_count;
+        size.vertices += is_faced ? faced.faces.cell_size(number++) : raw.linear_size(i, r);
     }
     return size;
 }
@@ -186,8 +174,10 @@ void fill_new(const raw_cells<Id> &raw, const faced_cells &faced, uint8_t *types
             number++;
             continue;
         }
-        for (size_t v = 0; v < r.part.vertex_count; v++)
-            connectivity[at++] = raw.connectivity[raw.offsets[i] + r.part.vertices[v]];
+        for (int64_t v = 0; v < raw.linear_size(i, r); v++) {
+            const int64_t point = r.what == kind::polygon ? v : r.part.vertices[static_cast<size_t>(v)];
+            connectivity[at++] = raw.connectivity[raw.offsets[i] + point];
+        }
     }
     *offsets = at;
 }
@@ -196,12 +186,13 @@ void fill_new(const raw_cells<Id> &raw, const faced_cells &faced, uint8_t *types
 std::string why_converted(const std::array<int64_t, 256> &by_type)
 {
     const char *const reasons[] = {"some cells not drawn",
-                                   "flat cells left out",
+                                   "points and lines left out",
                                    "",
-                                   "voxels reordered",
+                                   "",
+                                   "voxels and pixels reordered",
                                    "faces of polyhedra and prisms shared",
                                    "higher-order cells by their corners"};
-    std::array<bool, 6> has{};
+    std::array<bool, 7> has{};
     for (size_t type = 0; type < 256; type++)
         if (by_type[type] > 0) has[static_cast<size_t>(recipes()[type].what)] = true;
     std::string why;
@@ -249,7 +240,8 @@ void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std
     mesh.connectivity_count = connectivity_count;
     count.bytes_borrowed += connectivity_count * static_cast<int64_t>(sizeof(Id));
     const recipe &first = recipes()[raw.types[0]];
-    if (by_type[raw.types[0]] == raw.count && grid->GetCells()->IsHomogeneous() == first.needed_points) {
+    if (first.what != kind::polygon && by_type[raw.types[0]] == raw.count &&
+        grid->GetCells()->IsHomogeneous() == first.needed_points) {
         mesh.cell_type = static_cast<insitu_cell_type>(raw.types[0]);
         return;
     }
@@ -278,7 +270,8 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
                     std::to_string(connectivity_count) + " entries";
             return false;
         }
-        is_as_it_is = is_as_it_is && r.what == kind::as_it_is && raw.size(i) == r.needed_points;
+        is_as_it_is = is_as_it_is && ((r.what == kind::as_it_is && raw.size(i) == r.needed_points) ||
+                                      (r.what == kind::polygon && raw.size(i) >= r.needed_points));
     }
     if (is_as_it_is) {
         cells.count = raw.count;
@@ -320,7 +313,7 @@ void tell_about_cells(const cell_counts &counts, const std::string &what, tally 
                           vtkCellTypes::GetClassNameFromTypeId(type) + ")" + why + " are not drawn");
     }
     if (counts.flat > 0)
-        count.about_cells(what + ": " + std::to_string(counts.flat) + " cells of less than 3 dimensions are not drawn");
+        count.about_cells(what + ": " + std::to_string(counts.flat) + " points and lines are not drawn");
 }
 
 } // namespace insitu_vtk

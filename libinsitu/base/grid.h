@@ -12,12 +12,15 @@
 
 enum {
     GRID_NO_TYPE = 0,
+    GRID_TRIANGLE = 5,
+    GRID_POLYGON = 7,
+    GRID_QUAD = 9,
     GRID_TET = 10,
     GRID_HEX = 12,
     GRID_WEDGE = 13,
     GRID_PYRAMID = 14,
     GRID_POLYHEDRON = 42,
-    GRID_MAX_CELL_VERTICES = 8 /* of the types of a fixed number of vertices: all but polyhedra */
+    GRID_MAX_CELL_VERTICES = 8 /* of the types of a fixed number of vertices: all but polyhedra and polygons */
 };
 
 /* A strided array. is_wide: 8-byte elements (double or int64), else 4-byte (float or int32). */
@@ -72,7 +75,7 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
     return (a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p) - a->base;
 }
 
-/* 0 for a polyhedron, whose number is its own, and for what is no type. */
+/* 0 for polyhedra and polygons, whose numbers are their own, and for what is no type. */
 static inline int grid_type_vertices(int cell_type)
 {
     switch (cell_type) {
@@ -80,8 +83,16 @@ static inline int grid_type_vertices(int cell_type)
     case GRID_HEX: return 8;
     case GRID_WEDGE: return 6;
     case GRID_PYRAMID: return 5;
+    case GRID_TRIANGLE: return 3;
+    case GRID_QUAD: return 4;
     default: return 0;
     }
+}
+
+/* Of two dimensions: such cells are faces, which outer surfaces show. They are flat. */
+static inline bool grid_is_shell_type(int cell_type)
+{
+    return cell_type == GRID_TRIANGLE || cell_type == GRID_QUAD || cell_type == GRID_POLYGON;
 }
 
 static inline int grid_cell_type(const grid *g, int64_t cell)
@@ -94,7 +105,7 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
-/* The cell's vertex indices, in VTK's order; returns how many. None of a polyhedron: see grid_walk. */
+/* The cell's vertex indices, in VTK's order; returns how many. None of polyhedra and polygons: see grid_walk. */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int count = grid_type_vertices(grid_cell_type(g, cell));
@@ -141,7 +152,7 @@ static inline grid_walk grid_walk_cell(const grid *g, int64_t cell)
         return w;
     }
     w.next = g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
-    w.end = w.next + count;
+    w.end = type == GRID_POLYGON ? grid_array_index(&g->offsets, cell + 1) : w.next + count;
     return w;
 }
 
@@ -177,10 +188,21 @@ static inline bool grid_is_flat(const grid *g, int64_t cell)
     return g->flat && (g->flat[cell / 64] >> (cell % 64) & 1);
 }
 
+static inline bool grid_is_shell(const grid *g, int64_t cell)
+{
+    return grid_is_flat(g, cell) && grid_is_shell_type(grid_cell_type(g, cell));
+}
+
 /* Neither a ghost nor flat: what trees hold. */
 static inline bool grid_is_drawn(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);
+}
+
+/* The same, and shells: what pictures may show. */
+static inline bool grid_is_seen(const grid *g, int64_t cell)
+{
+    return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));
 }
 
 static inline double grid_field_value(const grid_field *f, int64_t i)

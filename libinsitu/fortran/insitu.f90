@@ -22,7 +22,7 @@ module insitu
         INSITU_ERROR_MESH = 3, INSITU_ERROR_FIELD = 4, INSITU_ERROR_IO = 5, INSITU_ERROR_MEMORY = 6, &
         INSITU_ERROR_MPI = 7, INSITU_ERROR_INTERNAL = 8
     integer, parameter, public :: INSITU_TET = 10, INSITU_HEX = 12, INSITU_WEDGE = 13, INSITU_PYRAMID = 14, &
-        INSITU_POLYHEDRON = 42
+        INSITU_POLYHEDRON = 42, INSITU_TRIANGLE = 5, INSITU_POLYGON = 7, INSITU_QUAD = 9
     integer, parameter, public :: INSITU_CHANGED_NOTHING = 0, INSITU_CHANGED_TOPOLOGY = 1, &
         INSITU_CHANGED_GEOMETRY = 2, INSITU_CHANGED_VALUES = 4, INSITU_CHANGED_ALL = 7
     integer, parameter, public :: INSITU_VERTEX = 0, INSITU_CELL = 1
@@ -78,6 +78,7 @@ module insitu
         real(c_double) :: total_ms = 0, prepare_ms = 0, build_ms = 0, refit_ms = 0, surface_ms = 0, volume_ms = 0, &
             composite_ms = 0, write_ms = 0
         integer(c_int64_t) :: cells = 0, cells_ghost = 0, cells_unusable = 0, cells_inverted = 0, cells_flat = 0
+        integer(c_int64_t) :: cells_shell = 0
         integer(c_int64_t) :: rays = 0, fragments = 0, map_failures = 0
         integer(c_int64_t) :: bytes_borrowed = 0, bytes_copied = 0, bytes_trees = 0, bytes_pictures = 0, bytes_peak = 0
         type(c_ptr) :: copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr ! texts: insitu_text()
@@ -478,6 +479,8 @@ contains
         case (INSITU_HEX); corners_of = 8
         case (INSITU_WEDGE); corners_of = 6
         case (INSITU_PYRAMID); corners_of = 5
+        case (INSITU_TRIANGLE); corners_of = 3
+        case (INSITU_QUAD); corners_of = 4
         case default; corners_of = 1
         end select
     end function corners_of

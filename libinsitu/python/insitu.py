@@ -18,11 +18,12 @@ import numpy
 from mpi4py import MPI
 
 TET, HEX, WEDGE, PYRAMID, POLYHEDRON = 10, 12, 13, 14, 42
+TRIANGLE, POLYGON, QUAD = 5, 7, 9
 CHANGED_NOTHING, CHANGED_TOPOLOGY, CHANGED_GEOMETRY, CHANGED_VALUES, CHANGED_ALL = 0, 1, 2, 4, 7
 VERTEX, CELL = 0, 1
 
 _TYPES = {"float32": 1, "float64": 2, "int32": 3, "int64": 4, "uint8": 5, "bool": 5}
-_CORNERS = {TET: 4, HEX: 8, WEDGE: 6, PYRAMID: 5}
+_CORNERS = {TET: 4, HEX: 8, WEDGE: 6, PYRAMID: 5, TRIANGLE: 3, QUAD: 4}
 _MPI_Comm = ctypes.c_void_p if MPI._sizeof(MPI.Comm) == ctypes.sizeof(ctypes.c_void_p) else ctypes.c_int
 
 
@@ -89,6 +90,7 @@ class _Report(ctypes.Structure):
         ("cells_unusable", ctypes.c_int64),
         ("cells_inverted", ctypes.c_int64),
         ("cells_flat", ctypes.c_int64),
+        ("cells_shell", ctypes.c_int64),
         ("rays", ctypes.c_int64),
         ("fragments", ctypes.c_int64),
         ("map_failures", ctypes.c_int64),

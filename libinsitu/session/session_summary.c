@@ -82,7 +82,8 @@ static void report_mesh(session_report *out, const session_mesh *mesh)
     if (!mesh->is_check_stale) {
         report->cells_ghost += mesh->ghost_count;
         report->cells_inverted += mesh->inverted_count;
-        report->cells_flat += mesh->flat_count;
+        report->cells_flat += mesh->flat_count - mesh->shell_count;
+        report->cells_shell += mesh->shell_count;
     }
     if (mesh->has_tree) report->bytes_trees += mmbvh_bytes(&mesh->tree);
     for (int i = 0; i < mesh->field_count; i++) report_field(out, mesh, i);

@@ -59,7 +59,14 @@ typedef enum insitu_cell_type {
     INSITU_HEX = 12,       /* 8 vertices: the lower quad around, then the upper quad above it */
     INSITU_WEDGE = 13,     /* 6 vertices: one triangle, then the other; either winding */
     INSITU_PYRAMID = 14,   /* 5 vertices: the quad around, then the apex */
-    INSITU_POLYHEDRON = 42 /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
+    INSITU_POLYHEDRON = 42, /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
+    /* Shells: cells of two dimensions, alone or among others. Layers of outer surfaces show them, one that lies on the
+     * face of another cell in place of that face; isosurfaces, volumes, slices and statistics pass them over. Their
+     * cells' values count like others at the vertices they share (insitu_centring). */
+    INSITU_TRIANGLE = 5, /* 3 vertices */
+    INSITU_POLYGON = 7,  /* 3 vertices or more, around it, told by offsets; best flat: drawn as triangles from the
+                            vertex that is least by x, then y, then z */
+    INSITU_QUAD = 9      /* 4 vertices around it; may be warped */
 } insitu_cell_type;
 
 /* What of a mesh or a field differs from the last time it was set. The safe default is everything. Whatever is said,
@@ -91,8 +98,8 @@ typedef struct insitu_mesh {
     insitu_array connectivity;   /* int32 or int64, connectivity_count: the cells' vertex indices from index_base,
                                     one cell after the other */
     insitu_array offsets;        /* int32 or int64, cell_count + 1: where each cell begins in connectivity, the last
-                                    is connectivity_count. Not needed where all cells are of one type that is not
-                                    INSITU_POLYHEDRON. */
+                                    is connectivity_count. Not needed where all cells are of one type that is
+                                    neither INSITU_POLYHEDRON nor INSITU_POLYGON. */
     /* Faces of polyhedra: given where there are any. A polyhedron's entries in connectivity are its faces' indices from
      * 0, at least 4, in any order; a face between two polyhedra is the same one in both. The faces of a cell must
      * make a closed surface: along every edge two of them meet, once each (an edge from a vertex to itself is none, so
@@ -146,6 +153,7 @@ typedef struct insitu_report {
     int64_t cells_inverted; /* drawn right all the same: left-handed, by the sign of the corner volumes' sum */
     int64_t cells_flat; /* of no volume, not drawn: the corner volumes, each without its sign, sum to nothing beside the
                            cell's box (at most 1.4e-14, rounding); polyhedra where all of one is in a plane. */
+    int64_t cells_shell; /* triangles, quads and polygons, which layers of outer surfaces show */
     int64_t rays;       /* primary rays traced */
     int64_t fragments;  /* sent to pixel owners, own ones included */
     int64_t map_failures;   /* inverse maps that did not converge and fell back to linear interpolation */

@@ -227,11 +227,29 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
 }
 
+/* Of the cells whose number of vertices is their own. */
+static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_place *place)
+{
+    const grid *g = &mesh->cells;
+    if (!g->offsets.data) return BAD_TYPE;
+    place->first = grid_array_index(&g->offsets, cell);
+    place->next = grid_array_index(&g->offsets, cell + 1);
+    if (place->first < 0 || place->next > mesh->given.connectivity_count || place->next - place->first < 3)
+        return BAD_OFFSETS;
+    for (int64_t i = place->first; i < place->next; i++) {
+        place->vertex = grid_array_index(&g->connectivity, i);
+        if (place->vertex < 0 || place->vertex >= g->vertex_count) return BAD_INDEX;
+        if (!grid_is_ghost(g, cell) && !is_finite_vertex(g, place->vertex, place->position)) return BAD_COORDINATE;
+    }
+    return CELL_GOOD;
+}
+
 static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *room, fault_place *place)
 {
     const grid *g = &mesh->cells;
     place->type = grid_cell_type(g, cell);
     if (place->type == GRID_POLYHEDRON) return check_polyhedron(mesh, cell, room, place);
+    if (place->type == GRID_POLYGON) return check_polygon(mesh, cell, place);
     const int count = grid_type_vertices(place->type);
     if (count == 0) return BAD_TYPE;
     if (g->offsets.data) {
@@ -266,6 +284,9 @@ static const char *type_name(int type)
     case GRID_WEDGE: return "wedge";
     case GRID_PYRAMID: return "pyramid";
     case GRID_POLYHEDRON: return "polyhedron";
+    case GRID_TRIANGLE: return "triangle";
+    case GRID_QUAD: return "quad";
+    case GRID_POLYGON: return "polygon";
     default: return "unknown";
     }
 }
@@ -274,6 +295,10 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
                                       base_error *error)
 {
     const long long base = mesh->given.index_base, first = place->first + base, next = place->next + base;
+    if (place->type == GRID_POLYGON && place->first >= 0 && place->next <= mesh->given.connectivity_count)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": cell %lld (polygon): offsets %lld and %lld; a polygon has at least 3 vertices",
+                         mesh->name, (long long)cell, first, next);
     if (place->type == GRID_POLYHEDRON && next < first)
         return base_fail(
             error, INSITU_ERROR_MESH,
@@ -312,7 +337,8 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
                              "mesh \"%s\": cell %lld is a polyhedron, and face_offsets are not given", mesh->name, at);
         return base_fail(
             error, INSITU_ERROR_MESH,
-            "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron)",
+            "mesh \"%s\": cell %lld: unknown cell type %lld (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 "
+            "triangle, 9 quad, 7 polygon)",
             mesh->name, at, given_type(&mesh->cells, cell));
     case BAD_OFFSETS: return describe_offsets(mesh, cell, &place, error);
     case BAD_INDEX:
@@ -354,8 +380,10 @@ static int64_t check_cells(const session_mesh *mesh, int threads, mesh_tally *ta
         for (int64_t begin = 0; begin < count; begin += BLOCK_CELLS) {
             if (first_bad < count) continue;
             const int64_t end = begin + BLOCK_CELLS < count ? begin + BLOCK_CELLS : count;
-            const int64_t bad = run ? run(mesh, begin, end, &mine) : check_each(mesh, begin, end, &room, &mine);
-            if (bad < end) first_bad = bad;
+            /* A run ends at a bad cell, or at a polygon, which it does not know. */
+            int64_t at = run ? run(mesh, begin, end, &mine) : begin;
+            if (at < end) at = check_each(mesh, at, end, &room, &mine);
+            if (at < end) first_bad = at;
         }
         free_room(&room);
 #pragma omp critical(session_check_tally)
@@ -452,6 +480,7 @@ static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *err
     mesh->ghost_count = tally.ghosts;
     mesh->inverted_count = tally.inverted;
     mesh->flat_count = tally.flat;
+    mesh->shell_count = tally.shells;
     mesh->size_sum = tally.sizes;
     mesh->is_check_stale = false;
     return INSITU_OK;

@@ -104,7 +104,7 @@ typedef struct session_mesh {
     bool is_topology_stale;    /* the tree is of other cells */
     bool is_geometry_stale;    /* the tree is of other coordinates */
     double lower[3], upper[3]; /* of the drawn cells; lower > upper: there are none */
-    int64_t drawn_count, ghost_count, inverted_count, flat_count;
+    int64_t drawn_count, ghost_count, inverted_count, flat_count, shell_count; /* shells are drawn and flat */
     double size_sum; /* of drawn cells: cube roots of volumes */
     uint64_t *flat;  /* NULL: no cell is flat; else as in cells */
 

@@ -148,11 +148,14 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
     }
     if (mesh->cell_type == INSITU_POLYHEDRON && !mesh->offsets.data)
         return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polyhedra need them");
-    if (mesh->cell_type == INSITU_POLYHEDRON) return INSITU_OK;
+    if (mesh->cell_type == INSITU_POLYGON && !mesh->offsets.data)
+        return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polygons need them");
+    if (mesh->cell_type == INSITU_POLYHEDRON || mesh->cell_type == INSITU_POLYGON) return INSITU_OK;
     const int vertices = grid_type_vertices((int)mesh->cell_type);
     if (vertices == 0)
         return base_fail(error, INSITU_ERROR_MESH,
-                         "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron)",
+                         "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 triangle, 9 "
+                         "quad, 7 polygon)",
                          (int)mesh->cell_type);
     if (!mesh->offsets.data && mesh->connectivity_count != mesh->cell_count * vertices)
         return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %d vertices need %lld",

@@ -18,6 +18,7 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part)
     }
     sum->drawn += part->drawn;
     sum->ghosts += part->ghosts;
+    sum->shells += part->shells;
     sum->inverted += part->inverted;
     sum->flat += part->flat;
     sum->sizes += part->sizes;
@@ -141,6 +142,13 @@ MMBVH_INLINE void tally_volume(mesh_tally *tally, double volume)
     tally->sizes += cube_root(fabs(volume));
 }
 
+MMBVH_INLINE void tally_shell(mesh_tally *tally)
+{
+    tally->drawn++;
+    tally->flat++;
+    tally->shells++;
+}
+
 MMBVH_INLINE void tally_point(mesh_tally *tally, const double point[3])
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -160,9 +168,13 @@ void tally_cell(const grid *g, int64_t cell, mesh_tally *tally)
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex;
     for (int i = 0; grid_walk_next(&walk, &vertex); i++) {
-        double *point = points[type == GRID_POLYHEDRON ? 0 : i];
+        double *point = points[grid_type_vertices(type) ? i : 0];
         grid_vertex(g, vertex, point);
         tally_point(tally, point);
+    }
+    if (grid_is_shell_type(type)) {
+        tally_shell(tally);
+        return;
     }
     bool is_flat_cell = false;
     double volume;
@@ -216,6 +228,7 @@ double tally_cell_volume(const grid *g, int64_t cell)
     bool is_flat_cell;
     double points[GRID_MAX_CELL_VERTICES][3];
     const int type = grid_cell_type(g, cell);
+    if (grid_is_shell_type(type)) return 0;
     if (type == GRID_POLYHEDRON) return fabs(session_polyhedron_volume(g, cell, &is_flat_cell));
     grid_walk walk = grid_walk_cell(g, cell);
     int64_t vertex;
@@ -264,6 +277,10 @@ MMBVH_INLINE bool run_cell(const session_mesh *mesh, int64_t cell, mesh_tally *t
     t->ghosts += is_ghost;
     if (is_ghost) return true;
     for (int i = 0; i < count; i++) tally_point(t, points[i]);
+    if (shape == FETCH_BY_CELL && grid_is_shell_type(type)) {
+        tally_shell(t);
+        return true;
+    }
     const double volume = signed_volume(type, points);
     *least = fabs(volume) < *least ? fabs(volume) : *least;
     tally_volume(t, volume);
@@ -457,6 +474,6 @@ tally_run tally_choose(const session_mesh *mesh)
 {
     static const tally_run table[FETCH_SHAPES][2][2] = FETCH_TABLE(run);
     const grid *g = &mesh->cells;
-    if (!fetch_is_plain(g)) return NULL;
+    if (!fetch_is_plain(g) || (!g->cell_types && grid_is_shell_type(g->cell_type))) return NULL;
     return table[fetch_grid_shape(g)][g->connectivity.is_wide][g->coordinates[0].is_wide];
 }

@@ -6,7 +6,7 @@
 
 typedef struct mesh_tally {
     double lower[3], upper[3];
-    int64_t drawn, ghosts, inverted, flat;
+    int64_t drawn, ghosts, inverted, flat, shells; /* shells are drawn and flat */
     double sizes; /* sum of cube roots of volumes; added up block by block, so that it rounds as a sum of few */
 } mesh_tally;
 
@@ -25,7 +25,7 @@ void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crosse
  */
 double tally_cell_volume(const grid *g, int64_t cell);
 
-/* Of a good cell: has it no volume but what rounding leaves? Never of a ghost. */
+/* Of a good cell: has it no volume but what rounding leaves, as shells have none? Never of a ghost. */
 bool tally_is_flat(const grid *g, int64_t cell);
 
 /* Check and tally cells begin .. end; returns the first that is not good, or end. */

@@ -10,8 +10,8 @@ static void sum_cells(const session_meshes *meshes, const char *name, int64_t su
 {
     const session_mesh *mesh = session_find_mesh(meshes, name);
     if (!mesh || !mesh->is_given) return;
-    sums[DRAWN] = mesh->drawn_count;
-    sums[FLAT] = mesh->flat_count;
+    sums[DRAWN] = mesh->drawn_count - mesh->shell_count;
+    sums[FLAT] = mesh->flat_count - mesh->shell_count;
     sums[INVERTED] = mesh->inverted_count;
     tally_crossed(mesh, &sums[LOOKED_AT], &sums[CROSSED]);
 }

@@ -1,4 +1,4 @@
-/* The faces of a cell of any type, one after the other. */
+/* The faces of a cell of any type, one after the other. A shell is its only face. */
 #ifndef SESSION_CELL_FACES_H
 #define SESSION_CELL_FACES_H
 
@@ -31,10 +31,11 @@ static inline const session_face_table *session_faces_of_type(int type)
 
 typedef struct session_cell_faces {
     const grid *cells;
-    const session_face_table *table; /* of other cells than polyhedra */
+    const session_face_table *table; /* NULL: of polyhedra and shells */
     int64_t count;
     int64_t vertices[GRID_MAX_CELL_VERTICES];
-    int64_t first; /* of a polyhedron: the first of its entries of connectivity */
+    int64_t first; /* of the entries of connectivity */
+    int64_t size;  /* of a shell: its vertices; 0: it is none */
 } session_cell_faces;
 
 static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t cell)
@@ -47,6 +48,13 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
         out.count = end - out.first;
         return out;
     }
+    if (grid_is_shell_type(type)) {
+        const grid_walk walk = grid_walk_cell(g, cell);
+        out.first = walk.next;
+        out.size = walk.end - walk.next;
+        out.count = 1;
+        return out;
+    }
     out.table = session_faces_of_type(type);
     out.count = out.table->count;
     grid_cell_vertices(g, cell, out.vertices);
@@ -56,7 +64,8 @@ static inline session_cell_faces session_faces_of_cell(const grid *g, int64_t ce
 /* The vertices around a face: session_face_vertex() of 0 .. size - 1. */
 typedef struct session_face_loop {
     const session_cell_faces *faces;
-    const signed char *places; /* NULL: of a polyhedron */
+    const signed char *places; /* NULL: the entries of the list from first on */
+    const grid_array *list;
     int64_t first, size;
 } session_face_loop;
 
@@ -68,7 +77,14 @@ static inline session_face_loop session_face_of(const session_cell_faces *faces,
         out.size = out.places[3] < 0 ? 3 : 4;
         return out;
     }
+    if (faces->size) {
+        out.list = &faces->cells->connectivity;
+        out.first = faces->first;
+        out.size = faces->size;
+        return out;
+    }
     int64_t end;
+    out.list = &faces->cells->face_connectivity;
     grid_face_vertices(faces->cells, grid_array_index(&faces->cells->connectivity, faces->first + face), &out.first,
                        &end);
     out.size = end - out.first;
@@ -78,7 +94,7 @@ static inline session_face_loop session_face_of(const session_cell_faces *faces,
 static inline int64_t session_face_vertex(const session_face_loop *loop, int64_t i)
 {
     if (loop->places) return loop->faces->vertices[(int)loop->places[i]];
-    return grid_array_index(&loop->faces->cells->face_connectivity, loop->first + i);
+    return grid_array_index(loop->list, loop->first + i);
 }
 
 #endif

@@ -3,6 +3,8 @@
  * takes the faces whose slots are not empty, few but the outer ones, and counts them exactly. So the memory goes with
  * the slots and the outer faces, not with all faces.
  *
+ * Shells are faces that are always kept, and take the place of a cell's outer face: what is there is drawn once.
+ *
  * Of the faces that a rank has once, those in other ranks' boxes go to rank hash(key) % ranks, which counts them for
  * all. */
 #include "session_outer_faces.h"
@@ -109,7 +111,8 @@ static int64_t take_faces(const face_search *s, int64_t cell, session_face *face
     for (int64_t f = 0; f < of_cell.count; f++) {
         const session_face_loop loop = session_face_of(&of_cell, f);
         session_key key;
-        if (!make_key(s, &loop, &key) || !s->slots[session_key_hash(&key) & s->mask]) continue;
+        if (!make_key(s, &loop, &key)) continue;
+        if (!of_cell.size && !s->slots[session_key_hash(&key) & s->mask]) continue;
         if (faces) {
             faces[count] = (session_face){cell, f};
             keys[count] = key;
@@ -148,11 +151,16 @@ static bool count_keys(const session_key *keys, int64_t count, int64_t **groups,
     return true;
 }
 
+static bool is_shell(const face_search *s, const session_face *face)
+{
+    return grid_is_shell_type(grid_cell_type(&s->mesh->cells, face->cell));
+}
+
 static void keep_single_faces(face_search *s)
 {
     int64_t kept = 0;
     for (int64_t i = 0; i < s->count; i++) {
-        if (s->sizes[s->groups[i]] != 1) continue;
+        if (s->sizes[s->groups[i]] != 1 && !is_shell(s, &s->faces[i])) continue;
         s->faces[kept] = s->faces[i];
         s->keys[kept++] = s->keys[i];
     }
@@ -258,7 +266,7 @@ static void drop_shared(face_search *s, const session_mail *answers, const int64
 {
     int64_t kept = 0;
     for (int64_t i = 0; i < answers->total; i++)
-        if (answers->words[i] > 1) s->faces[order[i]].cell = -1;
+        if (answers->words[i] > 1 && !is_shell(s, &s->faces[order[i]])) s->faces[order[i]].cell = -1;
     for (int64_t i = 0; i < s->count; i++)
         if (s->faces[i].cell >= 0) s->faces[kept++] = s->faces[i];
     s->count = kept;

@@ -82,7 +82,7 @@ static void count_cells(const session_mesh *mesh, const session_scalar *scalar, 
     const int shift = shift_of(of->pass);
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(+ : counts[:2 * DIGITS])
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (!grid_is_drawn(g, cell)) continue;
+        if (!grid_is_seen(g, cell)) continue;
         const fetch_range range = fetch_any_cell_range(g, &field, cell);
         const float middle = (float)(0.5 * range.low + 0.5 * range.high);
         if (!range.is_finite || !isfinite(middle) || (of->is_positive && !(middle > 0))) continue;

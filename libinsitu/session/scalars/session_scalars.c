@@ -118,12 +118,14 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
-static session_extremes find_extent(const grid *g, const grid_field *field, int threads, bool is_positive)
+/* has_shells: of planes there are none, which cut no shell. */
+static session_extremes find_extent(const grid *g, const grid_field *field, int threads, bool has_shells,
+                                    bool is_positive)
 {
     double least = INFINITY, most = -INFINITY;
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (!grid_is_drawn(g, cell)) continue;
+        if (has_shells ? !grid_is_seen(g, cell) : !grid_is_drawn(g, cell)) continue;
         const fetch_range of_cell = fetch_any_cell_range(g, field, cell);
         if (!of_cell.is_finite) continue;
         if (!is_positive || of_cell.low > 0) least = fmin(least, of_cell.low);
@@ -138,7 +140,7 @@ void session_scalar_extent(const session_mesh *mesh, session_scalar *scalar, int
     session_extremes *known = is_positive ? &scalar->positive : &scalar->extremes;
     if (!known->is_known) {
         const grid_field field = session_scalar_field(mesh, scalar);
-        *known = find_extent(&mesh->cells, &field, threads, is_positive);
+        *known = find_extent(&mesh->cells, &field, threads, !scalar->distances, is_positive);
     }
     *low = known->low;
     *high = known->high;

@@ -305,6 +305,8 @@ DEFINE_MAPPING(surface, "surface", SURFACE_KEYS);
       .help = "The outer surface of meshes: the faces that one cell alone has, of the cells of all ranks but ghosts. " \
               "Faces are one where their vertices are, by global ids or else by equal coordinates; a face that meets " \
               "smaller ones, at hanging nodes, is drawn, and so are these. They are found once for a mesh, and "       \
-              "some 250 bytes a face are held. Each counts as one isovalue.",                                          \
+              "some 250 bytes a face are held. Triangles, quads and polygons of a mesh are drawn too, each that lies " \
+              "on a "                                                                                                  \
+              "cell's face in its place. Each counts as one isovalue.",                                                \
       .by_default = "none", .child = &surface_mapping)
 EXPORT_MAPPING(layer, "layers", LAYER_KEYS);

@@ -43,7 +43,7 @@ typedef struct insitu_vtk_report {
     int64_t cells;           /* handed over, ghosts included */
     int64_t cells_split;     /* cut into several: no type is at present, hence 0 */
     int64_t cells_linear;    /* quadratic and higher-order cells drawn by their corners */
-    int64_t cells_flat;      /* not drawn: of less than 3 dimensions */
+    int64_t cells_flat;      /* not drawn: points and lines */
     int64_t cells_not_drawn; /* not drawn: 3-D cells of unknown types, cells with too few points or faces */
     int64_t bytes_borrowed;  /* of VTK's arrays handed over as they are */
     int64_t bytes_copied;    /* of arrays converted, held until the mesh is set again */
