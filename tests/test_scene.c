@@ -132,6 +132,28 @@ static const char every_key[] =
     "    outputs:\n"
     "      - {path: c.png, decorations: false}\n"
     "      - {path: \"c{time:.1e}.exr\", decorations: true}\n"
+    "  - name: fourth\n"
+    "    camera:\n"
+    "      automatic: {zoom: 0.9}\n"
+    "      orbit: {views: 4, axis: [0, 0, 2], elevation: [-10, 20.5], start: 45}\n"
+    "    sweep: {isovalues: true, fields: [p, r]}\n"
+    "    layers:\n"
+    "      - isosurface: {field: q, values: [1, 2, 3], colour_by: {field: p}}\n"
+    "    outputs:\n"
+    "      - {cinema: runs/all.cdb}\n"
+    "      - {path: \"d{view:02}{isovalue:.1f}{field}.exr\"}\n"
+    "  - name: fifth\n"
+    "    camera:\n"
+    "      angle: 30\n"
+    "      path:\n"
+    "        - {time: 0, position: [0, 0, 5], focal: [0, 0, 0]}\n"
+    "        - {time: 2, position: [5, 0, 0], focal: [0, 1, 0], up: [0, 0, 3], angle: 50}\n"
+    "    layers: [{volume: {field: p}}]\n"
+    "    outputs: [{cinema: runs/all.cdb, path: \"{cycle}/e.png\"}]\n"
+    "  - name: sixth\n"
+    "    camera: {path: [{cycle: 3, position: [0, 0, 5], focal: [0, 0, 0]}]}\n"
+    "    layers: [{volume: {field: p}}]\n"
+    "    outputs: [{path: f.png}]\n"
     "statistics:\n"
     "  - {field: p, mesh: air, component: x, path: out/p.csv, every: 3, histogram: {bins: 8, range: [-1, 1]}}\n"
     "  - {field: q, path: q.CSV, histogram: {}}\n"
@@ -176,7 +198,7 @@ static void scene_image_keys_are_read(void **state)
     parse_good(every_key, &s);
     assert_int_equal(s.threads, 3);
     assert_int_equal(s.tree, SCENE_TREE_PARTIAL);
-    assert_int_equal(s.image_count, 3);
+    assert_int_equal(s.image_count, 3 + 4 * 2 * 3 * 2 + 2);
     const scene_image *image = &s.images[0];
     assert_string_equal(image->name, "wave");
     assert_int_equal(image->line, 4);
@@ -556,6 +578,8 @@ static const char *const good_lines[] = {
 enum { good_line_count = sizeof good_lines / sizeof *good_lines };
 
 #define V "{volume: {field: f}}"
+#define AT_THE(keys) "{position: [0, 0, 5], focal: [0, 0, 0], " keys "}"
+#define AT "{position: [0, 0, 5], focal: [0, 0, 0]}"
 
 static const struct bad_file {
     int line; /* replaced */
@@ -799,7 +823,77 @@ static const struct bad_file {
     {14, "      - path: a.png\n      - path: a.png", 15, {"outputs[1].path: \"a.png\" is another output's file too"}},
     {14, "      - path: b.exr", 17, {"images[1].outputs[0].path: \"b.exr\" is another"}},
     {14, "      - path: a{cycle}.png\n      - path: a{cycle:03}.png", 15, {"is another output's file too"}},
-    {14, "      - bits: 8", 14, {"outputs[0].path: missing"}},
+    {14, "      - bits: 8", 14, {"outputs[0].path: missing", "cinema:"}},
+    {6, "    camera: {orbit: {axis: [0, 1, 0]}}", 6, {"camera.orbit.views: missing", "from 1 to 1024"}},
+    {6, "    camera: {orbit: {views: 0}}", 6, {"camera.orbit.views: \"0\"", "from 1 to 1024"}},
+    {6, "    camera: {orbit: {views: 2, axis: [0, 0, 0]}}", 6, {"camera.orbit.axis: has length 0"}},
+    {6, "    camera: {orbit: {views: 2, elevation: 90}}", 6, {"orbit.elevation: \"90\"", "-89.9 to 89.9; or a list"}},
+    {6, "    camera: {orbit: {views: 2, elevation: [0, 90]}}", 6, {"orbit.elevation[1]: \"90\"", "-89.9 to 89.9"}},
+    {6, "    camera: {orbit: {views: 2, elevation: []}}", 6, {"orbit.elevation: a list of 0", "1 to 32"}},
+    {6, "    camera: {orbit: {views: 2, start: 400}}", 6, {"orbit.start: \"400\"", "-360 to 360"}},
+    {6, "    camera: {orbit: {views: 2}, up: [0, 0, 1]}", 6, {"camera.up: given beside orbit", "axis"}},
+    {6, "    camera: {orbit: {views: 2}, automatic: {direction: [0, 0, 1]}}", 6, {"automatic.direction: given beside"}},
+    {6, "    camera: {orbit: {views: 2}, focal: [0, 0, 1]}", 6, {"camera.focal: given beside orbit"}},
+    {6, "    camera: {orbit: {views: 2}}", 14, {"images[0].outputs[0].path: \"a.png\"", "several views", "{view}"}},
+    {6, "    camera: {orbit: {views: 1025}}", 6, {"orbit.views: \"1025\"", "1 to 1024"}},
+    {6, "    camera: {orbit: {views: 1024}}", 15, {"images[1]: 1025 pictures a step up to here", "at most 1024"}},
+    {6, "    camera: {path: []}", 6, {"camera.path: a list of 0", "1 to 256 mappings"}},
+    {6, "    camera: {path: [{time: 0, focal: [0, 0, 0]}]}", 6, {"camera.path[0].position: missing"}},
+    {6, "    camera: {path: [" AT "]}", 6, {"camera.path[0]: has no time and no cycle"}},
+    {6, "    camera: {path: [" AT_THE("time: 1, cycle: 2") "]}", 6, {"camera.path[0].cycle: given beside time"}},
+    {6,
+     "    camera:\n      path:\n        - " AT_THE("time: 1") "\n        - " AT_THE("cycle: 2"),
+     9,
+     {"camera.path[1].cycle: given where the first place has a time"}},
+    {6,
+     "    camera:\n      path:\n        - " AT_THE("cycle: 2") "\n        - " AT_THE("cycle: 2"),
+     9,
+     {"camera.path[1].cycle: 2 comes after 2", "in the order of time"}},
+    {6, "    camera: {path: [" AT_THE("time: 1, up: [0, 0, 0]") "]}", 6, {"path[0].up: has length 0"}},
+    {6, "    camera: {path: [" AT_THE("time: 1, up: [0, 0, 1]") "]}", 6, {"path[0].up: [0, 0, 1] is parallel"}},
+    {6, "    camera: {path: [{time: 1, position: [1, 1, 1], focal: [1, 1, 1]}]}", 6, {"path[0].focal: [1, 1, 1] is"}},
+    {6,
+     "    camera: {path: [{time: 1, position: [1e31, 1, 1], focal: [1, 1, 1]}]}",
+     6,
+     {"path[0].position[0]: \"1e31"}},
+    {6, "    camera: {automatic: {}, path: [" AT_THE("time: 1") "]}", 6, {"camera.automatic: given beside path"}},
+    {6, "    camera: {orbit: {views: 2}, path: [" AT_THE("time: 1") "]}", 6, {"camera.path: given beside orbit"}},
+    {6, "    sweep: {}", 6, {"images[0].sweep: holds nothing", "isovalues: true, fields"}},
+    {6, "    sweep: {isovalues: 3}", 6, {"sweep.isovalues: \"3\"", "true or false"}},
+    {6,
+     "    sweep: {isovalues: true}",
+     14,
+     {"outputs[0].path: \"a.png\" is one file for several isovalues", "{isovalue}"}},
+    {6, "    sweep: {fields: [f, g]}", 14, {"outputs[0].path: \"a.png\" is one file for several fields", "{field}"}},
+    {6, "    sweep: {fields: [f, f]}", 6, {"sweep.fields[1]: \"f\" is there twice"}},
+    {6, "    sweep: {fields: [f, a/b]}", 6, {"sweep.fields[1]: \"a/b\" holds a /"}},
+    {11, "    sweep: {fields: g}", 11, {"sweep.fields: no layer is coloured by a field", "colour_by"}},
+    {11,
+     "      - isosurface: {field: f, values: [3]}\n    sweep: {isovalues: true}",
+     12,
+     {"sweep.isovalues: the image has 2 isosurface layers", "expected one"}},
+    {16, "    layers: [{volume: {field: f}}]\n    sweep: {isovalues: true}", 17, {"the image has 0 isosurface layers"}},
+    {14, "      - path: a{view}.png", 14, {"outputs[0].path: \"{view}\" is of images with an orbit alone"}},
+    {14, "      - path: a{isovalue}.png", 14, {"\"{isovalue}\" is of images with sweep: {isovalues: true} alone"}},
+    {14, "      - path: a{field}.png", 14, {"\"{field}\" is of images with sweep: {fields: ...} alone"}},
+    {14, "      - path: a{view:2}.png", 14, {"\"{view:2}\" is unknown", "{view}"}},
+    {12, "    decorations: {title: \"{view}\"}", 12, {"decorations.title: \"{view}\" is of images with an orbit"}},
+    {14, "      - cinema: a.png", 14, {"outputs[0].cinema: \"a.png\" has another ending", ".cdb"}},
+    {14, "      - cinema: out/.cdb", 14, {"outputs[0].cinema: \"out/.cdb\" has another ending", ".cdb"}},
+    {14, "      - cinema: \"{name}.cdb\"", 14, {"outputs[0].cinema: \"{name}.cdb\" holds a placeholder"}},
+    {14, "      - cinema: \"a\\nb.cdb\"", 14, {"outputs[0].cinema: holds a control character"}},
+    {14, "      - {cinema: a.cdb, path: a.exr}", 14, {"outputs[0].path: \"a.exr\" is no PNG"}},
+    {14, "      - {cinema: a.cdb, path: ../a.png}", 14, {"outputs[0].path: \"../a.png\" is not below the folder"}},
+    {14, "      - {cinema: a.cdb, path: b/../a.png}", 14, {"outputs[0].path: \"b/../a.png\" is not below"}},
+    {14,
+     "      - {cinema: a.cdb, path: a.png}\n      - cinema: a.cdb",
+     15,
+     {"outputs[1].cinema: \"a.cdb\" has this image"}},
+    {14,
+     "      - {cinema: a.cdb, path: a.png}\n      - path: a.cdb/a.png",
+     15,
+     {"outputs[1].path: \"a.cdb/a.png\" is another"}},
+    {14, "      - cinema: a.cdb\n        bits: 12", 15, {"outputs[0].bits: 12"}},
 };
 
 static void text_with_line(int line, const char *by, char *text)
@@ -946,15 +1040,17 @@ static void scene_texts_have_their_placeholders_replaced(void **state)
                  {"{cycle:03}", 123456, "123456"},
                  {"{cycle}", INT64_MIN, "-9223372036854775808"},
                  {"{cycle:05}", -3, "-0003"},
+                 {"{view} {view:02} {field}", 1, "3 03 p"},
+                 {"{isovalue} {isovalue:.3f}", 1, "-0.5 -0.500"},
                  {"{", 1, "{"},
                  {"", 1, ""}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char *path = scene_expand(cases[i].pattern, &(scene_moment){"wave", cases[i].cycle, 0.125});
+        char *path = scene_expand(cases[i].pattern, &(scene_moment){"wave", cases[i].cycle, 0.125, 3, -0.5, "p"});
         assert_string_equal(path, cases[i].path);
         base_free(path);
     }
     base_memory_fail_nth(1);
-    assert_null(scene_expand("a", &(scene_moment){"b", 1, 0}));
+    assert_null(scene_expand("a", &(scene_moment){"b", 1, 0, 0, 0, NULL}));
     base_memory_fail_nth(0);
 }
 

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -80,4 +81,49 @@ bool text_file_make_folders(const char *path)
 FILE *text_file_open(const char *path)
 {
     return open_stream(open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC), "r");
+}
+
+/* Until the end or an error; false where memory runs out. */
+static bool read_stream(FILE *file, char **text)
+{
+    size_t size = 0, capacity = 0;
+    do {
+        if (size + 1 >= capacity) {
+            capacity = 2 * capacity + 4096;
+            char *more = base_realloc(*text, capacity);
+            if (!more) return false;
+            *text = more;
+        }
+        size += fread(*text + size, 1, capacity - 1 - size, file);
+    } while (!feof(file) && !ferror(file));
+    (*text)[size] = '\0';
+    return true;
+}
+
+bool text_file_read(const char *path, char **text)
+{
+    *text = NULL;
+    FILE *file = text_file_open(path);
+    if (!file) return false;
+    errno = EIO; /* where fread() gives no reason */
+    const bool has_memory = read_stream(file, text), is_read = has_memory && !ferror(file);
+    const int reason = has_memory ? errno : ENOMEM;
+    fclose(file);
+    if (is_read) return true;
+    base_free(*text);
+    *text = NULL;
+    errno = reason;
+    return false;
+}
+
+size_t text_keep_below(char *text, long long number)
+{
+    size_t kept = 0;
+    for (char *line = text, *end; (end = strchr(line, '\n')) != NULL; line = end + 1) {
+        const size_t size = (size_t)(end + 1 - line);
+        if (strtoll(line, NULL, 10) >= number) continue;
+        memmove(text + kept, line, size);
+        kept += size;
+    }
+    return kept;
 }

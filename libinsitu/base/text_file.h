@@ -4,6 +4,7 @@
 
 #include <locale.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdio.h>
 
 /* The calling thread's numbers are C's from begin to end. begin: false where memory runs out; then there is no end. */
@@ -21,6 +22,13 @@ bool text_file_replace(const char *path, text_writer *write, const void *what);
 
 /* Make the folders of a path that are missing. False with errno where that cannot be done. */
 bool text_file_make_folders(const char *path);
+
+/* The whole file as text, from base_alloc(). False with errno where that cannot be done; *text is then NULL. */
+bool text_file_read(const char *path, char **text);
+
+/* Of lines that begin with a whole number, those of numbers below this move to the text's beginning; returns how many
+ * bytes they are. A last line without an end, torn, goes. */
+size_t text_keep_below(char *text, long long number);
 
 /* Open a file to read it. NULL with errno where that cannot be done; a pipe does not make the caller wait. */
 FILE *text_file_open(const char *path);

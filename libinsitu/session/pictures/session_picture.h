@@ -24,7 +24,7 @@ void session_drop_picture(session_picture *picture);
 typedef struct session_kept_pictures {
     bool is_on; /* the same on every rank, because depth is then drawn for all images */
     int count;
-    insitu_picture items[SCENE_MAX_IMAGES]; /* names are the scene's; pixels and depth of each are one block */
+    insitu_picture items[SCENE_MAX_PICTURES]; /* names are the scene's; pixels and depth of each are one block */
 } session_kept_pictures;
 
 /* Copy a picture that has depth. Local. */

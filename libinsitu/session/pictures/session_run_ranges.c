@@ -63,9 +63,10 @@ static char *file_path(const scene_image *image)
     const char *output = image->outputs[0].path;
     size_t folder = strcspn(output, "{");
     while (folder > 0 && output[folder - 1] != '/') folder--;
-    const size_t size = folder + strlen(image->name) + sizeof ".ranges";
-    char *path = base_alloc(size);
-    if (path) snprintf(path, size, "%.*s%s.ranges", (int)folder, output, image->name);
+    const size_t size = folder + strlen(image->name) + sizeof ".ranges" + 12;
+    char number[12] = "", *path = base_alloc(size);
+    if (image->variant.layers > 0) snprintf(number, sizeof number, ".%d", image->variant.layers);
+    if (path) snprintf(path, size, "%.*s%s%s.ranges", (int)folder, output, image->name, number);
     return path;
 }
 
@@ -158,10 +159,11 @@ void session_run_ranges_free(session_run_ranges *all)
     *all = (session_run_ranges){0};
 }
 
-static session_image_ranges *find_ranges(const session_run_ranges *all, const char *image)
+static session_image_ranges *find_ranges(const session_run_ranges *all, const scene_image *image)
 {
     for (int i = 0; i < all->count; i++)
-        if (strcmp(all->items[i].image, image) == 0) return &all->items[i];
+        if (all->items[i].layers == image->variant.layers && strcmp(all->items[i].image, image->name) == 0)
+            return &all->items[i];
     return NULL;
 }
 
@@ -174,6 +176,7 @@ static bool prepare_ranges(session_run_ranges *all, const scene_image *image, ba
         all->items = items;
         session_image_ranges *entry = &items[all->count];
         *entry = (session_image_ranges){.image = base_strdup(image->name),
+                                        .layers = image->variant.layers,
                                         .path = file_path(image),
                                         .count = count,
                                         .items = base_calloc((size_t)count, sizeof *entry->items)};
@@ -209,7 +212,7 @@ static insitu_status fill_ranges(session_image_ranges *ranges, const session_tea
 insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
                                       session_image_ranges **out, base_error *error)
 {
-    *out = find_ranges(all, image->name);
+    *out = find_ranges(all, image);
     if (*out || count_layers(image) == 0) return INSITU_OK;
     const bool has_room = prepare_ranges(all, image, error);
     session_image_ranges *ranges = has_room ? &all->items[all->count] : NULL;

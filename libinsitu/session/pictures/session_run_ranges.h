@@ -1,7 +1,8 @@
 /* Ranges that widen over a run (range: run): the widest that each layer of an image has been drawn with.
  *
  * They are kept in a file NAME.ranges, NAME being the image's, in the folder of the image's first output: the part of
- * its path before the last slash that comes before any placeholder. It is text, written anew after each picture for
+ * its path before the last slash that comes before any placeholder; those of a sweep's pictures but the first in
+ * NAME.1.ranges and so on. It is text, written anew after each picture for
  * which a range became wider, and read when the first picture of the image is drawn, so that a run that is started
  * again goes on with the ranges of the one before. A line: isosurface, surface, slice or volume, the layer's number
  * among those of its kind from 0 on, the component (scene.h), low, high, and the field. Lines that are of no layer of
@@ -24,6 +25,7 @@ typedef struct session_run_range {
 
 typedef struct session_image_ranges {
     char *image, *path;
+    int layers; /* of the image's variants */
     int count;
     session_run_range *items;
     bool is_changed; /* since the file was written */

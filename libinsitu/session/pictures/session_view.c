@@ -156,7 +156,7 @@ static void warn_of_view(const session_extent *e, const scene_image *image, cons
                          session_report *report)
 {
     const char *why = e->cell_count ? why_unseen(e, &view->camera) : NULL;
-    const session_warning warning = {WARNING_VIEW, image->name, NULL, 0};
+    const session_warning warning = {WARNING_VIEW, image->name, NULL, image->variant.view};
     session_warn(report, &warning, why != NULL,
                  "image \"%s\": its camera does not see the cells, which lie between (%g, %g, %g) and (%g, %g, %g): %s",
                  image->name, e->lower[0], e->lower[1], e->lower[2], e->upper[0], e->upper[1], e->upper[2],

@@ -12,8 +12,17 @@
 
 /* ---- which values show ---------------------------------------------------------------------------------------- */
 
+/* Fields of a sweep have their isosurfaces in common. */
+static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
+{
+    for (int i = 0; i < scalar->interval_count; i++)
+        if (memcmp(&scalar->intervals[i], interval, sizeof *interval) == 0) return true;
+    return false;
+}
+
 static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, int count)
 {
+    if (count == 1 && has_interval(scalar, more)) return true;
     const size_t sum = (size_t)(scalar->interval_count + count);
     mmbvh_interval *intervals = base_realloc(scalar->intervals, (sum ? sum : 1) * sizeof *intervals);
     if (!intervals) return false;
@@ -121,7 +130,7 @@ bool session_mark_needs(session_meshes *meshes, const scene_image *const *images
             mesh->scalars[i].interval_count = 0;
         }
         for (int i = 0; i < count && mesh->is_given; i++)
-            if (!mark_image(mesh, images[i], extent)) return false;
+            if (images[i]->variant.view == 0 && !mark_image(mesh, images[i], extent)) return false;
         session_drop_thresholds(mesh);
     }
     return true;

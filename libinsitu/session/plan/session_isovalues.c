@@ -55,9 +55,17 @@ typedef struct planned_surface {
     bool is_news; /* a value is outside what the trees hold, and that was not told */
 } planned_surface;
 
+/* A sweep over isovalues leaves one in each picture: its number is that of the file's. */
 static session_warning isovalue_warning(const planned_surface *s, int value)
 {
-    return (session_warning){WARNING_ISOVALUE, s->image->name, NULL, s->first_value + value};
+    return (session_warning){WARNING_ISOVALUE, s->image->name, NULL,
+                             s->first_value + value + s->image->variant.isovalue};
+}
+
+/* Views and fields of one image have the same isosurfaces. */
+static bool is_listed(const scene_image *image)
+{
+    return image->variant.view == 0 && image->variant.field == 0;
 }
 
 static int list_surfaces(const session_plan *plan, planned_surface *out)
@@ -65,6 +73,7 @@ static int list_surfaces(const session_plan *plan, planned_surface *out)
     int count = 0;
     for (int i = 0; i < plan->image_count; i++) {
         const scene_image *image = plan->images[i];
+        if (!is_listed(image)) continue;
         for (int n = 0, values = 0; n < image->isosurface_count; n++) {
             out[count++] = (planned_surface){image, &image->isosurfaces[n], values, no_range, false};
             values += image->isosurfaces[n].value_count;
@@ -122,7 +131,8 @@ insitu_status session_check_isovalues(const session_plan *plan, const session_me
                                       session_report *report, base_error *error)
 {
     int most = 0;
-    for (int i = 0; i < plan->image_count; i++) most += plan->images[i]->isosurface_count;
+    for (int i = 0; i < plan->image_count; i++)
+        if (is_listed(plan->images[i])) most += plan->images[i]->isosurface_count;
     if (most == 0 || plan->cell_count == 0) return INSITU_OK;
     planned_surface surfaces[most];
     const int count = list_surfaces(plan, surfaces);

@@ -203,6 +203,7 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
     bool is_planned = true;
     for (int i = 0; i < plan->image_count; i++) {
         const scene_image *image = plan->images[i];
+        if (image->variant.view > 0) continue; /* its layers are those of view 0 */
         for (int s = 0; s < image->isosurface_count && is_planned; s++)
             is_planned = add_recentrings(catalogue, plan, &image->isosurfaces[s].field) &&
                          (!image->isosurfaces[s].has_colour_by ||
@@ -243,7 +244,8 @@ insitu_status session_check_event_fields(const session_plan_basis *basis, bool i
         if (session_is_statistics_due(&scene->statistics[i], basis->moment->cycle))
             status = check_layer_field(basis, &scene->statistics[i].field, error);
     for (int i = 0; i < scene->image_count && images && !status; i++)
-        if (scene->images[i].when.is_given) status = check_layer_field(basis, &scene->images[i].when.field, error);
+        if (scene->images[i].when.is_given && scene_is_first_variant(&scene->images[i]))
+            status = check_layer_field(basis, &scene->images[i].when.field, error);
     return status;
 }
 
@@ -293,13 +295,17 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
+/* Views of an orbit have their layers in common, and so what can be said of these. */
 static void take_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
+    bool is_well = false;
     for (int i = 0; i < basis->scene->image_count; i++) {
         const scene_image *image = &basis->scene->images[i];
-        if (!(basis->let_images >> i & 1) || !is_due(image, basis->moment)) continue;
-        if (!can_be_drawn(basis, image, report, &plan->refusal)) continue;
+        if (!(basis->let_images >> image->variant.source & 1) || !is_due(image, basis->moment)) continue;
+        if (image->variant.view == 0) is_well = can_be_drawn(basis, image, report, &plan->refusal);
+        if (!is_well) continue;
         plan->images[plan->image_count++] = image;
+        if (image->variant.view > 0) continue;
         plan->slice_count += image->slice_count;
         plan->surface_count += image->surface_count;
     }

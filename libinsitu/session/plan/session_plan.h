@@ -18,7 +18,7 @@ typedef struct session_recentring {
 typedef struct session_plan {
     int image_count; /* that can be drawn */
     const scene_image **images;
-    int slice_count, surface_count; /* of all of them */
+    int slice_count, surface_count; /* of all of them, those of an orbit's views once */
     int recentring_count;
     session_recentring *recentrings;
     int64_t cell_count; /* drawn ones of all ranks */
@@ -37,7 +37,7 @@ typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* for messages */
     const session_moment *moment;
-    uint64_t let_images; /* a bit an image: those that no condition holds back */
+    uint64_t let_images; /* a bit an image of the file: those that no condition holds back */
     const session_catalogue *catalogue;
     const session_extent *extent;
 } session_plan_basis;

@@ -41,7 +41,7 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
 {
     int count = 0;
     for (int i = 0; i < plan->image_count; i++)
-        for (int n = 0; n < plan->images[i]->surface_count; n++)
+        for (int n = 0; n < plan->images[i]->surface_count && plan->images[i]->variant.view == 0; n++)
             for (int m = 0; m < catalogue->mesh_count; m++) {
                 const scene_surface *layer = &plan->images[i]->surfaces[n];
                 const surface_wish wish = {&catalogue->meshes[m], &layer->threshold};

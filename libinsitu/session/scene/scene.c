@@ -78,7 +78,7 @@ static insitu_status convert_name(const scene_document *d, const char *path, con
 {
     if (strchr(name, '/')) return scene_bad(d, path, "name", "\"%s\" holds a /, expected a name without", name);
     for (const scene_image *other = s->images; other < out; other++) {
-        if (strcmp(other->name, name) == 0) {
+        if (other->variant.source != out->variant.source && strcmp(other->name, name) == 0) {
             return scene_bad(d, path, "name", "\"%s\" is the name of the image in line %d too, expected another", name,
                              other->line);
         }
@@ -162,6 +162,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
     if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, out, &out->clips_of_all);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
+    if (status == INSITU_OK) status = scene_apply_sweep(d, path, in, out);
     out->once = in->once && *in->once;
     if (status == INSITU_OK) status = scene_convert_condition(d, path, in->when, &out->when);
     if (status == INSITU_OK) status = convert_sampling(d, path, in->sampling, out);
@@ -174,19 +175,58 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
     return status;
 }
 
+/* The variants of an image that differ in their layers, each at its first view. */
+static insitu_status convert_layers_in_turn(const scene_document *d, const scene_file *in, int source, scene *out)
+{
+    char path[32];
+    scene_series series;
+    snprintf(path, sizeof path, "images[%d]", source);
+    insitu_status status = scene_find_series(d, path, &in->images[source], &series);
+    for (int i = 0; !status && i < series.fields * series.isovalues; i++) {
+        scene_image *image = &out->images[out->image_count++];
+        image->variant = (scene_variant){source, i, i / series.isovalues, i % series.isovalues, 0};
+        status = convert_image(d, path, &in->images[source], out, image);
+    }
+    return status;
+}
+
+/* Put the views of orbits beside the first ones; from the last image on, because there is room behind them alone. */
+static void add_views(scene *s, int picture_count)
+{
+    int end = picture_count;
+    for (int i = s->image_count - 1; i >= 0; i--) {
+        const scene_image first = s->images[i];
+        const scene_orbit *orbit = &first.camera.orbit;
+        const int views = orbit->view_count ? orbit->view_count * orbit->circle_count : 1;
+        end -= views;
+        for (int view = 0; view < views; view++) {
+            scene_image *image = &s->images[end + view];
+            *image = first;
+            image->variant.view = view;
+            if (view) scene_place_view(&image->camera, view);
+        }
+    }
+    s->image_count = picture_count;
+}
+
+static insitu_status convert_images(const scene_document *d, const scene_file *in, scene *out)
+{
+    int count = 0;
+    insitu_status status = scene_count_pictures(d, in, &count);
+    if (status) return status;
+    out->images = base_calloc((size_t)count, sizeof *out->images);
+    if (!out->images) return scene_no_memory(d);
+    for (int i = 0; i < in->images_count && !status; i++) status = convert_layers_in_turn(d, in, i, out);
+    if (!status) status = scene_find_databases(d, out);
+    if (!status) add_views(out, count);
+    return status;
+}
+
 static insitu_status convert_file(const scene_document *d, const scene_file *in, scene *out)
 {
     out->threads = in->threads ? *in->threads : 0;
     out->tree = in->tree ? (scene_tree)*in->tree : SCENE_TREE_AUTO;
-    out->images = base_calloc((size_t)in->images_count, sizeof *out->images);
-    if (!out->images) return scene_no_memory(d);
-    out->image_count = in->images_count;
-    insitu_status status = INSITU_OK;
-    for (int i = 0; i < in->images_count && status == INSITU_OK; i++) {
-        char path[32];
-        snprintf(path, sizeof path, "images[%d]", i);
-        status = convert_image(d, path, &in->images[i], out, &out->images[i]);
-    }
+    insitu_status status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);
     return status == INSITU_OK ? scene_check_outputs(d, out) : status;
 }
@@ -264,6 +304,7 @@ static void free_colour_map(scene_colour_map *map)
 
 static void free_image(scene_image *image)
 {
+    if (image->variant.view > 0) return; /* nothing of it is its own */
     for (int i = 0; i < image->isosurface_count; i++) {
         scene_isosurface *surface = &image->isosurfaces[i];
         free_field(&surface->field);
@@ -292,6 +333,8 @@ static void free_image(scene_image *image)
     scene_free_decorations(&image->decorations);
     free_field(&image->when.field);
     base_free(image->name);
+    base_free(image->swept_field);
+    base_free(image->camera.points);
     base_free(image->isosurfaces);
     base_free(image->volumes);
     base_free(image->slices);
@@ -310,5 +353,7 @@ void scene_free(scene *s)
         base_free(s->statistics[i].path);
     }
     base_free(s->statistics);
+    for (int i = 0; i < s->database_count; i++) base_free(s->databases[i].path);
+    base_free(s->databases);
     *s = (scene){0};
 }

@@ -175,6 +175,22 @@ typedef struct scene_light {
     float colour[3]; /* linear, intensity included */
 } scene_light;
 
+/* Places on circles around the data, numbered circle by circle: view / view_count is the circle. */
+enum { SCENE_MAX_ELEVATIONS = 32 };
+typedef struct scene_orbit {
+    int view_count;                          /* of a circle; 0: there is no orbit */
+    double axis[3];                          /* unit length */
+    double start;                            /* degrees: phi of the first view of a circle */
+    int circle_count;                        /* 1 .. SCENE_MAX_ELEVATIONS */
+    double elevations[SCENE_MAX_ELEVATIONS]; /* degrees above the plane across the axis */
+} scene_orbit;
+
+/* Where a moving camera is at a time, or at a cycle. */
+typedef struct scene_camera_point {
+    double at;
+    double eye[3], focal[3], up[3], angle;
+} scene_camera_point;
+
 typedef struct scene_camera {
     bool is_automatic; /* eye and focal from the global bounds, looking along -direction */
     double eye[3], focal[3];
@@ -185,7 +201,15 @@ typedef struct scene_camera {
     bool fits_box; /* automatic: the bounds' box fills the frame; else the sphere around it */
     bool is_orthographic;
     double height; /* orthographic: of what the picture shows, scene units; 0: as far as a perspective one shows */
+    scene_orbit orbit;
+    double phi, theta;          /* of an orbit's view: degrees around the axis, and above the plane across it */
+    bool is_by_cycle;           /* points are at cycles, else at times */
+    int point_count;            /* 0: the camera does not move */
+    scene_camera_point *points; /* rising */
 } scene_camera;
+
+/* The camera as it stands in a step: one that moves is found between its points. */
+scene_camera scene_camera_at(const scene_camera *camera, int64_t cycle, double time);
 
 /* Places in the picture, as insitu_anchor (image_output.h) has them. */
 typedef enum scene_anchor {
@@ -227,10 +251,19 @@ typedef struct scene_decorations {
 typedef enum scene_format { SCENE_PNG8, SCENE_PNG16, SCENE_EXR } scene_format;
 
 typedef struct scene_output {
-    char *path; /* {cycle}, {cycle:06}, {time}, {name} are replaced; relative to the working directory of rank 0 */
+    char *path;           /* with placeholders (scene_expand()); relative to the working directory of rank 0 */
     scene_format format;  /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
     bool has_decorations; /* of the image, if that has any */
+    int database;         /* index of the scene's, in which the picture is a line; -1: none */
+    int folder_bytes;     /* of path that are the database's folder and its slash; 0 without a database */
 } scene_output;
+
+/* A Cinema database of Spec D: a folder of pictures, and a table of what they show. */
+typedef struct scene_database {
+    char *path;      /* the folder, relative to the working directory of rank 0; no slash at its end */
+    int first_image; /* the source of the first image in it */
+    bool has_images, has_orbits, has_isovalues, has_fields; /* columns: several images; and what some image has */
+} scene_database;
 
 typedef enum scene_statistic { SCENE_MINIMUM, SCENE_MAXIMUM, SCENE_MEAN } scene_statistic;
 
@@ -251,9 +284,23 @@ typedef struct scene_statistics {
     double low, high; /* of the bins; low > high: of the values */
 } scene_statistics;
 
+/* An image of the file makes a picture for each field and isovalue of its sweep and each view of its orbit: in this
+ * order, views running fastest. Each is a scene_image. */
+typedef struct scene_variant {
+    int source;          /* which image of the file */
+    int layers;          /* counts the fields and isovalues of a source through; 0 without a sweep */
+    int field, isovalue; /* which of the sweep's; 0 where there is none */
+    int view; /* pictures of the same source and layers differ in this and the camera alone: those after view 0 point
+               * to what that one owns */
+} scene_variant;
+
 typedef struct scene_image {
-    char *name;
+    char *name; /* the same of all variants */
     int line;
+    scene_variant variant;
+    bool has_isovalue; /* of a sweep */
+    double isovalue;
+    char *swept_field; /* NULL: the sweep has no fields */
     int width, height; /* 1 .. 32768; 1280 × 720 by default */
     scene_camera camera;
     float background[4]; /* linear premultiplied RGBA */
@@ -288,16 +335,25 @@ typedef struct scene_image {
     bool once; /* of the steps in which it is due, draw the first alone */
 } scene_image;
 
+/* What is the same of all variants of an image is found for the first. */
+static inline bool scene_is_first_variant(const scene_image *image)
+{
+    return image->variant.layers == 0 && image->variant.view == 0;
+}
+
 /* What trees are built over: all cells, those that the images can show, or what costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
-enum { SCENE_MAX_IMAGES = 64 };
+/* Images of a file, which have a bit each in session_events.h; and pictures that they make in a step. */
+enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
 
 typedef struct scene {
     int threads; /* per rank; 0: the cores there are, shared by the ranks of a node */
     scene_tree tree;
-    int image_count; /* 1 .. SCENE_MAX_IMAGES */
+    int image_count; /* 1 .. SCENE_MAX_PICTURES, variants counted */
     scene_image *images;
+    int database_count;
+    scene_database *databases;
     int statistics_count; /* 0 .. 64 */
     scene_statistics *statistics;
 } scene;
@@ -315,10 +371,16 @@ typedef struct scene_moment {
     const char *name; /* of the image */
     long long cycle;
     double time;
+    int view;
+    double isovalue;
+    const char *field; /* of a sweep; NULL: none */
 } scene_moment;
 
-/* Replace {cycle}, {cycle:0N}, {time}, {time:.Nf} (or e, or g) and {name} of pattern. Numbers have a decimal point in
- * any locale. The result is from base_alloc(), NULL where memory ran out. */
+scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time);
+
+/* Replace {cycle}, {cycle:0N}, {view}, {view:0N}, {time}, {time:.Nf} (or e, or g), {isovalue} as {time}, {name} and
+ * {field} of pattern. Numbers have a decimal point in any locale. The result is from base_alloc(), NULL where memory
+ * ran out. */
 char *scene_expand(const char *pattern, const scene_moment *moment);
 
 #endif

@@ -16,6 +16,40 @@ typedef struct scene_colour_points {
     bool is_banded; /* each colour is that of a band */
 } scene_colour_points;
 
+/* To unit length; false for a zero vector. */
+bool scene_normalize(double v[3]);
+/* Of unit vectors: within a millionth of a radian. */
+bool scene_is_parallel(const double a[3], const double b[3]);
+
+/* How many pictures an image makes in a step: their product. */
+typedef struct scene_series {
+    int fields, isovalues, views; /* each 1 or more */
+} scene_series;
+
+/* Checks the image's sweep. path: of the image. */
+insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
+                                scene_series *out);
+/* Of all images together; too many are an error. */
+insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
+/* Leave what the variant shows in the layers, which are those of the file. */
+insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
+                                scene_image *out);
+
+/* Of a camera, whose path is given: its orbit, its places, and how many views it has. */
+insitu_status scene_convert_orbit(const scene_document *d, const char *path, const scene_file_camera *in,
+                                  scene_camera *out);
+insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,
+                                 scene_camera *out);
+int scene_count_views(const scene_document *d, const char *path, const scene_file_camera *in);
+/* Turn a camera with an orbit to a view of it. */
+void scene_place_view(scene_camera *camera, int view);
+
+/* The path of an output that goes into a database. */
+insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
+                                   const scene_image *image, scene_output *out);
+/* List the databases of all images; views are still to be made. */
+insitu_status scene_find_databases(const scene_document *d, scene *s);
+
 /* Each fills one part of an image; path is that of the file's part, for messages. */
 insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
                                    scene_camera *out);
@@ -29,7 +63,7 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
 insitu_status scene_convert_decorations(const scene_document *d, const char *path, const scene_file_decorations *in,
                                         scene_decorations *out);
 void scene_free_decorations(scene_decorations *decorations);
-/* Refuse placeholders that are none. key: of the text. */
+/* Refuse placeholders that are none, or stand for what the image has not. key: of the text; path: below the image. */
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text);
 
 /* The keys that say how values become colours, of the mapping at path. */

@@ -12,57 +12,83 @@
 typedef enum placeholder_kind {
     PLACEHOLDER_NONE,
     PLACEHOLDER_CYCLE,
+    PLACEHOLDER_VIEW,
     PLACEHOLDER_TIME,
-    PLACEHOLDER_NAME
+    PLACEHOLDER_ISOVALUE,
+    PLACEHOLDER_NAME,
+    PLACEHOLDER_FIELD
 } placeholder_kind;
 
 typedef struct placeholder {
     placeholder_kind kind;
-    int digits;      /* least digits of the cycle, or digits of the time; -1: as few as the time needs */
-    char conversion; /* of the time: 'f', 'e' or 'g' */
+    int digits;      /* least digits of a whole number, or digits of another; -1: as few as the number needs */
+    char conversion; /* of a number that is not whole: 'f', 'e' or 'g' */
     size_t size;     /* bytes of the pattern it takes */
 } placeholder;
 
 static const placeholder no_placeholder = {PLACEHOLDER_NONE, 0, 0, 1};
 
-/* "{cycle:0N}", whose N begins at `digits` bytes into text. */
-static placeholder read_cycle(const char *text)
+/* "{WORD:0N}", whose ":" is at text[at]. */
+static placeholder read_whole(const char *text, size_t at, placeholder_kind kind)
 {
-    const size_t count = strspn(text + 8, "0123456789");
-    const long digits = count == 1 || count == 2 ? strtol(text + 8, NULL, 10) : 0;
-    if (digits < 1 || digits > 20 || text[8 + count] != '}') return no_placeholder;
-    return (placeholder){PLACEHOLDER_CYCLE, (int)digits, 0, 8 + count + 1};
+    if (text[at + 1] != '0') return no_placeholder;
+    const size_t count = strspn(text + at + 2, "0123456789");
+    const long digits = count == 1 || count == 2 ? strtol(text + at + 2, NULL, 10) : 0;
+    if (digits < 1 || digits > 20 || text[at + 2 + count] != '}') return no_placeholder;
+    return (placeholder){kind, (int)digits, 0, at + 2 + count + 1};
 }
 
-/* "{time:.Nf}", or e, or g. */
-static placeholder read_time(const char *text)
+/* "{WORD:.Nf}", or e, or g. */
+static placeholder read_real(const char *text, size_t at, placeholder_kind kind)
 {
-    const size_t count = strspn(text + 7, "0123456789");
-    const long digits = count == 1 || count == 2 ? strtol(text + 7, NULL, 10) : 99;
-    const char conversion = text[7 + count];
-    if (digits > 17 || !conversion || !strchr("efg", conversion) || text[8 + count] != '}') return no_placeholder;
-    return (placeholder){PLACEHOLDER_TIME, (int)digits, conversion, 7 + count + 2};
+    if (text[at + 1] != '.') return no_placeholder;
+    const size_t count = strspn(text + at + 2, "0123456789");
+    const long digits = count == 1 || count == 2 ? strtol(text + at + 2, NULL, 10) : 99;
+    const char conversion = text[at + 2 + count];
+    if (digits > 17 || !conversion || !strchr("efg", conversion) || text[at + 3 + count] != '}') return no_placeholder;
+    return (placeholder){kind, (int)digits, conversion, at + 2 + count + 2};
 }
 
 /* The placeholder that stands at text, which begins with '{'. */
 static placeholder read_placeholder(const char *text)
 {
-    if (strncmp(text, "{name}", 6) == 0) return (placeholder){PLACEHOLDER_NAME, 0, 0, 6};
-    if (strncmp(text, "{cycle}", 7) == 0) return (placeholder){PLACEHOLDER_CYCLE, 1, 0, 7};
-    if (strncmp(text, "{time}", 6) == 0) return (placeholder){PLACEHOLDER_TIME, -1, 'g', 6};
-    if (strncmp(text, "{cycle:0", 8) == 0) return read_cycle(text);
-    if (strncmp(text, "{time:.", 7) == 0) return read_time(text);
+    static const struct {
+        const char *word;
+        placeholder_kind kind;
+        int digits;
+        char conversion; /* 0: a whole number; 't': a text, without a format */
+    } known[] = {{"{cycle", PLACEHOLDER_CYCLE, 1, 0},  {"{view", PLACEHOLDER_VIEW, 1, 0},
+                 {"{time", PLACEHOLDER_TIME, -1, 'g'}, {"{isovalue", PLACEHOLDER_ISOVALUE, -1, 'g'},
+                 {"{name", PLACEHOLDER_NAME, 0, 't'},  {"{field", PLACEHOLDER_FIELD, 0, 't'}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        const size_t length = strlen(known[i].word);
+        if (strncmp(text, known[i].word, length) != 0) continue;
+        if (text[length] == '}') return (placeholder){known[i].kind, known[i].digits, known[i].conversion, length + 1};
+        if (text[length] != ':' || known[i].conversion == 't') continue;
+        return known[i].conversion ? read_real(text, length, known[i].kind) : read_whole(text, length, known[i].kind);
+    }
     return no_placeholder;
+}
+
+/* fewest: digits where no format is given. */
+static int write_number(const placeholder *p, double value, int fewest, char *out, size_t size)
+{
+    if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, value);
+    if (p->conversion == 'e') return snprintf(out, size, "%.*e", p->digits, value);
+    return snprintf(out, size, "%.*g", p->digits < 0 ? fewest : p->digits, value);
 }
 
 /* What the placeholder becomes, into out (size bytes; NULL and 0 to measure); returns its length. */
 static int write_value(const placeholder *p, const scene_moment *moment, char *out, size_t size)
 {
-    if (p->kind == PLACEHOLDER_CYCLE) return snprintf(out, size, "%0*lld", p->digits, moment->cycle);
-    if (p->kind == PLACEHOLDER_NAME) return snprintf(out, size, "%s", moment->name);
-    if (p->conversion == 'f') return snprintf(out, size, "%.*f", p->digits, moment->time);
-    if (p->conversion == 'e') return snprintf(out, size, "%.*e", p->digits, moment->time);
-    return snprintf(out, size, "%.*g", p->digits < 0 ? 6 : p->digits, moment->time);
+    switch (p->kind) {
+    case PLACEHOLDER_CYCLE: return snprintf(out, size, "%0*lld", p->digits, moment->cycle);
+    case PLACEHOLDER_VIEW: return snprintf(out, size, "%0*d", p->digits, moment->view);
+    case PLACEHOLDER_NAME: return snprintf(out, size, "%s", moment->name);
+    case PLACEHOLDER_FIELD: return snprintf(out, size, "%s", moment->field ? moment->field : "");
+    case PLACEHOLDER_ISOVALUE: return write_number(p, moment->isovalue, 9, out, size);
+    default: return write_number(p, moment->time, 6, out, size);
+    }
 }
 
 /* The text into out (size bytes; NULL and 0 to measure); returns its length. */
@@ -95,14 +121,31 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
     return text;
 }
 
+/* What the image lacks for the placeholder; NULL where it has it. image: its path. */
+static const char *what_lacks(const scene_document *d, const char *image, placeholder_kind kind)
+{
+    const bool is_view = kind == PLACEHOLDER_VIEW, is_value = kind == PLACEHOLDER_ISOVALUE;
+    char key[SCENE_PATH_SIZE + 32];
+    if (!is_view && !is_value && kind != PLACEHOLDER_FIELD) return NULL;
+    snprintf(key, sizeof key, "%s.%s", image, is_view ? "camera.orbit" : is_value ? "sweep.isovalues" : "sweep.fields");
+    if (scene_document_kind(d, key) != SCENE_NOTHING) return NULL;
+    return is_view ? "an orbit" : is_value ? "sweep: {isovalues: true}" : "sweep: {fields: ...}";
+}
+
 insitu_status scene_check_placeholders(const scene_document *d, const char *path, const char *key, const char *text)
 {
     for (const char *open = strchr(text, '{'); open; open = strchr(open + 1, '{')) {
-        if (read_placeholder(open).kind != PLACEHOLDER_NONE) continue;
-        return scene_bad(d, path, key,
-                         "\"%.*s\" is unknown, expected {cycle}, {cycle:01} to {cycle:020}, {time}, {time:.0f} to "
-                         "{time:.17f} (or e, or g) or {name}",
-                         (int)strcspn(open, "}") + 1 < 40 ? (int)strcspn(open, "}") + 1 : 40, open);
+        const placeholder_kind kind = read_placeholder(open).kind;
+        const int length = (int)strcspn(open, "}") + 1 < 40 ? (int)strcspn(open, "}") + 1 : 40;
+        if (kind == PLACEHOLDER_NONE)
+            return scene_bad(d, path, key,
+                             "\"%.*s\" is unknown, expected {cycle}, {cycle:01} to {cycle:020}, {time}, {time:.0f} to "
+                             "{time:.17f} (or e, or g), {name}, {view} as {cycle}, {isovalue} as {time} or {field}",
+                             length, open);
+        char image[SCENE_PATH_SIZE];
+        snprintf(image, sizeof image, "%.*s", (int)strcspn(path, "."), path);
+        const char *lack = what_lacks(d, image, kind);
+        if (lack) return scene_bad(d, path, key, "\"%.*s\" is of images with %s alone", length, open, lack);
     }
     return INSITU_OK;
 }
@@ -110,19 +153,35 @@ insitu_status scene_check_placeholders(const scene_document *d, const char *path
 static insitu_status convert_format(const scene_document *d, const char *path, const scene_file_output *in,
                                     scene_format *format)
 {
-    const size_t length = strlen(in->path);
-    const char *ending = length >= 4 ? in->path + length - 4 : "";
+    if (!in->path && !in->cinema)
+        return scene_bad(d, path, "path", "missing, expected a file's name, or cinema: and that of a database");
+    const char *file = in->path ? in->path : ".png";
+    const size_t length = strlen(file);
+    const char *ending = length >= 4 ? file + length - 4 : "";
     if (strcasecmp(ending, ".exr") == 0) {
         *format = SCENE_EXR;
         return in->bits ? scene_bad(d, path, "bits", "given for an EXR, expected for a PNG only") : INSITU_OK;
     }
     if (strcasecmp(ending, ".png") != 0) {
-        return scene_bad(d, path, "path", "\"%.100s\" has an unknown ending, expected .png or .exr", in->path);
+        return scene_bad(d, path, "path", "\"%.100s\" has an unknown ending, expected .png or .exr", file);
     }
     const int bits = in->bits ? *in->bits : 8;
     *format = bits == 16 ? SCENE_PNG16 : SCENE_PNG8;
     return bits == 8 || bits == 16 ? INSITU_OK
                                    : scene_bad(d, path, "bits", "%d is not allowed, expected 8 or 16", bits);
+}
+
+static insitu_status convert_output(const scene_document *d, const char *path, const scene_file_output *in,
+                                    const scene_image *image, scene_output *out)
+{
+    out->database = -1;
+    insitu_status status = convert_format(d, path, in, &out->format);
+    if (!status && in->path) status = scene_check_placeholders(d, path, "path", in->path);
+    if (status) return status;
+    out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
+    if (in->cinema) return scene_convert_cinema(d, path, in, image, out);
+    out->path = base_strdup(in->path);
+    return out->path ? INSITU_OK : scene_no_memory(d);
 }
 
 insitu_status scene_convert_outputs(const scene_document *d, const char *path, const scene_file_image *in,
@@ -135,52 +194,89 @@ insitu_status scene_convert_outputs(const scene_document *d, const char *path, c
     for (int i = 0; i < in->outputs_count && status == INSITU_OK; i++) {
         char output_path[SCENE_PATH_SIZE];
         snprintf(output_path, sizeof output_path, "%s.outputs[%d]", path, i);
-        status = convert_format(d, output_path, &in->outputs[i], &out->outputs[i].format);
-        if (status == INSITU_OK) status = scene_check_placeholders(d, output_path, "path", in->outputs[i].path);
-        if (status != INSITU_OK) break;
-        const bool *wanted = in->outputs[i].decorations;
-        out->outputs[i].has_decorations = wanted ? *wanted : out->outputs[i].format != SCENE_EXR;
-        out->outputs[i].path = base_strdup(in->outputs[i].path);
-        if (!out->outputs[i].path) status = scene_no_memory(d);
+        status = convert_output(d, output_path, &in->outputs[i], out, &out->outputs[i]);
     }
     return status;
 }
+
+/* ---- no two may be one ----------------------------------------------------------------------------------------- */
 
 /* Names are compared as they come out at one cycle of many digits, so that {cycle} and {cycle:03} count as the same. */
 static const long long sample_cycle = 123456789012345678;
 static const double sample_time = 0.5;
 
-static insitu_status check_output(const scene_document *d, const scene *s, int image, int output, char **paths,
-                                  int *path_count)
+scene_moment scene_moment_of(const scene_image *image, int64_t cycle, double time)
 {
-    const scene_moment moment = {s->images[image].name, sample_cycle, sample_time};
-    char *expanded = scene_expand(s->images[image].outputs[output].path, &moment);
-    if (!expanded) return scene_no_memory(d);
-    paths[(*path_count)++] = expanded;
-    for (int i = 0; i < *path_count - 1; i++) {
-        if (strcmp(paths[i], expanded) != 0) continue;
-        char path[SCENE_PATH_SIZE];
-        snprintf(path, sizeof path, "images[%d].outputs[%d]", image, output);
-        return scene_bad(d, path, "path", "\"%.100s\" is another output's file too, expected its own",
-                         s->images[image].outputs[output].path);
+    return (scene_moment){image->name,         (long long)cycle, time,
+                          image->variant.view, image->isovalue,  image->swept_field};
+}
+
+/* An output's file, and its place among all. */
+typedef struct written_file {
+    char *path;
+    int image, output, number;
+} written_file;
+
+static int compare_files(const void *a, const void *b)
+{
+    const written_file *first = a, *second = b;
+    const int order = strcmp(first->path, second->path);
+    return order ? order : first->number - second->number;
+}
+
+/* What two pictures of one image differ in. */
+static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
+{
+    if (a->view != b->view) return "view";
+    return a->isovalue != b->isovalue ? "isovalue" : "field";
+}
+
+static insitu_status refuse_file(const scene_document *d, const scene *s, const written_file *first,
+                                 const written_file *second)
+{
+    const scene_variant *a = &s->images[first->image].variant, *b = &s->images[second->image].variant;
+    const scene_output *output = &s->images[second->image].outputs[second->output];
+    const char *pattern = output->path + output->folder_bytes;
+    char path[64];
+    snprintf(path, sizeof path, "images[%d].outputs[%d]", b->source, second->output);
+    if (a->source != b->source || first->output != second->output)
+        return scene_bad(d, path, "path", "\"%.100s\" is another output's file too, expected its own", pattern);
+    const char *word = missing_placeholder(a, b);
+    return scene_bad(d, path, "path", "\"%.100s\" is one file for several %ss, expected {%s} in it", pattern, word,
+                     word);
+}
+
+/* The first output whose file another before it has. files: sorted. */
+static insitu_status check_files(const scene_document *d, const scene *s, const written_file *files, int count)
+{
+    int found = -1;
+    for (int i = 1; i < count; i++) {
+        if (strcmp(files[i - 1].path, files[i].path) != 0) continue;
+        if (found < 0 || files[i].number < files[found].number) found = i;
     }
-    return INSITU_OK;
+    return found < 0 ? INSITU_OK : refuse_file(d, s, &files[found - 1], &files[found]);
 }
 
 insitu_status scene_check_outputs(const scene_document *d, const scene *s)
 {
     size_t total = 0;
     for (int i = 0; i < s->image_count; i++) total += (size_t)s->images[i].output_count;
-    char **paths = base_calloc(total, sizeof *paths);
-    if (!paths) return scene_no_memory(d);
+    written_file *files = base_calloc(total, sizeof *files);
+    if (!files) return scene_no_memory(d);
     int count = 0;
     insitu_status status = INSITU_OK;
-    for (int i = 0; i < s->image_count; i++) {
-        for (int o = 0; o < s->images[i].output_count && status == INSITU_OK; o++) {
-            status = check_output(d, s, i, o, paths, &count);
+    for (int i = 0; i < s->image_count && !status; i++) {
+        const scene_moment moment = scene_moment_of(&s->images[i], sample_cycle, sample_time);
+        for (int o = 0; o < s->images[i].output_count && !status; o++) {
+            files[count] = (written_file){scene_expand(s->images[i].outputs[o].path, &moment), i, o, count};
+            if (files[count++].path == NULL) status = scene_no_memory(d);
         }
     }
-    for (int i = 0; i < count; i++) base_free(paths[i]);
-    base_free(paths);
+    if (!status) {
+        qsort(files, (size_t)count, sizeof *files, compare_files);
+        status = check_files(d, s, files, count);
+    }
+    for (int i = 0; i < count; i++) base_free(files[i].path);
+    base_free(files);
     return status;
 }

@@ -12,44 +12,7 @@ static const cyaml_strval_t anchor_words[] = {{"top_left", SCENE_TOP_LEFT},   {"
                                               {"right", SCENE_RIGHT},         {"bottom_left", SCENE_BOTTOM_LEFT},
                                               {"bottom", SCENE_BOTTOM},       {"bottom_right", SCENE_BOTTOM_RIGHT}};
 static const cyaml_strval_t side_words[] = {{"left", SCENE_LEFT}, {"right", SCENE_RIGHT}};
-static const cyaml_strval_t fit_words[] = {{"sphere", SCENE_FIT_SPHERE}, {"box", SCENE_FIT_BOX}};
-static const cyaml_strval_t projection_words[] = {{"perspective", SCENE_PERSPECTIVE},
-                                                  {"orthographic", SCENE_ORTHOGRAPHIC}};
 static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"world", SCENE_FRAME_WORLD}};
-
-#define AUTOMATIC_KEYS(X)                                                                                              \
-    X(NUMBERS("direction", scene_file_automatic, direction, 3),                                                        \
-      .help = "From the middle of the data towards the eye. Any length but 0.", .by_default = "`[1, 0.8, 1.2]`")       \
-    X(CHOICE("fit", scene_file_automatic, fit, fit_words),                                                             \
-      .help = "What fits into the image: the `box` of the data's bounds, which then fills 0.95 of the frame's width "  \
-              "or height, or the `sphere` around it, which looks the same size from every side.",                      \
-      .by_default = "`sphere`")                                                                                        \
-    X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom), .help = "1 fits; larger is nearer.",        \
-      .by_default = "`1`", .low = 1e-4, .high = 1000)
-DEFINE_MAPPING(automatic, "automatic", AUTOMATIC_KEYS);
-
-#define CAMERA_KEYS(X)                                                                                                 \
-    X(NUMBERS("position", scene_file_camera, position, 3),                                                             \
-      .help = "Where the eye is, in scene units. With `focal`; not with `automatic`.", .by_default = "automatic")      \
-    X(NUMBERS("focal", scene_file_camera, focal, 3),                                                                   \
-      .help = "The point looked at, in the middle of the image. Not where the eye is. With `position`.",               \
-      .by_default = "automatic")                                                                                       \
-    X(CYAML_FIELD_MAPPING_PTR("automatic", OPTIONAL, scene_file_camera, automatic, automatic_fields),                  \
-      .help = "Place the eye by the bounds of all the data of all ranks, at each drawn step.",                         \
-      .by_default = "where no `position` is given", .child = &automatic_mapping)                                       \
-    X(NUMBERS("up", scene_file_camera, up, 3), .help = "What is up in the image. Not parallel to the view.",           \
-      .by_default = "`[0, 1, 0]`; `[0, 0, 1]` where the view is along y")                                              \
-    X(CYAML_FIELD_FLOAT_PTR("angle", OPTIONAL, scene_file_camera, angle),                                              \
-      .help = "Whole vertical angle of view, in degrees.", .by_default = "`40`", .low = 1e-6, .high = 180,             \
-      .is_high_excluded = true)                                                                                        \
-    X(CHOICE("projection", scene_file_camera, projection, projection_words),                                           \
-      .help = "`orthographic`: all rays are parallel, and equal lengths look equal wherever they are.",                \
-      .by_default = "`perspective`")                                                                                   \
-    X(CYAML_FIELD_FLOAT_PTR("height", OPTIONAL, scene_file_camera, height),                                            \
-      .help = "With `projection: orthographic`: the height of what the image shows, in scene units.",                  \
-      .by_default = "what fits the data; with `position`, what a perspective image shows at `focal`", .low = 0,        \
-      .is_low_excluded = true, .high = 1e30)
-DEFINE_MAPPING(camera, "camera", CAMERA_KEYS);
 
 #define LIGHT_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_SEQUENCE_FIXED("direction", CYAML_FLAG_POINTER, scene_file_light, direction, &number, 3),            \
@@ -105,7 +68,9 @@ DEFINE_MAPPING(sampling, "sampling", SAMPLING_KEYS);
 
 #define PLACEHOLDERS                                                                                                   \
     "`{cycle}` becomes the cycle, `{cycle:06}` the cycle with zeros to 6 digits, `{time}` the time, `{time:.3f}` the " \
-    "time as C's printf writes it (`f`, `e` or `g`), `{name}` the image's name."
+    "time as C's printf writes it (`f`, `e` or `g`), `{name}` the image's "                                            \
+    "name, `{view}` and `{view:03}` the number of an orbit's view, from 0, `{isovalue}` (formats as of the time) and " \
+    "`{field}` those of a `sweep`."
 
 #define WORDS_KEYS(X)                                                                                                  \
     X(TEXT("text", REQUIRED, scene_file_words, text, 255), .help = "One line of text. " PLACEHOLDERS)                  \
@@ -161,14 +126,23 @@ DEFINE_MAPPING(scale_bar, "scale_bar", SCALE_BAR_KEYS);
 DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
 
 #define OUTPUT_KEYS(X)                                                                                                 \
-    X(TEXT("path", REQUIRED, scene_file_output, path, 1023),                                                           \
+    X(TEXT("path", OPTIONAL, scene_file_output, path, 1023),                                                           \
       .help =                                                                                                          \
           "File to write, ending in `.png` or `.exr`; relative to the working directory of rank 0; missing "           \
           "folders are made. " PLACEHOLDERS                                                                            \
           " At most 1023 bytes. The channel Z of an EXR is the depth of the nearest surface in the pixel: how far "    \
           "from the eye it is along the camera's axis, in scene units (not along the pixel's ray). Surfaces of any "   \
           "opacity count, 0 as well, and no volume hides them; it is infinite where there is none: volumes and the "   \
-          "background have no depth.")                                                                                 \
+          "background have no depth. With `cinema`: a PNG in the database's folder.",                                  \
+      .by_default = "required without `cinema`; with it `{name}_{cycle:06}.png`, and before the ending `_{view:03}`, " \
+                    "`_{isovalue}` and `_{field}` as far as the image has them")                                       \
+    X(TEXT("cinema", OPTIONAL, scene_file_output, cinema, 511),                                                        \
+      .help =                                                                                                          \
+          "Folder of a Cinema database of Spec D, ending in `.cdb`, into which the pictures go: `data.csv` has a "     \
+          "line for each, and `index.html` shows them in a browser, without a server. Several images may go into "     \
+          "one. A run that begins in a folder which has one drops the lines of its first cycle and of later ones, "    \
+          "and goes on.",                                                                                              \
+      .by_default = "none")                                                                                            \
     X(CYAML_FIELD_INT_PTR("bits", OPTIONAL, scene_file_output, bits),                                                  \
       .help =                                                                                                          \
           "Bits a channel of a PNG: 8 or 16. EXR always holds 32-bit floats: R, G, B (linear, times A), A, and the "   \
@@ -246,8 +220,11 @@ static const cyaml_schema_value_t statistics = {
     X(CYAML_FIELD_BOOL_PTR("once", OPTIONAL, scene_file_image, once),                                                  \
       .help = "Draw only at the first of the steps in which the image is due. An edited scene begins anew.",           \
       .by_default = "`false`")                                                                                         \
-    X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, camera_fields),                            \
-      .help = "Where the image is seen from.", .by_default = "automatic", .child = &camera_mapping)                    \
+    X(CYAML_FIELD_MAPPING_PTR("camera", OPTIONAL, scene_file_image, camera, scene_camera_fields),                      \
+      .help = "Where the image is seen from.", .by_default = "automatic", .child = &scene_camera_mapping)              \
+    X(CYAML_FIELD_MAPPING_PTR("sweep", OPTIONAL, scene_file_image, sweep, scene_sweep_fields),                         \
+      .help = "Draw the image once for each of several values and fields: a picture each.", .by_default = "none",      \
+      .child = &scene_sweep_mapping)                                                                                   \
     X(CYAML_FIELD_SEQUENCE("background", POINTER, scene_file_image, background, &number, 3, 4),                        \
       .help = "Colour where nothing is, sRGB, and optionally its opacity.", .by_default = "`[0.08, 0.09, 0.11, 1]`",   \
       .low = 0, .high = 1)                                                                                             \

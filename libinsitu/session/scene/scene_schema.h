@@ -18,6 +18,19 @@ typedef struct scene_file_automatic {
 typedef enum scene_fit { SCENE_FIT_SPHERE, SCENE_FIT_BOX } scene_fit;
 typedef enum scene_projection { SCENE_PERSPECTIVE, SCENE_ORTHOGRAPHIC } scene_projection;
 
+typedef struct scene_file_orbit {
+    int views;
+    double *axis; /* 3 */
+    double *start;
+} scene_file_orbit;
+
+typedef struct scene_file_point {
+    double *time;
+    int *cycle;
+    double *position, *focal, *up; /* 3 */
+    double *angle;
+} scene_file_point;
+
 typedef struct scene_file_camera {
     double *position, *focal; /* 3 */
     scene_file_automatic *automatic;
@@ -25,6 +38,9 @@ typedef struct scene_file_camera {
     double *angle;
     int *projection; /* scene_projection */
     double *height;
+    scene_file_orbit *orbit;
+    scene_file_point *path;
+    int path_count;
 } scene_file_camera;
 
 typedef struct scene_file_light {
@@ -168,8 +184,13 @@ typedef struct scene_file_decorations {
     double *size;
 } scene_file_decorations;
 
+/* fields is read from the document. */
+typedef struct scene_file_sweep {
+    bool *isovalues;
+} scene_file_sweep;
+
 typedef struct scene_file_output {
-    char *path;
+    char *path, *cinema;
     int *bits;
     bool *decorations;
 } scene_file_output;
@@ -200,6 +221,7 @@ typedef struct scene_file_image {
     bool *once;
     int *antialias;
     scene_file_camera *camera;
+    scene_file_sweep *sweep;
     double *background; /* 3 or 4 */
     int background_count;
     scene_file_light *lights;

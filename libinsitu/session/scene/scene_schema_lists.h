@@ -46,5 +46,8 @@ SHARED colour = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number,
 /* Of scene_schema_layers.c. */
 extern const cyaml_schema_field_t scene_layer_fields[], scene_clip_fields[];
 extern const scene_mapping scene_layer_mapping, scene_clip_mapping;
+/* Of series/scene_schema_series.c. */
+extern const cyaml_schema_field_t scene_camera_fields[], scene_sweep_fields[];
+extern const scene_mapping scene_camera_mapping, scene_sweep_mapping;
 
 #endif

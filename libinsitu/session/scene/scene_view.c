@@ -8,8 +8,8 @@
 #include "colour_map.h"
 #include "memory.h"
 
-/* To unit length; false for a zero vector. Scaled first, so that neither 1e-200 nor 1e200 is lost in its square. */
-static bool normalize(double v[3])
+/* Scaled first, so that neither 1e-200 nor 1e200 is lost in its square. */
+bool scene_normalize(double v[3])
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
     if (!(largest > 0)) return false;
@@ -19,8 +19,8 @@ static bool normalize(double v[3])
     return true;
 }
 
-/* Of unit vectors. Within a millionth of a radian the image's right would be mostly rounding. */
-static bool is_parallel(const double a[3], const double b[3])
+/* So close the image's right would be mostly rounding. */
+bool scene_is_parallel(const double a[3], const double b[3])
 {
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
     return sqrt(x * x + y * y + z * z) < 1e-6;
@@ -35,12 +35,12 @@ static insitu_status convert_up(const scene_document *d, const char *path, const
 {
     static const double along_y[3] = {0, 1, 0}, along_z[3] = {0, 0, 1};
     if (!given) {
-        copy_vector(out->up, is_parallel(along_y, out->direction) ? along_z : along_y);
+        copy_vector(out->up, scene_is_parallel(along_y, out->direction) ? along_z : along_y);
         return INSITU_OK;
     }
     copy_vector(out->up, given);
-    if (!normalize(out->up)) return scene_bad(d, path, "up", "has length 0, expected a direction");
-    if (is_parallel(out->up, out->direction)) {
+    if (!scene_normalize(out->up)) return scene_bad(d, path, "up", "has length 0, expected a direction");
+    if (scene_is_parallel(out->up, out->direction)) {
         return scene_bad(d, path, "up", "[%g, %g, %g] is parallel to the view, expected a direction across it",
                          given[0], given[1], given[2]);
     }
@@ -65,7 +65,7 @@ static insitu_status convert_explicit(const scene_document *d, const char *path,
             return scene_bad(d, path, "position", "too far from focal, expected a finite distance");
         }
     }
-    if (normalize(out->direction)) return INSITU_OK;
+    if (scene_normalize(out->direction)) return INSITU_OK;
     return scene_bad(d, path, "focal", "[%g, %g, %g] is the position too, expected another point", out->focal[0],
                      out->focal[1], out->focal[2]);
 }
@@ -76,8 +76,23 @@ static insitu_status convert_automatic(const scene_document *d, const char *path
     if (in && in->direction) copy_vector(out->direction, in->direction);
     if (in && in->zoom) out->zoom = *in->zoom;
     out->fits_box = in && in->fit && *in->fit == SCENE_FIT_BOX;
-    if (normalize(out->direction)) return INSITU_OK;
+    if (scene_normalize(out->direction)) return INSITU_OK;
     return scene_bad(d, path, "automatic.direction", "has length 0, expected a direction");
+}
+
+/* Where the camera stands, and what is up. */
+static insitu_status convert_place(const scene_document *d, const char *path, const scene_file_camera *in,
+                                   scene_camera *out)
+{
+    const bool is_explicit = (in->position || in->focal) && !in->path && !in->orbit;
+    insitu_status status = INSITU_OK;
+    if (is_explicit)
+        status = convert_explicit(d, path, in, out);
+    else if (!in->path)
+        status = convert_automatic(d, path, in->automatic, out);
+    if (!status && in->orbit) return scene_convert_orbit(d, path, in, out);
+    if (!status && in->path) return scene_convert_path(d, path, in, out);
+    return status ? status : convert_up(d, path, in->up, out);
 }
 
 insitu_status scene_convert_camera(const scene_document *d, const char *path, const scene_file_camera *in,
@@ -86,11 +101,8 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
     static const scene_file_camera none;
     *out = (scene_camera){.is_automatic = true, .direction = {1, 0.8, 1.2}, .angle = 40, .zoom = 1};
     if (!in) in = &none;
-    const bool is_explicit = in->position || in->focal;
-    insitu_status status =
-        is_explicit ? convert_explicit(d, path, in, out) : convert_automatic(d, path, in->automatic, out);
-    if (status == INSITU_OK) status = convert_up(d, path, in->up, out);
     if (in->angle) out->angle = *in->angle;
+    insitu_status status = convert_place(d, path, in, out);
     out->is_orthographic = in->projection && *in->projection == SCENE_ORTHOGRAPHIC;
     out->height = in->height ? *in->height : 0;
     if (status == INSITU_OK && in->height && !out->is_orthographic)
@@ -108,8 +120,8 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
         const float linear = in->colour ? colour_linear_from_srgb((float)in->colour[i]) : 1;
         out->colour[i] = (float)intensity * linear;
     }
-    return normalize(out->direction) ? INSITU_OK
-                                     : scene_bad(d, path, "direction", "has length 0, expected a direction");
+    return scene_normalize(out->direction) ? INSITU_OK
+                                           : scene_bad(d, path, "direction", "has length 0, expected a direction");
 }
 
 /* The fill keeps the side that the key light leaves dark readable, and is too weak to flatten what it shows. */
@@ -117,8 +129,8 @@ static void default_lights(scene_light lights[2])
 {
     lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};
     lights[1] = (scene_light){.direction = {-0.8, 0.1, 0.6}, .colour = {0.35F, 0.35F, 0.35F}};
-    normalize(lights[0].direction);
-    normalize(lights[1].direction);
+    scene_normalize(lights[0].direction);
+    scene_normalize(lights[1].direction);
 }
 
 insitu_status scene_convert_lights(const scene_document *d, const char *path, const scene_file_image *in,

@@ -46,7 +46,7 @@ static bool work_create(const scene *scene, int64_t cycle, event_work *w)
         w->of[w->count++] = i;
     }
     for (int i = 0; i < scene->image_count; i++) {
-        if (!scene->images[i].when.is_given) continue;
+        if (!scene->images[i].when.is_given || !scene_is_first_variant(&scene->images[i])) continue;
         w->wishes[w->count] = (session_statistics_wish){&scene->images[i].when.field, 0, 0, -1};
         w->of[w->count++] = scene->statistics_count + i;
     }
@@ -80,7 +80,8 @@ static void note_conditions(session_events *events, const scene *scene, const ev
     events->held = 0;
     for (int i = 0; i < w->count; i++) {
         const int image = w->of[i] - scene->statistics_count;
-        if (image >= 0 && holds(&scene->images[image].when, &w->found[i])) events->held |= (uint64_t)1 << image;
+        if (image >= 0 && holds(&scene->images[image].when, &w->found[i]))
+            events->held |= (uint64_t)1 << scene->images[image].variant.source;
     }
 }
 
@@ -104,7 +105,7 @@ uint64_t session_let_images(const session_events *events, const scene *scene)
 {
     uint64_t let = 0;
     for (int i = 0; i < scene->image_count; i++) {
-        const uint64_t bit = (uint64_t)1 << i;
+        const uint64_t bit = (uint64_t)1 << scene->images[i].variant.source;
         const bool is_let = !scene->images[i].when.is_given || events->held & bit;
         if (is_let && !(scene->images[i].once && events->drawn & bit)) let |= bit;
     }

@@ -9,8 +9,8 @@ typedef struct session_event_time {
     double time;
 } session_event_time;
 
-/* What a session knows of past steps and this one: a bit for each of the scene's statistics or images, which the schema
- * lets be no more than 64 each. */
+/* What a session knows of past steps and this one: a bit for each of the statistics or images of the scene's file,
+ * which the schema lets be no more than 64 each. All variants of an image have one bit. */
 typedef struct session_events {
     uint64_t begun; /* statistics whose file has a line of this session's */
     uint64_t held;  /* images whose condition holds in this step */

@@ -1,7 +1,6 @@
 #include "session_statistics_file.h"
 
 #include <errno.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "memory.h"
@@ -55,56 +54,14 @@ static insitu_status fail(const char *path, const char *what, int reason, base_e
                      "statistics: %.300s: cannot be %s: %s", path, what, strerror(reason));
 }
 
-/* The whole file as text, from base_alloc(); *text NULL: there is none. */
-static insitu_status read_file(const char *path, char **text, base_error *error)
-{
-    size_t size = 0, capacity = 0;
-    *text = NULL;
-    FILE *file = text_file_open(path);
-    if (!file) return errno == ENOENT ? INSITU_OK : fail(path, "read", errno, error);
-    do {
-        if (size + 1 >= capacity) {
-            capacity = 2 * capacity + 4096;
-            char *more = base_realloc(*text, capacity);
-            if (!more) {
-                fclose(file);
-                return fail(path, "read", ENOMEM, error);
-            }
-            *text = more;
-        }
-        size += fread(*text + size, 1, capacity - 1 - size, file);
-    } while (!feof(file) && !ferror(file));
-    (*text)[size] = '\0';
-    const bool is_read = !ferror(file);
-    const int reason = errno;
-    fclose(file);
-    return is_read ? INSITU_OK : fail(path, "read", reason, error);
-}
-
-/* The lines of cycles before this one move to the text's beginning; a last line without an end, torn, goes. */
-static size_t keep_earlier(char *text, int64_t cycle)
-{
-    size_t kept = 0;
-    for (char *line = text, *end; (end = strchr(line, '\n')) != NULL; line = end + 1) {
-        const size_t size = (size_t)(end + 1 - line);
-        if (strtoll(line, NULL, 10) >= cycle) continue;
-        memmove(text + kept, line, size);
-        kept += size;
-    }
-    return kept;
-}
-
 /* The session's first line. */
 static insitu_status begin_file(const char *path, new_lines *lines, base_error *error)
 {
     char *text;
     const size_t header = strlen(lines->header);
     if (!text_file_make_folders(path)) return fail(path, "written", errno, error);
-    insitu_status status = read_file(path, &text, error);
-    if (status) {
-        base_free(text);
-        return status;
-    }
+    insitu_status status = INSITU_OK;
+    if (!text_file_read(path, &text) && errno != ENOENT) return fail(path, "read", errno, error);
     if (text && *text) {
         if (strncmp(text, lines->header, header) != 0 || text[header] != '\n')
             status = base_fail(error, INSITU_ERROR_IO,
@@ -112,7 +69,7 @@ static insitu_status begin_file(const char *path, new_lines *lines, base_error *
                                "it to begin anew)",
                                path, lines->header);
         else
-            lines->old_size = keep_earlier(lines->old = text + header + 1, lines->cycle);
+            lines->old_size = text_keep_below(lines->old = text + header + 1, lines->cycle);
     }
     if (!status && !text_file_replace(path, write_lines, lines)) status = fail(path, "written", errno, error);
     base_free(text);

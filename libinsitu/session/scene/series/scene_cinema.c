@@ -1,0 +1,124 @@
+/* Outputs that go into Cinema databases. */
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+#include "scene_convert.h"
+
+/* A line of a table is a line of text, so that a part of one can be told from a whole. */
+static const char *find_control(const char *text)
+{
+    for (; text && *text; text++)
+        if ((unsigned char)*text < 0x20 || *text == 0x7f) return text;
+    return NULL;
+}
+
+static insitu_status check_folder(const scene_document *d, const char *path, const char *folder)
+{
+    const size_t length = strlen(folder);
+    if (length < 5 || strcmp(folder + length - 4, ".cdb") != 0 || folder[length - 5] == '/')
+        return scene_bad(d, path, "cinema", "\"%.100s\" has another ending, expected a folder's name that ends in .cdb",
+                         folder);
+    if (strchr(folder, '{'))
+        return scene_bad(d, path, "cinema", "\"%.100s\" holds a placeholder, expected one folder for all pictures",
+                         folder);
+    return find_control(folder) ? scene_bad(d, path, "cinema", "holds a control character, expected a folder's name")
+                                : INSITU_OK;
+}
+
+static insitu_status check_file(const scene_document *d, const char *path, const scene_image *image, const char *file)
+{
+    if (file && (file[0] == '/' || strncmp(file, "../", 3) == 0 || strstr(file, "/../")))
+        return scene_bad(d, path, "path", "\"%.100s\" is not below the folder, expected a file in the database", file);
+    if (find_control(file) || find_control(image->name) || find_control(image->swept_field))
+        return scene_bad(d, path, file ? "path" : "cinema",
+                         "the picture's name or field holds a control character, expected none in a database");
+    return INSITU_OK;
+}
+
+static const char *default_file(const scene_image *image, char file[96])
+{
+    snprintf(file, 96, "{name}_{cycle:06}%s%s%s.png", image->camera.orbit.view_count ? "_{view:03}" : "",
+             image->has_isovalue ? "_{isovalue}" : "", image->swept_field ? "_{field}" : "");
+    return file;
+}
+
+/* Folder and file in one path. */
+static insitu_status join(const scene_document *d, const char *folder, const char *file, scene_output *out)
+{
+    const size_t size = strlen(folder) + strlen(file) + 2;
+    out->path = base_alloc(size);
+    if (!out->path) return scene_no_memory(d);
+    snprintf(out->path, size, "%s/%s", folder, file);
+    out->folder_bytes = (int)strlen(folder) + 1;
+    return INSITU_OK;
+}
+
+insitu_status scene_convert_cinema(const scene_document *d, const char *path, const scene_file_output *in,
+                                   const scene_image *image, scene_output *out)
+{
+    char file[96];
+    insitu_status status = check_folder(d, path, in->cinema);
+    if (!status) status = check_file(d, path, image, in->path);
+    if (!status && out->format == SCENE_EXR)
+        status = scene_bad(d, path, "path", "\"%.100s\" is no PNG, expected .png in a database", in->path);
+    return status ? status : join(d, in->cinema, in->path ? in->path : default_file(image, file), out);
+}
+
+/* ---- databases ------------------------------------------------------------------------------------------------- */
+
+static bool is_in_folder(const scene_output *output, const char *folder)
+{
+    const size_t length = strlen(folder);
+    return output->folder_bytes == (int)length + 1 && strncmp(output->path, folder, length) == 0;
+}
+
+/* The database of the output's folder; a new one where there is none yet. -1: no memory. */
+static int find_database(scene *s, const scene_image *image, const scene_output *output)
+{
+    for (int i = 0; i < s->database_count; i++)
+        if (is_in_folder(output, s->databases[i].path)) return i;
+    scene_database *items = base_realloc(s->databases, (size_t)(s->database_count + 1) * sizeof *items);
+    if (!items) return -1;
+    s->databases = items;
+    char *folder = base_alloc((size_t)output->folder_bytes);
+    if (!folder) return -1;
+    snprintf(folder, (size_t)output->folder_bytes, "%s", output->path);
+    items[s->database_count] = (scene_database){.path = folder, .first_image = image->variant.source};
+    return s->database_count++;
+}
+
+static void note_columns(scene_database *database, const scene_image *image)
+{
+    database->has_images = database->has_images || image->variant.source != database->first_image;
+    database->has_orbits = database->has_orbits || image->camera.orbit.view_count > 0;
+    database->has_isovalues = database->has_isovalues || image->has_isovalue;
+    database->has_fields = database->has_fields || image->swept_field;
+}
+
+static insitu_status place_output(const scene_document *d, scene *s, scene_image *image, int index)
+{
+    scene_output *output = &image->outputs[index];
+    output->database = -1;
+    if (output->folder_bytes == 0) return INSITU_OK;
+    output->database = find_database(s, image, output);
+    if (output->database < 0) return scene_no_memory(d);
+    note_columns(&s->databases[output->database], image);
+    for (int i = 0; i < index; i++) {
+        if (image->outputs[i].database != output->database) continue;
+        char path[64];
+        snprintf(path, sizeof path, "images[%d].outputs[%d]", image->variant.source, index);
+        return scene_bad(d, path, "cinema", "\"%.100s\" has this image already, expected it there once",
+                         s->databases[output->database].path);
+    }
+    return INSITU_OK;
+}
+
+insitu_status scene_find_databases(const scene_document *d, scene *s)
+{
+    insitu_status status = INSITU_OK;
+    for (int i = 0; i < s->image_count; i++)
+        for (int o = 0; o < s->images[i].output_count && !status && s->images[i].variant.view == 0; o++)
+            status = place_output(d, s, &s->images[i], o);
+    return status;
+}

@@ -1,0 +1,146 @@
+/* What makes several pictures of an image: its sweep's fields and isovalues, and its orbit's views. */
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+#include "scene_convert.h"
+
+static bool is_over_isovalues(const scene_file_image *in)
+{
+    return in->sweep && in->sweep->isovalues && *in->sweep->isovalues;
+}
+
+static const scene_file_isosurface *find_isosurface(const scene_file_image *in, int *count)
+{
+    const scene_file_isosurface *found = NULL;
+    *count = 0;
+    for (int i = 0; i < in->layers_count; i++) {
+        if (!in->layers[i].isosurface) continue;
+        if (!found) found = in->layers[i].isosurface;
+        ++*count;
+    }
+    return found;
+}
+
+static int list_fields(const scene_document *d, const char *path, const char *fields[SCENE_MAX_NAMES])
+{
+    char fields_path[SCENE_PATH_SIZE];
+    snprintf(fields_path, sizeof fields_path, "%s.sweep.fields", path);
+    return scene_document_texts(d, fields_path, fields, SCENE_MAX_NAMES);
+}
+
+static insitu_status check_fields(const scene_document *d, const char *path, const char *const *fields, int count)
+{
+    for (int i = 0; i < count; i++) {
+        char key[32];
+        snprintf(key, sizeof key, "sweep.fields[%d]", i);
+        if (strchr(fields[i], '/'))
+            return scene_bad(d, path, key, "\"%.100s\" holds a /, expected a name without", fields[i]);
+        for (int k = 0; k < i; k++)
+            if (strcmp(fields[i], fields[k]) == 0)
+                return scene_bad(d, path, key, "\"%.100s\" is there twice, expected another field", fields[i]);
+    }
+    return INSITU_OK;
+}
+
+insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
+                                scene_series *out)
+{
+    int isosurfaces;
+    char camera[SCENE_PATH_SIZE];
+    const char *fields[SCENE_MAX_NAMES];
+    const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
+    const scene_file_isosurface *isosurface = find_isosurface(in, &isosurfaces);
+    snprintf(camera, sizeof camera, "%s.camera", path);
+    *out = (scene_series){field_count ? field_count : 1, 1, scene_count_views(d, camera, in->camera)};
+    if (!in->sweep) return INSITU_OK;
+    if (!is_over_isovalues(in) && field_count == 0)
+        return scene_bad(d, path, "sweep", "holds nothing, expected isovalues: true, fields or both");
+    if (is_over_isovalues(in)) {
+        if (isosurfaces != 1)
+            return scene_bad(d, path, "sweep.isovalues", "the image has %d isosurface layers, expected one",
+                             isosurfaces);
+        out->isovalues = isosurface->values_count;
+    }
+    return check_fields(d, path, fields, field_count);
+}
+
+insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count)
+{
+    int64_t sum = 0;
+    for (int i = 0; i < in->images_count; i++) {
+        char path[32];
+        scene_series s;
+        snprintf(path, sizeof path, "images[%d]", i);
+        const insitu_status status = scene_find_series(d, path, &in->images[i], &s);
+        if (status) return status;
+        sum += (int64_t)s.fields * s.isovalues * s.views;
+        if (sum > SCENE_MAX_PICTURES)
+            return scene_bad(d, path, "", "%lld pictures a step up to here, by orbits and sweeps, expected at most %d",
+                             (long long)sum, SCENE_MAX_PICTURES);
+    }
+    *count = (int)sum;
+    return INSITU_OK;
+}
+
+/* ---- one of them ----------------------------------------------------------------------------------------------- */
+
+static bool replace_field(scene_field *field, const char *name, int line)
+{
+    char *copy = base_strdup(name);
+    if (!copy) return false;
+    base_free(field->name);
+    field->name = copy;
+    field->line = line;
+    return true;
+}
+
+/* In all layers that a field colours. *count: of them. */
+static bool replace_fields(scene_image *image, const char *name, int line, int *count)
+{
+    bool is_done = true;
+    *count = image->slice_count + image->volume_count;
+    for (int i = 0; i < image->slice_count && is_done; i++)
+        is_done = replace_field(&image->slices[i].field, name, line);
+    for (int i = 0; i < image->volume_count && is_done; i++)
+        is_done = replace_field(&image->volumes[i].field, name, line);
+    for (int i = 0; i < image->isosurface_count && is_done; i++) {
+        if (!image->isosurfaces[i].has_colour_by) continue;
+        is_done = replace_field(&image->isosurfaces[i].colour_by, name, line);
+        ++*count;
+    }
+    for (int i = 0; i < image->surface_count && is_done; i++) {
+        if (!image->surfaces[i].has_colour_by) continue;
+        is_done = replace_field(&image->surfaces[i].colour_by, name, line);
+        ++*count;
+    }
+    return is_done;
+}
+
+static void keep_value(scene_image *image, int index)
+{
+    scene_isosurface *layer = &image->isosurfaces[0];
+    layer->values[0] = layer->values[index];
+    memmove(layer->colours, layer->colours + 3 * (size_t)index, 3 * sizeof *layer->colours);
+    layer->value_count = 1;
+    image->has_isovalue = true;
+    image->isovalue = layer->values[0];
+}
+
+insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in, scene_image *out)
+{
+    const char *fields[SCENE_MAX_NAMES];
+    const int field_count = in->sweep ? list_fields(d, path, fields) : 0;
+    if (is_over_isovalues(in)) keep_value(out, out->variant.isovalue);
+    if (field_count == 0) return INSITU_OK;
+    char key[SCENE_PATH_SIZE];
+    int replaced;
+    snprintf(key, sizeof key, "%s.sweep.fields[%d]", path, out->variant.field);
+    const char *field = fields[out->variant.field];
+    out->swept_field = base_strdup(field);
+    if (!out->swept_field || !replace_fields(out, field, scene_document_line(d, key), &replaced))
+        return scene_no_memory(d);
+    if (replaced) return INSITU_OK;
+    return scene_bad(d, path, "sweep.fields",
+                     "no layer is coloured by a field, expected a slice, a volume or a colour_by");
+}
