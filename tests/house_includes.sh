@@ -66,7 +66,8 @@ BEGIN {
     allowed["outer"] = " scalars meshes scene common mmbvh base public "
     allowed["statistics"] = " scalars meshes scene common mmbvh base public "
     allowed["plan"] = " statistics outer scalars meshes scene render render_face common mmbvh base public "
-    allowed["pictures"] = " plan compositing" allowed["plan"]
+    allowed["cinema"] = " scene common base public "
+    allowed["pictures"] = " cinema plan compositing" allowed["plan"]
     allowed["session"] = " pictures" allowed["pictures"]
     allowed["adaptor_headers"] = " public "
     allowed["adaptors"] = " adaptor_headers public "

@@ -53,6 +53,7 @@ static void free_session(insitu_session *session)
     session_drop_picture(&session->picture);
     session_drop_kept(&session->kept);
     session_run_ranges_free(&session->run_ranges);
+    session_cinema_free(&session->cinema);
     session_report_free(&session->report);
     base_free(session);
 }

@@ -7,6 +7,7 @@
 #include "error.h"
 #include "insitu/insitu.h"
 #include "session_catalogue.h"
+#include "session_cinema.h"
 #include "session_events.h"
 #include "session_mesh.h"
 #include "session_picture.h"
@@ -29,6 +30,7 @@ struct insitu_session {
     session_picture picture; /* rank 0 */
     session_kept_pictures kept;
     session_run_ranges run_ranges;
+    session_cinema cinema; /* rank 0 */
     session_events events;
     session_report report;
     bool has_stepped;

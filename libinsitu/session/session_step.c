@@ -31,6 +31,7 @@ static void reload_scene(insitu_session *s)
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
     session_drop_picture(&s->picture);
     session_run_ranges_free(&s->run_ranges);
+    session_cinema_free(&s->cinema);
     s->events = (session_events){0};
     session_forget_warnings(&s->report);
     for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
@@ -63,7 +64,7 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
 static void note_drawn(insitu_session *s, const session_plan *plan)
 {
     for (int i = 0; i < plan->image_count; i++)
-        s->events.drawn |= (uint64_t)1 << (plan->images[i] - s->scene_file.scene.images);
+        s->events.drawn |= (uint64_t)1 << plan->images[i]->variant.source;
 }
 
 /* The phases of a step in which something is due. What the plan does not name is not computed. */
@@ -76,7 +77,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent};
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
-                                     &s->space, &s->run_ranges,     &s->report,     &s->kept};
+                                     &s->space, &s->run_ranges,     &s->report,     &s->kept, basis.scene, &s->cinema};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
@@ -112,6 +113,7 @@ static insitu_status step(insitu_session *s, int64_t cycle, double time, const s
     if (status) return status;
     s->report.numbers.time = changes.time;
     if (changes.of_scene) reload_scene(s);
+    session_begin_cinema(&s->cinema, changes.cycle);
     status = session_check_input(&changes, &s->meshes, &s->team, error);
     const session_moment moment = {changes.cycle, changes.time, s->last_time, !s->has_stepped};
     s->has_stepped = true;

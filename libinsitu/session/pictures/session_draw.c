@@ -275,7 +275,7 @@ static insitu_image_format format_of(scene_format format)
 
 static scene_moment moment_of(const session_drawing *d, const scene_image *image)
 {
-    return (scene_moment){image->name, (long long)d->cycle, d->report->numbers.time};
+    return scene_moment_of(image, d->cycle, d->report->numbers.time);
 }
 
 static void write_output(const session_drawing *d, const scene_image *image, const scene_output *output,
@@ -298,6 +298,8 @@ static void write_output(const session_drawing *d, const scene_image *image, con
     base_error reason = {0};
     if (session_write_image(&picture, format_of(output->format), path, &reason) != INSITU_OK)
         base_fail(error, reason.status, "image \"%s\": %.900s", image->name, reason.message);
+    else if (output->database >= 0)
+        session_note_picture(d->cinema, d->scene, image, output, &moment, error);
     const session_warning warning = {WARNING_WORDS, image->name, NULL, 0};
     session_warn(d->report, &warning, reason.status == INSITU_OK && *reason.message, "image \"%s\": %.900s",
                  image->name, reason.message);
@@ -412,6 +414,18 @@ static render_active_cells *active_cells_for(const session_plan *plan, const sce
     return *active;
 }
 
+/* Of databases, on rank 0, with the lines of all pictures of the step. Collective. */
+static void write_tables(const session_drawing *d, base_error *first)
+{
+    base_error reason = {.status = INSITU_OK};
+    if (d->scene->database_count == 0) return;
+    const double start = MPI_Wtime();
+    if (d->team->rank == 0) session_write_cinema(d->cinema, &reason);
+    if (d->team->rank == 0) d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+    session_agree_as_is(d->team->comm, &reason);
+    if (!first->status) *first = reason;
+}
+
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, session_picture *picture,
                                   base_error *error)
 {
@@ -419,10 +433,13 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
     render_active_cells *active = NULL;
     for (int i = 0; i < plan->image_count; i++) {
         base_error reason = {0};
-        draw_image(d, plan->images[i], active_cells_for(plan, plan->images[i], &active), picture, &reason);
+        scene_image placed = *plan->images[i]; /* where its camera is now; all else is the scene's */
+        placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
+        draw_image(d, &placed, active_cells_for(plan, plan->images[i], &active), picture, &reason);
         if (first.status == INSITU_OK) first = reason;
     }
     render_active_cells_free(active);
+    write_tables(d, &first);
     if (first.status) *error = first;
     return error->status;
 }

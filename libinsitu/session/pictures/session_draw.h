@@ -2,6 +2,7 @@
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
+#include "session_cinema.h"
 #include "session_mesh.h"
 #include "session_picture.h"
 #include "session_plan.h"
@@ -21,6 +22,8 @@ typedef struct session_drawing {
     session_run_ranges *run_ranges;
     session_report *report;
     session_kept_pictures *kept;
+    const scene *scene;
+    session_cinema *cinema; /* rank 0's */
 } session_drawing;
 
 /* Is an isosurface of the image drawn so often in this step, by this and others of the plan's images or frame by frame,

@@ -1,0 +1,272 @@
+#include "session_cinema.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "memory.h"
+#include "text_file.h"
+
+static insitu_status fail(const scene_database *database, const char *file, const char *what, int reason,
+                          base_error *error)
+{
+    return base_fail(error, reason == ENOMEM ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
+                     "cinema: %.300s/%s: cannot be %s: %s", database->path, file, what, strerror(reason));
+}
+
+/* The file's name, from base_alloc(); NULL: no memory. */
+static char *file_in(const scene_database *database, const char *file)
+{
+    const size_t size = strlen(database->path) + strlen(file) + 2;
+    char *path = base_alloc(size);
+    if (path) snprintf(path, size, "%s/%s", database->path, file);
+    return path;
+}
+
+/* ---- lines ----------------------------------------------------------------------------------------------------- */
+
+/* And for a byte that ends the text. */
+static bool reserve(session_table *t, size_t more)
+{
+    if (t->size + more < t->capacity) return true;
+    const size_t capacity = 2 * t->capacity + more + 4096;
+    char *text = base_realloc(t->text, capacity);
+    if (!text) return false;
+    t->text = text;
+    t->capacity = capacity;
+    return true;
+}
+
+/* A line while it is made; is_well: there was memory for all of it. */
+typedef struct table_line {
+    session_table *table;
+    bool is_well;
+} table_line;
+
+static void add_bytes(table_line *line, const char *bytes, size_t count)
+{
+    session_table *t = line->table;
+    line->is_well = line->is_well && reserve(t, count);
+    if (!line->is_well) return;
+    memcpy(t->text + t->size, bytes, count);
+    t->size += count;
+}
+
+static void add_number(table_line *line, double number)
+{
+    char text[32];
+    const int length = snprintf(text, sizeof text, "%.9g,", number);
+    add_bytes(line, text, (size_t)length);
+}
+
+/* In quotes where it has what separates fields (RFC 4180). */
+static void add_text(table_line *line, const char *text, char end)
+{
+    const bool is_quoted = strpbrk(text, ",\"") != NULL;
+    if (is_quoted) add_bytes(line, "\"", 1);
+    for (; *text; text++) add_bytes(line, *text == '"' ? "\"\"" : text, *text == '"' ? 2 : 1);
+    if (is_quoted) add_bytes(line, "\"", 1);
+    add_bytes(line, &end, 1);
+}
+
+/* Empty is Spec D's word for what is not there. */
+static void add_nothing(table_line *line)
+{
+    add_bytes(line, ",", 1);
+}
+
+static void add_header(table_line *line)
+{
+    const scene_database *database = line->table->database;
+    static const char begin[] = "cycle,time,", images[] = "image,", orbits[] = "phi,theta,", isovalues[] = "isovalue,",
+                      fields[] = "field,", end[] = "FILE\n";
+    add_bytes(line, begin, sizeof begin - 1);
+    if (database->has_images) add_bytes(line, images, sizeof images - 1);
+    if (database->has_orbits) add_bytes(line, orbits, sizeof orbits - 1);
+    if (database->has_isovalues) add_bytes(line, isovalues, sizeof isovalues - 1);
+    if (database->has_fields) add_bytes(line, fields, sizeof fields - 1);
+    add_bytes(line, end, sizeof end - 1);
+}
+
+static void add_picture(table_line *line, const scene_image *image, const scene_moment *moment, const char *file)
+{
+    const scene_database *database = line->table->database;
+    char cycle[32];
+    const int length = snprintf(cycle, sizeof cycle, "%lld,", moment->cycle);
+    add_bytes(line, cycle, (size_t)length);
+    add_number(line, moment->time);
+    if (database->has_images) add_text(line, image->name, ',');
+    for (int i = 0; i < 2 && database->has_orbits; i++) {
+        if (image->camera.orbit.view_count)
+            add_number(line, i ? image->camera.theta : image->camera.phi);
+        else
+            add_nothing(line);
+    }
+    if (database->has_isovalues && image->has_isovalue) add_number(line, image->isovalue);
+    if (database->has_isovalues && !image->has_isovalue) add_nothing(line);
+    if (database->has_fields) add_text(line, image->swept_field ? image->swept_field : "", ',');
+    add_text(line, file, '\n');
+}
+
+/* ---- tables ---------------------------------------------------------------------------------------------------- */
+
+/* Lines of this cycle and later ones go. */
+static void drop_from(session_table *t, int64_t cycle)
+{
+    const char *end = t->size ? memchr(t->text, '\n', t->size) : NULL;
+    const size_t header = end ? (size_t)(end + 1 - t->text) : 0;
+    t->text[t->size] = '\0';
+    t->size = header + text_keep_below(t->text + header, cycle);
+}
+
+/* The lines that the folder has. */
+static insitu_status take_over(session_table *t, const char *old, int64_t cycle, base_error *error)
+{
+    const scene_database *database = t->database;
+    if (strncmp(old, t->text, t->size) != 0)
+        return base_fail(error, INSITU_ERROR_IO,
+                         "cinema: %.300s/data.csv: is there with other columns, expected \"%.*s\" (move or delete the "
+                         "folder to begin anew)",
+                         database->path, (int)t->size - 1, t->text);
+    table_line line = {t, true};
+    add_bytes(&line, old + t->size, strlen(old) - t->size);
+    if (!line.is_well) return fail(database, "data.csv", "read", ENOMEM, error);
+    drop_from(t, cycle);
+    return INSITU_OK;
+}
+
+static insitu_status begin_table(session_table *t, int64_t cycle, base_error *error)
+{
+    table_line line = {t, true};
+    char *old = NULL, *path = file_in(t->database, "data.csv");
+    t->size = 0;
+    add_header(&line);
+    if (!path || !line.is_well) {
+        base_free(path);
+        return fail(t->database, "data.csv", "read", ENOMEM, error);
+    }
+    insitu_status status = INSITU_OK;
+    if (!text_file_read(path, &old) && errno != ENOENT) status = fail(t->database, "data.csv", "read", errno, error);
+    if (!status && old && *old) status = take_over(t, old, cycle, error);
+    base_free(old);
+    base_free(path);
+    t->is_begun = !status;
+    t->last_cycle = INT64_MIN;
+    return status;
+}
+
+void session_begin_cinema(session_cinema *cinema, int64_t cycle)
+{
+    if (!cinema->has_begun) cinema->first_cycle = cycle;
+    cinema->has_begun = true;
+}
+
+static bool make_tables(session_cinema *cinema, const scene *scene)
+{
+    if (cinema->tables) return true;
+    cinema->tables = base_calloc((size_t)scene->database_count, sizeof *cinema->tables);
+    if (!cinema->tables) return false;
+    cinema->count = scene->database_count;
+    for (int i = 0; i < cinema->count; i++) cinema->tables[i].database = &scene->databases[i];
+    return true;
+}
+
+insitu_status session_note_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
+                                   const scene_output *output, const scene_moment *moment, base_error *error)
+{
+    const scene_database *database = &scene->databases[output->database];
+    c_numbers numbers;
+    if (!make_tables(cinema, scene)) return fail(database, "data.csv", "written", ENOMEM, error);
+    session_table *t = &cinema->tables[output->database];
+    insitu_status status = t->is_begun ? INSITU_OK : begin_table(t, cinema->first_cycle, error);
+    if (status) return status;
+    if (!t->is_open && moment->cycle <= t->last_cycle) drop_from(t, moment->cycle);
+    char *file = scene_expand(output->path + output->folder_bytes, moment);
+    if (!file || !c_numbers_begin(&numbers)) {
+        base_free(file);
+        return fail(database, "data.csv", "written", ENOMEM, error);
+    }
+    const size_t before = t->size;
+    table_line line = {t, true};
+    add_picture(&line, image, moment, file);
+    c_numbers_end(&numbers);
+    base_free(file);
+    if (!line.is_well) {
+        t->size = before;
+        return fail(database, "data.csv", "written", ENOMEM, error);
+    }
+    t->is_open = t->is_changed = true;
+    t->last_cycle = moment->cycle;
+    return INSITU_OK;
+}
+
+/* ---- files ----------------------------------------------------------------------------------------------------- */
+
+static void write_page(FILE *file, const void *what)
+{
+    (void)what;
+    fwrite(session_cinema_page, 1, session_cinema_page_size, file);
+}
+
+static void write_table(FILE *file, const void *what)
+{
+    const session_table *t = what;
+    fwrite(t->text, 1, t->size, file);
+}
+
+/* Bytes above 0x7f are those of UTF-8, in which a page's scripts are. */
+static void write_script_byte(FILE *file, unsigned char byte)
+{
+    if (byte == '"' || byte == '\\')
+        fprintf(file, "\\%c", byte);
+    else if (byte < 0x20)
+        fprintf(file, "\\x%02x", byte);
+    else
+        fputc(byte, file);
+}
+
+/* The lines as a list of texts, given to a function of the page. */
+static void write_script(FILE *file, const void *what)
+{
+    const session_table *t = what;
+    fputs("cinemaTable([\n", file);
+    for (size_t at = 0; at < t->size; at++) {
+        fputc('"', file);
+        for (; t->text[at] != '\n'; at++) write_script_byte(file, (unsigned char)t->text[at]);
+        fputs("\",\n", file);
+    }
+    fputs("]);\n", file);
+}
+
+static insitu_status replace(const session_table *t, const char *file, text_writer *write, base_error *error)
+{
+    char *path = file_in(t->database, file);
+    const bool is_written = path && text_file_make_folders(path) && text_file_replace(path, write, t);
+    const int reason = path ? errno : ENOMEM;
+    base_free(path);
+    return is_written ? INSITU_OK : fail(t->database, file, "written", reason, error);
+}
+
+insitu_status session_write_cinema(session_cinema *cinema, base_error *error)
+{
+    for (int i = 0; i < cinema->count; i++) {
+        session_table *t = &cinema->tables[i];
+        base_error own = {.status = INSITU_OK};
+        t->is_open = false;
+        if (!t->is_changed) continue;
+        insitu_status status = replace(t, "data.csv", write_table, &own);
+        if (!status) status = replace(t, "data.js", write_script, &own);
+        if (!status && !t->has_page) status = replace(t, "index.html", write_page, &own);
+        t->is_changed = status != INSITU_OK;
+        t->has_page = t->has_page || !status;
+        if (status && !error->status) *error = own;
+    }
+    return error->status;
+}
+
+void session_cinema_free(session_cinema *cinema)
+{
+    for (int i = 0; i < cinema->count; i++) base_free(cinema->tables[i].text);
+    base_free(cinema->tables);
+    *cinema = (session_cinema){0};
+}
