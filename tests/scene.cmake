@@ -9,6 +9,11 @@ target_link_libraries(test_scene_colour PRIVATE insitu_flags insitu_internal Pkg
 add_test(NAME scene_colour COMMAND test_scene_colour)
 set_tests_properties(scene_colour PROPERTIES TIMEOUT 60)
 
+add_executable(test_scene_series test_scene_series.c)
+target_link_libraries(test_scene_series PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA m)
+add_test(NAME scene_series COMMAND test_scene_series)
+set_tests_properties(scene_series PROPERTIES TIMEOUT 60)
+
 add_executable(scene_reference scene_reference.c)
 target_link_libraries(scene_reference PRIVATE insitu_flags insitu_internal)
 add_test(NAME scene_reference_is_in_step COMMAND scene_reference ${PROJECT_SOURCE_DIR}/docs/scene.md)

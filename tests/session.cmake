@@ -31,6 +31,21 @@ insitu_add_mpi_test(session_index_base test_session_index_base 1 3 TIMEOUT 120 A
 insitu_session_program(test_session_statistics)
 insitu_add_mpi_test(session_statistics test_session_statistics 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_cinema)
+insitu_add_mpi_test(session_cinema test_session_cinema 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
+# The databases' page in a browser, by Debian's python3, whose selenium is in no other interpreter.
+find_program(INSITU_SYSTEM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH)
+if(INSITU_SYSTEM_PYTHON)
+  add_test(NAME session_cinema_page COMMAND ${INSITU_SYSTEM_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/test_cinema_page.py
+    $<TARGET_FILE:six_calls> ${CMAKE_CURRENT_BINARY_DIR}/cinema_page)
+  set_tests_properties(session_cinema_page PROPERTIES
+    ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 240 PROCESSORS 2 SKIP_RETURN_CODE 77)
+else()
+  add_test(NAME session_cinema_page COMMAND ${CMAKE_COMMAND} -E echo "skipped: no /usr/bin/python3")
+  set_tests_properties(session_cinema_page PROPERTIES SKIP_REGULAR_EXPRESSION "^skipped")
+endif()
+
 insitu_session_program(test_session_thresholds)
 insitu_add_mpi_test(session_thresholds test_session_thresholds 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

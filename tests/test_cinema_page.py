@@ -1,0 +1,303 @@
+#!/usr/bin/python3
+"""test_cinema_page.py SIX_CALLS FOLDER: the page of Cinema databases in a browser without a screen, from file://.
+
+Two runs write their databases; the page is then moved by sliders and keys as a user would, and each picture that it shows is
+held against the line of data.csv that says so. Where Debian's chromium, chromium-driver or python3-selenium is missing the
+test is skipped (status 77).
+"""
+import csv
+import itertools
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+
+try:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+except ImportError:
+    print("skipped: there is no python3-selenium")
+    sys.exit(77)
+
+BROWSER, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+if not BROWSER or not DRIVER:
+    print("skipped: there is no chromium with chromium-driver")
+    sys.exit(77)
+
+program, folder = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
+
+NAME = 'a, "b" #1%'  # what a table, a script and a URL each have to write in their own way
+SCENE = """
+images:
+  - name: '{name}'
+    size: [160, 120]
+    every: {every}
+    camera: {{orbit: {{views: {views}, elevation: [0, 40]}}}}
+    sweep: {{isovalues: true, fields: [pressure]}}
+    layers: [{{isosurface: {{field: pressure, values: {values}, colour_by: {{field: pressure, range: [-1, 1]}}}}}}]
+    outputs: [{{cinema: {database}}}]
+"""
+
+
+def draw(database, **keys):
+    scene = folder / "scene.yaml"
+    scene.write_text(SCENE.format(name=NAME, database=database, **keys))
+    subprocess.run([program, scene], cwd=folder, check=True)
+
+
+def start():
+    options = webdriver.ChromeOptions()
+    options.binary_location = BROWSER
+    for option in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
+                   "--disable-background-networking", "--disable-component-update", "--window-size=1200,900",
+                   f"--user-data-dir={folder / 'profile'}"):
+        options.add_argument(option)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    return webdriver.Chrome(service=Service(DRIVER), options=options)
+
+
+def wait(what, holds, seconds=20):
+    end = time.monotonic() + seconds
+    while not holds():
+        if time.monotonic() > end:
+            raise AssertionError(f"after {seconds} s it is not so: {what}")
+        time.sleep(0.02)
+
+
+class Page:
+    def __init__(self, driver):
+        self.driver = driver
+
+    def open(self, query=""):
+        self.driver.get((folder / "run.cdb" / "index.html").as_uri() + query)
+        wait("a picture is shown", lambda: self.is_shown(0))
+
+    def at(self, name):
+        return self.driver.find_element(By.ID, name)
+
+    def run(self, script, *arguments):
+        return self.driver.execute_script(script, *arguments)
+
+    def is_shown(self, pane):
+        return self.run("const p = document.getElementById('picture' + arguments[0]);"
+                        "return p.offsetParent !== null && p.complete && p.naturalWidth > 0", pane)
+
+    def file(self, pane=0):
+        """The picture's file below the database, as the disk names it."""
+        return self.run("return decodeURIComponent(document.getElementById('picture' + arguments[0]).src"
+                        ".replace(/.*\\//, ''))", pane)
+
+    def caption(self, pane=0):
+        return self.at(f"caption{pane}").text
+
+    def sliders(self):
+        return [s.get_attribute("id").removeprefix("slider_")
+                for s in self.driver.find_elements(By.CSS_SELECTOR, "#sliders input[type=range]")]
+
+    def value(self, name):
+        return int(self.run("return document.getElementById('slider_' + arguments[0]).value", name))
+
+    def last(self, name):
+        return int(self.at("slider_" + name).get_attribute("max"))
+
+    def move(self, name, index):
+        self.run("const s = document.getElementById('slider_' + arguments[0]); s.value = arguments[1];"
+                 "s.dispatchEvent(new Event('input', {bubbles: true}))", name, index)
+
+    def key(self, key, on=None):
+        self.run("(arguments[0] ? document.getElementById(arguments[0]) : document.activeElement)"
+                 "[arguments[0] ? 'focus' : 'blur']()", on)
+        ActionChains(self.driver).send_keys(key).perform()
+
+    def message(self):
+        return self.at("message").text
+
+    def shot(self, name):
+        self.driver.save_screenshot(str(folder / name))
+
+
+def table(database):
+    with open(folder / database / "data.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def sliders_show_every_picture(page):
+    page.open()
+    rows = table("run.cdb")
+    assert page.at("title").text == "run.cdb", page.at("title").text
+    names = page.sliders()
+    assert names == ["time", "phi", "theta", "isovalue"], names  # cycle goes with time, and there is one field
+    values = {n: sorted({float(r[n]) for r in rows}) for n in names}
+    count = 0
+    for indices in itertools.product(*(range(len(values[n])) for n in names)):
+        for n, i in zip(names, indices):
+            if page.value(n) != i:
+                page.move(n, i)
+        row, = (r for r in rows if all(float(r[n]) == values[n][i] for n, i in zip(names, indices)))
+        assert page.file() == row["FILE"], (page.file(), row)
+        assert row["FILE"].startswith(NAME) and f"time {row['time']}, phi {row['phi']}" in page.caption(), page.caption()
+        count += 1
+    assert count == len(rows), (count, len(rows))
+    wait("the last is loaded", lambda: page.is_shown(0))
+    assert page.run("return document.getElementById('picture0').naturalWidth") == 160
+    page.shot("one_run.png")
+
+
+def keys_move_sliders(page):
+    page.open()
+    page.key(Keys.ARROW_RIGHT)
+    assert page.value("time") == 1 and page.value("phi") == 0
+    page.key(Keys.ARROW_LEFT)
+    page.key(Keys.ARROW_LEFT)  # stays at the first
+    assert page.value("time") == 0
+    page.key(Keys.END)
+    assert page.value("time") == page.last("time")
+    page.key(Keys.HOME)
+    page.key(Keys.ARROW_UP)
+    assert page.value("time") == 0 and page.value("phi") == 1
+    page.key(Keys.ARROW_DOWN)
+    assert page.value("phi") == 0
+    page.key(Keys.ARROW_RIGHT, on="slider_theta")
+    assert page.value("theta") == 1 and page.value("time") == 0 and "theta 40" in page.caption(), page.caption()
+    label = page.run("return document.getElementById('slider_theta').labels[0].textContent")
+    assert label == "theta" and page.at("slider_theta").get_attribute("aria-valuetext") == "theta 40"
+    page.at("with").send_keys("a b")  # keys of a text are the text's
+    assert page.at("with").get_attribute("value") == "a b" and page.at("play").text == "Play"
+
+
+def space_plays_over_time(page):
+    page.open()
+    page.at("speed").send_keys("25")
+    page.move("isovalue", 1)
+    page.key(Keys.SPACE)
+    assert page.at("play").text == "Stop"
+    seen = []
+
+    def has_gone_round():
+        if not seen or seen[-1] != page.value("time"):
+            seen.append(page.value("time"))
+        return seen.count(0) >= 2 and set(seen) == set(range(page.last("time") + 1))
+
+    wait("all steps were shown, and the first again", has_gone_round)
+    page.key(Keys.SPACE)
+    assert page.at("play").text == "Play" and page.value("isovalue") == 1
+    stopped = page.value("time")
+    time.sleep(0.3)
+    assert page.value("time") == stopped
+    page.at("play").click()
+    wait("it plays on by its button", lambda: page.value("time") != stopped)
+    page.at("play").click()
+
+
+def two_runs_stand_side_by_side(page):
+    page.open()
+    assert not page.at("picture1").is_displayed()
+    page.at("with").send_keys("../other.cdb", Keys.ENTER)
+    wait("the second run is shown", lambda: page.is_shown(0) and page.is_shown(1))
+    left, right = page.at("picture0").rect, page.at("picture1").rect
+    assert left["x"] + left["width"] <= right["x"] and abs(left["y"] - right["y"]) < 1, (left, right)
+    assert page.at("title").text == "run.cdb and other.cdb"
+    assert page.caption(1).startswith("other.cdb: cycle 0"), page.caption(1)
+    rows = table("other.cdb")
+    page.move("phi", page.last("phi"))  # the other has views at 0 and 180 degrees alone
+    row, = (r for r in rows if (r["cycle"], r["phi"], r["theta"], r["isovalue"]) == ("0", "180", "0", "0.2"))
+    assert page.file(1) == row["FILE"] and "nearest" in page.caption(1) and "nearest" not in page.caption(0)
+    page.shot("two_runs.png")
+    page.at("remove").click()
+    wait("one run is left", lambda: not page.at("picture1").is_displayed())
+    page.open("?with=../other.cdb/index.html")
+    wait("both by the page's address", lambda: page.is_shown(0) and page.is_shown(1))
+
+
+def what_is_missing_is_told(page):
+    page.open("?with=../none.cdb")
+    wait("the message", lambda: "no table at" in page.message() and "none.cdb/data.js" in page.message())
+    assert page.is_shown(0) and not page.at("picture1").is_displayed()
+    page.open("?with=https://example.org/other.cdb")
+    wait("the message", lambda: "same disk" in page.message())
+    assert page.is_shown(0)
+    victim = folder / "run.cdb" / table("run.cdb")[1]["FILE"]
+    victim.rename(folder / "victim.png")
+    page.open()
+    page.move("phi", 1)
+    wait("the message", lambda: "cannot be read" in page.message())
+    (folder / "victim.png").rename(victim)
+
+
+def new_pictures_are_found(page):
+    page.open()
+    page.move("phi", 2)
+    steps = page.last("time")
+    draw("run.cdb", every=1, views=3, values=[0.2, 0.5])
+    page.at("again").click()
+    wait("there are more steps", lambda: page.last("time") > steps)
+    assert page.value("phi") == 2 and page.message() == ""
+
+
+def contrast(page, selector):
+    """Of a text with the page's background, as WCAG 2 defines it."""
+    colours = page.run("const of = e => getComputedStyle(e); return [of(document.querySelector(arguments[0])).color,"
+                       "of(document.body).backgroundColor]", selector)
+
+    def luminance(text):
+        parts = [float(v) / 255 for v in text[text.index("(") + 1:-1].split(",")[:3]]
+        parts = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]
+        return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
+
+    low, high = sorted(luminance(c) for c in colours)
+    return (high + 0.05) / (low + 0.05), luminance(colours[1])
+
+
+def light_and_dark_are_readable(page):
+    for scheme in ("light", "dark"):
+        page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia",
+                                    {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
+        page.open("?with=../other.cdb")
+        wait("both are shown", lambda: page.is_shown(1))
+        for selector in ("h1", "figcaption", "output", "button", "#keys"):
+            ratio, background = contrast(page, selector)
+            assert ratio >= 4.5, (scheme, selector, ratio)
+            assert (background > 0.5) == (scheme == "light"), (scheme, background)
+        page.shot(scheme + ".png")
+
+
+def nothing_comes_from_a_network(page):
+    page.open("?with=../other.cdb")
+    wait("both are shown", lambda: page.is_shown(1))
+    loaded = page.run("return performance.getEntriesByType('resource').map(e => e.name)")
+    assert all(name.startswith("file:") for name in loaded), loaded
+    sources = page.run("return [...document.querySelectorAll('[src],[href]')].map(e => e.src || e.href)")
+    assert sources and all(name.startswith("file:") for name in sources), sources
+
+
+def no_script_failed(page):
+    failed = [entry for entry in page.driver.get_log("browser") if entry["source"] == "javascript"]
+    assert not failed, json.dumps(failed, indent=1)
+
+
+def main():
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    draw("run.cdb", every=2, views=3, values=[0.2, 0.5])
+    draw("other.cdb", every=1, views=2, values=[0.2])
+    driver = start()
+    try:
+        page = Page(driver)
+        for test in (sliders_show_every_picture, keys_move_sliders, space_plays_over_time, two_runs_stand_side_by_side,
+                     what_is_missing_is_told, light_and_dark_are_readable, new_pictures_are_found,
+                     nothing_comes_from_a_network, no_script_failed):
+            test(page)
+            print(test.__name__, "is so", flush=True)
+    finally:
+        driver.quit()
+    shutil.rmtree(folder / "profile", ignore_errors=True)
+
+
+os.environ["OMP_NUM_THREADS"] = "1"
+main()

@@ -1,0 +1,496 @@
+/* Databases as they are written: every byte of the table, the same on any ranks; runs that begin again or are killed;
+ * and pictures of orbits, sweeps and paths, which are those of scenes that ask for each alone. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "memory.h"
+#include "session_cinema.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, MOST = 1 << 16 };
+
+#define IMAGE(name, keys, layers, outputs)                                                                             \
+    "  - name: " name "\n    size: [16, 12]\n" keys "    layers: [" layers "]\n    outputs: [" outputs "]\n"
+#define SURFACE "{isosurface: {field: f, values: [0.25, -0.5]}}"
+#define SLICE "{slice: {field: f, planes: [{normal: [0, 0, 1]}]}}"
+
+static const char swept[] = "images:\n" IMAGE(
+    "a", "    camera: {orbit: {views: 2, elevation: [-20, 10.5]}}\n    sweep: {isovalues: true}\n    every: 2\n",
+    SURFACE, "{cinema: out/a.cdb}");
+
+/* ---- inputs and files ------------------------------------------------------------------------------------------ */
+
+static void make_input(session_input *in)
+{
+    input_create(in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+}
+
+/* Rank 0's file; empty where there is none. */
+static void read_file(const char *path, char text[MOST])
+{
+    text[0] = '\0';
+    FILE *file = own_rank == 0 ? fopen(path, "r") : NULL;
+    if (!file) return;
+    text[fread(text, 1, MOST - 1, file)] = '\0';
+    fclose(file);
+}
+
+static void put_file(const char *path, const char *text)
+{
+    if (own_rank != 0) return;
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    fclose(file);
+}
+
+static void forget_files(void)
+{
+    if (own_rank != 0) return;
+    unlink("out/a.cdb/data.csv");
+    unlink("out/a.cdb/data.js");
+    unlink("out/a.cdb/index.html");
+}
+
+/* The values, a little elsewhere in each mesh that a field stands for. */
+static void set_second_field(insitu_session *session, const session_input *in, double *values)
+{
+    insitu_field g = in->field;
+    for (int64_t v = 0; v < in->part.vertex_count; v++) values[v] = 0.3 - in->part.values[v];
+    g.name = "g";
+    g.values.data = values;
+    assert_int_equal(insitu_set_field(session, "m", &g), INSITU_OK);
+}
+
+static void run_steps(const char *scene, const session_input *in, int first, int end)
+{
+    double *values = calloc((size_t)in->part.vertex_count + 1, sizeof *values);
+    assert_non_null(values);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
+    forget_pictures();
+    for (int cycle = first; cycle < end; cycle++) {
+        assert_int_equal(hand_over(session, in), INSITU_OK);
+        set_second_field(session, in, values);
+        const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
+        if (status) fprintf(stderr, "%s\n", insitu_error(session));
+        everywhere(status == INSITU_OK);
+    }
+    insitu_destroy(&session);
+    free(values);
+}
+
+/* ---- tables ---------------------------------------------------------------------------------------------------- */
+
+/* What swept writes at these cycles. */
+static void expect_table(int first, int end, char text[MOST])
+{
+    static const double values[] = {0.25, -0.5}, elevations[] = {-20, 10.5};
+    size_t size = (size_t)snprintf(text, MOST, "cycle,time,phi,theta,isovalue,FILE\n");
+    for (int cycle = first; cycle < end; cycle++)
+        for (int i = 0; i < 8 && cycle % 2 == 0; i++)
+            size += (size_t)snprintf(text + size, MOST - size, "%d,%d,%d,%g,%g,a_%06d_%03d_%g.png\n", cycle, cycle / 2,
+                                     i % 2 * 180, elevations[i / 2 % 2], values[i / 4], cycle, i % 4, values[i / 4]);
+}
+
+/* The table's lines as a list of a script. */
+static void expect_script(const char *table, char text[MOST])
+{
+    size_t size = (size_t)snprintf(text, MOST, "cinemaTable([\n");
+    for (const char *line = table; *line; line = strchr(line, '\n') + 1)
+        size += (size_t)snprintf(text + size, MOST - size, "\"%.*s\",\n", (int)strcspn(line, "\n"), line);
+    snprintf(text + size, MOST - size, "]);\n");
+}
+
+static bool is_page_there(void)
+{
+    static char page[MOST];
+    read_file("out/a.cdb/index.html", page);
+    return strlen(page) == session_cinema_page_size && memcmp(page, session_cinema_page, strlen(page)) == 0;
+}
+
+static bool is_table(int first, int end)
+{
+    static char expected[MOST], found[MOST];
+    if (own_rank != 0) return true;
+    expect_table(first, end, expected);
+    read_file("out/a.cdb/data.csv", found);
+    if (strcmp(found, expected) != 0) {
+        fprintf(stderr, "%s\nexpected\n%s\n", found, expected);
+        return false;
+    }
+    static char script[MOST];
+    expect_script(expected, script);
+    read_file("out/a.cdb/data.js", found);
+    return strcmp(found, script) == 0 && is_page_there();
+}
+
+static void tables_have_a_line_a_picture(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    make_input(&in);
+    forget_files();
+    run_steps(swept, &in, 0, 5);
+    everywhere(is_table(0, 5));
+    everywhere(caught_count == (own_rank == 0 ? 24 : 0));
+    everywhere(own_rank != 0 || strcmp(caught[9].path, "out/a.cdb/a_000002_001_0.25.png") == 0);
+    input_free(&in);
+}
+
+/* An image without an orbit or a sweep has nothing in their columns; names that hold commas are in quotes. */
+static void tables_of_several_images_have_all_columns(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    session_input in = {0};
+    make_input(&in);
+    if (own_rank == 0) unlink("two.cdb/data.csv");
+    run_steps("images:\n" IMAGE("'x, \"y\"'", "    sweep: {fields: [f, g]}\n", SLICE, "{cinema: two.cdb}")
+                  IMAGE("z", "    camera: {orbit: {views: 1, start: 0.1}}\n", SURFACE,
+                        "{cinema: two.cdb, path: \"{cycle}/{name}.png\"}"),
+              &in, 3, 4);
+    read_file("two.cdb/data.csv", text);
+    everywhere(own_rank != 0 || strcmp(text, "cycle,time,image,phi,theta,field,FILE\n"
+                                             "3,1.5,\"x, \"\"y\"\"\",,,f,\"x, \"\"y\"\"_000003_f.png\"\n"
+                                             "3,1.5,\"x, \"\"y\"\"\",,,g,\"x, \"\"y\"\"_000003_g.png\"\n"
+                                             "3,1.5,z,0.1,30,,3/z.png\n") == 0);
+    read_file("two.cdb/data.js", text);
+    everywhere(own_rank != 0 || strstr(text, "\n\"3,1.5,\\\"x, \\\"\\\"y\\\"\\\"\\\",,,f,\\\"x, ") != NULL);
+    input_free(&in);
+}
+
+/* ---- restarts -------------------------------------------------------------------------------------------------- */
+
+static void runs_that_begin_again_go_on_with_the_table(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    session_input in = {0};
+    make_input(&in);
+    forget_files();
+    run_steps(swept, &in, 0, 7);
+    run_steps(swept, &in, 3, 7); /* the first picture is of cycle 4 */
+    everywhere(is_table(0, 7));
+    read_file("out/a.cdb/data.csv", text);
+    if (own_rank == 0) text[strlen(text) - 9] = '\0'; /* the last line is torn */
+    put_file("out/a.cdb/data.csv", text);
+    run_steps(swept, &in, 7, 9);
+    expect_table(0, 9, text);
+    static char found[MOST];
+    read_file("out/a.cdb/data.csv", found);
+    if (own_rank == 0) { /* all but the torn line */
+        char *torn = strstr(text, "\n6,3,180,10.5,-0.5") + 1, *after = strchr(torn, '\n') + 1;
+        memmove(torn, after, strlen(after) + 1);
+    }
+    everywhere(own_rank != 0 || strcmp(text, found) == 0);
+    run_steps(swept, &in, 1, 2); /* a run that draws nothing writes nothing */
+    read_file("out/a.cdb/data.csv", found);
+    everywhere(own_rank != 0 || strcmp(text, found) == 0);
+    run_steps(swept, &in, 2, 5);
+    everywhere(is_table(0, 5));
+    input_free(&in);
+}
+
+/* Lines between the session's first cycle and its first picture are of a run that is no more. */
+static void lines_go_from_the_first_step_on(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    make_input(&in);
+    forget_files();
+    run_steps(swept, &in, 0, 5);
+    static const char late[] = "images:\n" IMAGE(
+        "a", "    camera: {orbit: {views: 2, elevation: [-20, 10.5]}}\n    sweep: {isovalues: true}\n    every: 6\n",
+        SURFACE, "{cinema: out/a.cdb}");
+    static char text[MOST], expected[MOST], last[MOST];
+    run_steps(late, &in, 3, 7);
+    read_file("out/a.cdb/data.csv", text);
+    expect_table(0, 3, expected);
+    expect_table(6, 7, last);
+    strcat(expected, strchr(last, '\n') + 1);
+    everywhere(own_rank != 0 || strcmp(text, expected) == 0);
+    input_free(&in);
+}
+
+/* A simulation that goes back in time, and one that draws a cycle twice. */
+static void steps_that_go_back_drop_what_was_after(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    make_input(&in);
+    forget_files();
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
+    static const int cycles[] = {0, 2, 4, 6, 2, 2};
+    for (int i = 0; i < 6; i++) {
+        forget_pictures();
+        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        everywhere(insitu_step(session, cycles[i], 0.5 * cycles[i]) == INSITU_OK);
+        everywhere(is_table(0, cycles[i] + 1));
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* ---- what fails ------------------------------------------------------------------------------------------------ */
+
+static void tables_that_cannot_be_written_are_told_and_written_later(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    make_input(&in);
+    forget_files();
+    if (own_rank == 0) mkdir("out/a.cdb/data.csv", 0777);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    forget_pictures();
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "cinema: out/a.cdb/data.csv", "cannot be");
+    everywhere(caught_count == (own_rank == 0 ? 8 : 0));
+    if (own_rank == 0) rmdir("out/a.cdb/data.csv");
+    put_file("out/a.cdb/data.csv", "a,b\n1,2\n");
+    told_everywhere(session, insitu_step(session, 2, 1), INSITU_ERROR_IO, "out/a.cdb/data.csv", "other columns",
+                    "\"cycle,time,phi,theta,isovalue,FILE\"");
+    forget_files();
+    if (own_rank == 0) mkdir("out/a.cdb/data.js", 0777);
+    forget_pictures();
+    told_everywhere(session, insitu_step(session, 4, 2), INSITU_ERROR_IO, "cinema: out/a.cdb/data.js", "written");
+    if (own_rank == 0) rmdir("out/a.cdb/data.js");
+    everywhere(insitu_step(session, 6, 3) == INSITU_OK);
+    everywhere(is_table(4, 7)); /* what could not be written at cycle 4 is there */
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+static void pictures_that_cannot_be_written_have_no_line(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    session_input in = {0};
+    make_input(&in);
+    forget_files();
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    forget_pictures();
+    unwritable = "_002_";
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_IO, "image \"a\"", "a_000000_002_0.25.png");
+    unwritable = NULL;
+    read_file("out/a.cdb/data.csv", text);
+    everywhere(own_rank != 0 || (!strstr(text, "_002_") && strstr(text, "_003_-0.5.png\n")));
+    everywhere(caught_count == (own_rank == 0 ? 6 : 0));
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* Whole lines of whole steps alone, whatever allocation of rank 0's fails; and then it goes on. */
+static void tables_stay_whole_where_memory_runs_out(void **state)
+{
+    (void)state;
+    static char text[MOST];
+    session_input in = {0};
+    make_input(&in);
+    forget_files();
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(swept));
+    assert_int_equal(hand_over(session, &in), INSITU_OK);
+    int cycle = 0, failures = 0;
+    for (int n = 1; n < 1500; n += 7, cycle += 2) {
+        forget_pictures();
+        if (own_rank == 0) base_memory_fail_nth(n);
+        const insitu_status status = insitu_step(session, cycle, 0.5 * cycle);
+        base_memory_fail_nth(0);
+        everywhere(status == INSITU_OK || status == INSITU_ERROR_MEMORY);
+        failures += status != INSITU_OK;
+        read_file("out/a.cdb/data.csv", text);
+        bool is_whole = true;
+        for (const char *line = text, *end; *line && is_whole; line = end + 1) {
+            end = strchr(line, '\n');
+            is_whole = end && (line == text || strncmp(end - 4, ".png", 4) == 0);
+            if (!end) break;
+        }
+        everywhere(is_whole);
+        if (status == INSITU_OK && cycle > 40) break;
+        if (cycle > 80) forget_files(), cycle = 0;
+    }
+    everywhere(failures > 3);
+    forget_pictures();
+    everywhere(insitu_step(session, 1000, 500) == INSITU_OK);
+    read_file("out/a.cdb/data.csv", text);
+    everywhere(own_rank != 0 || strstr(text, "a_001000_003_-0.5.png\n"));
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* ---- pictures -------------------------------------------------------------------------------------------------- */
+
+/* Rank 0's pictures of a scene at one cycle, kept while another is drawn. */
+typedef struct picture_set {
+    int count;
+    caught_picture items[MAX_CAUGHT];
+} picture_set;
+
+static void keep_pictures(picture_set *set)
+{
+    set->count = caught_count;
+    memcpy(set->items, caught, sizeof caught);
+    caught_count = 0; /* they are the set's now */
+}
+
+static void free_pictures(picture_set *set)
+{
+    for (int i = 0; i < set->count; i++) free(set->items[i].rgba), free(set->items[i].depth);
+}
+
+static bool is_same_picture(const caught_picture *a, const caught_picture *b)
+{
+    return a->width == b->width && a->height == b->height &&
+           memcmp(a->rgba, b->rgba, (size_t)a->width * (size_t)a->height * 4 * sizeof(float)) == 0;
+}
+
+/* The scenes draw the same pictures, in their order, to the bit; and not all of them are alike. */
+static void draws_as(const char *one, const char *other, int cycle, int count)
+{
+    picture_set set;
+    session_input in = {0};
+    make_input(&in);
+    run_steps(one, &in, cycle, cycle + 1);
+    keep_pictures(&set);
+    run_steps(other, &in, cycle, cycle + 1);
+    bool is_same = caught_count == set.count && (own_rank != 0 || set.count == count), differ = count == 1;
+    for (int i = 0; i < caught_count && is_same; i++) {
+        is_same = is_same_picture(&set.items[i], &caught[i]);
+        differ = differ || !is_same_picture(&caught[0], &caught[i]);
+    }
+    everywhere(is_same && (differ || own_rank != 0));
+    free_pictures(&set);
+    input_free(&in);
+}
+
+static void sweeps_draw_what_each_image_alone_would(void **state)
+{
+    (void)state;
+    draws_as(
+        "images:\n" IMAGE("a", "    sweep: {isovalues: true}\n",
+                          "{isosurface: {field: f, values: [0.25, -0.5], colours: [[1, 0, 0], [0, 0, 1]]}}",
+                          "{path: \"{isovalue}.png\"}"),
+        "images:\n" IMAGE("a", "", "{isosurface: {field: f, values: [0.25], colours: [[1, 0, 0]]}}", "{path: a.png}")
+            IMAGE("b", "", "{isosurface: {field: f, values: [-0.5], colours: [[0, 0, 1]]}}", "{path: b.png}"),
+        0, 2);
+    draws_as("images:\n" IMAGE("a", "    sweep: {fields: [f, g]}\n", SLICE, "{path: \"{field}.png\"}"),
+             "images:\n" IMAGE("a", "", SLICE, "{path: a.png}")
+                 IMAGE("b", "", "{slice: {field: g, planes: [{normal: [0, 0, 1]}]}}", "{path: b.png}"),
+             0, 2);
+}
+
+/* Directions whose sines and cosines are exact, or the same doubles. */
+static void orbits_draw_what_each_camera_alone_would(void **state)
+{
+    (void)state;
+#define FROM(name, direction, up)                                                                                      \
+    IMAGE(name, "    camera: {automatic: {direction: " direction "}, up: " up "}\n", SURFACE, "{path: " name ".png}")
+    draws_as(
+        "images:\n" IMAGE("a", "    camera: {orbit: {views: 1, elevation: 0}}\n", SURFACE, "{path: \"{view}.png\"}")
+            IMAGE("b", "    camera: {orbit: {views: 1, elevation: 0, axis: [0, 0, 5]}}\n", SURFACE, "{path: b.png}"),
+        "images:\n" FROM("a", "[0, 0, 1]", "[0, 1, 0]") FROM("b", "[1, 0, 0]", "[0, 0, 1]"), 0, 2);
+}
+
+static void paths_draw_what_a_camera_there_would(void **state)
+{
+    (void)state;
+#define PATH                                                                                                           \
+    "    camera: {path: [{cycle: 0, position: [4, 1, 2], focal: [0, 0, 0]}, "                                          \
+    "{cycle: 10, position: [2, 3, 4], focal: [0, 1, 0]}]}\n"
+#define STANDS(position, focal) "    camera: {position: " position ", focal: " focal "}\n"
+    static const char path[] = "images:\n" IMAGE("a", PATH, SURFACE, "{path: \"{cycle}.png\"}");
+    draws_as(path, "images:\n" IMAGE("a", STANDS("[4, 1, 2]", "[0, 0, 0]"), SURFACE, "{path: a.png}"), 0, 1);
+    draws_as(path, "images:\n" IMAGE("a", STANDS("[3, 2, 3]", "[0, 0.5, 0]"), SURFACE, "{path: a.png}"), 5, 1);
+    draws_as(path, "images:\n" IMAGE("a", STANDS("[2, 3, 4]", "[0, 1, 0]"), SURFACE, "{path: a.png}"), 70, 1);
+}
+
+/* A condition and once are the image's, of all its pictures; steps draw all or none of them. */
+static void conditions_hold_for_all_pictures_of_an_image(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    make_input(&in);
+    insitu_session *session = open_session(
+        MPI_COMM_WORLD,
+        write_scene("images:\n" IMAGE("a",
+                                      "    camera: {orbit: {views: 3}}\n    sweep: {isovalues: true}\n    once: true\n"
+                                      "    when: {field: f, above: 50}\n",
+                                      SURFACE, "{path: \"a{view}{isovalue}.png\"}")
+                        IMAGE("b", "    when: {field: f, below: 50}\n", SURFACE, "{path: b.png}")));
+    static const int drawn[] = {1, 6, 0, 1};
+    for (int cycle = 0; cycle < 4; cycle++) {
+        forget_pictures();
+        for (int64_t v = 0; v < in.part.vertex_count; v++)
+            in.part.values[v] = (cycle == 1 || cycle == 2 ? 100 : 1) * test_linear(in.part.coordinates + 3 * v);
+        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
+        everywhere(insitu_last_report(session)->images == drawn[cycle]);
+        everywhere(own_rank != 0 || caught_count == drawn[cycle]);
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* An isovalue that the field does not reach is told once, though each picture has one value and is drawn at each step.
+ */
+static void warnings_of_swept_isovalues_are_told_once(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    make_input(&in);
+    insitu_session *session =
+        open_session(MPI_COMM_WORLD,
+                     write_scene("images:\n" IMAGE(
+                         "a", "    camera: {orbit: {views: 2}}\n    sweep: {isovalues: true}\n",
+                         "{isosurface: {field: f, values: [0.25, 1e6, 2e6]}}", "{path: \"a{view}{isovalue}.png\"}")));
+    for (int cycle = 0; cycle < 3; cycle++) {
+        forget_pictures();
+        assert_int_equal(hand_over(session, &in), INSITU_OK);
+        everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
+        const char *warnings = insitu_last_report(session)->warnings;
+        everywhere((strstr(warnings, "at 1e+06 is not there") != NULL) == (cycle == 0));
+        everywhere((strstr(warnings, "at 2e+06 is not there") != NULL) == (cycle == 0));
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+static const char *work_folder = ".";
+
+/* Files are written where the program runs: each count of ranks has a folder of its own. */
+static bool enter_folder(void)
+{
+    char name[512];
+    snprintf(name, sizeof name, "%s/cinema_np%d", work_folder, rank_count);
+    mkdir(name, 0777);
+    return chdir(name) == 0;
+}
+
+static int run(void)
+{
+    if (!enter_folder()) return 1;
+    const struct CMUnitTest tests[] = {cmocka_unit_test(tables_have_a_line_a_picture),
+                                       cmocka_unit_test(tables_of_several_images_have_all_columns),
+                                       cmocka_unit_test(runs_that_begin_again_go_on_with_the_table),
+                                       cmocka_unit_test(lines_go_from_the_first_step_on),
+                                       cmocka_unit_test(steps_that_go_back_drop_what_was_after),
+                                       cmocka_unit_test(tables_that_cannot_be_written_are_told_and_written_later),
+                                       cmocka_unit_test(pictures_that_cannot_be_written_have_no_line),
+                                       cmocka_unit_test(tables_stay_whole_where_memory_runs_out),
+                                       cmocka_unit_test(sweeps_draw_what_each_image_alone_would),
+                                       cmocka_unit_test(orbits_draw_what_each_camera_alone_would),
+                                       cmocka_unit_test(paths_draw_what_a_camera_there_would),
+                                       cmocka_unit_test(conditions_hold_for_all_pictures_of_an_image),
+                                       cmocka_unit_test(warnings_of_swept_isovalues_are_told_once)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1) work_folder = argv[1];
+    return run_session_tests(argc, argv, run);
+}
