@@ -78,17 +78,20 @@ static void cut_scalar(char *text)
     *text = 0;
 }
 
-/* The public face does not tell where pictures go; the scene does. Show its output paths as they are written there. */
+/* The public face does not tell where pictures go; the scene does. Show its output paths and databases as they are
+ * written there. A camera's path is a list. */
 static void show_paths(const char *scene)
 {
     char line[1024];
     FILE *file = fopen(scene, "r");
     if (!file) return;
     while (fgets(line, sizeof line, file)) {
-        char *path = strstr(line, "path:"), *comment = strchr(line, '#');
+        char *cinema = strstr(line, "cinema:"), *comment = strchr(line, '#');
+        char *path = cinema ? cinema : strstr(line, "path:");
         if (!path || (comment && comment < path)) continue;
-        path += strlen("path:");
-        path += strspn(path, " \t");
+        path = strchr(path, ':') + 1;
+        path += strspn(path, " \t\r\n");
+        if (*path == '[' || *path == 0) continue;
         cut_scalar(path);
         printf("  %s\n", path);
     }

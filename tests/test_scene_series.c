@@ -154,7 +154,7 @@ static void databases_have_the_columns_of_their_images(void **state)
     (void)state;
     scene s;
     parse_good("images:\n- name: a\n  camera: {orbit: {views: 3}}\n  layers: [{volume: {field: p}}]\n"
-               "  outputs: [{cinema: a.cdb}, {cinema: out/b.cdb, path: \"x/{view}.png\", bits: 16}]\n"
+               "  outputs: [{cinema: a.cdb}, {cinema: ././out/b.cdb, path: \"x/{view}.png\", bits: 16}]\n"
                "- name: b\n  sweep: {fields: [p]}\n  layers: [{volume: {field: p}}]\n"
                "  outputs: [{path: b.png}, {cinema: out/b.cdb}]\n",
                &s);
@@ -248,6 +248,8 @@ static void paths_are_smooth_and_do_not_swing_out(void **state)
         }
         assert_true(at.angle >= 30 && at.angle <= 50 && at.eye[2] == 8);
     }
+    /* x rises by 4 in 1, then by 2 in 3: the slope between is 12 / (7 / 4 + 5 / (2 / 3)). */
+    assert_near(scene_camera_at(c, 0, 1.5).eye[0], 2 - 12 / (1.75 + 7.5) / 8, 1e-14);
     scene_free(&s);
 }
 

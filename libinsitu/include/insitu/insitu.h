@@ -238,10 +238,11 @@ INSITU_API const insitu_report *insitu_last_report(const insitu_session *session
  * counts. */
 INSITU_API insitu_status insitu_keep_pictures(insitu_session *session, int keep);
 
-/* The pictures that the last step drew, *count of them, in the order of the scene; an image that could not be drawn is
- * left out, one whose file could not be written is there. The session owns them, and they are valid until the next
- * step, insitu_keep_pictures() or insitu_destroy(). NULL and 0 where there are none: on other ranks than 0, where
- * nothing was due, or where they are not kept. Local. */
+/* The pictures that the last step drew, *count of them, in the order of the scene, and those of one image by the fields
+ * and isovalues of its sweep and then the views of its orbit; all of them have the image's name. An image that could
+ * not be drawn is left out, one whose file could not be written is there. The session owns them, and they are valid
+ * until the next step, insitu_keep_pictures() or insitu_destroy(). NULL and 0 where there are none: on other ranks than
+ * 0, where nothing was due, or where they are not kept. Local. */
 INSITU_API const insitu_picture *insitu_last_pictures(const insitu_session *session, int *count);
 
 /* The message of the last call on the session that failed, "" if none did. Local. Valid until the next call on the

@@ -104,8 +104,8 @@ static const scene_form range_forms[] = {
               "of the values on the meshes of the layer, over all ranks, at each drawn step: `data`, the least and "   \
               "the greatest (with `scale: log` the least above 0); `symmetric`, the same made as wide on both sides "  \
               "of 0; `run`, the widest of all steps drawn so far, which is kept in the file NAME.ranges beside the "   \
-              "first output's pictures, so that a run that is started again goes on with it (delete it to begin "      \
-              "anew); or percentiles.",                                                                                \
+              "first output's pictures (of a sweep's others in NAME.1.ranges and so on), so that a run that is "       \
+              "started again goes on with it (delete it to begin anew); or percentiles.",                              \
       .by_default = RANGE_DEFAULT, TAKES(range_forms))
 #define PLANE_KEYS(X)                                                                                                  \
     X(CYAML_FIELD_SEQUENCE_FIXED("normal", CYAML_FLAG_POINTER, scene_file_plane, normal, &number, 3),                  \

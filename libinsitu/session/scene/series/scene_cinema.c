@@ -58,11 +58,13 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
                                    const scene_image *image, scene_output *out)
 {
     char file[96];
-    insitu_status status = check_folder(d, path, in->cinema);
+    const char *folder = in->cinema;
+    while (strncmp(folder, "./", 2) == 0) folder += 2; /* one folder has one table, whatever it is called */
+    insitu_status status = check_folder(d, path, folder);
     if (!status) status = check_file(d, path, image, in->path);
     if (!status && out->format == SCENE_EXR)
         status = scene_bad(d, path, "path", "\"%.100s\" is no PNG, expected .png in a database", in->path);
-    return status ? status : join(d, in->cinema, in->path ? in->path : default_file(image, file), out);
+    return status ? status : join(d, folder, in->path ? in->path : default_file(image, file), out);
 }
 
 /* ---- databases ------------------------------------------------------------------------------------------------- */

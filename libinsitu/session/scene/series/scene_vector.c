@@ -1,0 +1,22 @@
+/* Directions, as scenes give them. */
+#include <math.h>
+
+#include "scene_convert.h"
+
+/* Scaled first, so that neither 1e-200 nor 1e200 is lost in its square. */
+bool scene_normalize(double v[3])
+{
+    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!(largest > 0)) return false;
+    for (int i = 0; i < 3; i++) v[i] /= largest;
+    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    for (int i = 0; i < 3; i++) v[i] /= length;
+    return true;
+}
+
+/* So close the image's right would be mostly rounding. */
+bool scene_is_parallel(const double a[3], const double b[3])
+{
+    const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+    return sqrt(x * x + y * y + z * z) < 1e-6;
+}
