@@ -16,7 +16,7 @@
 static bool has_interval(const session_scalar *scalar, const mmbvh_interval *interval)
 {
     for (int i = 0; i < scalar->interval_count; i++)
-        if (memcmp(&scalar->intervals[i], interval, sizeof *interval) == 0) return true;
+        if (scalar->intervals[i].low == interval->low && scalar->intervals[i].high == interval->high) return true;
     return false;
 }
 
