@@ -104,7 +104,7 @@ class Page:
         return int(self.run("return document.getElementById('slider_' + arguments[0]).value", name))
 
     def last(self, name):
-        return int(self.at("slider_" + name).get_attribute("max"))
+        return int(self.run("return document.getElementById('slider_' + arguments[0]).max", name))
 
     def move(self, name, index):
         self.run("const s = document.getElementById('slider_' + arguments[0]); s.value = arguments[1];"
@@ -219,6 +219,8 @@ def what_is_missing_is_told(page):
     page.open("?with=../none.cdb")
     wait("the message", lambda: "no table at" in page.message() and "none.cdb/data.js" in page.message())
     assert page.is_shown(0) and not page.at("picture1").is_displayed()
+    page.open("?with=../100%.cdb")
+    wait("the message", lambda: "no table at" in page.message())
     page.open("?with=https://example.org/other.cdb")
     wait("the message", lambda: "same disk" in page.message())
     assert page.is_shown(0)
@@ -228,6 +230,15 @@ def what_is_missing_is_told(page):
     page.move("phi", 1)
     wait("the message", lambda: "cannot be read" in page.message())
     (folder / "victim.png").rename(victim)
+
+
+def runs_of_one_name_are_told_apart(page):
+    (folder / "later").mkdir()
+    shutil.copytree(folder / "other.cdb", folder / "later" / "run.cdb")
+    page.open("?with=../later/run.cdb")
+    wait("both are shown", lambda: page.is_shown(1))
+    names = page.caption(0).split(":")[0], page.caption(1).split(":")[0]
+    assert names == (f"{folder.name}/run.cdb", "later/run.cdb"), names
 
 
 def new_pictures_are_found(page):
@@ -290,8 +301,8 @@ def main():
     try:
         page = Page(driver)
         for test in (sliders_show_every_picture, keys_move_sliders, space_plays_over_time, two_runs_stand_side_by_side,
-                     what_is_missing_is_told, light_and_dark_are_readable, new_pictures_are_found,
-                     nothing_comes_from_a_network, no_script_failed):
+                     what_is_missing_is_told, runs_of_one_name_are_told_apart, light_and_dark_are_readable,
+                     new_pictures_are_found, nothing_comes_from_a_network, no_script_failed):
             test(page)
             print(test.__name__, "is so", flush=True)
     finally:

@@ -43,7 +43,10 @@ static const char edited_scene[] = "threads: 1\nimages:\n" IMAGE(
     "          range: run, below: [0, 0, 0]}}\n"
     "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: symlog,\n"
     "          threshold: 0.1, above: [1, 1, 1]}\n",
-    "    sampling: {step_cells: 0.5}\n");
+    "    sampling: {step_cells: 0.5}\n") "  - name: k\n    size: [8, 8]\n    camera: {orbit: {views: 2}}\n"
+                                         "    sweep: {isovalues: true, fields: [f, c]}\n    layers:\n"
+                                         "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: {field: f}}\n"
+                                         "    outputs: [{cinema: memory.cdb}]\n";
 
 typedef struct memory_case {
     const char *name;
@@ -113,7 +116,8 @@ static bool is_same_picture(const caught_picture *a, const caught_picture *b)
 {
     const size_t pixels = (size_t)a->width * (size_t)a->height;
     return a->width == b->width && a->height == b->height && !memcmp(a->rgba, b->rgba, pixels * 4 * sizeof(float)) &&
-           !memcmp(a->depth, b->depth, pixels * sizeof(float)) && !strcmp(a->path, b->path);
+           (a->depth && b->depth ? !memcmp(a->depth, b->depth, pixels * sizeof(float)) : a->depth == b->depth) &&
+           !strcmp(a->path, b->path);
 }
 
 /* Rank 0's pictures, which are forgotten. */
