@@ -159,7 +159,7 @@ static void tables_of_several_images_have_all_columns(void **state)
                                              "3,1.5,\"x, \"\"y\"\"\",,,g,\"x, \"\"y\"\"_000003_g.png\"\n"
                                              "3,1.5,z,0.1,30,,3/z.png\n") == 0);
     read_file("two.cdb/data.js", text);
-    everywhere(own_rank != 0 || strstr(text, "\n\"3,1.5,\\\"x, \\\"\\\"y\\\"\\\"\\\",,,f,\\\"x, ") != NULL);
+    everywhere(own_rank != 0 || strstr(text, "\n\"3,1.5,\\x22x, \\x22\\x22y\\x22\\x22\\x22,,,f,\\x22x, ") != NULL);
     input_free(&in);
 }
 

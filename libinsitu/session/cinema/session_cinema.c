@@ -214,15 +214,21 @@ static void write_table(FILE *file, const void *what)
     fwrite(t->text, 1, t->size, file);
 }
 
-/* Bytes above 0x7f are those of UTF-8, in which a page's scripts are. */
-static void write_script_byte(FILE *file, unsigned char byte)
+/* Not as it is in a script's text. Bytes above 0x7f are: they are UTF-8's, as the page's scripts are. */
+static bool is_escaped(unsigned char byte)
 {
-    if (byte == '"' || byte == '\\')
-        fprintf(file, "\\%c", byte);
-    else if (byte < 0x20)
-        fprintf(file, "\\x%02x", byte);
-    else
-        fputc(byte, file);
+    return byte == '"' || byte == '\\' || byte < 0x20;
+}
+
+static void write_script_line(FILE *file, const char *line, size_t size)
+{
+    for (size_t at = 0, end; at < size; at = end) {
+        for (end = at; end < size && !is_escaped((unsigned char)line[end]);) end++;
+        if (end > at)
+            fwrite(line + at, 1, end - at, file);
+        else
+            fprintf(file, "\\x%02x", (unsigned)(unsigned char)line[end++]);
+    }
 }
 
 /* The lines as a list of texts, given to a function of the page. */
@@ -230,9 +236,10 @@ static void write_script(FILE *file, const void *what)
 {
     const session_table *t = what;
     fputs("cinemaTable([\n", file);
-    for (size_t at = 0; at < t->size; at++) {
+    for (size_t at = 0, size; at < t->size; at += size + 1) {
+        size = (size_t)((const char *)memchr(t->text + at, '\n', t->size - at) - (t->text + at));
         fputc('"', file);
-        for (; t->text[at] != '\n'; at++) write_script_byte(file, (unsigned char)t->text[at]);
+        write_script_line(file, t->text + at, size);
         fputs("\",\n", file);
     }
     fputs("]);\n", file);
