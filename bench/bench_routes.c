@@ -177,7 +177,7 @@ static void write_depths(const bench_routes *r, const float *depths, const char 
         for (int channel = 0; channel < 3; channel++) rgba[4 * i + channel] = (float)fmin(1, fmax(0, grey));
         rgba[4 * i + 3] = 1;
     }
-    const insitu_image image = {r->camera->width, r->camera->height, rgba, NULL, NULL};
+    const insitu_image image = {.width = r->camera->width, .height = r->camera->height, .rgba = rgba};
     snprintf(path, sizeof path, "%s/%s-%d-%s.png", folder, r->subject->mesh, r->subject->n, name);
     if (session_write_image(&image, INSITU_PNG8, path, &error) != INSITU_OK) fprintf(stderr, "%s\n", error.message);
     free(rgba);

@@ -206,6 +206,15 @@ typedef struct render_clip {
     double centre[3], radius;   /* sphere */
 } render_clip;
 
+/* What hits are painted with: their colours, lit; or numbers of the pixel's nearest surface, as red, green and blue. Then
+ * surfaces are to be opaque, and volumes none. */
+typedef enum render_paint {
+    RENDER_LIGHT,
+    RENDER_NORMALS, /* the unit normal that light falls on, towards the eye, in world axes */
+    RENDER_VALUES   /* the value that colours the surface, or where none does its isovalue; and the number of the
+                       isovalue among the job's */
+} render_paint;
+
 typedef struct render_job {
     render_camera camera;
     render_space space;
@@ -214,6 +223,7 @@ typedef struct render_job {
     const mmbvh *parent; /* over the parts' boxes (mmbvh_build_boxes); NULL: parts are tried in turn */
     const render_surface_layer *surfaces;
     int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
+    render_paint paint;
     render_traversal traversal;
     render_active_cells *active; /* NULL: nothing is kept */
     const render_volume_layer *volumes;

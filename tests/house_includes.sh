@@ -67,7 +67,9 @@ BEGIN {
     allowed["statistics"] = " scalars meshes scene common mmbvh base public "
     allowed["plan"] = " statistics outer scalars meshes scene render render_face common mmbvh base public "
     allowed["cinema"] = " scene common base public "
-    allowed["pictures"] = " cinema plan compositing" allowed["plan"]
+    allowed["views"] = " plan" allowed["plan"]
+    allowed["decorations"] = " views" allowed["views"]
+    allowed["pictures"] = " decorations cinema compositing" allowed["decorations"]
     allowed["session"] = " pictures" allowed["pictures"]
     allowed["adaptor_headers"] = " public "
     allowed["adaptors"] = " adaptor_headers public "

@@ -64,7 +64,7 @@ static insitu_status write_picture(const picture_case *c, base_error *error)
                                                    .bars = &bar,
                                                    .has_axes = true};
     const insitu_image image = {WIDTH, HEIGHT, rgba, c->has_depth ? depth : NULL,
-                                c->is_decorated ? &decorations : NULL};
+                                c->is_decorated ? &decorations : NULL, 0, NULL};
     char path[1024];
     path_of(c, path);
     *error = (base_error){0};
@@ -268,7 +268,7 @@ int main(int argument_count, char **arguments)
     mkdir(folder, 0777);
     /* Loads the image library, which then refuses the picture. */
     base_error error = {0};
-    const insitu_image nothing = {0, 0, NULL, NULL, NULL};
+    const insitu_image nothing = {.rgba = NULL};
     if (session_write_image(&nothing, INSITU_PNG8, "none.png", &error) != INSITU_ERROR_ARGUMENT) {
         fprintf(stderr, "%s\n", error.message);
         return 1;

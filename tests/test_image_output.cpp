@@ -40,7 +40,7 @@ struct picture {
     std::vector<float> rgba, depth;
     insitu_image view(bool with_depth) const
     {
-        return {width, height, rgba.data(), with_depth ? depth.data() : nullptr, nullptr};
+        return {width, height, rgba.data(), with_depth ? depth.data() : nullptr, nullptr, 0, nullptr};
     }
 };
 
@@ -155,6 +155,32 @@ void png_of_numbers_that_are_not_is_black(void **)
     assert_int_equal(codes.size(), 8);
     const std::uint8_t expected[8] = {0, 255, 0, 255, 0, 0, 0, 0};
     assert_memory_equal(codes.data(), expected, 8);
+}
+
+void exr_has_channels_of_other_numbers(void **)
+{
+    const picture p = make_picture(17, 11, false);
+    const fs::path path = folder / "exr" / "channels.exr";
+    const insitu_channel channels[] = {{"N.X", p.rgba.data() + 1, 4}, {"value", p.depth.data(), 1}};
+    insitu_image image = p.view(true);
+    image.channel_count = 2;
+    image.channels = channels;
+    write_well(image, INSITU_EXR, path);
+    OIIO::ImageSpec spec;
+    const std::vector<float> values = read_back<float>(path, OIIO::TypeDesc::FLOAT, spec);
+    assert_int_equal(spec.nchannels, 7);
+    const auto place_of = [&spec](const char *name) {
+        const int place = spec.channelindex(name);
+        assert_true(place >= 0);
+        return static_cast<std::size_t>(place);
+    };
+    const std::size_t x = place_of("N.X"), value = place_of("value"), z = place_of("Z"), green = place_of("G");
+    for (std::size_t i = 0; i < p.depth.size(); i++) {
+        const float *pixel = &values[7 * i];
+        assert_true(pixel[x] == p.rgba[4 * i + 1] && pixel[green] == p.rgba[4 * i + 1]);
+        assert_true(pixel[value] == p.depth[i] && pixel[z] == p.depth[i]);
+    }
+    write_well(image, INSITU_PNG8, folder / "png" / "channels.png"); /* which passes them over */
 }
 
 void exr_is_bitwise(void **)
@@ -348,6 +374,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(png16_is_within_half_a_code),
         cmocka_unit_test(png_of_numbers_that_are_not_is_black),
         cmocka_unit_test(exr_is_bitwise),
+        cmocka_unit_test(exr_has_channels_of_other_numbers),
         cmocka_unit_test(writing_leaves_the_picture_alone),
         cmocka_unit_test(unwritable_places_are_told),
         cmocka_unit_test(full_disk_is_told_and_leaves_the_old_picture),

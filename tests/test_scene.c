@@ -99,6 +99,7 @@ static const char every_key[] =
     "      - path: \"out/{name}_{cycle:06}.png\"\n"
     "        bits: 16\n"
     "      - path: out/wave_{cycle}.EXR\n"
+    "        data: true\n"
     "  - name: second\n"
     "    every_time: 0.25\n"
     "    once: true\n"
@@ -218,6 +219,10 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(image->outputs[0].format, SCENE_PNG16);
     assert_string_equal(image->outputs[1].path, "out/wave_{cycle}.EXR");
     assert_int_equal(image->outputs[1].format, SCENE_EXR);
+    assert_true(image->outputs[1].has_data && !image->outputs[0].has_data);
+    assert_int_equal(image->isosurfaces[1].number, 2);
+    assert_int_equal(image->slices[0].number, 3);
+    assert_int_equal(image->surfaces[2].number, 6);
     assert_true(s.images[1].step == 0.125);
     assert_int_equal(s.images[1].outputs[0].format, SCENE_PNG8);
     scene_free(&s);
@@ -810,7 +815,7 @@ static const struct bad_file {
     {12, "    decorations: {colour_bar: true}", 12, {"colour_bar: \"true\"", "keys at, labels, ticks"}},
     {12, "    decorations: {colour_bar: {at: top}}", 12, {"colour_bar.at: \"top\"", "one of left, right"}},
     {12, "    decorations: {colour_bar: {ticks: 1}}", 12, {"colour_bar.ticks: \"1\"", "from 2 to 12"}},
-    {12, "    decorations: {outline: box}", 12, {"decorations.outline: \"box\"", "true or false"}},
+    {12, "    decorations: {outline: box}", 12, {"decorations.outline: \"box\"", "one of false, true, meshes, ranks"}},
     {12, "    decorations: {axes: 3}", 12, {"decorations.axes: \"3\"", "true or false"}},
     {12, "    decorations: {colour: [1, 0]}", 12, {"decorations.colour: a list of 2", "a list of 3 numbers"}},
     {12, "    decorations: {colour: [1, 0, 2]}", 12, {"decorations.colour[2]: \"2\"", "from 0 to 1"}},
@@ -820,6 +825,8 @@ static const struct bad_file {
     {14, "      - path: a{cycle.png", 14, {"is unknown"}},
     {14, "      - path: a.png\n        bits: 12", 15, {"outputs[0].bits: 12", "8 or 16"}},
     {14, "      - path: a.exr\n        bits: 16", 15, {"outputs[0].bits", "for a PNG only"}},
+    {14, "      - path: a.png\n        data: true", 15, {"outputs[0].data: given for a PNG", "an EXR only"}},
+    {14, "      - path: a.exr\n        data: 1", 15, {"outputs[0].data: \"1\"", "true or false"}},
     {14, "      - path: a.png\n      - path: a.png", 15, {"outputs[1].path: \"a.png\" is another output's file too"}},
     {14, "      - path: b.exr", 17, {"images[1].outputs[0].path: \"b.exr\" is another"}},
     {14, "      - path: a{cycle}.png\n      - path: a{cycle:03}.png", 15, {"is another output's file too"}},
@@ -1091,7 +1098,7 @@ static void scene_decorations_are_read(void **state)
     const scene_decorations *d = &s.images[2].decorations;
     assert_true(d->has_rulers && d->has_scale_bar && d->scale_at == SCENE_BOTTOM);
     assert_string_equal(d->scale_unit, "mm");
-    assert_true(d->is_given && d->has_outline && d->has_axes && d->has_bars && d->has_colour);
+    assert_true(d->is_given && d->outline == SCENE_BOX_OF_DATA && d->has_axes && d->has_bars && d->has_colour);
     assert_string_equal(d->title, "{name} at {time:.2f} s");
     assert_int_equal(d->words_count, 2);
     assert_string_equal(d->words[0].text, "cycle {cycle}");

@@ -187,13 +187,19 @@ insitu_status session_write_image(const insitu_image *image, insitu_image_format
     snprintf(picture.path, sizeof picture.path, "%s", path);
     picture.rgba = malloc(pixels * 4 * sizeof(float));
     if (image->depth) picture.depth = malloc(pixels * sizeof(float));
-    if (!picture.rgba || (image->depth && !picture.depth)) {
+    picture.channel_count = image->channel_count;
+    if (image->channel_count) picture.data = malloc(pixels * (size_t)image->channel_count * sizeof(float));
+    if (!picture.rgba || (image->depth && !picture.depth) || (image->channel_count && !picture.data)) {
         free(picture.rgba);
         free(picture.depth);
+        free(picture.data);
         return base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory to catch it", path);
     }
     memcpy(picture.rgba, image->rgba, pixels * 4 * sizeof(float));
     if (image->depth) memcpy(picture.depth, image->depth, pixels * sizeof(float));
+    for (int c = 0; c < image->channel_count; c++)
+        for (size_t p = 0; p < pixels; p++)
+            picture.data[pixels * (size_t)c + p] = image->channels[c].values[p * (size_t)image->channels[c].stride];
     caught[caught_count++] = picture;
     return INSITU_OK;
 }

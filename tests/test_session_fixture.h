@@ -77,6 +77,8 @@ void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spo
 typedef struct caught_picture {
     int width, height;
     float *rgba, *depth; /* depth NULL where none was given */
+    int channel_count;
+    float *data; /* the channels one after the other; NULL where there are none */
     char path[256];
     int64_t held; /* bytes that the library held when it was written */
 } caught_picture;

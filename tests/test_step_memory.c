@@ -18,7 +18,8 @@ static int64_t allocation;
 /* ---- scenes and meshes ---------------------------------------------------------------------------------------- */
 
 #define IMAGE(name, size, layers, sampling)                                                                            \
-    "  - name: " name "\n    size: " size "\n    layers:\n" layers sampling "    outputs: [{path: " name ".exr}]\n"
+    "  - name: " name "\n    size: " size "\n    layers:\n" layers sampling "    outputs: [{path: " name               \
+    ".exr, data: true}]\n"
 #define SURFACES                                                                                                       \
     "      - isosurface: {field: f, values: [0.1, -0.4]}\n"                                                            \
     "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
@@ -27,7 +28,7 @@ static int64_t allocation;
 /* Surfaces alone and in front of a volume, by samples and by segments, values at vertices and in cells, several
  * volumes, frames that are summed. */
 #define DECORATIONS                                                                                                    \
-    "    decorations: {title: t, text: [{text: a}], colour_bar: {labels: x}, outline: true, axes: true}\n"
+    "    decorations: {title: t, text: [{text: a}], colour_bar: {labels: x}, outline: ranks, axes: true}\n"
 
 static const char full_scene[] =
     "threads: 1\nimages:\n" IMAGE("a", "[24, 16]", SURFACES VOLUME("f"), "    sampling: {step_cells: 0.5, frames: 3}\n")
@@ -37,7 +38,7 @@ static const char full_scene[] =
 static const char edited_scene[] = "threads: 1\nimages:\n" IMAGE(
     "e", "[24, 16]",
     "      - isosurface: {field: f, values: [0.2]}\n"
-    "      - slice: {field: c, planes: [{normal: [1, 2, 3]}]}\n"
+    "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], clip: {sphere: {centre: [0, 0, 0], radius: 0.5}}}\n"
     "      - surface: {opacity: 0.5, colour_by: {field: c, discrete: 4,\n"
     "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"
     "          range: run, below: [0, 0, 0]}}\n"

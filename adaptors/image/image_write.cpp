@@ -67,12 +67,20 @@ template <typename code> std::vector<code> encode(const insitu_image &image, std
     return codes;
 }
 
-std::vector<float> with_depth(const insitu_image &image)
+std::size_t exr_channels(const insitu_image &image)
 {
-    std::vector<float> all(pixel_count(image) * 5);
+    return 4 + (image.depth ? 1 : 0) + static_cast<std::size_t>(image.channel_count);
+}
+
+std::vector<float> with_channels(const insitu_image &image)
+{
+    const std::size_t count = exr_channels(image);
+    std::vector<float> all(pixel_count(image) * count);
     for (std::size_t i = 0; i < pixel_count(image); i++) {
-        std::memcpy(&all[5 * i], image.rgba + 4 * i, 4 * sizeof(float));
-        all[5 * i + 4] = image.depth[i];
+        float *pixel = std::copy_n(image.rgba + 4 * i, 4, &all[count * i]);
+        if (image.depth) *pixel++ = image.depth[i];
+        for (int c = 0; c < image.channel_count; c++)
+            *pixel++ = image.channels[c].values[i * static_cast<std::size_t>(image.channels[c].stride)];
     }
     return all;
 }
@@ -96,7 +104,8 @@ OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
 {
     OIIO::ImageSpec spec(image.width, image.height, l.channels, l.type);
     spec.channelnames = {"R", "G", "B", "A"};
-    if (image.depth) spec.channelnames.push_back("Z");
+    if (image.depth) spec.channelnames.emplace_back("Z");
+    for (int c = 0; c < image.channel_count; c++) spec.channelnames.emplace_back(image.channels[c].name);
     spec.alpha_channel = 3;
     spec.z_channel = image.depth ? 4 : -1;
     spec.attribute("oiio:ColorSpace", "Linear");
@@ -180,9 +189,10 @@ template <typename code> void write_png(const insitu_image &image, OIIO::TypeDes
 
 void write_exr(const insitu_image &image, const std::string &path)
 {
-    const layout l{image.depth ? 5 : 4, OIIO::TypeDesc(OIIO::TypeDesc::FLOAT), "picture.exr", describe_exr};
-    const std::vector<float> all = image.depth ? with_depth(image) : std::vector<float>();
-    write_pixels(image, l, image.depth ? all.data() : image.rgba, path);
+    const std::size_t count = exr_channels(image);
+    const layout l{static_cast<int>(count), OIIO::TypeDesc(OIIO::TypeDesc::FLOAT), "picture.exr", describe_exr};
+    const std::vector<float> all = count > 4 ? with_channels(image) : std::vector<float>();
+    write_pixels(image, l, count > 4 ? all.data() : image.rgba, path);
 }
 
 void write_undecorated(const insitu_image &image, insitu_image_format format, const std::string &path)

@@ -77,7 +77,8 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent};
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
-                                     &s->space, &s->run_ranges,     &s->report,     &s->kept, basis.scene, &s->cinema};
+                                     &s->space, &s->run_ranges,     &s->report,     &s->kept, basis.scene, &s->cinema,
+                                    &s->catalogue};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);

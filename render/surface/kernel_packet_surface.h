@@ -103,8 +103,7 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, write, hits);
         kernel_fragments lit = {
             p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
-        kernel_packet_view(p);
-        kernel_shade(p, &s->layer->material, hits->normal, lit.colour);
+        kernel_paint(p, s, hits->normal, hits->kind, lit.colour);
         kernel_emit(p, write, 0, &lit);
     }
 }

@@ -75,14 +75,45 @@ SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
     g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
 }
 
+/* RENDER_NORMALS, as kernel_shade() finds it; and of RENDER_VALUES the isovalue's number. */
+static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
+                                                                 vf colour[3])
+{
+    const render_camera *c = &p->frame->job->camera;
+    vm flat;
+    vf unit[3], inverse = kernel_inverse_length(normal, &flat), facing = vf_set(0);
+    if (p->frame->job->paint == RENDER_VALUES) {
+        colour[1] = kind - (float)FRAGMENT_SURFACE;
+        colour[2] = vf_set(0);
+        return;
+    }
+    for (int a = 0; a < 3; a++) {
+        unit[a] = vf_select(flat, p->view[a], normal[a] * inverse);
+        facing += unit[a] * p->view[a];
+    }
+    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
+    for (int a = 0; a < 3; a++)
+        colour[a] =
+            turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
+}
+
+/* Hits as the job paints them; kind: that of the fragments. */
+SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind, vf colour[3])
+{
+    kernel_packet_view(p);
+    if (__builtin_expect(p->frame->job->paint == RENDER_LIGHT, 1))
+        kernel_shade(p, &s->layer->material, normal, colour);
+    else
+        kernel_paint_numbers(p, normal, kind, colour);
+}
+
 /* A hit in the place of the nearest, as folded cells may have them: compositing decides, by bits that do not know which
  * cell came first. */
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
     kernel_fragments lit = {t, t, {colour[0], colour[1], colour[2]}, vf_set(0), vf_set(0)};
-    kernel_packet_view(p);
-    kernel_shade(p, &s->layer->material, normal, lit.colour);
+    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), lit.colour);
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
@@ -90,6 +121,13 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
 typedef struct kernel_hit_places {
     vf t, normal[3], w;
 } kernel_hit_places;
+
+/* What colours the surface, or its isovalue. w: the first's place along the colour map's range. */
+SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
+{
+    if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
+    return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
+}
 
 /* Takes hits: the nearest are kept; those of a transparent surface are written at once. */
 SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
@@ -103,7 +141,10 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     /* Polyhedra (no cell given) have their own gradient always. */
     const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, at->w, colour);
-    if (s->layer->edge_width > 0 && c) kernel_draw_edges(p, s->layer, c, t, colour);
+    if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
+        colour[0] = kernel_surface_value(s, value, at->w);
+    else if (s->layer->edge_width > 0 && c)
+        kernel_draw_edges(p, s->layer, c, t, colour);
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
         if (__builtin_expect(vm_any(tied), 0)) {
@@ -123,8 +164,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         return;
     }
     if (by_differences) kernel_differences(p, s, value, hit, t, reach, normal);
-    kernel_packet_view(p);
-    kernel_shade(p, &s->layer->material, normal, colour);
+    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), colour);
     const float opacity = s->layer->opacity;
     const kernel_fragments f = {
         t, t, {colour[0] * opacity, colour[1] * opacity, colour[2] * opacity}, vf_set(1 - opacity), vf_set(0)};

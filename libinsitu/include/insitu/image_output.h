@@ -16,7 +16,7 @@ extern "C" {
 typedef enum insitu_image_format {
     INSITU_PNG8 = 0,  /* sRGB, 8 bits a channel, straight alpha; no alpha channel where all is opaque */
     INSITU_PNG16 = 1, /* the same with 16 bits */
-    INSITU_EXR = 2    /* linear premultiplied float RGBA, and the channel Z where depth is given */
+    INSITU_EXR = 2    /* linear premultiplied float RGBA, the channel Z where depth is given, and channels */
 } insitu_image_format;
 
 /* Where in the picture a decoration stands. Those of one place stack, and none lies over another. */
@@ -94,6 +94,13 @@ typedef struct insitu_decorations {
     double axes[3][3]; /* the scene's axes, seen from the camera: right, up, towards the eye; unit lengths */
 } insitu_decorations;
 
+/* Numbers of an image's pixels beside their colours, for EXR. */
+typedef struct insitu_channel {
+    const char *name;
+    const float *values; /* of the first pixel */
+    int stride;          /* floats from pixel to pixel, row-major, top row first */
+} insitu_channel;
+
 typedef struct insitu_image {
     int width, height;
     const float *rgba;  /* row-major, height × width × 4, top row first, linear, premultiplied */
@@ -101,6 +108,8 @@ typedef struct insitu_image {
                            volume is in front, the distance from the eye along the camera's axis (not along the pixel's
                            ray) in scene units; +infinity where there is none */
     const insitu_decorations *decorations; /* NULL: none, and rgba has its background */
+    int channel_count;
+    const insitu_channel *channels; /* borrowed; passed over where the format has none */
 } insitu_image;
 
 /* Write to a temporary file beside path and rename, so that path is never half a picture; missing folders are made. The

@@ -9,6 +9,7 @@
 #include "comp_edges.h"
 #include "memory.h"
 #include "session_agree.h"
+#include "session_channels.h"
 #include "session_decorations.h"
 #include "session_frame.h"
 #include "session_image.h"
@@ -25,7 +26,8 @@ typedef struct canvas {
     image samples; /* where edges alone take more than one frame: those, and their sums */
     int64_t edge_count, *edges;
     double *edge_sums;
-    double *sum;                      /* NULL: there is one frame */
+    double *sum; /* NULL: there is one frame */
+    session_channels channels;
     session_decorations *decorations; /* NULL: there are none, and the frame has its background */
 } canvas;
 
@@ -39,6 +41,7 @@ static void canvas_free(canvas *c, session_picture *picture)
     base_free(c->samples.rgba);
     base_free(c->edges);
     base_free(c->edge_sums);
+    session_free_channels(&c->channels);
     session_free_decorations(c->decorations);
 }
 
@@ -258,7 +261,12 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     if (status) return status;
     warn_of_overlaps(d->report, image, basis.overlaps);
     canvas_finish(canvas, image->frames, &view->space, d->team->threads);
-    return INSITU_OK;
+    if (!session_wants_channels(image)) return INSITU_OK;
+    session_frame taken;
+    const insitu_status drawn =
+        session_draw_channels(&basis.target, d->team, image, &job, &canvas->channels, &taken, error);
+    report_frame(&d->report->numbers, &taken);
+    return drawn;
 }
 
 /* ---- outputs ------------------------------------------------------------------------------------------------- */
@@ -292,6 +300,8 @@ static void write_output(const session_drawing *d, const scene_image *image, con
                                   .height = image->height,
                                   .rgba = source->frame.rgba,
                                   .depth = output->format == SCENE_EXR ? source->frame.depth : NULL,
+                                  .channel_count = output->has_data ? SESSION_CHANNELS : 0,
+                                  .channels = source->channels.items,
                                   .decorations = !decorations              ? NULL
                                                  : output->has_decorations ? &decorations->all
                                                                            : &decorations->background};
@@ -374,6 +384,24 @@ bool session_active_cells_pay(const session_plan *plan, const scene_image *image
 
 /* ---- images -------------------------------------------------------------------------------------------------- */
 
+/* Collective where the outline is of meshes or ranks; what fails on rank 0 alone is for the next agreement. */
+static insitu_status decorate(const session_drawing *d, const scene_image *image, const session_view *view,
+                              const session_layers *layers, canvas *out, base_error *error)
+{
+    session_outline outline;
+    const scene_moment moment = moment_of(d, image);
+    const insitu_status status =
+        session_find_outline(&image->decorations, d->catalogue, d->meshes, &d->space->extent, d->team, &outline, error);
+    if (status) return status;
+    if (image->decorations.is_given && d->team->rank == 0) {
+        out->decorations = session_make_decorations(
+            image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline});
+        if (!out->decorations) session_no_memory(error, (int64_t)sizeof *out->decorations, "decorations");
+    }
+    session_free_outline(&outline);
+    return INSITU_OK;
+}
+
 /* active: NULL, or for the image's frames to fill and to draw from. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
                                 session_picture *picture, base_error *error)
@@ -387,13 +415,9 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (!status) status = session_make_layers(&basis, image, &layers, error);
     if (status) return status;
     layers.active = active;
-    canvas_create(d, image, picture, &canvas, error);
-    if (image->decorations.is_given && d->team->rank == 0) {
-        const scene_moment moment = moment_of(d, image);
-        canvas.decorations = session_make_decorations(image, &moment, &d->space->extent, &view, &layers);
-        if (!canvas.decorations) session_no_memory(error, (int64_t)sizeof *canvas.decorations, "decorations");
-    }
-    status = session_agree(d->team->comm, error);
+    status = decorate(d, image, &view, &layers, &canvas, error);
+    if (!status) canvas_create(d, image, picture, &canvas, error);
+    if (!status) status = session_agree(d->team->comm, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
         if (d->kept->is_on && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);

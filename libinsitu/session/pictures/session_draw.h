@@ -2,6 +2,7 @@
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
+#include "session_catalogue.h"
 #include "session_cinema.h"
 #include "session_mesh.h"
 #include "session_picture.h"
@@ -24,6 +25,7 @@ typedef struct session_drawing {
     session_kept_pictures *kept;
     const scene *scene;
     session_cinema *cinema; /* rank 0's */
+    const session_catalogue *catalogue;
 } session_drawing;
 
 /* Is an isosurface of the image drawn so often in this step, by this and others of the plan's images or frame by frame,

@@ -106,6 +106,7 @@ typedef struct scene_isosurface {
     scene_normal normals;
     double difference; /* in cell sizes, > 0; 1 by default */
     uint32_t clips;    /* a set of the image's */
+    int number;        /* in the image's list of layers */
 } scene_isosurface;
 
 typedef struct scene_volume {
@@ -136,6 +137,7 @@ typedef struct scene_surface {
     float opacity;
     scene_material material;
     uint32_t clips; /* a set of the image's */
+    int number;     /* in the image's list of layers */
 } scene_surface;
 
 typedef struct scene_plane {
@@ -167,6 +169,7 @@ typedef struct scene_slice {
     float opacity;
     scene_material material; /* no light by default: colours are those of the map */
     uint32_t clips;          /* a set of the image's */
+    int number;              /* in the image's list of layers */
 } scene_slice;
 
 typedef struct scene_light {
@@ -229,6 +232,14 @@ typedef struct scene_words {
 } scene_words;
 
 /* What is written and drawn beside the data. */
+/* Boxes around all data, around each mesh, or around what each rank holds. */
+typedef enum scene_boxes {
+    SCENE_NO_BOX,
+    SCENE_BOX_OF_DATA,
+    SCENE_BOXES_OF_MESHES,
+    SCENE_BOXES_OF_RANKS
+} scene_boxes;
+
 typedef struct scene_decorations {
     bool is_given; /* else there are none */
     char *title;   /* NULL: none */
@@ -239,7 +250,8 @@ typedef struct scene_decorations {
     int tick_count; /* about so many a bar */
     int label_count;
     char **labels; /* of the bars in turn; beyond them the fields' names */
-    bool has_outline, has_rulers, has_axes;
+    scene_boxes outline;
+    bool has_rulers, has_axes;
     bool has_scale_bar;
     char *scale_unit; /* NULL: none */
     scene_anchor scale_at;
@@ -254,6 +266,7 @@ typedef struct scene_output {
     char *path;           /* with placeholders (scene_expand()); relative to the working directory of rank 0 */
     scene_format format;  /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
     bool has_decorations; /* of the image, if that has any */
+    bool has_data;        /* of EXR: the nearest surface's normal, value and numbers too */
     int database;         /* index of the scene's, in which the picture is a line; -1: none */
     int folder_bytes;     /* of path that are the database's folder and its slash; 0 without a database */
 } scene_output;

@@ -56,7 +56,7 @@ insitu_status scene_convert_decorations(const scene_document *d, const char *pat
 {
     if (!in) return INSITU_OK;
     out->is_given = true;
-    out->has_outline = in->outline && *in->outline;
+    out->outline = in->outline ? (scene_boxes)*in->outline : SCENE_NO_BOX;
     out->has_axes = in->axes && *in->axes;
     out->has_rulers = in->rulers && *in->rulers;
     out->has_scale_bar = in->scale_bar != NULL;

@@ -260,6 +260,14 @@ static insitu_status convert_clip_of(const scene_document *d, const char *path, 
                      "cuts otherwise than the first volume does, expected all volumes of an image to have one clip");
 }
 
+/* The layer was the last to be made of its kind. */
+static void number_layer(const scene_file_layer *in, int number, scene_image *out)
+{
+    if (in->isosurface) out->isosurfaces[out->isosurface_count - 1].number = number;
+    if (in->surface) out->surfaces[out->surface_count - 1].number = number;
+    if (in->slice) out->slices[out->slice_count - 1].number = number;
+}
+
 /* values: isovalues of the layers before it. */
 static insitu_status convert_layer(const scene_document *d, const char *path, const scene_file_layer *in, int values,
                                    scene_image *out)
@@ -289,6 +297,7 @@ insitu_status scene_convert_layers(const scene_document *d, const char *path, co
         snprintf(layer_path, sizeof layer_path, "%s.layers[%d].%s", path, i, layer_word(layer));
         status = convert_layer(d, layer_path, layer, values, out);
         if (!status) status = convert_clip_of(d, layer_path, layer, out);
+        if (!status) number_layer(layer, i, out);
         values += layer->isosurface ? layer->isosurface->values_count : 0;
     }
     return status;

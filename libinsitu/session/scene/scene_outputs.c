@@ -178,6 +178,9 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
     insitu_status status = convert_format(d, path, in, &out->format);
     if (!status && in->path) status = scene_check_placeholders(d, path, "path", in->path);
     if (status) return status;
+    out->has_data = in->data && *in->data;
+    if (out->has_data && out->format != SCENE_EXR)
+        return scene_bad(d, path, "data", "given for a PNG, expected for an EXR only");
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
     if (in->cinema) return scene_convert_cinema(d, path, in, image, out);
     out->path = base_strdup(in->path);

@@ -96,6 +96,10 @@ static const cyaml_schema_value_t words = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
     X(CHOICE("at", scene_file_scale_bar, at, anchor_words), .help = "Where it stands.", .by_default = "`bottom_right`")
 DEFINE_MAPPING(scale_bar, "scale_bar", SCALE_BAR_KEYS);
 
+static const cyaml_strval_t outline_words[] = {{"false", SCENE_NO_BOX},
+                                               {"true", SCENE_BOX_OF_DATA},
+                                               {"meshes", SCENE_BOXES_OF_MESHES},
+                                               {"ranks", SCENE_BOXES_OF_RANKS}};
 #define DECORATIONS_KEYS(X)                                                                                            \
     X(TEXT("title", OPTIONAL, scene_file_decorations, title, 255),                                                     \
       .help = "One line in the middle at the top, larger than other text, with the same placeholders.",                \
@@ -106,8 +110,9 @@ DEFINE_MAPPING(scale_bar, "scale_bar", SCALE_BAR_KEYS);
       .help = "A bar of colours with its numbers for each layer that is coloured by a field: isosurfaces and "         \
               "surfaces with `colour_by`, slices and volumes. `{}` takes all its defaults.",                           \
       .by_default = "none", .child = &colour_bar_mapping)                                                              \
-    X(CYAML_FIELD_BOOL_PTR("outline", OPTIONAL, scene_file_decorations, outline),                                      \
-      .help = "The edges of the box around all data; what is drawn hides those that lie behind it.",                   \
+    X(CHOICE("outline", scene_file_decorations, outline, outline_words),                                               \
+      .help = "The edges of the box around all data; or of those around each of the `meshes`, or around what each of " \
+              "the `ranks` holds. What is drawn hides edges at the back of a box.",                                    \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_BOOL_PTR("rulers", OPTIONAL, scene_file_decorations, rulers),                                        \
       .help = "Round numbers along three edges of the box around all data. A `zoom` below 1 leaves room for them.",    \
@@ -149,7 +154,14 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
           "depth, Z.",                                                                                                 \
       .by_default = "`8`", .low = 8, .high = 16)                                                                       \
     X(CYAML_FIELD_BOOL_PTR("decorations", OPTIONAL, scene_file_output, decorations),                                   \
-      .help = "Draw the image's decorations into this file.", .by_default = "`true` for PNG, `false` for EXR")
+      .help = "Draw the image's decorations into this file.", .by_default = "`true` for PNG, `false` for EXR")         \
+    X(CYAML_FIELD_BOOL_PTR("data", OPTIONAL, scene_file_output, data),                                                 \
+      .help = "Of an EXR: numbers of the nearest surface in the pixel too, of any opacity, through the pixel's "       \
+              "centre. N.X, N.Y and N.Z are its unit normal towards the eye, in the scene's axes; value is that of "   \
+              "the field that colours it, or its isovalue; layer is the number of its layer in the list, from 0, and " \
+              "surface that of its isovalue or plane in the layer. 0, NaN and -1 where there is no surface. Two "      \
+              "frames of surfaces more are drawn.",                                                                    \
+      .by_default = "`false`")
 DEFINE_MAPPING(output, "outputs", OUTPUT_KEYS);
 
 static const cyaml_schema_value_t light = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, scene_file_light, light_fields)};

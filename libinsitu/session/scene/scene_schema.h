@@ -178,7 +178,8 @@ typedef struct scene_file_decorations {
     scene_file_words *text;
     int text_count;
     scene_file_colour_bar *colour_bar;
-    bool *outline, *rulers, *axes;
+    int *outline; /* scene_boxes */
+    bool *rulers, *axes;
     scene_file_scale_bar *scale_bar;
     double *colour; /* 3 */
     double *size;
@@ -192,7 +193,7 @@ typedef struct scene_file_sweep {
 typedef struct scene_file_output {
     char *path, *cinema;
     int *bits;
-    bool *decorations;
+    bool *decorations, *data;
 } scene_file_output;
 
 typedef struct scene_file_condition {

@@ -5,6 +5,7 @@
 #include "insitu/image_output.h"
 #include "scene.h"
 #include "session_layers.h"
+#include "session_outline.h"
 #include "session_space.h"
 #include "session_ticks.h"
 #include "session_view.h"
@@ -20,14 +21,21 @@ typedef struct session_decorations {
     insitu_tick ticks[SESSION_MAX_BARS][SESSION_MAX_TICKS];
     char labels[SESSION_MAX_BARS][300];
     const scene_field *fields[SESSION_MAX_BARS]; /* of the bars */
-    insitu_stroke strokes[SESSION_BOX_EDGES + SESSION_RULER_STROKES];
+    insitu_stroke *strokes;                      /* room for the outline's boxes and the rulers */
     insitu_label ruler_labels[SESSION_RULER_LABELS];
 } session_decorations;
 
+/* What decorations are made of. */
+typedef struct session_decoration_basis {
+    const scene_moment *moment;
+    const session_extent *extent;
+    const session_view *view;
+    const session_layers *layers;
+    const session_outline *outline;
+} session_decoration_basis;
+
 /* Make them for an image that has some. NULL: no memory. Local. */
-session_decorations *session_make_decorations(const scene_image *image, const scene_moment *moment,
-                                              const session_extent *extent, const session_view *view,
-                                              const session_layers *layers);
+session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis);
 
 /* decorations may be NULL. */
 void session_free_decorations(session_decorations *decorations);

@@ -308,13 +308,20 @@ static void fill_lengths(session_decorations *d, const scene_decorations *scene,
     d->all.scale_bar.at = (insitu_anchor)scene->scale_at;
 }
 
-session_decorations *session_make_decorations(const scene_image *image, const scene_moment *moment,
-                                              const session_extent *extent, const session_view *view,
-                                              const session_layers *layers)
+static void fill_outline(session_decorations *d, const session_outline *outline, const render_camera *camera)
+{
+    for (int i = 0; i < outline->count; i++)
+        d->all.stroke_count += session_box_strokes(outline->boxes[i].lower, outline->boxes[i].upper, camera,
+                                                   d->strokes + d->all.stroke_count);
+}
+
+session_decorations *session_make_decorations(const scene_image *image, const session_decoration_basis *basis)
 {
     const scene_decorations *scene = &image->decorations;
+    const size_t strokes = (size_t)SESSION_BOX_EDGES * (size_t)basis->outline->count + SESSION_RULER_STROKES;
     session_decorations *d = base_calloc(1, sizeof *d);
     if (!d) return NULL;
+    d->strokes = base_alloc(strokes * sizeof *d->strokes);
     d->all = (insitu_decorations){.size = scene->size,
                                   .words = d->words,
                                   .bars = d->bars,
@@ -325,12 +332,13 @@ session_decorations *session_make_decorations(const scene_image *image, const sc
     d->background = d->all;
     d->background.has_axes = false;
     choose_colour(image, d->all.colour);
-    fill_axes(d, &view->camera);
-    if (scene->has_bars) fill_bars(d, image, layers);
-    if (scene->has_outline && extent->cell_count)
-        d->all.stroke_count = session_box_strokes(extent->lower, extent->upper, &view->camera, d->strokes);
-    if (extent->cell_count) fill_lengths(d, scene, extent, &view->camera);
-    if (fill_words(d, scene, moment)) return d;
+    fill_axes(d, &basis->view->camera);
+    if (scene->has_bars) fill_bars(d, image, basis->layers);
+    if (d->strokes) {
+        fill_outline(d, basis->outline, &basis->view->camera);
+        if (basis->extent->cell_count) fill_lengths(d, scene, basis->extent, &basis->view->camera);
+        if (fill_words(d, scene, basis->moment)) return d;
+    }
     session_free_decorations(d);
     return NULL;
 }
@@ -339,5 +347,6 @@ void session_free_decorations(session_decorations *decorations)
 {
     if (!decorations) return;
     for (int i = 0; i < decorations->all.words_count; i++) base_free((void *)(uintptr_t)decorations->words[i].text);
+    base_free(decorations->strokes);
     base_free(decorations);
 }

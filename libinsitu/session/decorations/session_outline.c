@@ -1,0 +1,103 @@
+#include "session_outline.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+
+void session_free_outline(session_outline *outline)
+{
+    base_free(outline->boxes);
+    *outline = (session_outline){0};
+}
+
+/* ---- ends: x, y, z of the lower corner, and those of the upper one with the other sign, so that the least of all
+ * count */
+
+enum { ENDS = 6 };
+
+static void widen(const session_mesh *mesh, double ends[ENDS])
+{
+    if (!mesh || !mesh->is_given || mesh->drawn_count == 0) return;
+    for (int axis = 0; axis < 3; axis++) {
+        ends[axis] = fmin(ends[axis], mesh->lower[axis]);
+        ends[3 + axis] = fmin(ends[3 + axis], -mesh->upper[axis]);
+    }
+}
+
+/* Boxes around nothing are left out. */
+static void take_boxes(const double *ends, int count, session_outline *out)
+{
+    for (int i = 0; i < count; i++, ends += ENDS) {
+        if (!(ends[0] <= -ends[3])) continue;
+        session_box *box = &out->boxes[out->count++];
+        for (int axis = 0; axis < 3; axis++) {
+            box->lower[axis] = ends[axis];
+            box->upper[axis] = -ends[3 + axis];
+        }
+    }
+}
+
+/* This rank's ends: of each mesh of the catalogue, or of all of them together. */
+static void find_ends(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, double *ends)
+{
+    for (int i = 0; i < (by_mesh ? catalogue->mesh_count : 1) * ENDS; i++) ends[i] = INFINITY;
+    for (int i = 0; i < catalogue->mesh_count; i++)
+        widen(session_find_mesh(meshes, catalogue->meshes[i].name), ends + (by_mesh ? i * (ptrdiff_t)ENDS : 0));
+}
+
+static insitu_status gather(const session_catalogue *catalogue, const session_meshes *meshes, bool by_mesh, int boxes,
+                            const session_team *team, double *all, base_error *error)
+{
+    double own[ENDS];
+    if (!by_mesh) {
+        find_ends(catalogue, meshes, false, own);
+        return session_mpi(error, MPI_Gather(own, ENDS, MPI_DOUBLE, all, ENDS, MPI_DOUBLE, 0, team->comm),
+                           "MPI_Gather");
+    }
+    find_ends(catalogue, meshes, true, all);
+    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, all, ENDS * boxes, MPI_DOUBLE, MPI_MIN, team->comm),
+                       "MPI_Allreduce");
+}
+
+/* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+/* Room for the boxes, on rank 0. */
+static bool reserve(session_outline *out, int count)
+{
+    out->boxes = base_alloc((size_t)count * sizeof *out->boxes);
+    return out->boxes != NULL;
+}
+
+static insitu_status find_boxes(bool by_mesh, const session_catalogue *catalogue, const session_meshes *meshes,
+                                const session_team *team, session_outline *out, base_error *error)
+{
+    const int boxes = by_mesh ? catalogue->mesh_count : team->ranks;
+    double *ends = base_alloc((size_t)boxes * ENDS * sizeof *ends);
+    if (!ends || (team->rank == 0 && !reserve(out, boxes)))
+        session_no_memory(error, boxes * (int64_t)(ENDS * sizeof *ends), "boxes of an outline");
+    insitu_status status = session_agree(team->comm, error);
+    if (!status) status = gather(catalogue, meshes, by_mesh, boxes, team, ends, error);
+    if (!status && team->rank == 0) take_boxes(ends, boxes, out);
+    base_free(ends);
+    if (status) session_free_outline(out);
+    return status;
+}
+
+insitu_status session_find_outline(const scene_decorations *decorations, const session_catalogue *catalogue,
+                                   const session_meshes *meshes, const session_extent *extent, const session_team *team,
+                                   session_outline *out, base_error *error)
+{
+    *out = (session_outline){0};
+    if (!decorations->is_given || decorations->outline == SCENE_NO_BOX || extent->cell_count == 0) return INSITU_OK;
+    if (decorations->outline != SCENE_BOX_OF_DATA)
+        return find_boxes(decorations->outline == SCENE_BOXES_OF_MESHES, catalogue, meshes, team, out, error);
+    if (team->rank == 0 && !reserve(out, 1)) session_no_memory(error, (int64_t)sizeof *out->boxes, "an outline");
+    const insitu_status status = session_agree(team->comm, error);
+    if (status || team->rank != 0) return status;
+    memcpy(out->boxes[0].lower, extent->lower, sizeof extent->lower);
+    memcpy(out->boxes[0].upper, extent->upper, sizeof extent->upper);
+    out->count = 1;
+    return INSITU_OK;
+}

@@ -1,0 +1,146 @@
+#include "session_channels.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+
+bool session_wants_channels(const scene_image *image)
+{
+    for (int i = 0; i < image->output_count; i++)
+        if (image->outputs[i].has_data) return true;
+    return false;
+}
+
+void session_free_channels(session_channels *channels)
+{
+    base_free(channels->normals);
+    base_free(channels->values);
+    *channels = (session_channels){0};
+}
+
+/* ---- frames -------------------------------------------------------------------------------------------------- */
+
+static void add_frame(session_frame *sum, const session_frame *frame)
+{
+    sum->rays += frame->rays;
+    sum->map_failures += frame->map_failures;
+    sum->fragments += frame->fragments;
+    sum->surface_ms += frame->surface_ms;
+    sum->composite_ms += frame->composite_ms;
+}
+
+static insitu_status draw_numbers(const session_frame_target *target, const render_job *job, render_paint paint,
+                                  float *rgba, session_frame *taken, base_error *error)
+{
+    static const float nothing[4] = {0, 0, 0, 0};
+    const session_frame_target bare = {target->comm, target->compositing_comm, nothing, target->fragment_limit};
+    image out = {.width = job->camera.width, .height = job->camera.height, .rgba = rgba};
+    render_job numbers = *job;
+    session_frame frame = {0};
+    numbers.paint = paint;
+    const insitu_status status = session_draw_frame(&bare, &numbers, &out, &frame, error);
+    add_frame(taken, &frame);
+    return status;
+}
+
+/* The job without what a surface may be seen through or beside. surfaces: room for the job's. */
+static render_job opaque_job(const render_job *job, render_surface_layer *surfaces)
+{
+    render_job out = *job;
+    for (int i = 0; i < job->surface_count; i++) {
+        surfaces[i] = job->surfaces[i];
+        surfaces[i].opacity = 1;
+    }
+    out.surfaces = surfaces;
+    out.volume_count = out.frame = 0;
+    out.camera.offset[0] = out.camera.offset[1] = 0;
+    out.pixels = NULL;
+    out.active = NULL;
+    return out;
+}
+
+/* ---- numbers ------------------------------------------------------------------------------------------------- */
+
+/* The layers and their surfaces, by the isovalues' numbers in the job. */
+typedef struct surface_numbers {
+    int count;
+    float layer[RENDER_MAX_ISOVALUES], surface[RENDER_MAX_ISOVALUES];
+} surface_numbers;
+
+static void add_numbers(surface_numbers *n, int layer, int surfaces)
+{
+    for (int i = 0; i < surfaces && n->count < RENDER_MAX_ISOVALUES; i++) {
+        n->layer[n->count] = (float)layer;
+        n->surface[n->count++] = (float)i;
+    }
+}
+
+static surface_numbers number_surfaces(const scene_image *image)
+{
+    surface_numbers out = {0};
+    for (int i = 0; i < image->isosurface_count; i++)
+        add_numbers(&out, image->isosurfaces[i].number, image->isosurfaces[i].value_count);
+    for (int i = 0; i < image->surface_count; i++) add_numbers(&out, image->surfaces[i].number, 1);
+    for (int i = 0; i < image->slice_count; i++)
+        add_numbers(&out, image->slices[i].number, image->slices[i].plane_count);
+    return out;
+}
+
+/* value, isovalue's number, 0, opacity become value, layer, surface. */
+static void name_surfaces(const scene_image *image, float *values, int threads)
+{
+    const surface_numbers numbers = number_surfaces(image);
+    const int64_t pixels = (int64_t)image->width * image->height;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t p = 0; p < pixels; p++) {
+        float *pixel = values + 4 * p;
+        const int number = (int)pixel[1];
+        if (pixel[3] > 0 && number >= 0 && number < numbers.count) {
+            pixel[1] = numbers.layer[number];
+            pixel[2] = numbers.surface[number];
+        } else {
+            pixel[0] = NAN;
+            pixel[1] = pixel[2] = -1;
+        }
+    }
+}
+
+static void fill_items(session_channels *c)
+{
+    const insitu_channel items[SESSION_CHANNELS] = {{"N.X", c->normals, 4},      {"N.Y", c->normals + 1, 4},
+                                                    {"N.Z", c->normals + 2, 4},  {"value", c->values, 4},
+                                                    {"layer", c->values + 1, 4}, {"surface", c->values + 2, 4}};
+    memcpy(c->items, items, sizeof items);
+}
+
+/* ---- the whole ----------------------------------------------------------------------------------------------- */
+
+insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
+                                    const scene_image *image, const render_job *job, session_channels *out,
+                                    session_frame *taken, base_error *error)
+{
+    const size_t bytes = (size_t)image->width * (size_t)image->height * 4 * sizeof(float);
+    render_surface_layer *surfaces = base_alloc((size_t)job->surface_count * sizeof *surfaces);
+    bool has_memory = surfaces != NULL;
+    *taken = (session_frame){0};
+    if (team->rank == 0) {
+        out->normals = base_alloc(bytes);
+        out->values = base_alloc(bytes);
+        has_memory = has_memory && out->normals && out->values;
+    }
+    if (!has_memory) session_no_memory(error, 2 * (int64_t)bytes, "the data of a picture");
+    insitu_status status = session_agree(team->comm, error);
+    if (!status) {
+        const render_job opaque = opaque_job(job, surfaces);
+        status = draw_numbers(target, &opaque, RENDER_NORMALS, out->normals, taken, error);
+        if (!status) status = draw_numbers(target, &opaque, RENDER_VALUES, out->values, taken, error);
+    }
+    base_free(surfaces);
+    if (!status && team->rank == 0) {
+        name_surfaces(image, out->values, team->threads);
+        fill_items(out);
+    }
+    return status;
+}

@@ -1,0 +1,30 @@
+/* What an EXR may hold beside colours and depth: the nearest surface's normal, value and numbers. */
+#ifndef SESSION_CHANNELS_H
+#define SESSION_CHANNELS_H
+
+#include "fragment.h"
+#include "insitu/image_output.h"
+#include "render.h"
+#include "scene.h"
+#include "session_frame.h"
+#include "session_team.h"
+
+enum { SESSION_CHANNELS = 6 };
+
+typedef struct session_channels {
+    float *normals, *values; /* rank 0's, 4 floats a pixel; of values the last is the number of the surface */
+    insitu_channel items[SESSION_CHANNELS];
+} session_channels;
+
+/* Does an output of the image ask for them? */
+bool session_wants_channels(const scene_image *image);
+
+/* Draw them in two frames: the job's surfaces, all of them opaque, through the pixels' centres. taken: what the frames
+ * took is added. Collective; what is made is to be freed in any case. */
+insitu_status session_draw_channels(const session_frame_target *target, const session_team *team,
+                                    const scene_image *image, const render_job *job, session_channels *out,
+                                    session_frame *taken, base_error *error);
+
+void session_free_channels(session_channels *channels);
+
+#endif

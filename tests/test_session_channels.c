@@ -1,0 +1,180 @@
+/* The numbers that an EXR may hold beside colours: normals, values, layers and surfaces of what is nearest, by closed
+ * form on planes in a cube of every type of cell, and the same to the bit dealt at random as on one rank. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render.h"
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
+enum { NX, NY, NZ, VALUE, LAYER, SURFACE, CHANNELS };
+
+/* Layer 0 is a volume, layer 1 two planes of a slice, layer 2 two clear isosurfaces, which f colours none of; layer 3
+ * one that f colours. test_linear() is 0.3 x - 0.7 y + 0.5 z + 0.1. */
+#define SCENE(more)                                                                                                    \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n"                                         \
+    "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n" more "    layers:\n"                          \
+    "      - volume: {field: f, range: [-2, 2]}\n"                                                                     \
+    "      - slice: {field: f, range: [-2, 2], planes: [{normal: [1, 0, 0], point: [-0.4, 0, 0]},\n"                   \
+    "               {normal: [0, 0, 1], point: [0, 0, -0.3]}]}\n"                                                      \
+    "      - isosurface: {field: f, values: [0.9, 0.5], opacity: 0.25}\n"                                              \
+    "      - isosurface: {field: f, values: [-0.3], colour_by: {field: f, map: grey, discrete: 3}}\n"                  \
+    "    outputs: [{path: a.exr, data: true}]\n"
+
+typedef struct plane {
+    double normal[3], distance;
+    int layer, surface;
+    bool has_isovalue;
+    double isovalue; /* else the field at the place is the value */
+} plane;
+
+static const plane planes[] = {{{1, 0, 0}, -0.4, 1, 0, false, 0},
+                               {{0, 0, 1}, -0.3, 1, 1, false, 0},
+                               {{0.3, -0.7, 0.5}, 0.8, 2, 0, true, 0.9},
+                               {{0.3, -0.7, 0.5}, 0.4, 2, 1, true, 0.5},
+                               {{0.3, -0.7, 0.5}, -0.4, 3, 0, false, 0}};
+enum { PLANES = sizeof planes / sizeof *planes };
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The pixel's ray meets the plane there, in the cube; false where it does not. close: set where rounding decides. */
+static bool meet(const plane *p, const double base[3], const double direction[3], double *depth, bool *close)
+{
+    *depth = (p->distance - dot(p->normal, base)) / dot(p->normal, direction);
+    bool is_within = true;
+    for (int a = 0; a < 3; a++) {
+        const double place = fabs(base[a] + *depth * direction[a]);
+        *close = *close || fabs(place - 1) < 1e-4;
+        is_within = is_within && place < 1;
+    }
+    return is_within;
+}
+
+/* Normals round by some units of 6e-8; the value of a place by its gradient of 0.91 times the place's 1.5e-5, as
+ * test_session_surfaces.c derives it. */
+static bool is_as_expected(const caught_picture *picture, int pixel, const plane *p, const double place[3],
+                           const double direction[3])
+{
+    double own[CHANNELS];
+    for (int c = 0; c < CHANNELS; c++) own[c] = (double)picture->data[c * PIXELS + pixel];
+    if (!p)
+        return own[NX] == 0 && own[NY] == 0 && own[NZ] == 0 && isnan(own[VALUE]) && own[LAYER] == -1 &&
+               own[SURFACE] == -1;
+    const double length = sqrt(dot(p->normal, p->normal)) * (dot(p->normal, direction) > 0 ? -1 : 1);
+    bool is_well = own[LAYER] == p->layer && own[SURFACE] == p->surface;
+    for (int a = 0; a < 3; a++) is_well = is_well && fabs(own[NX + a] - p->normal[a] / length) < 1e-5;
+    return is_well && (p->has_isovalue ? own[VALUE] == (double)(float)p->isovalue
+                                       : fabs(own[VALUE] - test_linear(place)) < 1.5e-5);
+}
+
+static bool is_right(const caught_picture *picture)
+{
+    int hits[PLANES] = {0};
+    render_camera camera;
+    render_camera_look_at(&camera, (const double[]){3, 2.2, 4}, (const double[]){0, 0, 0}, (const double[]){0, 1, 0},
+                          40, WIDTH, HEIGHT);
+    for (int pixel = 0; pixel < PIXELS; pixel++) {
+        double base[3], direction[3], nearest = INFINITY, place[3];
+        const plane *seen = NULL;
+        bool is_close = false;
+        render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, base, direction);
+        for (int i = 0; i < PLANES; i++) {
+            double depth;
+            if (!meet(&planes[i], base, direction, &depth, &is_close) || depth > nearest + 1e-4) continue;
+            is_close = is_close || fabs(depth - nearest) < 1e-4;
+            nearest = depth;
+            seen = &planes[i];
+        }
+        if (is_close) continue;
+        for (int a = 0; a < 3; a++) place[a] = base[a] + nearest * direction[a];
+        if (seen) hits[seen - planes]++;
+        if (is_as_expected(picture, pixel, seen, place, direction)) continue;
+        fprintf(stderr, "pixel %d, plane %d:", pixel, seen ? (int)(seen - planes) : -1);
+        for (int c = 0; c < CHANNELS; c++) fprintf(stderr, " %.9g", (double)picture->data[c * PIXELS + pixel]);
+        fprintf(stderr, "; the field there is %.9g\n", test_linear(place));
+        return false;
+    }
+    for (int i = 0; i < PLANES; i++)
+        if (hits[i] < 10) return false;
+    return true;
+}
+
+static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    caught_picture picture = {0};
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+    free(picture->data);
+}
+
+static void compare(test_mesh_kind kind, const char *text)
+{
+    session_input whole = {0}, part = {0};
+    const char *scene = write_scene(text);
+    test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
+    input_describe(&whole);
+    int *owners = test_calloc((size_t)whole.part.cell_count, sizeof *owners);
+    test_partition(&whole.part, TEST_RANDOM, SIDE, rank_count, owners);
+    test_mesh_part(&whole.part, owners, own_rank, &part.part);
+    test_free(owners);
+    input_describe(&part);
+    caught_picture ours = draw(MPI_COMM_WORLD, scene, &part), alone = {0};
+    bool is_well = true;
+    if (own_rank == 0) {
+        alone = draw(MPI_COMM_SELF, scene, &whole);
+        is_well = alone.channel_count == CHANNELS && is_right(&alone) && ours.channel_count == CHANNELS &&
+                  memcmp(ours.data, alone.data, CHANNELS * PIXELS * sizeof(float)) == 0;
+        if (!is_well) fprintf(stderr, "%s\n", test_mesh_kind_name(kind));
+    }
+    everywhere(is_well);
+    free_picture(&ours);
+    free_picture(&alone);
+    input_free(&part);
+    input_free(&whole);
+}
+
+static void data_are_those_of_the_nearest_surface(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) compare(kind, SCENE(""));
+}
+
+static void samples_do_not_change_the_data(void **state)
+{
+    (void)state;
+    compare(TEST_HEXES, SCENE("    antialias: 4\n"));
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(data_are_those_of_the_nearest_surface),
+        cmocka_unit_test(samples_do_not_change_the_data),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
