@@ -17,6 +17,10 @@ static int64_t mesh_bytes(const insitu_mesh *m)
     bytes += array_bytes(&m->cell_types, m->cell_count);
     bytes += array_bytes(&m->face_offsets, m->face_count + 1);
     bytes += array_bytes(&m->face_connectivity, m->face_connectivity_count);
+    bytes += array_bytes(&m->face_sizes, m->face_count);
+    if (m->face_lists.data) bytes += m->face_count * (int64_t)sizeof(void *);
+    bytes += array_bytes(&m->owner, m->face_count);
+    bytes += array_bytes(&m->neighbour, m->neighbour_count);
     bytes += array_bytes(&m->connectivity, m->connectivity_count);
     bytes += array_bytes(&m->offsets, m->offsets.data ? m->cell_count + 1 : 0);
     return bytes + array_bytes(&m->ghosts, m->cell_count);
@@ -73,12 +77,32 @@ static void report_outer(session_report *out, const session_mesh *mesh)
     session_text_add(&out->copied_why, "mesh \"%s\": its outer faces: %lld bytes", mesh->name, (long long)bytes);
 }
 
+static void report_topology(session_report *out, const session_mesh *mesh)
+{
+    const session_topology *t = &mesh->topology;
+    const long long bytes = t->cell_bytes, face_bytes = t->face_bytes;
+    out->numbers.cells_recognised += t->recognised_count;
+    out->numbers.bytes_copied += t->cell_bytes + t->face_bytes;
+    if (t->recognised_count)
+        session_text_add(&out->copied_why,
+                         "mesh \"%s\": %lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that "
+                         "their faces make: %lld bytes",
+                         mesh->name, (long long)t->recognised_count, (long long)t->polyhedron_count, bytes);
+    else if (bytes)
+        session_text_add(&out->copied_why, "mesh \"%s\": its cells' faces, by owner and neighbour: %lld bytes",
+                         mesh->name, bytes);
+    if (face_bytes)
+        session_text_add(&out->copied_why, "mesh \"%s\": its faces' vertices, out of lists: %lld bytes", mesh->name,
+                         face_bytes);
+}
+
 static void report_mesh(session_report *out, const session_mesh *mesh)
 {
     insitu_report *report = &out->numbers;
     int64_t unusable = 0;
     report->cells += mesh->given.cell_count;
     report->bytes_borrowed += mesh_bytes(&mesh->given);
+    report_topology(out, mesh);
     if (!mesh->is_check_stale) {
         report->cells_ghost += mesh->ghost_count;
         report->cells_inverted += mesh->inverted_count;

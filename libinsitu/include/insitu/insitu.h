@@ -101,19 +101,45 @@ typedef struct insitu_mesh {
                                     is connectivity_count. Not needed where all cells are of one type that is
                                     neither INSITU_POLYHEDRON nor INSITU_POLYGON. */
     /* Faces of polyhedra: given where there are any. A polyhedron's entries in connectivity are its faces' indices from
-     * 0, at least 4, in any order; a face between two polyhedra is the same one in both. The faces of a cell must
-     * make a closed surface: along every edge two of them meet, once each (an edge from a vertex to itself is none, so
-     * a face may repeat a vertex beside itself, or be one vertex). Which way round a face runs is nothing. No copy of
-     * them is kept: a frame holds those under way alone, about 200 bytes a vertex of each, 16 MiB a thread at most. */
+     * index_base, at least 4, in any order; a face between two polyhedra is the same one in both. The faces of a cell
+     * must make a closed surface: along every edge two of them meet, once each (an edge from a vertex to itself is
+     * none, so a face may repeat a vertex beside itself, or be one vertex). Which way round a face runs is nothing. No
+     * copy of them is kept but what keep_polyhedra and face_lists say: a frame holds those under way alone, about 200
+     * bytes a vertex of each, 16 MiB a thread at most. */
     int64_t face_count;
     insitu_array face_offsets;       /* int32 or int64, face_count + 1: where each face begins in face_connectivity */
     int64_t face_connectivity_count; /* elements in face_connectivity */
-    insitu_array face_connectivity;  /* int32 or int64, face_connectivity_count: the faces' vertex indices from 0, at
-                                        least 3 a face, around it in either direction, beginning anywhere */
+    insitu_array face_connectivity;  /* int32 or int64, face_connectivity_count: the faces' vertex indices from
+                                        index_base, at least 3 a face, around it in either direction, beginning
+                                        anywhere */
     insitu_array ghosts;             /* optional, uint8, cell_count: cells with a nonzero flag are not drawn */
     unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
-    int index_base;                  /* 0 by default, or 1, as Fortran counts: what the first vertex, face and element
-                                        are called in connectivity, offsets, face_offsets and face_connectivity */
+    int index_base;                  /* 0 by default, or 1, as Fortran counts: what the first vertex, face, cell and
+                                        element are called in connectivity, offsets, face_offsets, face_connectivity,
+                                        face_lists, owner and neighbour */
+    /* Instead of connectivity, offsets and cell_types (not given then), cell_type being INSITU_POLYHEDRON: each face's
+     * cells, as codes of finite volumes have them (docs/finite_volume.md). The faces' vertices stay where they are; the
+     * library makes, once for each topology, the faces of each cell, in the order of their numbers: 4 bytes a cell and
+     * up to 8 a face (twice that where there are more than 2^31 of them), in bytes_copied. */
+    insitu_array owner;      /* int32 or int64, face_count: the cell on one side of each face */
+    int64_t neighbour_count; /* elements in neighbour; at most face_count */
+    insitu_array neighbour;  /* int32 or int64, neighbour_count: the cell on the other side of each face, another than
+                                the owner. Faces on the boundary have -1 (or 0 where index_base is 1), or are the last
+                                ones, beyond neighbour_count. */
+    /* Instead of face_offsets and face_connectivity (not given then): a list of vertices for each face. They are copied
+     * into one array, once for each topology, and held as long as polyhedra are drawn by them: 4 bytes a face and 4 a
+     * vertex of each, in bytes_copied. */
+    insitu_array face_sizes; /* int32 or int64, face_count: how many vertices each face has */
+    insitu_array face_lists; /* face_count pointers, each to so many vertex indices, packed, of the type given here:
+                                int32 or int64. stride_bytes is from pointer to pointer; 0: packed */
+    /* A polyhedron whose faces make a tet, hex, wedge or pyramid is drawn as that, whichever way its faces run; 1
+     * leaves it as it is. Told in cells_recognised. What is seen differs inside of such cells alone: the field is
+     * trilinear in a hex, and linear on 24 tets about its centre in the polyhedron. Faces of four vertices are bilinear
+     * patches in both, warped or not, so that no seam is left beside true polyhedra. A hex that is folded, or of which
+     * a corner is pushed in, is better left. Held, in bytes_copied: 32 bytes a hex, 4 a face of each polyhedron that
+     * stays, and, unless all cells are of one type, 5 a cell; twice as much where there are more than 2^31 vertices or
+     * faces. */
+    int keep_polyhedra; /* 0 by default, or 1 */
 } insitu_mesh;
 
 /* Whether a field has one value a vertex or one a cell. Of cells, volumes and colours show each value as it is, unless
@@ -153,17 +179,18 @@ typedef struct insitu_report {
     int64_t cells_inverted; /* drawn right all the same: left-handed, by the sign of the corner volumes' sum */
     int64_t cells_flat; /* of no volume, not drawn: the corner volumes, each without its sign, sum to nothing beside the
                            cell's box (at most 1.4e-14, rounding); polyhedra where all of one is in a plane. */
-    int64_t cells_shell; /* triangles, quads and polygons, which layers of outer surfaces show */
-    int64_t rays;       /* primary rays traced */
-    int64_t fragments;  /* sent to pixel owners, own ones included */
-    int64_t map_failures;   /* inverse maps that did not converge and fell back to linear interpolation */
-    int64_t bytes_borrowed; /* of the caller's arrays in use */
-    int64_t bytes_copied;   /* of the caller's data held in copies, with reasons in copied_why */
-    int64_t bytes_trees;    /* of all trees held */
-    int64_t bytes_pictures; /* of the last picture, kept on rank 0 for the next one; at most 64 MiB */
-    int64_t bytes_peak;     /* most bytes the library held at once in this step */
-    const char *copied_why; /* "" or a list of what was copied and why; valid until the next step */
-    const char *left_out;   /* "" or a list of what the scene does not need and was not computed; as above */
+    int64_t cells_shell;      /* triangles, quads and polygons, which layers of outer surfaces show */
+    int64_t cells_recognised; /* polyhedra drawn as the tets, hexes, wedges or pyramids that their faces make */
+    int64_t rays;             /* primary rays traced */
+    int64_t fragments;        /* sent to pixel owners, own ones included */
+    int64_t map_failures;     /* inverse maps that did not converge and fell back to linear interpolation */
+    int64_t bytes_borrowed;   /* of the caller's arrays in use */
+    int64_t bytes_copied;     /* of the caller's data held in copies, with reasons in copied_why */
+    int64_t bytes_trees;      /* of all trees held */
+    int64_t bytes_pictures;   /* of the last picture, kept on rank 0 for the next one; at most 64 MiB */
+    int64_t bytes_peak;       /* most bytes the library held at once in this step */
+    const char *copied_why;   /* "" or a list of what was copied and why; valid until the next step */
+    const char *left_out;     /* "" or a list of what the scene does not need and was not computed; as above */
     const char *warnings; /* "" or one warning a line; as above. Told where it begins to be true, and again when it has
                              ceased to be in between; but the scene file's broken edit, and counts of this rank's
                              cells with values that are not finite, at every step. Others than these are the same on

@@ -14,6 +14,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_tally.h"
+#include "session_topology.h"
 
 /* ---- polyhedra -----------------------------------------------------------------------------------------------
  *
@@ -80,7 +81,7 @@ static face_fault check_face(const session_mesh *mesh, bool is_ghost, face_place
     const grid *g = &mesh->cells;
     if (place->face < 0 || place->face >= g->face_count) return FACE_BAD_INDEX;
     grid_face_vertices(g, place->face, &place->first, &place->next);
-    if (place->first < 0 || place->next < place->first || place->next > mesh->given.face_connectivity_count)
+    if (place->first < 0 || place->next < place->first || place->next > mesh->topology.face_connectivity_count)
         return FACE_BAD_OFFSETS;
     if (place->next - place->first < 3) return FACE_TOO_SMALL;
     for (int64_t i = place->first; i < place->next; i++) {
@@ -165,7 +166,7 @@ static insitu_status describe_faces(const session_mesh *mesh, int64_t cell, face
                          "mesh \"%s\": cell %lld (polyhedron): face %lld: offsets %lld and %lld do not rise within "
                          "%lld..%lld",
                          name, at, face, place->first + base, place->next + base, base,
-                         mesh->given.face_connectivity_count + base);
+                         mesh->topology.face_connectivity_count + base);
     case FACE_TOO_SMALL:
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (polyhedron): face %lld has %lld vertices, at least 3 are needed",
@@ -221,7 +222,7 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     if (!grid_has_faces(g) || !g->offsets.data) return BAD_TYPE;
     place->first = grid_array_index(&g->offsets, cell);
     place->next = grid_array_index(&g->offsets, cell + 1);
-    if (place->first < 0 || place->next > mesh->given.connectivity_count || place->next < place->first)
+    if (place->first < 0 || place->next > mesh->topology.connectivity_count || place->next < place->first)
         return BAD_OFFSETS;
     place->fault_of_faces = check_faces(mesh, cell, room, &place->faces);
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
@@ -255,7 +256,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     if (g->offsets.data) {
         place->first = grid_array_index(&g->offsets, cell);
         place->next = grid_array_index(&g->offsets, cell + 1);
-        if (place->first < 0 || place->next > mesh->given.connectivity_count || place->next < place->first ||
+        if (place->first < 0 || place->next > mesh->topology.connectivity_count || place->next < place->first ||
             place->next - place->first != count)
             return BAD_OFFSETS;
     }
@@ -308,11 +309,11 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
         place->next < place->first
             ? "mesh \"%s\": cell %lld (%s): offsets fall from %lld to %lld; a cell of its type has %d vertices"
             : "mesh \"%s\": cell %lld (%s): offsets %lld and %lld do not lie %d apart, the vertices of its type";
-    if (place->first < 0 || (next >= first && place->next > mesh->given.connectivity_count))
+    if (place->first < 0 || (next >= first && place->next > mesh->topology.connectivity_count))
         return base_fail(error, INSITU_ERROR_MESH,
                          "mesh \"%s\": cell %lld (%s): offsets %lld and %lld are outside %lld..%lld", mesh->name,
                          (long long)cell, type_name(place->type), first, next, base,
-                         mesh->given.connectivity_count + base);
+                         mesh->topology.connectivity_count + base);
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
     return base_fail(error, INSITU_ERROR_MESH, format, mesh->name, (long long)cell, type_name(place->type), first, next,
@@ -397,10 +398,10 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
     const grid *g = &mesh->cells;
     if (!g->offsets.data || g->cell_count == 0) return INSITU_OK;
     const int64_t last = grid_array_index(&g->offsets, g->cell_count);
-    if (last == mesh->given.connectivity_count) return INSITU_OK;
+    if (last == mesh->topology.connectivity_count) return INSITU_OK;
     const long long base = mesh->given.index_base;
     return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": the last offset is %lld, not connectivity_count%s, %lld",
-                     mesh->name, last + base, base ? " + 1" : "", mesh->given.connectivity_count + base);
+                     mesh->name, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
 }
 
 /* The squares and volumes of larger ones, and what follows from them, would leave double. */
@@ -464,7 +465,7 @@ static insitu_status update_flat(session_mesh *mesh, int64_t count, int threads,
     return INSITU_OK;
 }
 
-static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
+static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error *error)
 {
     mesh_tally tally = tally_empty();
     const int64_t bad = check_cells(mesh, threads, &tally);
@@ -484,6 +485,15 @@ static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *err
     mesh->size_sum = tally.sizes;
     mesh->is_check_stale = false;
     return INSITU_OK;
+}
+
+/* Where cells are wrong, what was made of them is forgotten: the caller may right them in place. */
+static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
+{
+    if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;
+    const insitu_status status = check_cells_of(mesh, threads, error);
+    if (status) session_drop_topology(&mesh->topology);
+    return status;
 }
 
 insitu_status session_check_meshes(const session_meshes *meshes, const session_team *team, base_error *error)

@@ -33,6 +33,21 @@ void session_drop_tree(session_mesh *mesh)
     }
 }
 
+static void free_array(const grid_array *array)
+{
+    base_free((void *)(uintptr_t)array->data);
+}
+
+void session_drop_topology(session_topology *topology)
+{
+    free_array(&topology->offsets);
+    free_array(&topology->connectivity);
+    base_free(topology->cell_types);
+    free_array(&topology->face_offsets);
+    free_array(&topology->face_connectivity);
+    *topology = (session_topology){0};
+}
+
 void session_drop_fields(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->field_count; i++) base_free((void *)(uintptr_t)mesh->fields[i].given.name);
@@ -113,6 +128,7 @@ void session_drop_contents(session_mesh *mesh)
     session_drop_scalars(mesh);
     session_drop_tree(mesh);
     session_drop_fields(mesh);
+    session_drop_topology(&mesh->topology);
     base_free(mesh->flat);
     mesh->flat = NULL;
 }

@@ -90,10 +90,27 @@ typedef struct session_outer {
     int64_t bytes;
 } session_outer;
 
+/* Arrays of the session's own that are read in place of the caller's (session_topology.h). They are made once for each
+ * topology, and are declared copies. */
+typedef struct session_topology {
+    bool is_made;                     /* of the cells of now, be it that nothing had to be made */
+    bool has_own_cells;               /* those next are read, else the caller's */
+    grid_array offsets, connectivity; /* no offsets: all cells are of cell_type */
+    unsigned char *cell_types;        /* NULL: all cells are of cell_type */
+    int cell_type;
+    bool has_own_faces;                                  /* those next are read, else the caller's */
+    grid_array face_offsets, face_connectivity;          /* no data: there are no polyhedra */
+    int64_t connectivity_count, face_connectivity_count; /* of the arrays that are read, whosever they are */
+    int64_t cell_bytes, face_bytes;
+    int64_t polyhedron_count; /* of the caller's */
+    int64_t recognised_count; /* of them: read as tets, hexes, wedges or pyramids */
+} session_topology;
+
 /* One rank's part of a mesh. */
 typedef struct session_mesh {
     char *name;
     insitu_mesh given;
+    session_topology topology;
     grid cells;
     bool is_given;      /* false after an insitu_set_mesh() that failed: problem says why */
     base_error problem; /* of the last insitu_set_mesh() */
@@ -155,6 +172,7 @@ void session_remove_mesh(session_meshes *meshes, const char *name);
 /* Free what depends on the fields' values, on the cells, or all that is known of the mesh. */
 void session_drop_scalars(session_mesh *mesh);
 void session_drop_tree(session_mesh *mesh);
+void session_drop_topology(session_topology *topology);
 void session_drop_fields(session_mesh *mesh);
 /* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */
 void session_drop_outer(session_outer *outer, bool with_faces);

@@ -8,6 +8,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_topology.h"
 
 void insitu_mesh_defaults(insitu_mesh *mesh)
 {
@@ -105,16 +106,18 @@ static insitu_status check_counts(const insitu_mesh *mesh, base_error *error)
     if (!status) status = check_count("connectivity_count", mesh->connectivity_count, INT64_MAX / 32, error);
     if (!status) status = check_count("face_count", mesh->face_count, INT64_MAX / 32, error);
     if (!status) status = check_count("face_connectivity_count", mesh->face_connectivity_count, INT64_MAX / 32, error);
+    if (!status) status = check_count("neighbour_count", mesh->neighbour_count, INT64_MAX / 32, error);
     return status;
 }
 
 static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
 {
-    const insitu_array *const arrays[] = {&mesh->coordinates[0],   &mesh->coordinates[1], &mesh->coordinates[2],
-                                          &mesh->vertex_ids,       &mesh->cell_types,     &mesh->connectivity,
-                                          &mesh->offsets,          &mesh->ghosts,         &mesh->face_offsets,
-                                          &mesh->face_connectivity};
-    const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count;
+    const insitu_array *const arrays[] = {
+        &mesh->coordinates[0], &mesh->coordinates[1], &mesh->coordinates[2],   &mesh->vertex_ids,   &mesh->cell_types,
+        &mesh->connectivity,   &mesh->offsets,        &mesh->ghosts,           &mesh->face_offsets, &mesh->face_sizes,
+        &mesh->owner,          &mesh->neighbour,      &mesh->face_connectivity};
+    const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count, faces = mesh->face_count;
+    const bool has_lists = mesh->face_lists.data != NULL;
     const array_rule rules[] = {
         {"x coordinates", vertices, ALLOW_FLOATS, false},
         {"y coordinates", vertices, ALLOW_FLOATS, false},
@@ -124,7 +127,10 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
         {"connectivity indices", mesh->connectivity_count, ALLOW_INTEGERS, false},
         {"offsets", cells, ALLOW_INTEGERS, true},
         {"ghost flags", cells, ALLOW_BYTES, true},
-        {"face offsets", mesh->face_count, ALLOW_INTEGERS, false},
+        {"face offsets", faces, ALLOW_INTEGERS, has_lists},
+        {"face sizes", faces, ALLOW_INTEGERS, !has_lists},
+        {"owners of faces", faces, ALLOW_INTEGERS, true},
+        {"neighbours of faces", mesh->neighbour_count, ALLOW_INTEGERS, false},
         {"face vertex indices", mesh->face_connectivity_count, ALLOW_INTEGERS, false},
     };
     for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
@@ -134,20 +140,75 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
+/* An array of pointers: its type is that of what they point to. */
+static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error)
+{
+    const insitu_array *lists = &mesh->face_lists;
+    if (!lists->data) {
+        if (!mesh->face_sizes.data) return INSITU_OK;
+        return base_fail(error, INSITU_ERROR_MESH, "face sizes are given, and face lists are not");
+    }
+    if (mesh->face_offsets.data || mesh->face_connectivity.data)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "face lists and %s are given: faces have their vertices by one of them",
+                         mesh->face_offsets.data ? "face offsets" : "face vertex indices");
+    if (!is_allowed(lists->type, ALLOW_INTEGERS))
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "face lists are of element type %d, not int32 or int64",
+                         (int)lists->type);
+    const long long size = sizeof(void *);
+    if (lists->stride_bytes % size != 0)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "face lists have a stride of %lld bytes, no multiple of a pointer's %lld",
+                         (long long)lists->stride_bytes, size);
+    if ((uintptr_t)lists->data % (uintptr_t)size != 0)
+        return base_fail(error, INSITU_ERROR_MESH, "face lists are not aligned to a pointer's %lld bytes", size);
+    return INSITU_OK;
+}
+
+/* Cells that have their faces by owner and neighbour have them by nothing else. */
+static insitu_status check_owner(const insitu_mesh *mesh, base_error *error)
+{
+    if (!mesh->owner.data) {
+        if (!mesh->neighbour.data) return INSITU_OK;
+        return base_fail(error, INSITU_ERROR_MESH, "neighbours of faces are given, and owners are not");
+    }
+    if (mesh->neighbour_count > mesh->face_count)
+        return base_fail(error, INSITU_ERROR_MESH, "neighbour_count is %lld, more than face_count, %lld",
+                         (long long)mesh->neighbour_count, (long long)mesh->face_count);
+    if (mesh->cell_type != INSITU_POLYHEDRON)
+        return base_fail(error, INSITU_ERROR_MESH, "cell_type is %d, owners of faces are for %d, polyhedra",
+                         (int)mesh->cell_type, (int)INSITU_POLYHEDRON);
+    const char *other = mesh->connectivity.data ? "connectivity indices"
+                        : mesh->offsets.data    ? "offsets"
+                        : mesh->cell_types.data ? "cell types"
+                                                : NULL;
+    if (other)
+        return base_fail(error, INSITU_ERROR_MESH, "owners of faces and %s are given: cells are made of one of them",
+                         other);
+    return INSITU_OK;
+}
+
+static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
 {
     if (mesh->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", mesh->changed);
     if (mesh->index_base != 0 && mesh->index_base != 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "index_base is %d, expected 0 or 1", mesh->index_base);
-    if (mesh->cell_count == 0) return INSITU_OK;
+    if (mesh->keep_polyhedra != 0 && mesh->keep_polyhedra != 1)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "keep_polyhedra is %d, expected 0 or 1", mesh->keep_polyhedra);
+    return INSITU_OK;
+}
+
+static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
+{
+    if (mesh->cell_count == 0 || mesh->owner.data) return INSITU_OK;
     if (mesh->cell_types.data) {
         if (!mesh->offsets.data)
             return base_fail(error, INSITU_ERROR_MESH, "offsets are not given, cell types are: mixed cells need both");
         return INSITU_OK;
     }
     if (mesh->cell_type == INSITU_POLYHEDRON && !mesh->offsets.data)
-        return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polyhedra need them");
+        return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polyhedra need them, or owners of faces");
     if (mesh->cell_type == INSITU_POLYGON && !mesh->offsets.data)
         return base_fail(error, INSITU_ERROR_MESH, "offsets are not given: polygons need them");
     if (mesh->cell_type == INSITU_POLYHEDRON || mesh->cell_type == INSITU_POLYGON) return INSITU_OK;
@@ -168,42 +229,11 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
 {
     insitu_status status = check_counts(mesh, error);
     if (!status) status = check_arrays(mesh, error);
+    if (!status) status = check_choices(mesh, error);
+    if (!status) status = check_face_lists(mesh, error);
+    if (!status) status = check_owner(mesh, error);
     if (!status) status = check_shape(mesh, error);
     return status;
-}
-
-static grid_array as_grid_array(const insitu_array *array)
-{
-    grid_array out = {0};
-    if (!array->data) return out;
-    out.data = array->data;
-    out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
-    out.is_wide = session_type_size(array->type) == 8;
-    out.is_integer = array->type == INSITU_INT32 || array->type == INSITU_INT64;
-    return out;
-}
-
-static grid as_grid(const insitu_mesh *mesh)
-{
-    grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
-    for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = as_grid_array(&mesh->coordinates[axis]);
-    g.connectivity = as_grid_array(&mesh->connectivity);
-    g.offsets = as_grid_array(&mesh->offsets);
-    g.face_count = mesh->face_count;
-    g.face_offsets = as_grid_array(&mesh->face_offsets);
-    g.face_connectivity = as_grid_array(&mesh->face_connectivity);
-    g.connectivity.base = g.offsets.base = g.face_offsets.base = g.face_connectivity.base = mesh->index_base;
-    if (mesh->cell_types.data) {
-        const grid_array types = as_grid_array(&mesh->cell_types);
-        g.cell_types = types.data;
-        g.cell_types_stride = types.stride;
-        g.cell_types_bytes = (int)session_type_size(mesh->cell_types.type);
-    }
-    if (mesh->ghosts.data) {
-        g.ghosts = mesh->ghosts.data;
-        g.ghosts_stride = mesh->ghosts.stride_bytes ? mesh->ghosts.stride_bytes : 1;
-    }
-    return g;
 }
 
 /* Whether cells differ, whatever the caller says of them. */
@@ -213,12 +243,14 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            a->connectivity_count != b->connectivity_count || a->cell_type != b->cell_type ||
            a->index_base != b->index_base || !a->cell_types.data != !b->cell_types.data ||
            !a->offsets.data != !b->offsets.data || !a->ghosts.data != !b->ghosts.data ||
-           a->face_count != b->face_count || a->face_connectivity_count != b->face_connectivity_count;
+           a->face_count != b->face_count || a->face_connectivity_count != b->face_connectivity_count ||
+           a->neighbour_count != b->neighbour_count || a->keep_polyhedra != b->keep_polyhedra ||
+           !a->owner.data != !b->owner.data || !a->face_lists.data != !b->face_lists.data;
 }
 
 static bool is_same_array(const insitu_array *a, const insitu_array *b)
 {
-    const grid_array x = as_grid_array(a), y = as_grid_array(b);
+    const grid_array x = session_grid_array(a), y = session_grid_array(b);
     return x.data == y.data && x.stride == y.stride && (!x.data || a->type == b->type);
 }
 
@@ -226,11 +258,13 @@ static bool is_same_array(const insitu_array *a, const insitu_array *b)
  * are read otherwise, hold what nobody has looked at. */
 static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
 {
-    bool has_same_cells = is_same_array(&a->cell_types, &b->cell_types) &&
-                          is_same_array(&a->connectivity, &b->connectivity) &&
-                          is_same_array(&a->offsets, &b->offsets) && is_same_array(&a->ghosts, &b->ghosts) &&
-                          is_same_array(&a->face_offsets, &b->face_offsets) &&
-                          is_same_array(&a->face_connectivity, &b->face_connectivity);
+    bool has_same_cells =
+        is_same_array(&a->cell_types, &b->cell_types) && is_same_array(&a->connectivity, &b->connectivity) &&
+        is_same_array(&a->offsets, &b->offsets) && is_same_array(&a->ghosts, &b->ghosts) &&
+        is_same_array(&a->face_offsets, &b->face_offsets) &&
+        is_same_array(&a->face_connectivity, &b->face_connectivity) && is_same_array(&a->face_sizes, &b->face_sizes) &&
+        is_same_array(&a->face_lists, &b->face_lists) && is_same_array(&a->owner, &b->owner) &&
+        is_same_array(&a->neighbour, &b->neighbour);
     bool has_same_vertices = is_same_array(&a->vertex_ids, &b->vertex_ids);
     for (int axis = 0; axis < 3; axis++)
         has_same_vertices = has_same_vertices && is_same_array(&a->coordinates[axis], &b->coordinates[axis]);
@@ -251,6 +285,7 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
     if (changed & INSITU_CHANGED_TOPOLOGY) {
         session_drop_scalars(mesh);
         session_drop_tree(mesh);
+        session_drop_topology(&mesh->topology);
         mesh->rent = 0;
         mesh->is_topology_stale = true;
     }
@@ -263,8 +298,7 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
         for (int i = 0; i < mesh->scalar_count; i++) mesh->scalars[i].are_values_stale = true;
     }
     mesh->given = *given;
-    mesh->cells = as_grid(given);
-    mesh->cells.flat = mesh->flat;
+    session_read_topology(mesh);
     mesh->is_given = true;
     mesh->problem = (base_error){0};
 }
@@ -386,7 +420,7 @@ static void take_field(session_meshes *meshes, session_mesh *mesh, int index, co
     const char *name = field->given.name;
     field->given = *given;
     field->given.name = name;
-    field->values = as_grid_array(&given->values);
+    field->values = session_grid_array(&given->values);
     const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
     if (given->values.stride_bytes == 0) field->values.stride = size * given->component_count;
     field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;

@@ -68,6 +68,11 @@ MMBVH_INLINE double signed_volume(int type, double points[][3])
     return sum / of.shares;
 }
 
+double tally_signed_volume(int type, double points[][3])
+{
+    return signed_volume(type, points);
+}
+
 /* What rounding may leave of a cell without volume, of its box's volume ex ey ez. With u = 2^-53: a determinant is six
  * products of one component along each axis, none longer than the box, and each passes at most 8 roundings (3 of edges,
  * 2 of products, 3 of sums), so it is off by 48 u of the box at most. n of them sum with n - 1 roundings more of 6 of
@@ -243,7 +248,7 @@ MMBVH_INLINE bool offsets_are_good(const session_mesh *mesh, int64_t cell, int c
     const grid_array *offsets = &mesh->cells.offsets;
     if (!offsets->data) return true;
     const int64_t first = grid_array_index(offsets, cell), next = grid_array_index(offsets, cell + 1);
-    return first >= 0 && next <= mesh->given.connectivity_count && next - first == count;
+    return first >= 0 && next <= mesh->topology.connectivity_count && next - first == count;
 }
 
 /* The vertices' positions; false where an index is out of range or, of a drawn cell, a coordinate is not finite. */

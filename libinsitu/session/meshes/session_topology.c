@@ -1,0 +1,591 @@
+/* The rooms below the session read cells -> faces -> vertices. Codes of finite volumes hold faces -> vertices and, of
+ * each face, the cell that owns it and the neighbour beyond. What lies between is built here, once for each topology:
+ * the faces of each cell, in the order of their numbers. Which way round a face runs means nothing below, and so
+ * nothing is turned. The faces' vertices are read where they are; only where each face has a list of its own are they
+ * brought together.
+ *
+ * A polyhedron of six quads may be a hex, which is drawn in a fraction of the time. It is recognised by its faces
+ * alone, never by coordinates: all ranks that have the cell take it for the same, and so does every step of a mesh that
+ * moves.
+ *
+ *      t3 ------ t2      The base is any face of the right size. The face on the other side of each of its edges
+ *      /|        /|      is a side, which tells what stands above the edge's ends: t0 and t1 above a0 and a1. If
+ *     / |       / |      neighbouring sides agree in what is above the vertex between them, if the one face that is
+ *   t0 ------ t1  |      left goes around the tops in their order, and if no two vertices are the same, then every
+ *    | a3 -----|- a2     face has its place and every edge is one of two faces: the cell is closed, and is a hex
+ *    | /       | /       (base of 4), or a wedge (base of 3). Sides that are triangles have one top, of a pyramid or a
+ *    |/        |/        tet. The faces' own directions are not asked.
+ *   a0 ------ a1
+ *
+ * Whatever is wrong with any cell, nothing is recognised in the mesh, so that session_check.c finds it in the caller's
+ * own terms. */
+#include "session_topology.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_tally.h"
+
+/* ---- arrays --------------------------------------------------------------------------------------------------- */
+
+grid_array session_grid_array(const insitu_array *array)
+{
+    grid_array out = {0};
+    if (!array->data) return out;
+    out.data = array->data;
+    out.stride = array->stride_bytes ? array->stride_bytes : session_type_size(array->type);
+    out.is_wide = session_type_size(array->type) == 8;
+    out.is_integer = array->type == INSITU_INT32 || array->type == INSITU_INT64;
+    return out;
+}
+
+static grid_array index_array(const insitu_mesh *mesh, const insitu_array *array)
+{
+    grid_array out = session_grid_array(array);
+    out.base = mesh->index_base;
+    return out;
+}
+
+static grid as_grid(const insitu_mesh *mesh)
+{
+    grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
+    for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_grid_array(&mesh->coordinates[axis]);
+    g.connectivity = index_array(mesh, &mesh->connectivity);
+    g.offsets = index_array(mesh, &mesh->offsets);
+    g.face_count = mesh->face_count;
+    g.face_offsets = index_array(mesh, &mesh->face_offsets);
+    g.face_connectivity = index_array(mesh, &mesh->face_connectivity);
+    if (mesh->cell_types.data) {
+        const grid_array types = session_grid_array(&mesh->cell_types);
+        g.cell_types = types.data;
+        g.cell_types_stride = types.stride;
+        g.cell_types_bytes = (int)session_type_size(mesh->cell_types.type);
+    }
+    if (mesh->ghosts.data) {
+        g.ghosts = mesh->ghosts.data;
+        g.ghosts_stride = mesh->ghosts.stride_bytes ? mesh->ghosts.stride_bytes : 1;
+    }
+    return g;
+}
+
+void session_read_topology(session_mesh *mesh)
+{
+    session_topology *t = &mesh->topology;
+    grid g = as_grid(&mesh->given);
+    if (t->has_own_cells) {
+        g.offsets = t->offsets;
+        g.connectivity = t->connectivity;
+        g.cell_types = (const char *)t->cell_types;
+        g.cell_types_stride = g.cell_types_bytes = 1;
+        g.cell_type = t->cell_type;
+    } else {
+        t->connectivity_count = mesh->given.connectivity_count;
+    }
+    if (t->has_own_faces) {
+        g.face_offsets = t->face_offsets;
+        g.face_connectivity = t->face_connectivity;
+    } else {
+        t->face_connectivity_count = mesh->given.face_connectivity_count;
+    }
+    g.flat = mesh->flat;
+    mesh->cells = g;
+}
+
+/* Room for indices up to largest, as narrow as they can be. False where memory runs out. */
+static bool make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
+                         base_error *error)
+{
+    const bool is_wide = largest > INT32_MAX;
+    const int64_t size = is_wide ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);
+    const void *data = base_calloc((size_t)count + 1, (size_t)size);
+    if (!data) {
+        base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->name,
+                  (long long)((count + 1) * size), what);
+        return false;
+    }
+    *out = (grid_array){data, size, is_wide, true, 0};
+    return true;
+}
+
+static void put_index(const grid_array *array, int64_t i, int64_t value)
+{
+    char *p = (char *)(uintptr_t)array->data + i * array->stride;
+    if (array->is_wide)
+        *(int64_t *)(void *)p = value;
+    else
+        *(int32_t *)(void *)p = (int32_t)value;
+}
+
+static void free_indices(grid_array *array)
+{
+    base_free((void *)(uintptr_t)array->data);
+    *array = (grid_array){0};
+}
+
+/* ---- faces' vertices out of lists ----------------------------------------------------------------------------- */
+
+static const void *list_of_face(const insitu_mesh *mesh, int64_t face)
+{
+    const int64_t stride = mesh->face_lists.stride_bytes ? mesh->face_lists.stride_bytes : (int64_t)sizeof(void *);
+    return *(const void *const *)(const void *)((const char *)mesh->face_lists.data + face * stride);
+}
+
+/* How many vertices all faces have, -1 where a list is none. */
+static int64_t count_listed(const session_mesh *mesh, base_error *error)
+{
+    const insitu_mesh *given = &mesh->given;
+    const grid_array sizes = session_grid_array(&given->face_sizes);
+    const int64_t most = INT64_MAX / 32;
+    int64_t total = 0;
+    for (int64_t face = 0; face < given->face_count; face++) {
+        const int64_t size = grid_array_index(&sizes, face);
+        const long long at = face + given->index_base;
+        if (size < 0 || size > most - total) {
+            base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its size is %lld", mesh->name, at,
+                      (long long)size);
+            return -1;
+        }
+        if (size > 0 && !list_of_face(given, face)) {
+            base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its list is NULL, its size %lld", mesh->name,
+                      at, (long long)size);
+            return -1;
+        }
+        total += size;
+    }
+    return total;
+}
+
+static insitu_status copy_lists(session_mesh *mesh, base_error *error)
+{
+    const insitu_mesh *given = &mesh->given;
+    session_topology *t = &mesh->topology;
+    const grid_array sizes = session_grid_array(&given->face_sizes);
+    const int64_t total = count_listed(mesh, error), base = given->index_base;
+    int64_t at = 0;
+    t->has_own_faces = true;
+    if (total < 0 || !make_indices(mesh, "faces' offsets", given->face_count, total, &t->face_offsets, error) ||
+        !make_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
+        return error->status;
+    insitu_array list = {NULL, given->face_lists.type, 0};
+    for (int64_t face = 0; face < given->face_count; face++) {
+        const int64_t size = grid_array_index(&sizes, face);
+        list.data = list_of_face(given, face);
+        const grid_array vertices = index_array(given, &list);
+        for (int64_t i = 0; i < size; i++) {
+            const int64_t vertex = grid_array_index(&vertices, i);
+            if (vertex < 0 || vertex >= given->vertex_count)
+                return base_fail(error, INSITU_ERROR_MESH,
+                                 "mesh \"%s\": face %lld: vertex index %lld is outside %lld..%lld (index_base is %lld)",
+                                 mesh->name, (long long)(face + base), (long long)(vertex + base), (long long)base,
+                                 (long long)(given->vertex_count - 1 + base), (long long)base);
+            put_index(&t->face_connectivity, at++, vertex);
+        }
+        put_index(&t->face_offsets, face + 1, at);
+    }
+    t->face_connectivity_count = total;
+    t->face_bytes = (given->face_count + 1) * t->face_offsets.stride + (total + 1) * t->face_connectivity.stride;
+    return INSITU_OK;
+}
+
+/* ---- cells' faces out of owner and neighbour ------------------------------------------------------------------ */
+
+/* The two cells of a face; cells[1] is -1 of a boundary's. */
+typedef struct face_sides {
+    const insitu_mesh *given;
+    grid_array owner, neighbour;
+} face_sides;
+
+static void sides_of(const face_sides *sides, int64_t face, int64_t cells[2])
+{
+    cells[0] = grid_array_index(&sides->owner, face);
+    cells[1] = -1;
+    if (face >= sides->given->neighbour_count) return;
+    cells[1] = grid_array_index(&sides->neighbour, face);
+    if (cells[1] + sides->given->index_base == -1) cells[1] = -1;
+}
+
+static insitu_status check_sides(const session_mesh *mesh, int64_t face, const int64_t cells[2], base_error *error)
+{
+    const long long base = mesh->given.index_base, last = mesh->given.cell_count - 1 + base, at = face + base;
+    if (cells[0] < 0 || cells[0] > last - base)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": face %lld: its owner %lld is outside %lld..%lld (index_base is %lld)",
+                         mesh->name, at, cells[0] + base, base, last, base);
+    if (cells[1] < -1 || cells[1] > last - base)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "mesh \"%s\": face %lld: its neighbour %lld is outside %lld..%lld (index_base is %lld), and "
+                         "not %lld as of a boundary's face",
+                         mesh->name, at, cells[1] + base, base, last, base, base - 1);
+    if (cells[0] == cells[1])
+        return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its owner and its neighbour are both %lld",
+                         mesh->name, at, cells[0] + base);
+    return INSITU_OK;
+}
+
+/* offsets[c + 1] becomes how many faces cell c has. */
+static insitu_status count_faces(const session_mesh *mesh, const face_sides *sides, const grid_array *offsets,
+                                 base_error *error)
+{
+    for (int64_t face = 0; face < mesh->given.face_count; face++) {
+        int64_t cells[2];
+        sides_of(sides, face, cells);
+        if (check_sides(mesh, face, cells, error)) return error->status;
+        for (int i = 0; i < 2 && cells[i] >= 0; i++)
+            put_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
+    }
+    return INSITU_OK;
+}
+
+/* The counts become where each cell begins, then, as its faces are put there, where it ends, which is where the next
+ * one begins. */
+static void put_faces(const session_mesh *mesh, const face_sides *sides, const session_topology *t)
+{
+    const int64_t count = mesh->given.cell_count;
+    for (int64_t c = 0; c < count; c++)
+        put_index(&t->offsets, c + 1, grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
+    for (int64_t face = 0; face < mesh->given.face_count; face++) {
+        int64_t cells[2];
+        sides_of(sides, face, cells);
+        for (int i = 0; i < 2 && cells[i] >= 0; i++) {
+            const int64_t at = grid_array_index(&t->offsets, cells[i]);
+            put_index(&t->connectivity, at, face);
+            put_index(&t->offsets, cells[i], at + 1);
+        }
+    }
+    for (int64_t c = count; c > 0; c--) put_index(&t->offsets, c, grid_array_index(&t->offsets, c - 1));
+    put_index(&t->offsets, 0, 0);
+}
+
+static insitu_status list_faces(session_mesh *mesh, base_error *error)
+{
+    const insitu_mesh *given = &mesh->given;
+    session_topology *t = &mesh->topology;
+    const face_sides sides = {given, index_array(given, &given->owner), index_array(given, &given->neighbour)};
+    const int64_t most = given->face_count + given->neighbour_count;
+    t->has_own_cells = true;
+    t->cell_type = GRID_POLYHEDRON;
+    if (!make_indices(mesh, "cells' offsets", given->cell_count, most, &t->offsets, error)) return error->status;
+    if (count_faces(mesh, &sides, &t->offsets, error)) return error->status;
+    int64_t total = 0;
+    for (int64_t c = 0; c < given->cell_count; c++) total += grid_array_index(&t->offsets, c + 1);
+    if (!make_indices(mesh, "cells' faces", total, given->face_count, &t->connectivity, error)) return error->status;
+    put_faces(mesh, &sides, t);
+    t->connectivity_count = total;
+    t->cell_bytes = (given->cell_count + 1) * t->offsets.stride + (total + 1) * t->connectivity.stride;
+    return INSITU_OK;
+}
+
+/* ---- one polyhedron ------------------------------------------------------------------------------------------- */
+
+enum { MOST_FACES = 6 };
+
+typedef struct face_ring {
+    int count; /* 3 or 4 */
+    int64_t vertex[4];
+} face_ring;
+
+/* False where the face has another number of vertices, or is none. */
+static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
+{
+    const grid *g = &mesh->cells;
+    int64_t from, to;
+    if (face < 0 || face >= g->face_count) return false;
+    grid_face_vertices(g, face, &from, &to);
+    if (from < 0 || to > mesh->topology.face_connectivity_count || to < from + 3 || to > from + 4) return false;
+    ring->count = (int)(to - from);
+    for (int i = 0; i < ring->count; i++) {
+        ring->vertex[i] = grid_array_index(&g->face_connectivity, from + i);
+        if (ring->vertex[i] < 0 || ring->vertex[i] >= g->vertex_count) return false;
+    }
+    return true;
+}
+
+/* The unused face on the edge from a to b, and what follows each of them on it; -1: there is none. */
+static int find_side(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
+{
+    for (int f = 0; f < count; f++) {
+        const int n = rings[f].count;
+        const int64_t *v = rings[f].vertex;
+        for (int i = 0; i < n && !(used >> f & 1); i++)
+            for (int back = 0; back < 2; back++) {
+                if (v[i] != ends[back] || v[(i + 1) % n] != ends[1 - back]) continue;
+                above[back] = v[(i + n - 1) % n];
+                above[1 - back] = v[(i + 2) % n];
+                return f;
+            }
+    }
+    return -1;
+}
+
+/* Does the ring go around the tops, from any of them on and either way? */
+static bool goes_around(const face_ring *ring, const int64_t *top, int n)
+{
+    if (ring->count != n) return false;
+    for (int begin = 0; begin < n; begin++)
+        for (int step = 1; step < n; step += n - 2) {
+            int same = 0;
+            while (same < n && ring->vertex[(begin + same * step) % n] == top[same]) same++;
+            if (same == n) return true;
+        }
+    return false;
+}
+
+static bool are_distinct(const int64_t *vertices, int count)
+{
+    for (int i = 0; i < count; i++)
+        for (int j = 0; j < i; j++)
+            if (vertices[i] == vertices[j]) return false;
+    return true;
+}
+
+/* The cell on a base, with sides of so many vertices, in VTK's order but for its handedness. */
+static bool erect(const face_ring *rings, int count, int base, int side_size, int64_t vertices[GRID_MAX_CELL_VERTICES])
+{
+    const int n = rings[base].count, tops = side_size == 3 ? 1 : n;
+    unsigned used = 1u << base;
+    int64_t top[5];
+    for (int i = 0; i < n; i++) {
+        const int64_t ends[2] = {rings[base].vertex[i], rings[base].vertex[(i + 1) % n]};
+        int64_t above[2];
+        const int side = find_side(rings, count, used, ends, above);
+        if (side < 0 || rings[side].count != side_size) return false;
+        used |= 1u << side;
+        if (i == 0) top[0] = above[0];
+        if (above[0] != top[i]) return false;
+        top[i + 1] = above[1];
+    }
+    if (top[n] != top[0]) return false;
+    memcpy(vertices, rings[base].vertex, (size_t)n * sizeof *vertices);
+    memcpy(vertices + n, top, (size_t)tops * sizeof *vertices);
+    if (!are_distinct(vertices, n + tops)) return false;
+    int left = 0;
+    while (left < count - 1 && used >> left & 1) left++;
+    return side_size == 3 || goes_around(&rings[left], top, n);
+}
+
+static void swap_vertices(int64_t *vertices, int i, int j)
+{
+    const int64_t v = vertices[i];
+    vertices[i] = vertices[j];
+    vertices[j] = v;
+}
+
+/* The other way round, where the cell would else be left-handed: by where its vertices are now, for faces may run
+ * either way. Pictures are the same in both. */
+static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
+{
+    double points[GRID_MAX_CELL_VERTICES][3];
+    const int count = grid_type_vertices(type);
+    for (int i = 0; i < count; i++) grid_vertex(g, vertices[i], points[i]);
+    if (!(tally_signed_volume(type, points) < 0)) return;
+    swap_vertices(vertices, 1, n - 1);
+    if (count == 2 * n) swap_vertices(vertices, n + 1, 2 * n - 1);
+}
+
+/* Which type a polyhedron's faces make it, and its vertices as that; GRID_POLYHEDRON: another one. */
+static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
+{
+    static const struct {
+        int type, triangles, quads, base, side;
+    } shapes[] = {{GRID_TET, 4, 0, 3, 3}, {GRID_PYRAMID, 4, 1, 4, 3}, {GRID_WEDGE, 2, 3, 3, 4}, {GRID_HEX, 0, 6, 4, 4}};
+    const grid *g = &mesh->cells;
+    face_ring rings[MOST_FACES];
+    int64_t first, end;
+    int triangles = 0, base = 0;
+    grid_cell_faces(g, cell, &first, &end);
+    const int count = end - first <= MOST_FACES ? (int)(end - first) : 0;
+    for (int i = 0; i < count; i++) {
+        if (!read_ring(mesh, grid_array_index(&g->connectivity, first + i), &rings[i])) return GRID_POLYHEDRON;
+        triangles += rings[i].count == 3;
+    }
+    for (size_t s = 0; s < sizeof shapes / sizeof shapes[0]; s++) {
+        if (count != shapes[s].triangles + shapes[s].quads || triangles != shapes[s].triangles) continue;
+        while (rings[base].count != shapes[s].base) base++;
+        if (!erect(rings, count, base, shapes[s].side, vertices)) return GRID_POLYHEDRON;
+        make_right_handed(g, shapes[s].type, shapes[s].base, vertices);
+        return shapes[s].type;
+    }
+    return GRID_POLYHEDRON;
+}
+
+/* ---- all polyhedra -------------------------------------------------------------------------------------------- */
+
+typedef struct recognition {
+    bool is_faulty;                                    /* some cell is wrong in some way */
+    int64_t polyhedra, recognised;                     /* the polyhedra that were, and those that are others now */
+    int64_t of_tets, of_hexes, of_wedges, of_pyramids; /* cells of each type, then */
+    int64_t entries;                                   /* of all cells, then */
+    unsigned char *types;
+} recognition;
+
+/* Are the cell's entries within the connectivity, and indices of faces or vertices? */
+static bool has_good_entries(const session_mesh *mesh, int64_t cell, int type)
+{
+    const grid *g = &mesh->cells;
+    const int64_t limit = type == GRID_POLYHEDRON ? g->face_count : g->vertex_count;
+    int64_t first, end;
+    grid_cell_faces(g, cell, &first, &end);
+    if (first < 0 || end > mesh->topology.connectivity_count || end < first) return false;
+    if (type != GRID_POLYHEDRON && end - first != grid_type_vertices(type)) return false;
+    for (int64_t i = first; i < end; i++) {
+        const int64_t index = grid_array_index(&g->connectivity, i);
+        if (index < 0 || index >= limit) return false;
+    }
+    return true;
+}
+
+static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *r)
+{
+    const int type = grid_cell_type(&mesh->cells, cell);
+    int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
+    if ((grid_type_vertices(type) == 0 && type != GRID_POLYHEDRON) || !has_good_entries(mesh, cell, type)) {
+        r->is_faulty = true;
+        return;
+    }
+    const int now = type == GRID_POLYHEDRON ? recognise(mesh, cell, vertices) : type;
+    grid_cell_faces(&mesh->cells, cell, &first, &end);
+    r->types[cell] = (unsigned char)now;
+    r->polyhedra += type == GRID_POLYHEDRON;
+    r->recognised += now != type;
+    r->of_tets += now == GRID_TET;
+    r->of_hexes += now == GRID_HEX;
+    r->of_wedges += now == GRID_WEDGE;
+    r->of_pyramids += now == GRID_PYRAMID;
+    r->entries += now == GRID_POLYHEDRON ? end - first : grid_type_vertices(now);
+}
+
+static void recognise_cells(const session_mesh *mesh, int threads, recognition *r)
+{
+    const int64_t count = mesh->cells.cell_count;
+#pragma omp parallel num_threads(threads)
+    {
+        recognition mine = {.types = r->types};
+#pragma omp for schedule(static)
+        for (int64_t cell = 0; cell < count; cell++) recognise_cell(mesh, cell, &mine);
+#pragma omp critical(session_topology_recognise)
+        {
+            r->is_faulty = r->is_faulty || mine.is_faulty;
+            r->polyhedra += mine.polyhedra;
+            r->recognised += mine.recognised;
+            r->of_tets += mine.of_tets;
+            r->of_hexes += mine.of_hexes;
+            r->of_wedges += mine.of_wedges;
+            r->of_pyramids += mine.of_pyramids;
+            r->entries += mine.entries;
+        }
+    }
+}
+
+/* The type that all cells are of, or 0. */
+static int only_type(const recognition *r, int64_t count)
+{
+    return r->of_tets == count       ? GRID_TET
+           : r->of_hexes == count    ? GRID_HEX
+           : r->of_wedges == count   ? GRID_WEDGE
+           : r->of_pyramids == count ? GRID_PYRAMID
+                                     : 0;
+}
+
+static void put_cell(const session_mesh *mesh, int64_t cell, int type, int64_t at, const grid_array *out)
+{
+    const grid *g = &mesh->cells;
+    int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
+    if (type == grid_cell_type(g, cell)) {
+        grid_cell_faces(g, cell, &first, &end);
+        for (int64_t i = first; i < end; i++) put_index(out, at++, grid_array_index(&g->connectivity, i));
+        return;
+    }
+    recognise(mesh, cell, vertices);
+    for (int i = 0; i < grid_type_vertices(type); i++) put_index(out, at++, vertices[i]);
+}
+
+static void put_offsets(const session_mesh *mesh, const recognition *r, const grid_array *out)
+{
+    int64_t at = 0;
+    for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) {
+        int64_t first = 0, end = grid_type_vertices(r->types[cell]);
+        if (r->types[cell] == GRID_POLYHEDRON) grid_cell_faces(&mesh->cells, cell, &first, &end);
+        at += end - first;
+        put_index(out, cell + 1, at);
+    }
+}
+
+/* The cells of the types found; read instead of what was before. Cells of one type need neither types nor offsets. */
+static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads, base_error *error)
+{
+    session_topology *t = &mesh->topology;
+    const int64_t count = mesh->cells.cell_count, vertices = mesh->cells.vertex_count, faces = mesh->cells.face_count;
+    const int type = only_type(r, count), size = grid_type_vertices(type);
+    grid_array offsets = {0}, connectivity;
+    if (!make_indices(mesh, "recognised cells", r->entries, vertices > faces ? vertices : faces, &connectivity, error))
+        return error->status;
+    if (!type && !make_indices(mesh, "recognised cells' offsets", count, r->entries, &offsets, error)) {
+        free_indices(&connectivity);
+        return error->status;
+    }
+    if (!type) put_offsets(mesh, r, &offsets);
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t cell = 0; cell < count; cell++)
+        put_cell(mesh, cell, r->types[cell], type ? cell * size : grid_array_index(&offsets, cell), &connectivity);
+    free_indices(&t->offsets);
+    free_indices(&t->connectivity);
+    t->has_own_cells = true;
+    t->offsets = offsets;
+    t->connectivity = connectivity;
+    t->cell_type = type;
+    t->connectivity_count = r->entries;
+    t->cell_bytes = (r->entries + 1) * connectivity.stride + (type ? 0 : (count + 1) * offsets.stride + count);
+    if (type) return INSITU_OK;
+    t->cell_types = r->types;
+    r->types = NULL;
+    return INSITU_OK;
+}
+
+static insitu_status recognise_mesh(session_mesh *mesh, int threads, base_error *error)
+{
+    session_topology *t = &mesh->topology;
+    const grid *g = &mesh->cells;
+    const int64_t count = g->cell_count;
+    recognition r = {0};
+    if (grid_array_index(&g->offsets, count) != t->connectivity_count) return INSITU_OK;
+    r.types = base_alloc((size_t)count);
+    if (!r.types)
+        return base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of cells' types",
+                         mesh->name, (long long)count);
+    recognise_cells(mesh, threads, &r);
+    insitu_status status = INSITU_OK;
+    if (!r.is_faulty) t->polyhedron_count = r.polyhedra;
+    if (!r.is_faulty && r.recognised) {
+        t->recognised_count = r.recognised;
+        status = write_cells(mesh, &r, threads, error);
+    }
+    base_free(r.types);
+    if (status || r.is_faulty || r.recognised < r.polyhedra) return status;
+    free_indices(&t->face_offsets);
+    free_indices(&t->face_connectivity);
+    t->has_own_faces = true;
+    t->face_bytes = t->face_connectivity_count = 0;
+    return INSITU_OK;
+}
+
+/* May some cells be polyhedra? */
+static bool may_have_polyhedra(const grid *g)
+{
+    return g->cell_count && g->offsets.data && grid_has_faces(g) && (g->cell_types || g->cell_type == GRID_POLYHEDRON);
+}
+
+insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    session_drop_topology(&mesh->topology);
+    session_read_topology(mesh);
+    if (mesh->given.face_lists.data) status = copy_lists(mesh, error);
+    if (!status && mesh->given.owner.data) status = list_faces(mesh, error);
+    session_read_topology(mesh);
+    if (!status && !mesh->given.keep_polyhedra && may_have_polyhedra(&mesh->cells))
+        status = recognise_mesh(mesh, threads, error);
+    if (status) session_drop_topology(&mesh->topology);
+    session_read_topology(mesh);
+    mesh->topology.is_made = !status;
+    return status;
+}

@@ -1,0 +1,20 @@
+/* The cells as the rooms below the session read them: the caller's arrays, or arrays of the session's own where cells
+ * are described by their faces. */
+#ifndef SESSION_TOPOLOGY_H
+#define SESSION_TOPOLOGY_H
+
+#include "session_mesh.h"
+
+/* An array as the rooms below read it; its indices count from 0. */
+grid_array session_grid_array(const insitu_array *array);
+
+/* The grid that reads these arrays: the session's own where they are made, else the caller's. Local. */
+void session_read_topology(session_mesh *mesh);
+
+/* Make what the description leaves to the library, once for each topology: cells' faces from owner and neighbour,
+ * faces' vertices in one array from lists, and tets, hexes, wedges and pyramids from the polyhedra that are such. Then
+ * read it. What is wrong with owner and neighbour or with the lists is told; the rest is not looked at for errors,
+ * which is for session_check.c. On an error nothing is made. Local. */
+insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
+
+#endif
