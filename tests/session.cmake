@@ -34,6 +34,13 @@ insitu_add_mpi_test(session_clips test_session_clips 1 2 3 7 TIMEOUT 120 ARGS ${
 insitu_session_program(test_session_index_base)
 insitu_add_mpi_test(session_index_base test_session_index_base 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+# Faces by owner and neighbour.
+foreach(name owner owner_faults)
+  insitu_session_program(test_session_${name})
+  target_sources(test_session_${name} PRIVATE test_owned_faces.c)
+  insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+endforeach()
+
 insitu_session_program(test_session_statistics)
 insitu_add_mpi_test(session_statistics test_session_statistics 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

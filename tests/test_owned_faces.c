@@ -1,0 +1,99 @@
+#include "test_owned_faces.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_mesh_make.h"
+
+static void find_sides(const test_mesh *part, int64_t *first, int64_t *second)
+{
+    for (int64_t face = 0; face < part->face_count; face++) first[face] = second[face] = -1;
+    for (int64_t cell = 0; cell < part->cell_count; cell++)
+        for (int64_t i = part->offsets[cell]; i < part->offsets[cell + 1]; i++) {
+            const int64_t face = part->connectivity[i];
+            if (first[face] < 0)
+                first[face] = cell;
+            else
+                second[face] = cell;
+        }
+}
+
+static void take_face(owned *o, const test_mesh *part, int64_t face, int64_t at, int64_t first, int64_t second)
+{
+    const int64_t *vertices = part->face_connectivity + part->face_offsets[face];
+    const int64_t count = part->face_offsets[face + 1] - part->face_offsets[face];
+    o->owner[at] = first;
+    o->neighbour[at] = second;
+    o->offsets[at + 1] = o->offsets[at] + count;
+    memcpy(o->vertices + o->offsets[at], vertices, (size_t)count * sizeof *vertices);
+}
+
+static void make_narrow(owned *o, int64_t faces, int32_t base)
+{
+    for (int64_t face = 0; face < faces; face++) {
+        o->pairs[2 * face] = (int32_t)o->owner[face] + base;
+        o->pairs[2 * face + 1] = (int32_t)o->neighbour[face] + base;
+        o->lists[face] =
+            (label_list){(int32_t)(o->offsets[face + 1] - o->offsets[face]), o->narrow_vertices + o->offsets[face]};
+    }
+    for (int64_t face = 0; face <= faces; face++) o->narrow_offsets[face] = (int32_t)o->offsets[face] + base;
+    for (int64_t i = 0; i < o->offsets[faces]; i++) o->narrow_vertices[i] = (int32_t)o->vertices[i] + base;
+}
+
+owned make_owned(const test_mesh *part, int32_t base)
+{
+    const int64_t faces = part->face_count, entries = part->face_connectivity_count;
+    owned o = {.owner = test_allocate(faces, sizeof(int64_t)),
+               .neighbour = test_allocate(faces, sizeof(int64_t)),
+               .offsets = test_allocate(faces + 1, sizeof(int64_t)),
+               .vertices = test_allocate(entries, sizeof(int64_t)),
+               .pairs = test_allocate(2 * faces, sizeof(int32_t)),
+               .narrow_offsets = test_allocate(faces + 1, sizeof(int32_t)),
+               .narrow_vertices = test_allocate(entries, sizeof(int32_t)),
+               .lists = test_allocate(faces, sizeof(label_list))};
+    int64_t *first = test_allocate(faces, sizeof *first), *second = test_allocate(faces, sizeof *second), at = 0;
+    find_sides(part, first, second);
+    for (int64_t face = 0; face < faces; face++)
+        if (second[face] >= 0) take_face(&o, part, face, at++, first[face], second[face]);
+    o.inner = at;
+    for (int64_t face = 0; face < faces; face++)
+        if (second[face] < 0) take_face(&o, part, face, at++, first[face], second[face]);
+    make_narrow(&o, faces, base);
+    free(first);
+    free(second);
+    return o;
+}
+
+void free_owned(owned *o)
+{
+    void *const arrays[] = {o->owner, o->neighbour,      o->offsets,         o->vertices,
+                            o->pairs, o->narrow_offsets, o->narrow_vertices, o->lists};
+    for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) free(arrays[i]);
+    *o = (owned){0};
+}
+
+void describe_owned(const owned *o, form which, int base, insitu_mesh *mesh)
+{
+    const int64_t pair = 2 * sizeof(int32_t);
+    mesh->cell_type = INSITU_POLYHEDRON;
+    mesh->cell_types = mesh->offsets = mesh->connectivity = (insitu_array){0};
+    mesh->connectivity_count = 0;
+    mesh->neighbour_count = which == FORM_WIDE ? o->inner : mesh->face_count;
+    mesh->owner = (insitu_array){o->pairs, INSITU_INT32, pair};
+    mesh->neighbour = (insitu_array){o->pairs + 1, INSITU_INT32, pair};
+    mesh->face_offsets = (insitu_array){o->narrow_offsets, INSITU_INT32, 0};
+    mesh->face_connectivity = (insitu_array){o->narrow_vertices, INSITU_INT32, 0};
+    mesh->index_base = base;
+    if (which == FORM_WIDE) {
+        mesh->owner = (insitu_array){o->owner, INSITU_INT64, 0};
+        mesh->neighbour = (insitu_array){o->neighbour, INSITU_INT64, 0};
+        mesh->face_offsets = (insitu_array){o->offsets, INSITU_INT64, 0};
+        mesh->face_connectivity = (insitu_array){o->vertices, INSITU_INT64, 0};
+        mesh->index_base = 0;
+    }
+    if (which != FORM_LISTS) return;
+    mesh->face_connectivity_count = 0;
+    mesh->face_offsets = mesh->face_connectivity = (insitu_array){0};
+    mesh->face_sizes = (insitu_array){&o->lists->size, INSITU_INT32, sizeof(label_list)};
+    mesh->face_lists = (insitu_array){&o->lists->labels, INSITU_INT32, sizeof(label_list)};
+}

@@ -1,0 +1,34 @@
+/* A mesh's faces by owner and neighbour, in the forms that codes of finite volumes have them in. */
+#ifndef TEST_OWNED_FACES_H
+#define TEST_OWNED_FACES_H
+
+#include "insitu/insitu.h"
+#include "test_meshes.h"
+
+/* A face as OpenFOAM's lists have it. */
+typedef struct label_list {
+    int32_t size;
+    int32_t *labels;
+} label_list;
+
+/* Faces in the order of finite volume codes: inner ones first. Beside the arrays of 8 bytes those of 4 that count from
+ * base, pairs of owner and neighbour, and lists. */
+typedef struct owned {
+    int64_t inner;
+    int64_t *owner, *neighbour, *offsets, *vertices;
+    int32_t *pairs, *narrow_offsets, *narrow_vertices;
+    label_list *lists;
+} owned;
+
+/* The arrays of 4 bytes count from base. The part is of polyhedra alone. */
+owned make_owned(const test_mesh *part, int32_t base);
+void free_owned(owned *o);
+
+/* FORM_WIDE: 8 bytes, from 0, neighbours of inner faces alone. FORM_PAIRS: 4 bytes, from base, owners and neighbours in
+ * turn, as many as faces. FORM_LISTS: the same with a list of vertices for each face. */
+typedef enum form { FORM_WIDE, FORM_PAIRS, FORM_LISTS, FORM_COUNT } form;
+
+/* Describe the faces so, in place of the cells' connectivity. */
+void describe_owned(const owned *o, form which, int base, insitu_mesh *mesh);
+
+#endif

@@ -1,0 +1,213 @@
+/* What a user gets wrong in owners, neighbours and lists of faces, on one rank alone: every rank is told the same, with
+ * the rank, the mesh, the face and the value; nothing is drawn; and once the thing is right the next step draws. */
+#include "test_owned_faces.h"
+#include "test_session_fixture.h"
+
+static const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
+                                  "    outputs: [{path: a.exr}]\n";
+
+static insitu_session *session;
+static owned spoilt;
+
+/* The description of these is spoilt, or their arrays, on one rank. */
+static void by_owner(session_input *in, form which, int base)
+{
+    free_owned(&spoilt);
+    spoilt = make_owned(&in->part, base);
+    describe_owned(&spoilt, which, base, &in->mesh);
+}
+
+static void owner_large(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    spoilt.owner[3] = 1000000;
+}
+static void owner_negative(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    spoilt.owner[2] = -1;
+}
+static void owner_before_one(session_input *in)
+{
+    by_owner(in, FORM_PAIRS, 1);
+    spoilt.pairs[2 * 4] = 0;
+}
+static void neighbour_large(session_input *in)
+{
+    by_owner(in, FORM_PAIRS, 1);
+    spoilt.pairs[1] = (int32_t)in->part.cell_count + 1;
+}
+static void neighbour_negative(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    spoilt.neighbour[1] = -2;
+}
+static void owner_is_neighbour(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    spoilt.owner[1] = spoilt.neighbour[1] = 2;
+}
+/* The faces of cell 0 go to another. */
+static void cell_without_faces(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    const int64_t inner = spoilt.inner;
+    for (int64_t f = 0; f < in->part.face_count; f++) {
+        if (spoilt.owner[f] == 0) spoilt.owner[f] = f < inner && spoilt.neighbour[f] == 1 ? 2 : 1;
+        if (f < inner && spoilt.neighbour[f] == 0) spoilt.neighbour[f] = spoilt.owner[f] == 1 ? 2 : 1;
+    }
+}
+static void face_of_another_cell(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    spoilt.owner[in->part.face_count - 1] = spoilt.owner[in->part.face_count - 1] ? 0 : 1;
+}
+static void faces_left_out(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.face_count = in->mesh.neighbour_count = 0;
+}
+static void more_neighbours(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.neighbour_count = in->mesh.face_count + 1;
+}
+static void negative_neighbours(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.neighbour_count = -4;
+}
+static void neighbours_alone(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.owner.data = NULL;
+}
+static void no_neighbours(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.neighbour_count = 1;
+    in->mesh.neighbour.data = NULL;
+}
+static void float_owners(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.owner.type = INSITU_FLOAT64;
+}
+static void owners_of_tets(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.cell_type = INSITU_TET;
+}
+static void owners_and_connectivity(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.connectivity = (insitu_array){in->part.connectivity, INSITU_INT64, 0};
+}
+static void owners_and_offsets(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.offsets = (insitu_array){in->part.offsets, INSITU_INT64, 0};
+}
+static void keep_some(session_input *in)
+{
+    in->mesh.keep_polyhedra = 7;
+}
+static void list_null(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 0);
+    spoilt.lists[5].labels = NULL;
+}
+static void list_negative(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 1);
+    spoilt.lists[5].size = -3;
+}
+static void list_vertex_large(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 1);
+    spoilt.lists[0].labels[2] = 1000000;
+}
+static void list_short(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 0);
+    for (int64_t f = 0; f < in->part.face_count; f++)
+        if (spoilt.pairs[2 * f] == 0 || spoilt.pairs[2 * f + 1] == 0) spoilt.lists[f].size = 2;
+}
+static void lists_without_sizes(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 0);
+    in->mesh.face_sizes.data = NULL;
+}
+static void sizes_without_lists(session_input *in)
+{
+    by_owner(in, FORM_WIDE, 0);
+    in->mesh.face_sizes = (insitu_array){&spoilt.lists->size, INSITU_INT32, sizeof(label_list)};
+}
+static void lists_and_offsets(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 0);
+    in->mesh.face_offsets = (insitu_array){spoilt.offsets, INSITU_INT64, 0};
+}
+static void lists_between_pointers(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 0);
+    in->mesh.face_lists.stride_bytes = 12;
+}
+static void float_lists(session_input *in)
+{
+    by_owner(in, FORM_LISTS, 0);
+    in->mesh.face_lists.type = INSITU_FLOAT32;
+}
+
+static const spoilt_case cases[] = {
+    {"owner", owner_large, INSITU_ERROR_MESH, false, {"face 3: its owner 1000000 is outside 0..", "index_base is 0"}},
+    {"owner -1", owner_negative, INSITU_ERROR_MESH, false, {"face 2: its owner -1 is outside 0.."}},
+    {"owner 0 of 1", owner_before_one, INSITU_ERROR_MESH, false, {"face 5: its owner 0 is outside 1..", "is 1"}},
+    {"neighbour", neighbour_large, INSITU_ERROR_MESH, false, {"face 1: its neighbour ", "not 0 as of a boundary's"}},
+    {"neighbour -2", neighbour_negative, INSITU_ERROR_MESH, false, {"face 1: its neighbour -2 is outside 0.."}},
+    {"both", owner_is_neighbour, INSITU_ERROR_MESH, false, {"face 1: its owner and its neighbour are both 2"}},
+    {"empty cell", cell_without_faces, INSITU_ERROR_MESH, false, {"cell 0 (polyhedron): 0 faces, ", "at least 4"}},
+    {"open", face_of_another_cell, INSITU_ERROR_MESH, false, {"(polyhedron): ", "the surface is not closed"}},
+    {"no faces", faces_left_out, INSITU_ERROR_MESH, false, {"cell 0 (polyhedron): 0 faces"}},
+    {"count", more_neighbours, INSITU_ERROR_MESH, true, {"neighbour_count is ", "more than face_count"}},
+    {"count -4", negative_neighbours, INSITU_ERROR_ARGUMENT, true, {"neighbour_count is -4"}},
+    {"alone", neighbours_alone, INSITU_ERROR_MESH, true, {"neighbours of faces are given, and owners are not"}},
+    {"none", no_neighbours, INSITU_ERROR_MESH, true, {"neighbours of faces are not given"}},
+    {"float", float_owners, INSITU_ERROR_ARGUMENT, true, {"owners of faces are of element type 2, not int32 or int64"}},
+    {"tets", owners_of_tets, INSITU_ERROR_MESH, true, {"cell_type is 10, owners of faces are for 42, polyhedra"}},
+    {"two forms", owners_and_connectivity, INSITU_ERROR_MESH, true, {"owners of faces and connectivity indices are"}},
+    {"two", owners_and_offsets, INSITU_ERROR_MESH, true, {"owners of faces and offsets are given"}},
+    {"keep", keep_some, INSITU_ERROR_ARGUMENT, true, {"keep_polyhedra is 7, expected 0 or 1"}},
+    {"NULL", list_null, INSITU_ERROR_MESH, false, {"face 5: its list is NULL, its size "}},
+    {"size", list_negative, INSITU_ERROR_MESH, false, {"face 6: its size is -3"}},
+    {"listed", list_vertex_large, INSITU_ERROR_MESH, false, {"face 1: vertex index 1000000 is outside 1..", "is 1"}},
+    {"short", list_short, INSITU_ERROR_MESH, false, {"cell 0 (polyhedron): face ", " has 2 vertices, at least 3"}},
+    {"no sizes", lists_without_sizes, INSITU_ERROR_MESH, true, {"face sizes are not given"}},
+    {"no lists", sizes_without_lists, INSITU_ERROR_MESH, true, {"face sizes are given, and face lists are not"}},
+    {"both lists", lists_and_offsets, INSITU_ERROR_MESH, true, {"face lists and face offsets are given"}},
+    {"stride", lists_between_pointers, INSITU_ERROR_MESH, true, {"face lists have a stride of 12 bytes"}},
+    {"floats", float_lists, INSITU_ERROR_ARGUMENT, true, {"face lists are of element type 1, not int32 or int64"}},
+};
+
+static void what_is_wrong_is_told_to_all(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    input_create(&in, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &in, &cases[i]);
+    insitu_destroy(&session);
+    input_free(&in);
+    free_owned(&spoilt);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_wrong_is_told_to_all)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
