@@ -10,6 +10,8 @@ program test_fortran
     real(real32), target :: xyz_4(3, vertices), vector_4(2, vertices)
     integer(int32), target :: hexes(8, cells)
     integer(int64), target :: hexes_8(8, cells), offsets_8(cells + 1), wide_8(16, cells)
+    integer, parameter :: face_count = 3*n*(n - 1)**2
+    integer(int32), target :: faces(4, face_count), face_offsets(face_count + 1), owner(face_count), neighbour(face_count)
     integer(int8), target :: types(cells), ghosts(cells)
     character(:), allocatable :: prefix, plain
     integer :: rank, status
@@ -28,6 +30,9 @@ program test_fortran
     call same(picture('vector', insitu_points(xyz), insitu_borrow(reshaped()), insitu_borrow(vector_4), 'x'), 'components')
     call same(picture('mixed', insitu_points(xyz), insitu_borrow(hexes_8), insitu_borrow(pressure), with_types=.true.), &
         'types, offsets, ghosts')
+    call make_faces()
+    call same(picture('faces', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(pressure), with_owner=.true.), &
+        'owner and neighbour')
     call errors_are_told()
     call MPI_Finalize()
 
@@ -75,6 +80,34 @@ contains
         ghosts = 0_int8
     end subroutine make_mesh
 
+    ! Each quad once, with the first of its cells and the second, 0 where there is none.
+    subroutine make_faces()
+        integer, parameter :: corners(4, 6) = reshape([1, 2, 3, 4, 5, 6, 7, 8, 1, 2, 6, 5, 2, 3, 7, 6, 3, 4, 8, 7, 4, 1, 5, 8], &
+            [4, 6])
+        integer :: cell, side, face, count
+        count = 0
+        neighbour = 0
+        do cell = 1, cells
+            do side = 1, 6
+                associate (quad => hexes(corners(:, side), cell))
+                    do face = 1, count
+                        if (sum(faces(:, face)) == sum(quad) .and. minval(faces(:, face)) == minval(quad) .and. &
+                            maxval(faces(:, face)) == maxval(quad)) exit
+                    end do
+                    if (face <= count) then
+                        neighbour(face) = cell
+                    else
+                        count = face
+                        faces(:, face) = quad
+                        owner(face) = cell
+                    end if
+                end associate
+            end do
+        end do
+        face_offsets = [(1 + 4*(face - 1), face=1, face_count + 1)]
+        call expect(count == face_count, 'all faces are found')
+    end subroutine make_faces
+
     ! The connectivity as a list.
     function reshaped()
         integer(int32), pointer :: reshaped(:)
@@ -104,11 +137,11 @@ contains
     end function scene_of
 
     ! The file's bytes, on rank 0.
-    function picture(name, points, connectivity, values, component, with_types) result(out)
+    function picture(name, points, connectivity, values, component, with_types, with_owner) result(out)
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity, values
         character(*), intent(in), optional :: component
-        logical, intent(in), optional :: with_types
+        logical, intent(in), optional :: with_types, with_owner
         character(:), allocatable :: out
         type(insitu_session) :: session
         type(insitu_report) :: report
@@ -122,6 +155,9 @@ contains
         if (present(with_types)) then
             call session%set_mesh('m', points, connectivity, status, cell_types=insitu_borrow(types), &
                 offsets=insitu_borrow(offsets_8), ghosts=insitu_borrow(ghosts))
+        else if (present(with_owner)) then
+            call session%set_mesh_of_faces('m', points, connectivity, insitu_borrow(face_offsets), insitu_borrow(owner), &
+                insitu_borrow(neighbour), cells, status, ghosts=insitu_borrow(ghosts))
         else
             call session%set_mesh('m', points, connectivity, status, cell_type=INSITU_HEX)
         end if
@@ -133,6 +169,7 @@ contains
         report = session%report()
         call expect(report%images == 1 .and. report%cycle == 7 .and. abs(report%time - 0.5_real64) < 1e-9, &
             'the report is of the step')
+        call expect(report%cells_recognised == merge(cells, 0, present(with_owner)), 'hexes are recognised')
         call expect(report%cells == cells .and. index(insitu_text(report%copied_why), 'outer faces') > 0, 'and its texts')
         call session%destroy(status)
         call expect(status == INSITU_OK, 'the session ends')
@@ -162,12 +199,15 @@ contains
         call session%set_mesh('m', insitu_points(axes), insitu_borrow(hexes), status)
         call refused(session, 'first extent than 3')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), status, cell_type=INSITU_HEX)
-        call refused(session, 'gaps between its columns')
+        call refused(session, 'gaps between their columns')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_TET)
         call refused(session, 'another first extent than cells')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX, &
             ghosts=insitu_borrow(ghosts(2:)))
         call refused(session, 'ghosts are not as many')
+        call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(face_offsets), &
+            insitu_borrow(owner(2:)), insitu_borrow(neighbour), cells, status)
+        call refused(session, 'face_offsets are not one more than owner')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
         call expect(status == INSITU_OK, session%error())
         call session%set_field('m', 'p', insitu_borrow(pressure(2:)), status)

@@ -137,6 +137,44 @@ def pictures_are_arrays():
     everywhere(comm.rank or well, "the picture is in the arrays")
 
 
+def faces_of(hexes):
+    """Each quad once, with the first of its cells and the second, -1 where there is none."""
+    quads = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    faces, cells = hexes[:, quads].reshape(-1, 4), numpy.repeat(numpy.arange(len(hexes)), 6)
+    _, first, which = numpy.unique(numpy.sort(faces), axis=0, return_index=True, return_inverse=True)
+    neighbour = numpy.full(len(first), -1)
+    second = numpy.setdiff1d(numpy.arange(len(faces)), first)
+    neighbour[which[second]] = cells[second]
+    return faces[first], cells[first], neighbour
+
+
+def finite_volumes_are_their_hexes():
+    xyz, hexes, f = lattice()
+    faces, owner, neighbour = faces_of(hexes)
+    with open(f"{folder}/plain.png", "rb") as file:
+        plain = file.read()
+    for base, kind in [(0, numpy.int64), (1, numpy.int32)]:
+        with insitu.Session(comm, scene_text=SCENE.format(name="volumes", folder=folder)) as s:
+            mesh = dict(coordinates=xyz, faces=(faces + base).astype(kind), index_base=base, cell_count=64,
+                        face_offsets=4 * numpy.arange(len(faces) + 1) + base, owner=(owner + base).astype(kind),
+                        neighbour=(neighbour + base).astype(kind))
+            raises(TypeError, "expected one of them", s.set_mesh, "m", connectivity=hexes, **mesh)
+            raises(TypeError, "expected both or none", s.set_mesh, "m", **{**mesh, "cell_count": None})
+            raises(ValueError, "owner: has 239 elements, expected 240", s.set_mesh, "m",
+                   **{**mesh, "owner": mesh["owner"][1:]})
+            s.set_mesh("m", **mesh)
+            s.set_field("m", "f", f)
+            s.step(0, 0.0)
+            everywhere(s.report["cells_recognised"] == 64, "hexes are recognised")
+            comm.Barrier()
+            with open(f"{folder}/volumes.png", "rb") as file:
+                everywhere(file.read() == plain, "the picture of the hexes")
+            s.set_mesh("m", keep_polyhedra=True, **mesh)
+            s.set_field("m", "f", f)
+            s.step(1, 0.0)
+            everywhere(s.report["cells_recognised"] == 0, "polyhedra are left")
+
+
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
@@ -153,4 +191,5 @@ comm.Barrier()
 layouts_draw_the_same_picture()
 what_cannot_be_borrowed_is_refused()
 pictures_are_arrays()
+finite_volumes_are_their_hexes()
 structures_are_those_of_the_header()

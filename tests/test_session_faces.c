@@ -348,13 +348,14 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     test_free(before);
 }
 
-/* The first allocation of a step that checks polyhedra is for their edges. Without it nothing is known of the cells,
+/* The first allocation of a step that checks polyhedra, and is not to recognise any, is for their edges. Without it nothing is known of the cells,
  * and the next step must look at them again. */
 static void check_without_memory_is_told_and_repeated(void **context)
 {
     (void)context;
     char rank_words[32];
     snprintf(rank_words, sizeof rank_words, "rank %d: ", rank_count - 1);
+    input.mesh.keep_polyhedra = 1;
     everywhere(hand_over(session, &input) == INSITU_OK);
     base_memory_fail_nth(own_rank == rank_count - 1);
     const insitu_status status = insitu_step(session, 8, 0);

@@ -58,6 +58,10 @@ module insitu
         integer(c_int64_t) :: face_connectivity_count
         type(c_array) :: face_connectivity, ghosts
         integer(c_int) :: changed, index_base
+        type(c_array) :: owner
+        integer(c_int64_t) :: neighbour_count
+        type(c_array) :: neighbour, face_sizes, face_lists
+        integer(c_int) :: keep_polyhedra
     end type c_mesh
 
     type, bind(C) :: c_field
@@ -77,8 +81,8 @@ module insitu
         integer(c_int) :: images = 0
         real(c_double) :: total_ms = 0, prepare_ms = 0, build_ms = 0, refit_ms = 0, surface_ms = 0, volume_ms = 0, &
             composite_ms = 0, write_ms = 0
-        integer(c_int64_t) :: cells = 0, cells_ghost = 0, cells_unusable = 0, cells_inverted = 0, cells_flat = 0
-        integer(c_int64_t) :: cells_shell = 0
+        integer(c_int64_t) :: cells = 0, cells_ghost = 0, cells_unusable = 0, cells_inverted = 0, cells_flat = 0, &
+            cells_shell = 0, cells_recognised = 0
         integer(c_int64_t) :: rays = 0, fragments = 0, map_failures = 0
         integer(c_int64_t) :: bytes_borrowed = 0, bytes_copied = 0, bytes_trees = 0, bytes_pictures = 0, bytes_peak = 0
         type(c_ptr) :: copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr ! texts: insitu_text()
@@ -93,7 +97,7 @@ module insitu
         procedure, private :: create_integer, create_f08, text_integer, text_f08
         generic :: create => create_integer, create_f08                   ! (comm, scene_file, status)
         generic :: create_from_text => text_integer, text_f08             ! (comm, scene_text, status)
-        procedure :: set_mesh, remove_mesh, set_field, step, report, error, destroy
+        procedure :: set_mesh, set_mesh_of_faces, remove_mesh, set_field, step, report, error, destroy
     end type insitu_session
 
     ! An array of any kind that the library takes: reals and integers of 4 and 8 bytes, integers of 1 byte; a list, or a
@@ -389,9 +393,9 @@ contains
         else if (any(points%columns /= points(1)%columns)) then
             out = 'x, y and z are of different lengths'
         else if (.not. is_list(connectivity)) then
-            out = 'connectivity has gaps between its columns, which must follow one another'
+            out = 'connectivity or faces have gaps between their columns, which must follow one another'
         else if (any(lists%rows > 1)) then
-            out = 'cell_types, offsets, face_offsets, ghosts and vertex_ids are lists, one is a matrix'
+            out = 'cell_types, offsets, face_offsets, owner, neighbour, ghosts and vertex_ids are lists, one is a matrix'
         end if
     end function find_fault
 
@@ -399,13 +403,14 @@ contains
     ! where each begins, of polyhedra, whose connectivity is of faces. Every index and offset counts from 1, or from
     ! index_base.
     subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
-        ghosts, vertex_ids, changed, index_base)
+        ghosts, vertex_ids, changed, index_base, keep_polyhedra)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity
         integer, intent(out) :: status
         integer, intent(in), optional :: cell_type, changed, index_base
         type(insitu_array), intent(in), optional :: cell_types, offsets, faces, face_offsets, ghosts, vertex_ids
+        logical, intent(in), optional :: keep_polyhedra
         type(insitu_array) :: given(6)
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
@@ -416,6 +421,7 @@ contains
         if (present(cell_type)) mesh%cell_type = cell_type
         if (present(changed)) mesh%changed = changed
         if (present(index_base)) mesh%index_base = index_base
+        if (present(keep_polyhedra)) mesh%keep_polyhedra = merge(1_c_int, 0_c_int, keep_polyhedra)
         if (present(cell_types)) given(1) = cell_types
         if (present(offsets)) given(2) = offsets
         if (present(face_offsets)) given(3) = face_offsets
@@ -451,6 +457,69 @@ contains
         if (len(self%own_error) > 0) return
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
     end subroutine set_mesh
+
+    ! This rank's part of a mesh of finite volumes: faces' vertices, and where each begins; of each face the cell that owns
+    ! it, and the neighbour beyond. Faces on the boundary have 0 for a neighbour (index_base - 1), or are the last ones,
+    ! beyond the neighbours.
+    subroutine set_mesh_of_faces(self, name, points, faces, face_offsets, owner, neighbour, cell_count, status, ghosts, &
+        vertex_ids, changed, index_base, keep_polyhedra)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        type(insitu_array), intent(in) :: points(3), faces, face_offsets, owner, neighbour
+        integer, intent(in) :: cell_count
+        integer, intent(out) :: status
+        type(insitu_array), intent(in), optional :: ghosts, vertex_ids
+        integer, intent(in), optional :: changed, index_base
+        logical, intent(in), optional :: keep_polyhedra
+        type(insitu_array) :: given(5)
+        type(c_mesh), target :: mesh
+        real(real64), target :: nothing
+        integer :: axis
+        nothing = 0
+        call c_mesh_defaults(mesh)
+        mesh%index_base = 1
+        mesh%cell_type = INSITU_POLYHEDRON
+        mesh%cell_count = cell_count
+        if (present(changed)) mesh%changed = changed
+        if (present(index_base)) mesh%index_base = index_base
+        if (present(keep_polyhedra)) mesh%keep_polyhedra = merge(1_c_int, 0_c_int, keep_polyhedra)
+        given(1:3) = [face_offsets, owner, neighbour]
+        if (present(ghosts)) given(4) = ghosts
+        if (present(vertex_ids)) given(5) = vertex_ids
+        self%own_error = find_fault(points, faces, given)
+        if (len(self%own_error) == 0) self%own_error = find_face_length(points(1)%columns, mesh%cell_count, given)
+        status = INSITU_ERROR_ARGUMENT
+        if (len(self%own_error) > 0) return
+        mesh%vertex_count = points(1)%columns
+        do axis = 1, 3
+            mesh%coordinates(axis) = as_c(points(axis), nothing)
+        end do
+        mesh%face_count = max(0_c_int64_t, face_offsets%columns - 1)
+        mesh%face_offsets = as_c(face_offsets, nothing)
+        mesh%face_connectivity_count = faces%rows * faces%columns
+        mesh%face_connectivity = as_c(faces, nothing)
+        mesh%owner = as_c(owner, nothing)
+        mesh%neighbour_count = neighbour%columns
+        mesh%neighbour = as_c(neighbour, nothing)
+        if (present(ghosts)) mesh%ghosts = as_c(ghosts, nothing)
+        if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
+        status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
+    end subroutine set_mesh_of_faces
+
+    ! As find_length(). given: face_offsets, owner, neighbour, ghosts, vertex_ids.
+    function find_face_length(vertices, cells, given) result(out)
+        integer(c_int64_t), intent(in) :: vertices, cells
+        type(insitu_array), intent(in) :: given(5)
+        character(:), allocatable :: out
+        out = ''
+        if (given(1)%columns /= given(2)%columns + 1) then
+            out = 'face_offsets are not one more than owner'
+        else if (given(4)%columns > 0 .and. given(4)%columns /= cells) then
+            out = 'ghosts are not as many as the cells'
+        else if (given(5)%columns > 0 .and. given(5)%columns /= vertices) then
+            out = 'vertex_ids are not as many as the vertices'
+        end if
+    end function find_face_length
 
     ! Lengths that C is not told, and would read beyond. given: cell_types, offsets, face_offsets, ghosts, vertex_ids.
     function find_length(cells, vertices, rows, corners, given) result(out)

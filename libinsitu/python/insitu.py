@@ -57,6 +57,12 @@ class _Mesh(ctypes.Structure):
         ("ghosts", _Array),
         ("changed", ctypes.c_uint),
         ("index_base", ctypes.c_int),
+        ("owner", _Array),
+        ("neighbour_count", ctypes.c_int64),
+        ("neighbour", _Array),
+        ("face_sizes", _Array),
+        ("face_lists", _Array),
+        ("keep_polyhedra", ctypes.c_int),
     ]
 
 
@@ -91,6 +97,7 @@ class _Report(ctypes.Structure):
         ("cells_inverted", ctypes.c_int64),
         ("cells_flat", ctypes.c_int64),
         ("cells_shell", ctypes.c_int64),
+        ("cells_recognised", ctypes.c_int64),
         ("rays", ctypes.c_int64),
         ("fragments", ctypes.c_int64),
         ("map_failures", ctypes.c_int64),
@@ -228,21 +235,29 @@ class Session:
         handle = _MPI_Comm.from_address(MPI._addressof(comm))
         _check(create(handle, text, ctypes.byref(self._session)), None, True)
 
-    def set_mesh(self, name, *, coordinates, connectivity, cell_type=TET, cell_types=None, offsets=None, faces=None,
-                 face_offsets=None, ghosts=None, vertex_ids=None, index_base=0, changed=CHANGED_ALL):
-        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h)."""
+    def set_mesh(self, name, *, coordinates, connectivity=None, cell_type=TET, cell_types=None, offsets=None, faces=None,
+                 face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
+                 keep_polyhedra=False, changed=CHANGED_ALL):
+        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h). In
+        place of connectivity, cell_type, cell_types and offsets: owner, neighbour and cell_count, of finite volumes."""
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
-        axes, mesh.vertex_count, arrays = _axes(coordinates)
+        axes, mesh.vertex_count, held = _axes(coordinates)
         mesh.coordinates[:] = axes
-        mesh.connectivity, mesh.connectivity_count, array = _rows("connectivity", connectivity)
-        held += arrays + [array]
-        if cell_types is None and offsets is None:
-            _expect_rows_of(cell_type, array)
-        mesh.cell_type, mesh.changed, mesh.index_base = cell_type, changed, index_base
+        if (connectivity is None) == (owner is None):
+            raise TypeError("connectivity, owner: expected one of them")
+        if (cell_count is None) != (owner is None):
+            raise TypeError("owner, cell_count: one is given, expected both or none")
+        if connectivity is not None:
+            mesh.connectivity, mesh.connectivity_count, array = _rows("connectivity", connectivity)
+            held.append(array)
+            if cell_types is None and offsets is None:
+                _expect_rows_of(cell_type, array)
+        mesh.cell_type, mesh.changed = cell_type if owner is None else POLYHEDRON, changed
+        mesh.index_base, mesh.keep_polyhedra = index_base, keep_polyhedra
         counts = {}
         for key, given in [("cell_types", cell_types), ("offsets", offsets), ("face_offsets", face_offsets),
-                           ("ghosts", ghosts), ("vertex_ids", vertex_ids)]:
+                           ("owner", owner), ("neighbour", neighbour), ("ghosts", ghosts), ("vertex_ids", vertex_ids)]:
             if given is not None:
                 borrowed, counts[key], array = _list(key, given)
                 setattr(mesh, key, borrowed)
@@ -251,7 +266,8 @@ class Session:
             mesh.face_connectivity, mesh.face_connectivity_count, array = _rows("faces", faces)
             held.append(array)
         mesh.face_count = max(counts.get("face_offsets", 0) - 1, 0)
-        mesh.cell_count = self._cell_count(mesh, counts)
+        mesh.neighbour_count = counts.get("neighbour", 0)
+        mesh.cell_count = self._cell_count(mesh, counts) if cell_count is None else cell_count
         self._expect_counts(mesh, counts)
         self._hand_over(_library.insitu_set_mesh, name, mesh, None, held)
 
@@ -343,7 +359,7 @@ class Session:
     @staticmethod
     def _expect_counts(mesh, counts):
         """Lengths that the C interface is not told, and would read beyond."""
-        cells, vertices = mesh.cell_count, mesh.vertex_count
-        for key, expected in [("offsets", cells + 1), ("ghosts", cells), ("vertex_ids", vertices)]:
+        cells, vertices, faces = mesh.cell_count, mesh.vertex_count, mesh.face_count
+        for key, expected in [("offsets", cells + 1), ("ghosts", cells), ("vertex_ids", vertices), ("owner", faces)]:
             if key in counts and counts[key] != expected:
                 raise ValueError(f"{key}: has {counts[key]} elements, expected {expected}")
