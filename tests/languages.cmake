@@ -7,6 +7,11 @@ function(insitu_add_same_pictures_test name)
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 PROCESSORS 2)
 endfunction()
 
+# Not another language, but another description of the mesh: faces by owner and neighbour.
+add_executable(finite_volume ${PROJECT_SOURCE_DIR}/examples/finite_volume.c)
+target_link_libraries(finite_volume PRIVATE insitu insitu_flags m)
+insitu_add_same_pictures_test(finite_volume_example_draws_on_2_ranks $<TARGET_FILE:finite_volume>)
+
 # C++: from the header alone, under more warnings than our own code has. MPI's header is the system's, and not asked.
 add_executable(six_calls_cpp ${PROJECT_SOURCE_DIR}/examples/six_calls.cpp)
 set_target_properties(six_calls_cpp PROPERTIES CXX_EXTENSIONS OFF) # -std=c++17

@@ -10,3 +10,12 @@ endfunction()
 
 expect_shown(c examples/six_calls.c)
 expect_shown(yaml examples/six_calls.yaml)
+
+# What docs/finite_volume.md shows is part of the example.
+file(READ ${ROOT}/docs/finite_volume.md page)
+file(READ ${ROOT}/examples/finite_volume.c text)
+string(REGEX MATCH "```c\n([^`]+)```" block "${page}")
+string(FIND "${text}" "${CMAKE_MATCH_1}" at)
+if(NOT block OR at EQUAL -1)
+  message(SEND_ERROR "docs/finite_volume.md shows what is not in examples/finite_volume.c")
+endif()

@@ -261,7 +261,7 @@ static const spoilt_case at_the_step[] = {
     {"a face an edge", vertex_twice_beside, INSITU_ERROR_MESH, false, {CELL_0 "face ", "not once in each of two"}},
     {"face twice", face_left_out, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
     {"another's face", face_of_another_cell, INSITU_ERROR_MESH, false, {CELL_0 "face ", "the surface is not closed"}},
-    {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {CELL_0 "face 0: vertex 0 has a coordinate that is not finite"}},
+    {"NaN", coordinate_nan, INSITU_ERROR_MESH, false, {CELL_0, "vertex 0 has a coordinate that is not finite"}},
 };
 
 static void spoilt_arrays_are_told_at_once(void **context)
@@ -348,8 +348,8 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     test_free(before);
 }
 
-/* The first allocation of a step that checks polyhedra, and is not to recognise any, is for their edges. Without it nothing is known of the cells,
- * and the next step must look at them again. */
+/* The first allocation of a step that checks polyhedra, and is not to recognise any, is for their edges. Without it
+ * nothing is known of the cells, and the next step must look at them again. */
 static void check_without_memory_is_told_and_repeated(void **context)
 {
     (void)context;

@@ -292,6 +292,12 @@ static const char *type_name(int type)
     }
 }
 
+/* As the caller has the cell: a polyhedron may be read as another type. */
+static const char *given_name(const session_mesh *mesh, int64_t cell)
+{
+    return type_name(session_given_type(mesh, cell));
+}
+
 static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, const fault_place *place,
                                       base_error *error)
 {
@@ -329,7 +335,7 @@ static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base
     const cell_fault fault = check_cell(mesh, cell, &room, &place);
     free_room(&room);
     const long long base = mesh->given.index_base, at = cell, vertex = place.vertex + base;
-    const char *type = type_name(place.type);
+    const char *type = given_name(mesh, cell);
     switch (fault) {
     case BAD_FACES: return describe_faces(mesh, cell, place.fault_of_faces, &place.faces, error);
     case BAD_TYPE:
@@ -423,8 +429,8 @@ static insitu_status describe_far_cell(const session_mesh *mesh, base_error *err
                     error, INSITU_ERROR_MESH,
                     "mesh \"%s\": cell %lld (%s): vertex %lld is at (%g, %g, %g), coordinates of at most %g "
                     "are supported",
-                    mesh->name, (long long)cell, type_name(grid_cell_type(g, cell)),
-                    (long long)vertex + mesh->given.index_base, p[0], p[1], p[2], largest_coordinate);
+                    mesh->name, (long long)cell, given_name(mesh, cell), (long long)vertex + mesh->given.index_base,
+                    p[0], p[1], p[2], largest_coordinate);
         }
     }
     return INSITU_OK;

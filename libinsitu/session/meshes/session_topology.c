@@ -91,6 +91,12 @@ void session_read_topology(session_mesh *mesh)
     mesh->cells = g;
 }
 
+int session_given_type(const session_mesh *mesh, int64_t cell)
+{
+    const grid given = as_grid(&mesh->given);
+    return grid_cell_type(&given, cell);
+}
+
 /* Room for indices up to largest, as narrow as they can be. False where memory runs out. */
 static bool make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
                          base_error *error)

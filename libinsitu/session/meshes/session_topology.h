@@ -11,6 +11,9 @@ grid_array session_grid_array(const insitu_array *array);
 /* The grid that reads these arrays: the session's own where they are made, else the caller's. Local. */
 void session_read_topology(session_mesh *mesh);
 
+/* The type that the caller gave the cell, whatever it is read as. */
+int session_given_type(const session_mesh *mesh, int64_t cell);
+
 /* Make what the description leaves to the library, once for each topology: cells' faces from owner and neighbour,
  * faces' vertices in one array from lists, and tets, hexes, wedges and pyramids from the polyhedra that are such. Then
  * read it. What is wrong with owner and neighbour or with the lists is told; the rest is not looked at for errors,
