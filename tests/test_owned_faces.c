@@ -33,6 +33,7 @@ static void make_narrow(owned *o, int64_t faces, int32_t base)
     for (int64_t face = 0; face < faces; face++) {
         o->pairs[2 * face] = (int32_t)o->owner[face] + base;
         o->pairs[2 * face + 1] = (int32_t)o->neighbour[face] + base;
+        if (o->neighbour[face] < 0 && face % 2) o->pairs[2 * face + 1] = -1;
         o->lists[face] =
             (label_list){(int32_t)(o->offsets[face + 1] - o->offsets[face]), o->narrow_vertices + o->offsets[face]};
     }

@@ -25,7 +25,8 @@ owned make_owned(const test_mesh *part, int32_t base);
 void free_owned(owned *o);
 
 /* FORM_WIDE: 8 bytes, from 0, neighbours of inner faces alone. FORM_PAIRS: 4 bytes, from base, owners and neighbours in
- * turn, as many as faces. FORM_LISTS: the same with a list of vertices for each face. */
+ * turn, as many as faces; on the boundary -1, or base - 1. FORM_LISTS: the same with a list of vertices for each face.
+ */
 typedef enum form { FORM_WIDE, FORM_PAIRS, FORM_LISTS, FORM_COUNT } form;
 
 /* Describe the faces so, in place of the cells' connectivity. */

@@ -247,6 +247,66 @@ static void hexes_among_polyhedra_are_hexes(void **state)
     input_free(&mixed);
 }
 
+/* An orange of six segments: six quads and eight vertices as a hex has, but all quads from pole to pole. */
+static void make_orange(test_mesh *out)
+{
+    test_mesh_allocate(out, 8, 1, 6);
+    test_mesh_allocate_faces(out, 6, 24);
+    int64_t faces[6];
+    for (int i = 0; i < 8; i++) {
+        const double turn = acos(-1) / 3 * i;
+        const double p[3] = {i < 6 ? cos(turn) : 0, i < 6 ? sin(turn) : 0, i < 6 ? 0 : 13 - 2 * i};
+        out->values[test_mesh_add_vertex(out, p)] = i % 2;
+    }
+    for (int i = 0; i < 6; i++) faces[i] = test_mesh_add_face(out, (const int64_t[]){6, i, 7, (i + 1) % 6}, 4);
+    test_mesh_add_polyhedron(out, faces, 6);
+}
+
+/* Rank 0 has it. */
+static void six_quads_that_are_no_hex_stay(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    const char *scene = write_scene(scene_text);
+    if (own_rank == 0)
+        make_orange(&in.part);
+    else
+        input_create(&in, TEST_HEXES, 1, TEST_BLOCK, 0, 2); /* no cell: the other one has it */
+    everywhere(in.part.cell_count == (own_rank == 0));
+    input_describe(&in);
+    drawing drawn = draw(scene, &in);
+    everywhere(drawn.recognised == 0);
+    in.mesh.keep_polyhedra = 1;
+    drawing kept = draw(scene, &in);
+    everywhere(shows_something(&kept) && are_same(&kept, &drawn));
+    free_drawing(&drawn);
+    free_drawing(&kept);
+    input_free(&in);
+}
+
+/* Whichever face of a hex crosses itself, it is no hex, and not closed. The last rank has it. */
+static void hexes_with_a_crossed_face_are_told(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    const bool has_it = own_rank == rank_count - 1;
+    input_create(&in, TEST_HEXES, 1, TEST_BLOCK, 0, has_it ? 1 : 2);
+    test_mesh_to_polyhedra(&in.part, 1);
+    input_describe(&in);
+    for (int64_t i = 0; i < 6; i++) {
+        int64_t *v = has_it ? in.part.face_connectivity + 4 * i : (int64_t[]){0, 0, 0};
+        const int64_t first = v[1], second = v[2];
+        v[1] = second, v[2] = first;
+        hand_over(session, &in);
+        told_everywhere(session, insitu_step(session, i, 0), INSITU_ERROR_MESH,
+                        "mesh \"m\": cell 0 (polyhedron): ", "the surface is not closed");
+        v[1] = first, v[2] = second;
+    }
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
 /* Drawn, and drawn again with other coordinates; copied is what the second step holds beyond the first. */
 static drawing draw_moved(const char *scene, session_input *in)
 {
@@ -322,6 +382,8 @@ static int run(void)
         cmocka_unit_test(owner_and_neighbour_are_the_plain_form),
         cmocka_unit_test(polyhedra_are_the_cells_that_they_are),
         cmocka_unit_test(hexes_among_polyhedra_are_hexes),
+        cmocka_unit_test(six_quads_that_are_no_hex_stay),
+        cmocka_unit_test(hexes_with_a_crossed_face_are_told),
         cmocka_unit_test(moved_cells_are_the_same_cells),
         cmocka_unit_test(memory_that_runs_out_is_told),
     };

@@ -349,7 +349,7 @@ static bool erect(const face_ring *rings, int count, int base, int side_size, in
 {
     const int n = rings[base].count, tops = side_size == 3 ? 1 : n;
     unsigned used = 1u << base;
-    int64_t top[5];
+    int64_t top[5] = {0};
     for (int i = 0; i < n; i++) {
         const int64_t ends[2] = {rings[base].vertex[i], rings[base].vertex[(i + 1) % n]};
         int64_t above[2];
