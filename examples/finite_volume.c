@@ -57,7 +57,7 @@ static void hand_over(insitu_session *session)
     mesh.cell_type = INSITU_POLYHEDRON;
     mesh.face_count = FACES;
     mesh.face_offsets = (insitu_array){.data = face_offsets, .type = INSITU_INT32};
-    mesh.face_connectivity_count = 4 * FACES;
+    mesh.face_connectivity_count = face_offsets[FACES];
     mesh.face_connectivity = (insitu_array){.data = face_points, .type = INSITU_INT32};
     mesh.owner = (insitu_array){.data = owner, .type = INSITU_INT32};
     mesh.neighbour_count = inner_faces; /* the others are on the boundary */

@@ -75,7 +75,7 @@ typedef enum insitu_cell_type {
  * too) or VALUES. What was written into the same arrays only the caller knows. */
 enum {
     INSITU_CHANGED_NOTHING = 0,
-    INSITU_CHANGED_TOPOLOGY = 1, /* cells, their types, ghost flags: the tree is built again */
+    INSITU_CHANGED_TOPOLOGY = 1, /* cells, their types and faces, ghost flags: the tree is built again */
     INSITU_CHANGED_GEOMETRY = 2, /* coordinates: the tree's bounds are refitted */
     INSITU_CHANGED_VALUES = 4,   /* a field's values: the tree's ranges are refitted, if they did change */
     INSITU_CHANGED_ALL = 7
@@ -104,8 +104,8 @@ typedef struct insitu_mesh {
      * index_base, at least 4, in any order; a face between two polyhedra is the same one in both. The faces of a cell
      * must make a closed surface: along every edge two of them meet, once each (an edge from a vertex to itself is
      * none, so a face may repeat a vertex beside itself, or be one vertex). Which way round a face runs is nothing. No
-     * copy of them is kept but what keep_polyhedra and face_lists say: a frame holds those under way alone, about 200
-     * bytes a vertex of each, 16 MiB a thread at most. */
+     * copy of them is kept but what is said at owner, face_lists and keep_polyhedra: a frame holds those under way
+     * alone, about 200 bytes a vertex of each, 16 MiB a thread at most. */
     int64_t face_count;
     insitu_array face_offsets;       /* int32 or int64, face_count + 1: where each face begins in face_connectivity */
     int64_t face_connectivity_count; /* elements in face_connectivity */
@@ -124,8 +124,8 @@ typedef struct insitu_mesh {
     insitu_array owner;      /* int32 or int64, face_count: the cell on one side of each face */
     int64_t neighbour_count; /* elements in neighbour; at most face_count */
     insitu_array neighbour;  /* int32 or int64, neighbour_count: the cell on the other side of each face, another than
-                                the owner. Faces on the boundary have -1 (or 0 where index_base is 1), or are the last
-                                ones, beyond neighbour_count. */
+                                the owner. Faces on the boundary have -1, or 0 where index_base is 1, or are the last
+                                ones, beyond neighbour_count; so have those to cells of other ranks. */
     /* Instead of face_offsets and face_connectivity (not given then): a list of vertices for each face. They are copied
      * into one array, once for each topology, and held as long as polyhedra are drawn by them: 4 bytes a face and 4 a
      * vertex of each, in bytes_copied. */
@@ -134,7 +134,7 @@ typedef struct insitu_mesh {
                                 int32 or int64. stride_bytes is from pointer to pointer; 0: packed */
     /* A polyhedron whose faces make a tet, hex, wedge or pyramid is drawn as that, whichever way its faces run; 1
      * leaves it as it is. Told in cells_recognised. What is seen differs inside of such cells alone: the field is
-     * trilinear in a hex, and linear on 24 tets about its centre in the polyhedron. Faces of four vertices are bilinear
+     * trilinear in a hex, and linear on tets about its centre in the polyhedron. Faces of four vertices are bilinear
      * patches in both, warped or not, so that no seam is left beside true polyhedra. A hex that is folded, or of which
      * a corner is pushed in, is better left. Held, in bytes_copied: 32 bytes a hex, 4 a face of each polyhedron that
      * stays, and, unless all cells are of one type, 5 a cell; twice as much where there are more than 2^31 vertices or

@@ -103,10 +103,10 @@ static bool make_indices(const session_mesh *mesh, const char *what, int64_t cou
 {
     const bool is_wide = largest > INT32_MAX;
     const int64_t size = is_wide ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);
+    const long long bytes = size * (count + 1);
     const void *data = base_calloc((size_t)count + 1, (size_t)size);
     if (!data) {
-        base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->name,
-                  (long long)((count + 1) * size), what);
+        base_fail(error, INSITU_ERROR_MEMORY, "mesh \"%s\": no memory for %lld bytes of %s", mesh->name, bytes, what);
         return false;
     }
     *out = (grid_array){data, size, is_wide, true, 0};
@@ -166,7 +166,8 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
     const insitu_mesh *given = &mesh->given;
     session_topology *t = &mesh->topology;
     const grid_array sizes = session_grid_array(&given->face_sizes);
-    const int64_t total = count_listed(mesh, error), base = given->index_base;
+    const int64_t total = count_listed(mesh, error);
+    const long long base = given->index_base;
     int64_t at = 0;
     t->has_own_faces = true;
     if (total < 0 || !make_indices(mesh, "faces' offsets", given->face_count, total, &t->face_offsets, error) ||
@@ -182,8 +183,7 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
             if (vertex < 0 || vertex >= given->vertex_count)
                 return base_fail(error, INSITU_ERROR_MESH,
                                  "mesh \"%s\": face %lld: vertex index %lld is outside %lld..%lld (index_base is %lld)",
-                                 mesh->name, (long long)(face + base), (long long)(vertex + base), (long long)base,
-                                 (long long)(given->vertex_count - 1 + base), (long long)base);
+                                 mesh->name, face + base, vertex + base, base, given->vertex_count - 1 + base, base);
             put_index(&t->face_connectivity, at++, vertex);
         }
         put_index(&t->face_offsets, face + 1, at);
@@ -205,7 +205,7 @@ static void sides_of(const face_sides *sides, int64_t face, int64_t cells[2])
 {
     cells[0] = grid_array_index(&sides->owner, face);
     cells[1] = -1;
-    if (face >= sides->given->neighbour_count) return;
+    if (face >= sides->given->neighbour_count || !sides->neighbour.data) return;
     cells[1] = grid_array_index(&sides->neighbour, face);
     if (cells[1] + sides->given->index_base == -1) cells[1] = -1;
 }
@@ -416,11 +416,13 @@ static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GR
 
 /* ---- all polyhedra -------------------------------------------------------------------------------------------- */
 
+enum { TYPES = GRID_POLYHEDRON + 1 };
+
 typedef struct recognition {
-    bool is_faulty;                                    /* some cell is wrong in some way */
-    int64_t polyhedra, recognised;                     /* the polyhedra that were, and those that are others now */
-    int64_t of_tets, of_hexes, of_wedges, of_pyramids; /* cells of each type, then */
-    int64_t entries;                                   /* of all cells, then */
+    bool is_faulty;                /* some cell is wrong in some way */
+    int64_t polyhedra, recognised; /* the polyhedra that were, and those that are others now */
+    int64_t of_type[TYPES];        /* cells by their type, now */
+    int64_t entries;               /* of all cells, now */
     unsigned char *types;
 } recognition;
 
@@ -453,10 +455,7 @@ static void recognise_cell(const session_mesh *mesh, int64_t cell, recognition *
     r->types[cell] = (unsigned char)now;
     r->polyhedra += type == GRID_POLYHEDRON;
     r->recognised += now != type;
-    r->of_tets += now == GRID_TET;
-    r->of_hexes += now == GRID_HEX;
-    r->of_wedges += now == GRID_WEDGE;
-    r->of_pyramids += now == GRID_PYRAMID;
+    r->of_type[now]++;
     r->entries += now == GRID_POLYHEDRON ? end - first : grid_type_vertices(now);
 }
 
@@ -473,10 +472,7 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
             r->is_faulty = r->is_faulty || mine.is_faulty;
             r->polyhedra += mine.polyhedra;
             r->recognised += mine.recognised;
-            r->of_tets += mine.of_tets;
-            r->of_hexes += mine.of_hexes;
-            r->of_wedges += mine.of_wedges;
-            r->of_pyramids += mine.of_pyramids;
+            for (int type = 0; type < TYPES; type++) r->of_type[type] += mine.of_type[type];
             r->entries += mine.entries;
         }
     }
@@ -485,11 +481,9 @@ static void recognise_cells(const session_mesh *mesh, int threads, recognition *
 /* The type that all cells are of, or 0. */
 static int only_type(const recognition *r, int64_t count)
 {
-    return r->of_tets == count       ? GRID_TET
-           : r->of_hexes == count    ? GRID_HEX
-           : r->of_wedges == count   ? GRID_WEDGE
-           : r->of_pyramids == count ? GRID_PYRAMID
-                                     : 0;
+    int type = TYPES - 1;
+    while (type > 0 && r->of_type[type] != count) type--;
+    return type;
 }
 
 static void put_cell(const session_mesh *mesh, int64_t cell, int type, int64_t at, const grid_array *out)
@@ -585,7 +579,7 @@ insitu_status session_make_topology(session_mesh *mesh, int threads, base_error 
     insitu_status status = INSITU_OK;
     session_drop_topology(&mesh->topology);
     session_read_topology(mesh);
-    if (mesh->given.face_lists.data) status = copy_lists(mesh, error);
+    if (mesh->given.face_lists.data && mesh->given.face_sizes.data) status = copy_lists(mesh, error);
     if (!status && mesh->given.owner.data) status = list_faces(mesh, error);
     session_read_topology(mesh);
     if (!status && !mesh->given.keep_polyhedra && may_have_polyhedra(&mesh->cells))
