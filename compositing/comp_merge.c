@@ -197,14 +197,14 @@ static bool has_length(const fragment *f)
 /* The depth of what lets nothing through. */
 static const double opaque_depth = 1e6;
 
-/* Blends the fragments, which all begin at from, from there to the next cut. */
+/* Blends the stretches, which all begin at from or before and end at to or behind, from the one depth to the other. */
 static void blend_mixed(blend *b, const fragment *items, int64_t count, float from, float to)
 {
     double colour[3] = {0, 0, 0}, depth = 0;
     for (int64_t i = 0; i < count; i++) {
         const fragment *f = &items[i];
         const double absorbed = 1 - (double)f->transmittance;
-        if (!has_length(f) || !(f->t_out >= to && absorbed > 0)) continue;
+        if (!(absorbed > 0)) continue;
         const double share = ((double)to - (double)from) / ((double)f->t_out - (double)f->t_in);
         const double own = share * (absorbed < 1 ? -log((double)f->transmittance) : opaque_depth);
         for (int c = 0; c < 3; c++) colour[c] += (double)f->colour[c] / absorbed * own;
@@ -216,11 +216,27 @@ static void blend_mixed(blend *b, const fragment *items, int64_t count, float fr
     b->transmittance *= exp(-depth);
 }
 
-static float next_cut(const fragment *items, int64_t count, float from)
+static void exchange(fragment *items, int64_t a, int64_t b)
+{
+    const fragment kept = items[a];
+    items[a] = items[b];
+    items[b] = kept;
+}
+
+/* Moves those that go on behind the depth to the front, in their order; returns how many there are. */
+static int64_t keep_open(fragment *items, int64_t count, float depth)
+{
+    int64_t open = 0;
+    for (int64_t i = 0; i < count; i++)
+        if (items[i].t_out > depth) exchange(items, open++, i);
+    return open;
+}
+
+static float next_end(const fragment *items, int64_t count)
 {
     float to = INFINITY;
     for (int64_t i = 0; i < count; i++)
-        if (has_length(&items[i]) && items[i].t_out > from && items[i].t_out < to) to = items[i].t_out;
+        if (items[i].t_out < to) to = items[i].t_out;
     return to;
 }
 
@@ -230,20 +246,28 @@ static bool is_overlapped(const fragment *sorted, int64_t count)
     return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
-/* The fragments from the first on to where none goes on; returns how many they are. */
-static int64_t blend_run(blend *b, const fragment *sorted, int64_t count)
+/* The fragments from the first on to where none goes on; returns how many they are. Stretches under way are kept at the
+ * front, so that a cut costs no more than what is mixed in it: a thousand short ones behind each other beside a long one
+ * are a thousand cuts of two. The fragments are in order again in the end. */
+static int64_t blend_run(blend *b, fragment *sorted, int64_t count)
 {
     float at = sorted[0].t_in;
-    for (int64_t first = 0, end = 0;;) {
+    int64_t open = 0, end = 0;
+    for (;;) {
         for (; end < count && sorted[end].t_in <= at; end++)
-            if (!has_length(&sorted[end])) blend_over(b, &sorted[end]);
-        while (first < end && !(has_length(&sorted[first]) && sorted[first].t_out > at)) first++;
-        if (first == end || b->transmittance == 0) return end;
-        float to = next_cut(sorted + first, end - first, at);
+            if (has_length(&sorted[end]))
+                exchange(sorted, open++, end);
+            else
+                blend_over(b, &sorted[end]);
+        open = keep_open(sorted, open, at);
+        if (open == 0 || b->transmittance == 0) break;
+        float to = next_end(sorted, open);
         if (end < count && sorted[end].t_in < to) to = sorted[end].t_in;
-        blend_mixed(b, sorted + first, end - first, at, to);
+        blend_mixed(b, sorted, open, at, to);
         at = to;
     }
+    sort(sorted, end);
+    return end;
 }
 
 /* As below, for a pixel of one fragment, which most pixels are. */

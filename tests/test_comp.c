@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include <cmocka.h>
 #include <omp.h>
@@ -465,6 +466,34 @@ static void stretches_that_overlap_are_mixed(void **context)
     }
 }
 
+/* One long stretch over many short ones behind each other, as a ray has them where one mesh is fine and another coarse,
+ * in time that goes with their number: a quadratic rule takes minutes. All cuts mix the same two media, so that the
+ * whole is one of their sum; roundings of sums of so many are below 1e-9, of the floats below 3e-7. */
+static void many_short_stretches_under_a_long_one_take_no_time(void **context)
+{
+    (void)context;
+    enum { SHORT = 200000 };
+    const float clear = 0.99999f;
+    fragment *items = calloc(SHORT + 1, sizeof *items);
+    for (int i = 0; i < SHORT; i++) {
+        fragment *f = &items[(int64_t)i * 7919 % SHORT]; /* in no order */
+        *f = (fragment){.t_in = (float)i, .t_out = (float)(i + 1), .transmittance = clear};
+        f->colour[0] = 1 - clear;
+    }
+    items[SHORT] = (fragment){.t_in = 0, .t_out = SHORT, .colour = {0, 0.5f, 0}, .transmittance = 0.5f};
+    float rgba[4], depth;
+    const clock_t start = clock();
+    comp_merge_pixel(items, SHORT + 1, black, rgba, &depth);
+    const double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;
+    const double red = -log((double)clear) * SHORT, green = -log(0.5), all = red + green, light = -expm1(-all) / all;
+    assert_true(fabs((double)rgba[0] - red * light) < 3e-7 && fabs((double)rgba[1] - green * light) < 3e-7);
+    assert_true(fabs((double)rgba[3] + expm1(-all)) < 3e-7);
+    for (int i = 0; i < SHORT; i++) assert_true(items[i].t_in <= items[i + 1].t_in);
+    assert_true(comp_pixel_overlaps(items, SHORT + 1));
+    assert_true(seconds < 2);
+    free(items);
+}
+
 /* Of a sample that rounding gives to two neighbours the one behind counts, in whatever order they come. */
 static void samples_of_neighbours_count_once(void **context)
 {
@@ -701,6 +730,7 @@ int main(void)
         cmocka_unit_test(permutations_give_the_same_bits),
         cmocka_unit_test(samples_of_one_place_share_what_they_absorb),
         cmocka_unit_test(stretches_that_overlap_are_mixed),
+        cmocka_unit_test(many_short_stretches_under_a_long_one_take_no_time),
         cmocka_unit_test(samples_of_neighbours_count_once),
         cmocka_unit_test(overlaps_are_where_a_volume_has_not_ended),
         cmocka_unit_test(owners_share_all_pixels_evenly),
