@@ -247,8 +247,8 @@ static bool is_overlapped(const fragment *sorted, int64_t count)
 }
 
 /* The fragments from the first on to where none goes on; returns how many they are. Stretches under way are kept at the
- * front, so that a cut costs no more than what is mixed in it: a thousand short ones behind each other beside a long one
- * are a thousand cuts of two. The fragments are in order again in the end. */
+ * front, so that a cut costs no more than what is mixed in it: a thousand short ones behind each other beside a long
+ * one are a thousand cuts of two. The fragments are in order again in the end. */
 static int64_t blend_run(blend *b, fragment *sorted, int64_t count)
 {
     float at = sorted[0].t_in;

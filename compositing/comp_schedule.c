@@ -1,27 +1,33 @@
-/* Why runs, and why this long: a run keeps the pixels that one packet of rays made on one owner, so that messages
- * stay few, and going round keeps an object in the middle of the image from falling to a few ranks. 64 pixels are
- * some packets wide. With more ranks than runs of 64 the runs shrink, so that no rank idles while another owns two. */
+/* Why runs, and why this long: a run keeps the pixels that one packet of rays made on one owner. 64 pixels are some
+ * packets wide. Where a rank would have fewer than a thousand runs they shrink, so that what is seen falls to all ranks
+ * alike: a rank's share of it goes by how many of its runs are there.
+ *
+ * Why rounds are turned: where the width is a multiple of a round, or a round of the width, a rank would own columns of
+ * the picture, and what stands in the middle would fall to a few. */
 #include "comp_schedule.h"
 
 #include "comp.h"
 
-enum { longest_run_shift = 6 };
+enum { longest_run_shift = 6, least_runs = 1024 };
 
 comp_layout comp_layout_of(uint32_t pixel_count, int ranks)
 {
     comp_layout layout = {pixel_count, (uint32_t)ranks, longest_run_shift, 1};
-    while (layout.run_shift > 0 && pixel_count >> layout.run_shift < layout.ranks) layout.run_shift--;
+    while (layout.run_shift > 0 && pixel_count >> layout.run_shift < (uint64_t)layout.ranks * least_runs)
+        layout.run_shift--;
     return layout;
 }
 
 uint32_t comp_layout_owned(const comp_layout *layout, int rank)
 {
-    const uint64_t run = (uint64_t)1 << layout->run_shift;
-    const uint64_t runs = (layout->pixel_count + run - 1) >> layout->run_shift;
-    if ((uint64_t)rank >= runs) return 0;
-    const uint64_t own_runs = (runs - 1 - (uint64_t)rank) / layout->ranks + 1;
-    const uint64_t missing = (runs - 1) % layout->ranks == (uint64_t)rank ? runs * run - layout->pixel_count : 0;
-    return (uint32_t)(own_runs * run - missing);
+    const uint32_t run = 1u << layout->run_shift, ranks = layout->ranks;
+    const uint32_t runs = (uint32_t)(((uint64_t)layout->pixel_count + run - 1) >> layout->run_shift);
+    const uint32_t rounds = runs / ranks, left = runs % ranks;
+    /* Which run of the last round is the rank's, were it whole. */
+    const uint32_t own = ((uint32_t)rank + ranks - comp_layout_turn(layout, rounds)) % ranks;
+    const uint64_t pixels = ((uint64_t)rounds + (own < left)) * run;
+    const bool has_last = runs && comp_layout_owner(layout, layout->pixel_count - 1) == (uint32_t)rank;
+    return (uint32_t)(pixels - (has_last ? (uint64_t)runs * run - layout->pixel_count : 0));
 }
 
 int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks)

@@ -1,10 +1,11 @@
 /* Who owns which pixel, in plain arithmetic: no MPI, no memory, so that it can be tried for any number of ranks.
  *
- * Pixels are cut into runs of 2^run_shift consecutive ones, and runs go round the ranks. An owner counts its pixels
- * from 0, run after run: the owned index. */
+ * Pixels are cut into runs of 2^run_shift consecutive ones, and runs go round the ranks: in each round every rank has
+ * one, and rounds begin at different ranks. An owner counts its pixels from 0, run after run: the owned index. */
 #ifndef COMP_COMP_SCHEDULE_H
 #define COMP_COMP_SCHEDULE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 typedef struct comp_layout {
@@ -16,9 +17,18 @@ typedef struct comp_layout {
 
 comp_layout comp_layout_of(uint32_t pixel_count, int ranks);
 
+/* The rank at which a round begins: multiples of the golden ratio, whose parts behind the point fall evenly everywhere
+ * (Knuth, The Art of Computer Programming 3, 6.4). */
+static inline uint32_t comp_layout_turn(const comp_layout *layout, uint32_t round)
+{
+    return (uint32_t)((uint64_t)(round * 2654435769u) * layout->ranks >> 32);
+}
+
 static inline uint32_t comp_layout_owner(const comp_layout *layout, uint32_t pixel)
 {
-    return (pixel >> layout->run_shift) % layout->ranks;
+    const uint32_t run = pixel >> layout->run_shift, round = run / layout->ranks;
+    const uint64_t owner = (uint64_t)(run - round * layout->ranks) + comp_layout_turn(layout, round);
+    return (uint32_t)(owner < layout->ranks ? owner : owner - layout->ranks);
 }
 
 /* The pixel's owned index on its owner: 0 .. comp_layout_owned(owner) - 1, rising with the pixel. */

@@ -5,6 +5,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -286,6 +287,65 @@ static void owners_share_all_pixels_evenly(void **context)
     const uint32_t pixels[] = {1, 2, 63, 64, 65, 333, 640 * 480, 1021 * 769};
     for (size_t r = 0; r < sizeof ranks / sizeof *ranks; r++)
         for (size_t p = 0; p < sizeof pixels / sizeof *pixels; p++) check_layout(pixels[p], ranks[r]);
+}
+
+/* What of a picture's pixels is seen. */
+typedef bool seen_function(double x, double y);
+
+static bool is_in_disc(double x, double y)
+{
+    return hypot(x, y) < 0.3;
+}
+static bool is_in_ring(double x, double y)
+{
+    return fabs(hypot(x, y) - 0.4) < 0.05;
+}
+static bool is_in_column(double x, double y)
+{
+    (void)y;
+    return fabs(x) < 0.15;
+}
+static bool is_in_band(double x, double y)
+{
+    (void)x;
+    return fabs(y) < 0.15;
+}
+
+/* Most of what one rank owns of it, over the mean. */
+static double skew_of(int width, int height, int ranks, seen_function *is_seen)
+{
+    const comp_layout layout = comp_layout_of((uint32_t)width * (uint32_t)height, ranks);
+    int64_t *owned = calloc((size_t)ranks, sizeof *owned), most = 0, all = 0;
+    assert_non_null(owned);
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+            if (!is_seen((x + 0.5 - 0.5 * width) / height, (y + 0.5) / height - 0.5)) continue;
+            const int64_t here = ++owned[comp_layout_owner(&layout, (uint32_t)(y * width + x))];
+            most = here > most ? here : most;
+            all++;
+        }
+    free(owned);
+    return (double)most * ranks / (double)all;
+}
+
+/* Of widths that rounds of runs divide, as of others. A thousand ranks have a hundred pixels each of what is seen of
+ * the smaller pictures, which cannot be shared as evenly: there 1.2. */
+static void owners_share_what_is_seen(void **context)
+{
+    (void)context;
+    static seen_function *const shapes[] = {is_in_disc, is_in_ring, is_in_column, is_in_band};
+    const int sizes[][2] = {{1000, 1000}, {1024, 1024}, {1280, 720}, {1920, 1080}, {2048, 1024}, {4096, 2304}};
+    const int ranks[] = {2, 3, 16, 64, 100, 256, 1000};
+    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
+        for (size_t r = 0; r < sizeof ranks / sizeof *ranks; r++)
+            for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
+                const double skew = skew_of(sizes[s][0], sizes[s][1], ranks[r], shapes[k]);
+                const double most = ranks[r] == 1000 && sizes[s][1] < 2000 ? 1.2 : 1.1;
+                if (skew > most)
+                    fprintf(stderr, "%d x %d, %d ranks, shape %d: %g\n", sizes[s][0], sizes[s][1], ranks[r], (int)k,
+                            skew);
+                assert_true(skew <= most);
+            }
 }
 
 static void owners_of_the_largest_image_add_up(void **context)
@@ -734,6 +794,7 @@ int main(void)
         cmocka_unit_test(samples_of_neighbours_count_once),
         cmocka_unit_test(overlaps_are_where_a_volume_has_not_ended),
         cmocka_unit_test(owners_share_all_pixels_evenly),
+        cmocka_unit_test(owners_share_what_is_seen),
         cmocka_unit_test(owners_of_the_largest_image_add_up),
         cmocka_unit_test(bucket_by_owner_keeps_the_set),
         cmocka_unit_test(pixels_beyond_the_image_are_seen),
