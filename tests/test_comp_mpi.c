@@ -233,9 +233,12 @@ static void statistics_count_what_travelled(void **context)
     const insitu_status status = comp_composite(comm, &s.own, background, 0, &s.out, &statistics, NULL);
     assert_everywhere(status == INSITU_OK, "composite succeeds");
     int64_t foreign = 0, touched = 0;
-    for (int64_t i = 0; i < s.own.count; i++) foreign += (int)(s.own.items[i].pixel / 64) != own_rank;
-    for (int p = 64 * own_rank; own_rank > 0 && p < 64 * (own_rank + 1); p++)
-        touched += memcmp(s.expected.rgba + 4 * p, background, sizeof background) != 0;
+    const uint32_t pixels = 64 * (uint32_t)rank_count;
+    for (int64_t i = 0; i < s.own.count; i++)
+        foreign += comp_owner(s.own.items[i].pixel, pixels, rank_count) != own_rank;
+    for (uint32_t p = 0; own_rank > 0 && p < pixels; p++)
+        touched += comp_owner(p, pixels, rank_count) == own_rank &&
+                   memcmp(s.expected.rgba + 4 * p, background, sizeof background) != 0;
     const int64_t expected = foreign * (int64_t)sizeof(fragment) + touched * (int64_t)sizeof(comp_pixel);
     assert_everywhere(statistics.sent_bytes == expected, "bytes are those of foreign fragments and touched pixels");
     free_setting(&s);

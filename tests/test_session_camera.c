@@ -111,6 +111,45 @@ static void a_box_fills_an_orthographic_frame(void **state)
     check_box(true);
 }
 
+/* What decorations leave of half a side: 6.5 heights of words are a colour bar's, 2.4 a title's, 3 those of a ruler. */
+static double left_by(double words, double size, int pixels)
+{
+    return fmax(0.95 - 2 * words * size / pixels, 0.5);
+}
+
+/* Both borders of the tighter side are met, and none is passed. */
+static void decorations_keep_their_room(void **state)
+{
+    (void)state;
+    srand(12);
+    for (int i = 0; i < 3000; i++) {
+        const session_extent extent = random_extent();
+        scene_image image = random_image();
+        scene_decorations *d = &image.decorations;
+        render_camera camera;
+        double low[2], high[2];
+        image.camera.fits_box = true;
+        image.camera.is_orthographic = i % 2;
+        *d = (scene_decorations){.is_given = true, .size = 0.03, .has_bars = i % 3, .has_rulers = i % 5 == 0};
+        d->bars_at = i % 3 == 1 ? SCENE_LEFT : SCENE_RIGHT;
+        d->title = i % 7 ? (char *)(uintptr_t) "title" : NULL;
+        if (!(extent.half_diagonal > 0) || !session_make_camera(&extent, &image, &camera)) continue;
+        const double size = 0.03 * image.height, ruled = d->has_rulers ? 3 : 0;
+        const double most[2] = {left_by(ruled + (i % 3 == 2 ? 6.5 : 0), size, image.width),
+                                left_by(i % 7 ? 2.4 : 0, size, image.height)};
+        const double least[2] = {-left_by(ruled + (i % 3 == 1 ? 6.5 : 0), size, image.width),
+                                 -left_by(ruled, size, image.height)};
+        assert_true(borders(&camera, &extent, low, high));
+        bool is_filled = is_close(&camera, &extent);
+        for (int a = 0; a < 2; a++) {
+            assert_true(low[a] >= least[a] - 1e-9 && high[a] <= most[a] + 1e-9);
+            is_filled = is_filled || (low[a] < least[a] + 1e-9 && high[a] > most[a] - 1e-9);
+        }
+        assert_true(is_filled || extent.upper[0] == extent.lower[0] || extent.upper[1] == extent.lower[1] ||
+                    extent.upper[2] == extent.lower[2]);
+    }
+}
+
 static void zoom_and_height_are_what_they_say(void **state)
 {
     (void)state;
@@ -137,8 +176,8 @@ static void zoom_and_height_are_what_they_say(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_box_fills_the_frame),
-                                       cmocka_unit_test(a_box_fills_an_orthographic_frame),
-                                       cmocka_unit_test(zoom_and_height_are_what_they_say)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_box_fills_the_frame), cmocka_unit_test(a_box_fills_an_orthographic_frame),
+        cmocka_unit_test(decorations_keep_their_room), cmocka_unit_test(zoom_and_height_are_what_they_say)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

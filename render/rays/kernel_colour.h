@@ -122,6 +122,10 @@ SIMD_INLINE vf kernel_inverse_length(const vf v[3], vm *is_zero)
 SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, const vf n[3], vf colour[3])
 {
     const render_job *job = p->frame->job;
+    if (m->diffuse == 0 && m->specular == 0) {
+        for (int a = 0; a < 3; a++) colour[a] *= m->ambient;
+        return;
+    }
     vm flat;
     vf unit[3], inverse = kernel_inverse_length(n, &flat);
     vf facing = vf_set(0);

@@ -115,7 +115,8 @@ static const cyaml_strval_t outline_words[] = {{"false", SCENE_NO_BOX},
               "the `ranks` holds. What is drawn hides edges at the back of a box.",                                    \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_BOOL_PTR("rulers", OPTIONAL, scene_file_decorations, rulers),                                        \
-      .help = "Round numbers along three edges of the box around all data. A `zoom` below 1 leaves room for them.",    \
+      .help = "Round numbers along three edges of the box around all data. With `fit: box` they have room; else a "    \
+              "`zoom` below 1 leaves some.",                                                                           \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_MAPPING_PTR("scale_bar", OPTIONAL, scene_file_decorations, scale_bar, scale_bar_fields),             \
       .help =                                                                                                          \

@@ -1,10 +1,11 @@
 /* An automatic camera looks along a given direction. What is left to find is where it stands: for the sphere around the
- * bounds, on the line through their middle; for the box, where its corners just fill the frame.
+ * bounds, on the line through their middle; for the box, where its corners just fill what decorations leave of the
+ * frame.
  *
  * A corner at (x, y) across and w towards the eye, seen from a place s to the right and D towards the eye, is within
- * the right border if x - s <= t (D - w), t being the tangent of half the angle; and within the left one if s - x <= t
- * (D - w). So with a = max(x + t w) and b = max(t w - x), D is at least (a + b) / 2t, and s = (a - b) / 2 does for
- * every such D. The same holds for up and down; the larger D serves both. */
+ * the right border if x - s <= r (D - w), r being its tangent; and within the left one, of tangent l, if s - x <=
+ * l (D - w). So with a = max(x + r w) and b = max(l w - x), D is at least (a + b) / (r + l), and s = (a - b + (l - r)
+ * D) / 2 does for every such D. The same holds for up and down; the larger D serves both. */
 #include "session_camera.h"
 
 #include <math.h>
@@ -37,10 +38,10 @@ static void choose_up(const double direction[3], const double up[3], double out[
 
 /* ---- where it stands ------------------------------------------------------------------------------------------- */
 
-/* How far from the middle of the bounds: to the right, up, and towards the eye; and half the height of an orthographic
- * picture. */
+/* How far from the middle of the bounds: to the right and up, and by how much more for each length towards the eye; how
+ * far towards it; and of an orthographic picture half the height, for each length of which it is moved too. */
 typedef struct camera_stand {
-    double right, up, back, half_height;
+    double right, up, right_slope, up_slope, back, half_height, right_share, up_share;
 } camera_stand;
 
 /* Tangents of half the angles of view, across and up. */
@@ -67,31 +68,71 @@ typedef struct corner_reach {
     double right, left, up, down, back;
 } corner_reach;
 
-static corner_reach reach_of_corners(const session_extent *e, const render_camera *axes, double across, double up)
+/* Shares of half the frame, or tangents, from its middle to where the data may reach on each side. */
+typedef struct camera_frame {
+    double right, left, up, down;
+} camera_frame;
+
+/* In heights of words: what a colour bar, a title, and rulers' numbers take of the picture. */
+static const double bar_room = 6.5, title_room = 2.4, ruler_room = 3;
+
+static double less_room(double words, double pixels)
+{
+    return fmax(filled - 2 * words / pixels, 0.5);
+}
+
+/* What decorations leave free. */
+static camera_frame free_frame(const scene_image *image)
+{
+    const scene_decorations *d = &image->decorations;
+    if (!d->is_given) return (camera_frame){filled, filled, filled, filled};
+    const double size = d->size * image->height, rulers = d->has_rulers ? ruler_room * size : 0;
+    const double bars = d->has_bars ? bar_room * size : 0, title = d->title ? title_room * size : 0;
+    return (camera_frame){.right = less_room(rulers + (d->bars_at == SCENE_RIGHT ? bars : 0), image->width),
+                          .left = less_room(rulers + (d->bars_at == SCENE_LEFT ? bars : 0), image->width),
+                          .up = less_room(title, image->height),
+                          .down = less_room(rulers, image->height)};
+}
+
+static corner_reach reach_of_corners(const session_extent *e, const render_camera *axes, const camera_frame *f)
 {
     corner_reach r = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY};
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         for (int a = 0; a < 3; a++) p[a] = (corner >> a & 1 ? 0.5 : -0.5) * (e->upper[a] - e->lower[a]);
         const double x = dot(p, axes->right), y = dot(p, axes->up), w = -dot(p, axes->forward);
-        r.right = fmax(r.right, x + across * w);
-        r.left = fmax(r.left, across * w - x);
-        r.up = fmax(r.up, y + up * w);
-        r.down = fmax(r.down, up * w - y);
+        r.right = fmax(r.right, x + f->right * w);
+        r.left = fmax(r.left, f->left * w - x);
+        r.up = fmax(r.up, y + f->up * w);
+        r.down = fmax(r.down, f->down * w - y);
         r.back = fmax(r.back, w);
     }
     return r;
 }
 
-static camera_stand fit_box(const session_extent *e, const render_camera *axes, camera_tangents t)
+static camera_stand fit_box(const session_extent *e, const render_camera *axes, const scene_image *image,
+                            camera_tangents t)
 {
-    const double across = filled * t.across, up = filled * t.up;
-    const corner_reach near = reach_of_corners(e, axes, across, up), flat = reach_of_corners(e, axes, 0, 0);
-    const double back = fmax((near.right + near.left) / (2 * across), (near.up + near.down) / (2 * up));
+    static const camera_frame nothing;
+    const camera_frame share = free_frame(image);
+    const camera_frame f = {share.right * t.across, share.left * t.across, share.up * t.up, share.down * t.up};
+    const corner_reach near = reach_of_corners(e, axes, &f), flat = reach_of_corners(e, axes, &nothing);
+    const double back = fmax((near.right + near.left) / (f.right + f.left), (near.up + near.down) / (f.up + f.down));
+    const double across = 2 * flat.right / (share.right + share.left) * t.up / t.across;
     return (camera_stand){.right = 0.5 * (near.right - near.left),
                           .up = 0.5 * (near.up - near.down),
+                          .right_slope = 0.5 * (f.left - f.right),
+                          .up_slope = 0.5 * (f.down - f.up),
                           .back = fmax(back, near.back + 0.01 * e->half_diagonal), /* flat bounds, seen edge on */
-                          .half_height = fmax(flat.up, flat.right * t.up / t.across) / filled};
+                          .half_height = fmax(2 * flat.up / (share.up + share.down), across),
+                          .right_share = 0.5 * (share.left - share.right) * t.across / t.up,
+                          .up_share = 0.5 * (share.down - share.up)};
+}
+
+/* Of an orthographic picture. */
+static double half_height_of(const scene_image *image, double fitting)
+{
+    return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
 
 /* The eye is where all data is before it. An orthographic picture is no other from farther away. */
@@ -99,7 +140,7 @@ static void set_orthographic(const scene_image *image, double half_height, rende
 {
     if (!image->camera.is_orthographic) return;
     camera->is_orthographic = true;
-    camera->half_height = image->camera.height > 0 ? 0.5 * image->camera.height : half_height;
+    camera->half_height = half_height_of(image, half_height);
 }
 
 static bool automatic_camera(const session_extent *extent, const scene_image *image, render_camera *out)
@@ -116,15 +157,18 @@ static bool automatic_camera(const session_extent *extent, const scene_image *im
     choose_up(c->direction, c->up, up);
     if (!render_camera_look_at(&axes, eye, middle, up, c->angle, image->width, image->height)) return false;
     const bool by_box = c->fits_box && extent->half_diagonal > 0;
-    const camera_stand stand = by_box ? fit_box(extent, &axes, tangents) : fit_sphere(radius, image, tangents);
+    const camera_stand stand = by_box ? fit_box(extent, &axes, image, tangents) : fit_sphere(radius, image, tangents);
     const bool is_flat = c->is_orthographic;
     const double back = is_flat ? 2 * radius : stand.back / c->zoom;
+    const double half_height = half_height_of(image, stand.half_height / c->zoom);
+    const double right = is_flat ? stand.right_share * half_height : stand.right + stand.right_slope * back;
+    const double above = is_flat ? stand.up_share * half_height : stand.up + stand.up_slope * back;
     for (int a = 0; a < 3; a++) {
-        focal[a] = middle[a] + (is_flat ? 0 : stand.right * axes.right[a] + stand.up * axes.up[a]);
+        focal[a] = middle[a] + (right * axes.right[a] + above * axes.up[a]);
         eye[a] = focal[a] + c->direction[a] / length(c->direction) * back;
     }
     if (!render_camera_look_at(out, eye, focal, up, c->angle, image->width, image->height)) return false;
-    set_orthographic(image, stand.half_height / c->zoom, out);
+    set_orthographic(image, half_height, out);
     return true;
 }
 

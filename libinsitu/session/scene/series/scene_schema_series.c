@@ -17,7 +17,8 @@ static const cyaml_strval_t projection_words[] = {{"perspective", SCENE_PERSPECT
       .help = "From the middle of the data towards the eye. Any length but 0.", .by_default = "`[1, 0.8, 1.2]`")       \
     X(CHOICE("fit", scene_file_automatic, fit, fit_words),                                                             \
       .help = "What fits into the image: the `box` of the data's bounds, which then fills 0.95 of the frame's width "  \
-              "or height, or the `sphere` around it, which looks the same size from every side.",                      \
+              "or height, less the room of a title, colour bars and rulers, or the `sphere` around it, which looks "   \
+              "the same size from every side.",                                                                        \
       .by_default = "`sphere`")                                                                                        \
     X(CYAML_FIELD_FLOAT_PTR("zoom", OPTIONAL, scene_file_automatic, zoom), .help = "1 fits; larger is nearer.",        \
       .by_default = "`1`", .low = 1e-4, .high = 1000)
