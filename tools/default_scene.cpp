@@ -94,7 +94,7 @@ std::string default_scene(const options &o)
     const std::string colour = field.empty() ? "" : "colour_by: {field: " + quoted(field) + "}";
     std::ostringstream scene;
     scene << "images:\n  - name: " << quoted(name) << "\n    size: [" << o.width << ", " << o.height << "]\n"
-          << "    camera: {automatic: {fit: box, zoom: 0.85, direction: [" << o.direction << "]}}\n"
+          << "    camera: {automatic: {fit: box, direction: [" << o.direction << "]}}\n"
           << "    layers: [{surface: {" << colour << "}}]\n    decorations: {title: " << quoted(name)
           << ", text: [{text: \"t = {time}\"}], outline: true, axes: true" << (field.empty() ? "" : ", colour_bar: {}")
           << "}\n    outputs: [{path: \"{name}_{cycle:04}.png\"}]\n";
