@@ -26,8 +26,9 @@ target_link_libraries(test_vtk_formats PRIVATE test_vtk_samples insitu_flags Pkg
 add_test(NAME vtk_formats COMMAND test_vtk_formats $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE})
 insitu_add_long_test(vtk_formats_cut_often
   test_vtk_formats $<TARGET_FILE:insitu-render> ${MPIEXEC_EXECUTABLE} 50 90 95 99)
+# One program after the other, most of whose time is to be loaded, on one core: others run beside.
 set_tests_properties(vtk_formats vtk_formats_cut_often PROPERTIES
-  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300)
+  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300)
 
 add_executable(test_vtk_tool test_vtk_tool.cpp test_vtk_run.cpp)
 target_link_libraries(test_vtk_tool PRIVATE insitu_flags PkgConfig::CMOCKA VTK::IOLegacy VTK::IOXML)
@@ -54,7 +55,7 @@ endforeach()
 target_link_libraries(test_data_polyhedra PRIVATE test_own_tets)
 
 set_tests_properties(vtk_tool vtk_images PROPERTIES
-  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" PROCESSORS 2 TIMEOUT 300 SKIP_RETURN_CODE 77)
+  ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 300 SKIP_RETURN_CODE 77)
 
 # The manual page names the options of --help, and is well formed.
 add_test(NAME manual_page COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/manual_page.sh $<TARGET_FILE:insitu-render>
