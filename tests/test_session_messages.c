@@ -78,6 +78,11 @@ static void centre_on_cells(session_input *in)
     in->field.count = in->part.cell_count; /* of hexes, which are fewer than their vertices */
 }
 
+static void make_negative(session_input *in)
+{
+    for (int64_t v = 0; v < in->part.vertex_count; v++) in->part.values[v] = -1 - fabs(in->part.values[v]);
+}
+
 static void make_nothing(session_input *in)
 {
     for (int64_t i = 0; i < in->part.vertex_count; i++) in->part.values[i] = NAN;
@@ -128,6 +133,11 @@ static const struct warning_case {
      TEST_HEXES,
      centre_on_cells,
      {"\"f\" at 0.1 is not there: the field is from 5 to 5"}},
+    {"a logarithm of nothing",
+     IMAGE("[24, 16]", "", "{surface: {colour_by: {field: f, scale: log}}}", ""),
+     TEST_HEXES,
+     make_negative,
+     {"image \"a\": the field \"f\" has no value above 0", "scale: log"}},
     {"no value at all", plain, TEST_TETS, make_nothing, {"are not finite"}},
     {"a camera that looks away",
      IMAGE("[24, 16]", CAMERA("position: [0, 0, 9], focal: [0, 0, 12]"), SURFACE, ""),

@@ -406,7 +406,7 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
                                 session_picture *picture, base_error *error)
 {
-    session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report, NULL};
+    session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report, NULL, image};
     session_view view;
     session_layers layers = {0};
     canvas canvas = {0};

@@ -117,6 +117,15 @@ static render_field place_distances(const session_meshes *meshes, session_layers
     return out;
 }
 
+static void warn_of_scale(const session_layer_basis *basis, const scene_field *field, bool is_true)
+{
+    const session_warning warning = {WARNING_SCALE, basis->image->name, field->name, 0};
+    session_warn(basis->report, &warning, is_true,
+                 "image \"%s\": the field \"%s\" has no value above 0, and scale: log shows such values alone: all of "
+                 "it lies below the range",
+                 basis->image->name, field->name);
+}
+
 /* With what a run has met before. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
@@ -126,6 +135,7 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     insitu_status status = INSITU_OK;
     if (!map->range.is_fixed) status = session_find_range(basis->meshes, basis->team, field, map, &low, &high, error);
     if (status) return status;
+    if (!map->range.is_fixed && map->scale == SCENE_LOG) warn_of_scale(basis, field, !(high > 0));
     if (!map->range.is_fixed && map->range.source == SCENE_RANGE_RUN)
         session_widen_run_range(basis->run_ranges, map, &low, &high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))

@@ -32,6 +32,7 @@ typedef struct session_layer_basis {
     double half_diagonal; /* of the global bounds */
     session_report *report;
     session_image_ranges *run_ranges; /* NULL: no layer has one over the run */
+    const scene_image *image;
 } session_layer_basis;
 
 /* Collective: ranges from the data are over all ranks. On an error nothing is left to free. */
