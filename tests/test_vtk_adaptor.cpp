@@ -21,7 +21,11 @@
 #include <vtkPartitionedDataSetCollection.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
+#include <vtkImageData.h>
 #include <vtkPolyData.h>
+#include <vtkTable.h>
+#include <vtkStructuredGrid.h>
+#include <vtkRectilinearGrid.h>
 #include <vtkSOADataArrayTemplate.h>
 #include <vtkShortArray.h>
 #include <vtkTypeInt32Array.h>
@@ -567,25 +571,103 @@ void ghost_flags_follow_cells_left_out(void **)
     for (int i = 0; i < 2; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
 }
 
+/* Of hexes alone, whose types and offsets are not given. */
+double whole_volume(insitu_mesh mesh)
+{
+    double sum = 0;
+    const std::vector<uint8_t> types(static_cast<size_t>(mesh.cell_count), INSITU_HEX);
+    std::vector<int64_t> offsets;
+    for (int64_t i = 0; i <= mesh.cell_count; i++) offsets.push_back(8 * i);
+    mesh.cell_types = {types.data(), INSITU_UINT8, 0};
+    mesh.offsets = {offsets.data(), INSITU_INT64, 0};
+    for (int64_t i = 0; i < mesh.cell_count; i++) sum += cell_volume(mesh, i);
+    return sum;
+}
+
+/* 3 x 4 x 5 points. */
+void structured_grids_are_hexahedra(void **)
+{
+    vtkNew<vtkImageData> image;
+    image->SetDimensions(3, 4, 5);
+    image->SetOrigin(1, 2, 3);
+    image->SetSpacing(0.5, 1, 2);
+    vtkNew<vtkRectilinearGrid> rectilinear;
+    rectilinear->SetDimensions(3, 4, 5);
+    vtkNew<vtkDoubleArray> axes[3];
+    const std::vector<double> places[3] = {{1, 1.5, 2}, {2, 3, 3.5, 5}, {3, 5, 6, 7, 11}};
+    for (int a = 0; a < 3; a++)
+        for (const double place : places[a]) axes[a]->InsertNextValue(place);
+    rectilinear->SetXCoordinates(axes[0]);
+    rectilinear->SetYCoordinates(axes[1]);
+    rectilinear->SetZCoordinates(axes[2]);
+    vtkNew<vtkStructuredGrid> curvilinear;
+    curvilinear->SetDimensions(3, 4, 5);
+    vtkNew<vtkPoints> points;
+    for (int i = 0; i < 60; i++) {
+        double at[3];
+        image->GetPoint(i, at);
+        points->InsertNextPoint(at);
+    }
+    curvilinear->SetPoints(points);
+    for (vtkDataSet *data : {static_cast<vtkDataSet *>(image), static_cast<vtkDataSet *>(rectilinear),
+                             static_cast<vtkDataSet *>(curvilinear)}) {
+        vtkNew<vtkDoubleArray> values;
+        values->SetName("f");
+        values->SetNumberOfTuples(60);
+        values->Fill(1);
+        data->GetPointData()->AddArray(values);
+        fixture f;
+        assert_int_equal(f.set(data), INSITU_OK);
+        const insitu_mesh &mesh = f.mesh().mesh;
+        assert_true(mesh.cell_count == 24 && mesh.vertex_count == 60 && mesh.cell_type == INSITU_HEX);
+        assert_true(std::fabs(whole_volume(mesh) - 1 * 3 * 8) < 24 * rounding);
+        assert_ptr_equal(f.mesh().fields.at("f").values.data, values->GetPointer(0));
+        assert_true(f.report.bytes_copied > 24 * 8 * 4);
+        assert_non_null(strstr(f.report.copied_why, data->GetClassName()));
+    }
+}
+
+void polygons_are_shells(void **)
+{
+    vtkNew<vtkPolyData> data;
+    vtkNew<vtkPoints> points;
+    for (const std::array<double, 3> &at : cube) points->InsertNextPoint(at.data());
+    vtkNew<vtkCellArray> lines, polygons;
+    lines->InsertNextCell({0, 6});
+    polygons->InsertNextCell({0, 1, 2});
+    polygons->InsertNextCell({0, 1, 2, 3});
+    polygons->InsertNextCell({0, 1, 5, 4, 3});
+    data->SetPoints(points);
+    data->SetLines(lines);
+    data->SetPolys(polygons);
+    fixture f;
+    assert_int_equal(f.set(data), INSITU_OK);
+    const insitu_mesh &mesh = f.mesh().mesh;
+    const int types[] = {INSITU_TRIANGLE, INSITU_QUAD, INSITU_POLYGON};
+    assert_int_equal(mesh.cell_count, 3);
+    for (int i = 0; i < 3; i++) assert_int_equal(integer_at(mesh.cell_types, i), types[i]);
+    assert_int_equal(f.report.cells_flat, 1);
+}
+
 void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
 {
     vtkNew<vtkUnstructuredGrid> a, b;
     add_cell(a, VTK_TETRA, corner);
     add_cell(b, VTK_HEXAHEDRON, cube);
-    vtkNew<vtkPolyData> flat;
+    vtkNew<vtkTable> table;
     vtkNew<vtkMultiBlockDataSet> inner, outer;
     inner->SetBlock(0, nullptr);
     inner->SetBlock(1, b);
     outer->SetBlock(0, a);
     outer->SetBlock(1, inner);
-    outer->SetBlock(2, flat);
+    outer->SetBlock(2, table);
     fixture f;
     assert_int_equal(f.set(outer), INSITU_OK);
     assert_int_equal(f.report.meshes, 2);
     assert_int_equal(f.session.meshes.size(), 2);
     assert_int_equal(f.mesh("m/0").mesh.cell_type, INSITU_TET);
     assert_int_equal(f.mesh("m/2").mesh.cell_type, INSITU_HEX);
-    assert_non_null(strstr(f.report.warnings, "vtkPolyData"));
+    assert_non_null(strstr(f.report.warnings, "vtkTable"));
 
     outer->SetBlock(0, nullptr);
     assert_int_equal(f.set(outer), INSITU_OK);
@@ -667,9 +749,9 @@ void malformed_data_is_refused(void **)
     add_cell(grid, VTK_TETRA, corner);
     assert_int_equal(insitu_vtk_set(f.adaptor, "", grid, nullptr), INSITU_ERROR_ARGUMENT);
     assert_int_equal(insitu_vtk_set(nullptr, "m", grid, nullptr), INSITU_ERROR_ARGUMENT);
-    vtkNew<vtkPolyData> flat;
-    assert_int_equal(f.set(flat), INSITU_ERROR_ARGUMENT);
-    assert_non_null(strstr(insitu_vtk_error(f.adaptor), "vtkPolyData"));
+    vtkNew<vtkTable> table;
+    assert_int_equal(f.set(table), INSITU_ERROR_ARGUMENT);
+    assert_non_null(strstr(insitu_vtk_error(f.adaptor), "vtkTable"));
 }
 
 void empty_grid_is_no_mesh(void **)
@@ -721,6 +803,8 @@ int main()
         cmocka_unit_test(polyhedra_without_faces_are_warned_about),
         cmocka_unit_test(ghost_flags_that_hide_are_handed_over),
         cmocka_unit_test(ghost_flags_follow_cells_left_out),
+        cmocka_unit_test(structured_grids_are_hexahedra),
+        cmocka_unit_test(polygons_are_shells),
         cmocka_unit_test(leaves_of_composites_are_meshes_and_go_when_they_are_gone),
         cmocka_unit_test(arrays_outlive_the_data_set),
         cmocka_unit_test(one_name_at_points_and_cells_warns),

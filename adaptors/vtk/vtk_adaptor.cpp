@@ -11,14 +11,18 @@
 #include <string>
 #include <vector>
 
+#include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkDataSet.h>
 #include <vtkPointData.h>
+#include <vtkPointSet.h>
 #include <vtkPoints.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
+#include "insitu/vtk_grids.h"
 #include "vtk_arrays.h"
 #include "vtk_cells.h"
 
@@ -208,6 +212,27 @@ void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
     }
 }
 
+/* The bytes of the lists that insitu_vtk_make_grid() made. */
+int64_t bytes_made(vtkUnstructuredGrid *grid, vtkDataSet *data)
+{
+    vtkCellArray *cells = grid->GetCells();
+    const int64_t id = cells->IsStorage64Bit() ? 8 : 4;
+    const int64_t lists = cells->GetNumberOfConnectivityIds() + cells->GetNumberOfCells() + 1;
+    const int64_t point = vtkPointSet::SafeDownCast(data) ? 0 : 3 * grid->GetPoints()->GetData()->GetDataTypeSize();
+    return lists * id + cells->GetNumberOfCells() + point * grid->GetNumberOfPoints();
+}
+
+/* A data set of another class than an unstructured grid, as one. */
+void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
+               vtkDataSet *data, outcome &out)
+{
+    const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(data));
+    if (grid->GetNumberOfCells() > 0)
+        out.count.copied("mesh '" + name + "'", std::string("the cells of a ") + data->GetClassName() + " listed",
+                         bytes_made(grid, data));
+    set_leaf(adaptor, parts, name, grid, out);
+}
+
 /* Every leaf, the empty ones too, so that a leaf has one number on all ranks. */
 void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
                 vtkCompositeDataSet *composite, outcome &out)
@@ -221,6 +246,8 @@ void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts,
         const std::string leaf_name = name + "/" + std::to_string(number);
         if (auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf))
             set_leaf(adaptor, parts, leaf_name, grid, out);
+        else if (auto *other = vtkDataSet::SafeDownCast(leaf))
+            set_other(adaptor, parts, leaf_name, other, out);
         else
             out.count.warn("mesh '" + leaf_name + "': a " + leaf->GetClassName() + " is not drawn");
     }
@@ -234,10 +261,11 @@ void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
         set_leaf(adaptor, parts, name, grid, out);
     else if (auto *composite = vtkCompositeDataSet::SafeDownCast(data))
         set_leaves(adaptor, parts, name, composite, out);
+    else if (auto *other = vtkDataSet::SafeDownCast(data))
+        set_other(adaptor, parts, name, other, out);
     else
-        throw failure{INSITU_ERROR_ARGUMENT,
-                      "mesh '" + name + "': a " + data->GetClassName() +
-                          " is not taken, expected a vtkUnstructuredGrid or a composite of them"};
+        throw failure{INSITU_ERROR_ARGUMENT, "mesh '" + name + "': a " + data->GetClassName() +
+                                                 " is not taken, expected a vtkDataSet or a composite of them"};
 }
 
 /* Take away what an earlier call set and this one did not. */

@@ -9,20 +9,23 @@
  *     insitu_vtk_destroy(&adaptor);
  *     insitu_destroy(&session);
  *
- * Taken are vtkUnstructuredGrid and composite data sets of them (multiblock, partitioned data set collections, AMR):
- * the leaves of a composite become the meshes "name/0", "name/1", ..., numbered in the order of VTK's iterator, empty
- * leaves counted. All numeric point and cell arrays become fields.
+ * Taken are all vtkDataSets (unstructured, curvilinear and rectilinear grids, images, polygonal data) and composite data
+ * sets of them (multiblock, partitioned data set collections, AMR): the leaves of a composite become the meshes "name/0",
+ * "name/1", ..., numbered in the order of VTK's iterator, empty leaves counted. All numeric point and cell arrays become
+ * fields.
  *
  *  - Points: float or double borrowed, whether interleaved (AOS) or a component apart (SOA); others copied to double.
- *  - Cells 10, 12, 13, 14: borrowed, with 32- or 64-bit storage.
- *  - Voxels (11): drawn as hexahedra; a copy of the connectivity.
+ *  - Cells 10, 12, 13, 14, and the shells 5, 7, 9: borrowed, with 32- or 64-bit storage.
+ *  - Data sets that are no unstructured grid: their cells are listed anew in each call, and points that are given by
+ *    axes (insitu/vtk_grids.h); the report has the bytes.
+ *  - Voxels (11) and pixels (8): drawn as hexahedra and quads; a copy of the connectivity.
  *  - Polyhedra (42): their face streams become faces shared between cells; a copy. Pentagonal and hexagonal prisms
  *    (15, 16) come as polyhedra too.
- *  - Quadratic and higher-order 3-D cells: drawn by their corners as linear cells, and reported; copied.
- *  - What else is left of 3-D cells, polyhedra without their faces too: not drawn, and reported; so are flat, line and
- * point cells.
+ *  - Quadratic and higher-order cells: drawn by their corners as linear cells, and reported; copied.
+ *  - What else is left, polyhedra without their faces too: not drawn, and reported; so are lines and points.
  *  - Fields: float, double and 32- or 64-bit signed integers borrowed; other types copied.
- *  - vtkGhostType of the cells: duplicate, hidden and refined cells are not drawn. Hidden points are ignored.
+ *  - vtkGhostType of the cells: duplicate, hidden and refined cells are not drawn, nor cells of structured grids
+ *    with a hidden point. Cells of AMR that finer levels refine are to be flagged, as by vtkAMRUtilities::BlankCells().
  *
  * No function throws, and none changes a data set. */
 #ifndef INSITU_VTK_H
