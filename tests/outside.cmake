@@ -9,3 +9,23 @@ add_test(NAME outside_project_builds_and_runs
     -DPKG_CONFIG=${PKG_CONFIG_EXECUTABLE} -P ${CMAKE_CURRENT_SOURCE_DIR}/outside_run.cmake)
 set_tests_properties(outside_project_builds_and_runs PROPERTIES
   ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};ASAN_OPTIONS=detect_leaks=0" TIMEOUT 180)
+
+# What is exported is what the headers declare.
+set(insitu_headers_of ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu)
+add_test(NAME exported_symbols COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu> libinsitu.so.0
+  ${insitu_headers_of}/insitu.h ${insitu_headers_of}/status.h)
+add_test(NAME exported_symbols_of_image COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu_image>
+  libinsitu_image.so ${insitu_headers_of}/image_output.h)
+if(TARGET insitu_vtk)
+  add_test(NAME exported_symbols_of_vtk COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/exported_symbols.sh $<TARGET_FILE:insitu_vtk>
+    libinsitu_vtk.so.0 ${PROJECT_SOURCE_DIR}/adaptors/vtk/include/insitu/vtk.h
+    ${PROJECT_SOURCE_DIR}/adaptors/vtk/include/insitu/vtk_grids.h)
+endif()
+
+# Debian packages: made daily; in a bare Debian by the long tests, which takes root and a network.
+add_test(NAME packages COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/packages.sh ${CMAKE_CPACK_COMMAND} ${PROJECT_BINARY_DIR}
+  ${CMAKE_CURRENT_BINARY_DIR}/packages)
+set_tests_properties(packages PROPERTIES TIMEOUT 180 SKIP_RETURN_CODE 77)
+insitu_add_long_test(packages_in_a_bare_debian ${CMAKE_CURRENT_SOURCE_DIR}/package_chroot.sh ${CMAKE_CPACK_COMMAND}
+  ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_BINARY_DIR}/bare)
+set_tests_properties(packages_in_a_bare_debian PROPERTIES SKIP_RETURN_CODE 77)

@@ -36,3 +36,10 @@ execute_process(COMMAND ${PKG_CONFIG} --cflags --libs insitu
 separate_arguments(flags UNIX_COMMAND "${flags} ${FLAGS}")
 run(${MPICC} ${SOURCE}/outside_user.c -o ${FOLDER}/by_pkg_config ${flags} -Wl,-rpath,${prefix}/${LIBDIR})
 run(${FOLDER}/by_pkg_config)
+
+# What is installed can be taken away.
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${FOLDER}/again)
+run(${CMAKE_COMMAND} -DMANIFEST=${BUILD}/install_manifest.txt -P ${SOURCE}/../../cmake/uninstall.cmake)
+if(EXISTS ${FOLDER}/again)
+  message(FATAL_ERROR "uninstall left ${FOLDER}/again")
+endif()

@@ -7,11 +7,15 @@
 class vtkDataSet;
 class vtkUnstructuredGrid;
 
+extern "C" {
+
 /* Images, rectilinear and curvilinear grids of three dimensions become hexahedra; of fewer, and polygonal data, their
  * own cells. Arrays of points and cells are data's own, by reference, and so are the points where data has a list of
  * them. What is made is a list of cells, 32 bytes a hexahedron or 64 where there are more than 268 million points, and
  * for images and rectilinear grids a list of points. A cell that has a hidden point gets the flag of a hidden one.
  * The grid is the caller's, to be given back by its Delete(). data is not changed. May throw std::bad_alloc. Local. */
 INSITU_API vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data);
+
+} // extern "C"
 
 #endif
