@@ -2,8 +2,10 @@
  * so that what they hold is known.
  *
  *     test_vtk_tool <insitu-render> <mpiexec> */
+#include <filesystem>
 #include <string>
 
+#include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkFloatArray.h>
 #include <vtkMultiBlockDataSet.h>
@@ -14,6 +16,7 @@
 #include <vtkUnstructuredGrid.h>
 #include <vtkUnstructuredGridWriter.h>
 #include <vtkXMLMultiBlockDataWriter.h>
+#include <vtkXMLPolyDataWriter.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
 #include "test_vtk_run.h"
@@ -80,6 +83,30 @@ void write_vtu(const std::string &name, vtkUnstructuredGrid *grid)
     assert_int_equal(writer->Write(), 1);
 }
 
+/* 4 x 4 quads and a triangle, of surface meshes' own format. */
+void write_sheet()
+{
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkFloatArray> height;
+    height->SetName("height");
+    for (int i = 0; i < 25; i++) {
+        points->InsertNextPoint(i % 5, i / 5, 0.1 * i);
+        height->InsertNextValue(0.1F * static_cast<float>(i));
+    }
+    vtkNew<vtkCellArray> cells;
+    for (int i = 0; i < 20; i++)
+        if (i % 5 < 4) cells->InsertNextCell({i, i + 1, i + 6, i + 5});
+    cells->InsertNextCell({0, 6, 12});
+    vtkNew<vtkPolyData> sheet;
+    sheet->SetPoints(points);
+    sheet->SetPolys(cells);
+    sheet->GetPointData()->AddArray(height);
+    vtkNew<vtkXMLPolyDataWriter> writer;
+    writer->SetFileName(path_of("sheet.vtp").c_str());
+    writer->SetInputData(sheet);
+    assert_int_equal(writer->Write(), 1);
+}
+
 int make_files(void **)
 {
     folder = fresh_folder("vtk_tool");
@@ -117,6 +144,7 @@ int make_files(void **)
     const vtkIdType line[] = {0, 1};
     flat->InsertNextCell(VTK_LINE, 2, line);
     write_vtu("flat.vtu", flat);
+    write_sheet();
     return 0;
 }
 
@@ -224,6 +252,16 @@ void one_rank_failing_to_read_ends_all(void **)
     expect(run_ranks(3, "scene.yaml cut.vtu"), 1, "insitu-render: cut.vtu: is cut short");
 }
 
+void surface_meshes_are_drawn(void **)
+{
+    expect(run_tool("--info sheet.vtp"), 0, "sheet.vtp: vtkPolyData, 17 cells");
+    for (const int ranks : {1, 2}) {
+        expect(run_ranks(ranks, "--field height sheet.vtp"), 0, "17 cells");
+        assert_true(std::filesystem::exists(path_of("sheet_0000.png")));
+        std::filesystem::remove(path_of("sheet_0000.png"));
+    }
+}
+
 void nothing_to_draw_is_an_error(void **)
 {
     expect(run_tool("scene.yaml empty.vtu"), 1, "insitu-render: empty.vtu: no cells to draw");
@@ -282,6 +320,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(one_rank_failing_ends_all),
         cmocka_unit_test(one_rank_failing_to_read_ends_all),
         cmocka_unit_test(nothing_to_draw_is_an_error),
+        cmocka_unit_test(surface_meshes_are_drawn),
         cmocka_unit_test(wrong_scenes_are_errors),
         cmocka_unit_test(several_files_are_steps_in_the_order_of_their_numbers),
         cmocka_unit_test(chosen_steps_keep_their_cycles),

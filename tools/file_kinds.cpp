@@ -13,6 +13,7 @@
 #include <vtkXMLPStructuredGridReader.h>
 #include <vtkXMLPartitionedDataSetCollectionReader.h>
 #include <vtkXMLRectilinearGridReader.h>
+#include <vtkXMLPolyDataReader.h>
 #include <vtkXMLStructuredGridReader.h>
 #include <vtkXMLUniformGridAMRReader.h>
 #include <vtkXMLUnstructuredGridReader.h>
@@ -148,6 +149,7 @@ const std::vector<file_kind> &file_kinds()
         {".pvti", make_plain<vtkXMLPImageDataReader>, no, yes, nullptr},
         {".vtr", make_plain<vtkXMLRectilinearGridReader>, no, no, nullptr},
         {".pvtr", make_plain<vtkXMLPRectilinearGridReader>, no, yes, nullptr},
+        {".vtp", make_plain<vtkXMLPolyDataReader>, no, no, nullptr},
         {".vts", make_plain<vtkXMLStructuredGridReader>, no, no, nullptr},
         {".pvts", make_plain<vtkXMLPStructuredGridReader>, no, yes, nullptr},
         {".vtm", make_plain<vtkXMLMultiBlockDataReader>, no, yes, "<DataSet"},
