@@ -26,6 +26,7 @@ module insitu
     integer, parameter, public :: INSITU_CHANGED_NOTHING = 0, INSITU_CHANGED_TOPOLOGY = 1, &
         INSITU_CHANGED_GEOMETRY = 2, INSITU_CHANGED_VALUES = 4, INSITU_CHANGED_ALL = 7
     integer, parameter, public :: INSITU_VERTEX = 0, INSITU_CELL = 1
+    integer, parameter, public :: INSITU_ORDER_VTK = 0, INSITU_ORDER_LEXICOGRAPHIC = 1, INSITU_ORDER_DMPLEX = 2
 
     integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 5
 
@@ -61,7 +62,8 @@ module insitu
         type(c_array) :: owner
         integer(c_int64_t) :: neighbour_count
         type(c_array) :: neighbour, face_sizes, face_lists
-        integer(c_int) :: keep_polyhedra
+        integer(c_int) :: keep_polyhedra, vertex_order
+        integer(c_int64_t) :: connectivity_row
     end type c_mesh
 
     type, bind(C) :: c_field
@@ -72,6 +74,7 @@ module insitu
         integer(c_int64_t) :: component_stride
         type(c_array) :: values
         integer(c_int) :: changed
+        type(c_array) :: index
     end type c_field
 
     ! What the last step did, on this rank: as insitu_report in insitu.h.
@@ -88,11 +91,18 @@ module insitu
         type(c_ptr) :: copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr ! texts: insitu_text()
     end type insitu_report
 
+    ! Of a mesh that was handed over: how long the index of a field must be.
+    type :: mesh_size
+        character(:), allocatable :: name
+        integer(c_int64_t) :: vertices = 0, cells = 0
+    end type mesh_size
+
     ! A session. create, step and destroy are collective, the others local. status: INSITU_OK, or what error() explains.
     type, public :: insitu_session
         private
         type(c_ptr) :: handle = c_null_ptr
         character(:), allocatable :: own_error ! of an argument that C was not told
+        type(mesh_size), allocatable :: sizes(:)
     contains
         procedure, private :: create_integer, create_f08, text_integer, text_f08
         generic :: create => create_integer, create_f08                   ! (comm, scene_file, status)
@@ -319,6 +329,15 @@ contains
         is_list = a%rows <= 1 .or. a%columns <= 1 .or. a%stride == a%rows * a%row_stride
     end function is_list
 
+    ! Elements from one column's first to the next one's, where there are others between; 0: there are none, or no whole
+    ! number of them.
+    integer(c_int64_t) function row_of(a)
+        type(insitu_array), intent(in) :: a
+        row_of = 0
+        if (is_list(a) .or. a%row_stride == 0) return
+        if (mod(a%stride, a%row_stride) == 0 .and. a%stride / a%row_stride > a%rows) row_of = a%stride / a%row_stride
+    end function row_of
+
     ! ---- texts ----------------------------------------------------------------------------------------------------
 
     ! A text of C's, as those of a report; valid as long as they are.
@@ -383,35 +402,39 @@ contains
         call self%text_integer(comm%MPI_VAL, scene_text, status)
     end subroutine text_f08
 
-    ! The first of the arguments that C cannot be told of; '' where there is none.
-    function find_fault(points, connectivity, lists) result(out)
+    ! The first of the arguments that C cannot be told of; '' where there is none. row: as row_of(), 0 where there must be
+    ! no gaps.
+    function find_fault(points, connectivity, row, lists) result(out)
         type(insitu_array), intent(in) :: points(3), connectivity, lists(:)
+        integer(c_int64_t), intent(in) :: row
         character(:), allocatable :: out
         out = ''
         if (points(1)%rows /= 1) then
             out = 'points have another first extent than 3'
         else if (any(points%columns /= points(1)%columns)) then
             out = 'x, y and z are of different lengths'
-        else if (.not. is_list(connectivity)) then
+        else if (row == 0 .and. .not. is_list(connectivity)) then
             out = 'connectivity or faces have gaps between their columns, which must follow one another'
         else if (any(lists%rows > 1)) then
             out = 'cell_types, offsets, face_offsets, owner, neighbour, ghosts and vertex_ids are lists, one is a matrix'
         end if
     end function find_fault
 
-    ! This rank's part of a mesh. connectivity: a list, or (corners, cells). faces, face_offsets: the faces' vertices, and
+    ! This rank's part of a mesh. connectivity: a list, or (corners, cells), of cells of one type also some first rows of
+    ! a matrix; in VTK's order, or in vertex_order. faces, face_offsets: the faces' vertices, and
     ! where each begins, of polyhedra, whose connectivity is of faces. Every index and offset counts from 1, or from
     ! index_base.
     subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
-        ghosts, vertex_ids, changed, index_base, keep_polyhedra)
+        ghosts, vertex_ids, changed, index_base, keep_polyhedra, vertex_order)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity
         integer, intent(out) :: status
-        integer, intent(in), optional :: cell_type, changed, index_base
+        integer, intent(in), optional :: cell_type, changed, index_base, vertex_order
         type(insitu_array), intent(in), optional :: cell_types, offsets, faces, face_offsets, ghosts, vertex_ids
         logical, intent(in), optional :: keep_polyhedra
         type(insitu_array) :: given(6)
+        integer(c_int64_t) :: gap ! elements between one column's last and the next one's first
         type(c_mesh), target :: mesh
         real(real64), target :: nothing
         integer :: axis, corners
@@ -428,14 +451,17 @@ contains
         if (present(ghosts)) given(4) = ghosts
         if (present(vertex_ids)) given(5) = vertex_ids
         if (present(faces)) given(6) = faces
-        self%own_error = find_fault(points, connectivity, given(1:5))
+        if (present(vertex_order)) mesh%vertex_order = vertex_order
+        if (.not. (present(offsets) .or. present(cell_types))) mesh%connectivity_row = row_of(connectivity)
+        gap = max(0_c_int64_t, mesh%connectivity_row - connectivity%rows)
+        self%own_error = find_fault(points, connectivity, mesh%connectivity_row, given(1:5))
         status = INSITU_ERROR_ARGUMENT
         if (len(self%own_error) > 0) return
         mesh%vertex_count = points(1)%columns
         do axis = 1, 3
             mesh%coordinates(axis) = as_c(points(axis), nothing)
         end do
-        mesh%connectivity_count = connectivity%rows * connectivity%columns
+        mesh%connectivity_count = connectivity%rows * connectivity%columns + gap * max(0_c_int64_t, connectivity%columns - 1)
         mesh%connectivity = as_c(connectivity, nothing)
         if (present(cell_types)) mesh%cell_types = as_c(cell_types, nothing)
         if (present(offsets)) mesh%offsets = as_c(offsets, nothing)
@@ -451,11 +477,12 @@ contains
         else if (present(offsets)) then
             mesh%cell_count = max(0_c_int64_t, offsets%columns - 1)
         else
-            mesh%cell_count = mesh%connectivity_count / max(1, corners)
+            mesh%cell_count = connectivity%rows * connectivity%columns / max(1, corners)
         end if
         self%own_error = find_length(mesh%cell_count, mesh%vertex_count, connectivity%rows, corners, given(1:5))
         if (len(self%own_error) > 0) return
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
+        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count))
     end subroutine set_mesh
 
     ! This rank's part of a mesh of finite volumes: faces' vertices, and where each begins; of each face the cell that owns
@@ -486,7 +513,7 @@ contains
         given(1:3) = [face_offsets, owner, neighbour]
         if (present(ghosts)) given(4) = ghosts
         if (present(vertex_ids)) given(5) = vertex_ids
-        self%own_error = find_fault(points, faces, given)
+        self%own_error = find_fault(points, faces, 0_c_int64_t, given)
         if (len(self%own_error) == 0) self%own_error = find_face_length(points(1)%columns, mesh%cell_count, given)
         status = INSITU_ERROR_ARGUMENT
         if (len(self%own_error) > 0) return
@@ -504,6 +531,7 @@ contains
         if (present(ghosts)) mesh%ghosts = as_c(ghosts, nothing)
         if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
+        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count))
     end subroutine set_mesh_of_faces
 
     ! As find_length(). given: face_offsets, owner, neighbour, ghosts, vertex_ids.
@@ -554,6 +582,34 @@ contains
         end select
     end function corners_of
 
+    subroutine note_size(sizes, new)
+        type(mesh_size), allocatable, intent(inout) :: sizes(:)
+        type(mesh_size), intent(in) :: new
+        integer :: i
+        if (.not. allocated(sizes)) allocate (sizes(0))
+        do i = 1, size(sizes)
+            if (sizes(i)%name /= new%name) cycle
+            sizes(i) = new
+            return
+        end do
+        sizes = [sizes, new]
+    end subroutine note_size
+
+    ! Has the index of a field an entry for each vertex, or cell, of the mesh? What C refuses anyway is well.
+    logical function is_as_long(sizes, mesh, centring, length)
+        type(mesh_size), allocatable, intent(in) :: sizes(:)
+        character(*), intent(in) :: mesh
+        integer(c_int), intent(in) :: centring
+        integer(c_int64_t), intent(in) :: length
+        integer :: i
+        is_as_long = .true.
+        if (.not. allocated(sizes)) return
+        do i = 1, size(sizes)
+            if (sizes(i)%name == trim(mesh)) &
+                is_as_long = length == merge(sizes(i)%cells, sizes(i)%vertices, centring == INSITU_CELL)
+        end do
+    end function is_as_long
+
     ! Take this rank's part of a mesh away.
     subroutine remove_mesh(self, name, status)
         class(insitu_session), intent(inout) :: self
@@ -563,13 +619,15 @@ contains
         status = c_set_mesh(self%handle, as_c_text(name), c_null_ptr)
     end subroutine remove_mesh
 
-    ! This rank's part of a field: a list, or (components, tuples).
-    subroutine set_field(self, mesh, name, values, status, centring, changed)
+    ! This rank's part of a field: a list, or (components, tuples). index: which tuple each vertex or cell has, from 1, or
+    ! from the mesh's index_base.
+    subroutine set_field(self, mesh, name, values, status, centring, changed, index)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
         type(insitu_array), intent(in) :: values
         integer, intent(out) :: status
         integer, intent(in), optional :: centring, changed
+        type(insitu_array), intent(in), optional :: index
         character(kind=c_char), target :: c_name(len_trim(name) + 1)
         type(c_field) :: field
         real(real64), target :: nothing
@@ -585,6 +643,16 @@ contains
         field%values = as_c(values, nothing)
         field%values%stride = values%stride
         self%own_error = ''
+        if (present(index)) then
+            field%index = as_c(index, nothing)
+            if (index%rows > 1) then
+                self%own_error = 'index is a list, and a matrix is given'
+            else if (.not. is_as_long(self%sizes, mesh, field%centring, index%columns)) then
+                self%own_error = 'index has not as many entries as the mesh has vertices, or cells'
+            end if
+            status = INSITU_ERROR_ARGUMENT
+            if (len(self%own_error) > 0) return
+        end if
         status = c_set_field(self%handle, as_c_text(mesh), field)
     end subroutine set_field
 

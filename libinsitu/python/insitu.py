@@ -21,6 +21,7 @@ TET, HEX, WEDGE, PYRAMID, POLYHEDRON = 10, 12, 13, 14, 42
 TRIANGLE, POLYGON, QUAD = 5, 7, 9
 CHANGED_NOTHING, CHANGED_TOPOLOGY, CHANGED_GEOMETRY, CHANGED_VALUES, CHANGED_ALL = 0, 1, 2, 4, 7
 VERTEX, CELL = 0, 1
+ORDER_VTK, ORDER_LEXICOGRAPHIC, ORDER_DMPLEX = 0, 1, 2
 
 _TYPES = {"float32": 1, "float64": 2, "int32": 3, "int64": 4, "uint8": 5, "bool": 5}
 _CORNERS = {TET: 4, HEX: 8, WEDGE: 6, PYRAMID: 5, TRIANGLE: 3, QUAD: 4}
@@ -63,6 +64,8 @@ class _Mesh(ctypes.Structure):
         ("face_sizes", _Array),
         ("face_lists", _Array),
         ("keep_polyhedra", ctypes.c_int),
+        ("vertex_order", ctypes.c_int),
+        ("connectivity_row", ctypes.c_int64),
     ]
 
 
@@ -75,6 +78,7 @@ class _Field(ctypes.Structure):
         ("component_stride_bytes", ctypes.c_int64),
         ("values", _Array),
         ("changed", ctypes.c_uint),
+        ("index", _Array),
     ]
 
 
@@ -201,6 +205,26 @@ def _rows(what, given):
     return _strided(what, array, array.strides[-1]), array.size, array
 
 
+def _row(array):
+    """Elements from one row's first to the next one's, where there are others between; else 0."""
+    if array.ndim != 2 or array.shape[0] < 2 or array.strides[1] == 0 or array.strides[0] % array.strides[1] != 0:
+        return 0
+    row = array.strides[0] // array.strides[1]
+    return row if row > array.shape[1] else 0
+
+
+def _connectivity(given, cell_type, may_have_gaps):
+    """A list, or rows; of cells of one type also some first columns of a table. Returns the row and the cells too."""
+    array = _view("connectivity", given, (1, 2))
+    if may_have_gaps and array.ndim == 2 and _CORNERS.get(cell_type) not in (None, array.shape[1]):
+        raise ValueError(f"connectivity: has {array.shape[1]} columns, expected {_CORNERS[cell_type]} for this cell_type")
+    row = _row(array) if may_have_gaps else 0
+    if not row:
+        return *_rows("connectivity", given)[:2], row, array.size // _CORNERS.get(cell_type, 1), array
+    count = (array.shape[0] - 1) * row + array.shape[1]
+    return _strided("connectivity", array, array.strides[1]), count, row, array.shape[0], array
+
+
 def _axes(given):
     """Coordinates: vertices x 3, or one array each of x, y and z."""
     if isinstance(given, (tuple, list)):
@@ -213,12 +237,6 @@ def _axes(given):
     return [array for array, _, _ in axes], axes[0][1], [held for _, _, held in axes]
 
 
-def _expect_rows_of(cell_type, connectivity):
-    corners = _CORNERS.get(cell_type)
-    if connectivity.ndim == 2 and corners and connectivity.shape[1] != corners:
-        raise ValueError(f"connectivity: has {connectivity.shape[1]} columns, expected {corners} for this cell_type")
-
-
 class Session:
     """A session. Opening and closing it and step() are collective: every rank of the communicator calls them."""
 
@@ -227,6 +245,7 @@ class Session:
         if scene is not None and scene_text is not None:
             raise TypeError("scene, scene_text: both are given, expected one of them")
         self._session = ctypes.c_void_p()
+        self._counts = {}  # mesh: its vertices and cells
         self._held = {}  # mesh: {None: what the mesh borrows, field: what that borrows}
         self._retired = []  # borrowed before it was set again: until a step has returned
         create = _library.insitu_create if scene_text is None else _library.insitu_create_from_text
@@ -237,9 +256,9 @@ class Session:
 
     def set_mesh(self, name, *, coordinates, connectivity=None, cell_type=TET, cell_types=None, offsets=None, faces=None,
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
-                 keep_polyhedra=False, changed=CHANGED_ALL):
-        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h). In
-        place of connectivity, cell_type, cell_types and offsets: owner, neighbour and cell_count, of finite volumes."""
+                 keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL):
+        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h). Of
+        cells of one type connectivity may be some first columns of a table: nodes[:, :8]. In place of connectivity, cell_type, cell_types and offsets: owner, neighbour and cell_count, of finite volumes."""
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
         axes, mesh.vertex_count, held = _axes(coordinates)
@@ -249,12 +268,11 @@ class Session:
         if (cell_count is None) != (owner is None):
             raise TypeError("owner, cell_count: one is given, expected both or none")
         if connectivity is not None:
-            mesh.connectivity, mesh.connectivity_count, array = _rows("connectivity", connectivity)
+            mesh.connectivity, mesh.connectivity_count, mesh.connectivity_row, cells, array = _connectivity(
+                connectivity, cell_type, cell_types is None and offsets is None)
             held.append(array)
-            if cell_types is None and offsets is None:
-                _expect_rows_of(cell_type, array)
         mesh.cell_type, mesh.changed = cell_type if owner is None else POLYHEDRON, changed
-        mesh.index_base, mesh.keep_polyhedra = index_base, keep_polyhedra
+        mesh.index_base, mesh.keep_polyhedra, mesh.vertex_order = index_base, keep_polyhedra, vertex_order
         counts = {}
         for key, given in [("cell_types", cell_types), ("offsets", offsets), ("face_offsets", face_offsets),
                            ("owner", owner), ("neighbour", neighbour), ("ghosts", ghosts), ("vertex_ids", vertex_ids)]:
@@ -267,17 +285,19 @@ class Session:
             held.append(array)
         mesh.face_count = max(counts.get("face_offsets", 0) - 1, 0)
         mesh.neighbour_count = counts.get("neighbour", 0)
-        mesh.cell_count = self._cell_count(mesh, counts) if cell_count is None else cell_count
+        mesh.cell_count = self._cell_count(counts, cells) if cell_count is None else cell_count
         self._expect_counts(mesh, counts)
         self._hand_over(_library.insitu_set_mesh, name, mesh, None, held)
+        self._counts[name] = mesh.vertex_count, mesh.cell_count
 
     def remove_mesh(self, name):
         """Take this rank's part of a mesh away, and its fields. Local."""
         _check(_library.insitu_set_mesh(self._open(), name.encode(), None), self._session, False)
         self._retired.append(self._held.pop(name, None))
 
-    def set_field(self, mesh, name, values, *, centring=VERTEX, changed=CHANGED_ALL):
-        """Hand over this rank's part of a field: values of n tuples, or n x components. Local."""
+    def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, changed=CHANGED_ALL):
+        """Hand over this rank's part of a field: values of n tuples, or n x components. index: which of the tuples each
+        vertex or cell has, from the mesh's index_base on. Local."""
         array = _view("values", values, (1, 2))
         field = _Field()
         _library.insitu_field_defaults(ctypes.byref(field))
@@ -289,7 +309,14 @@ class Session:
         field.values = _strided("values", array, array.strides[0] if array.shape[0] > 1 else -1)
         if array.shape[0] < 2:
             field.values.stride_bytes = 0
-        self._hand_over(_library.insitu_set_field, mesh, field, name, [array])
+        held = [array]
+        if index is not None:
+            field.index, size, array = _list("index", index)
+            expected = self._counts.get(mesh, (size, size))[centring == CELL]
+            if size != expected:
+                raise ValueError(f"index: has {size} elements, expected {expected}")
+            held.append(array)
+        self._hand_over(_library.insitu_set_field, mesh, field, name, held)
 
     def step(self, cycle, time):
         """Draw what is due. Collective; after an error, which every rank has, the session stays usable."""
@@ -349,12 +376,12 @@ class Session:
         fields[key] = arrays
 
     @staticmethod
-    def _cell_count(mesh, counts):
+    def _cell_count(counts, cells):
         if "cell_types" in counts:
             return counts["cell_types"]
         if "offsets" in counts:
             return max(counts["offsets"] - 1, 0)
-        return mesh.connectivity_count // _CORNERS.get(mesh.cell_type, 1)
+        return cells
 
     @staticmethod
     def _expect_counts(mesh, counts):

@@ -88,7 +88,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if ((changes->of_cells || changes->of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
     if (!status) update_events(s, &basis, &of_events);
-    if (!status) status = session_make_plan(&basis, &s->meshes, team->comm, &s->report, &plan, error);
+    if (!status) status = session_make_plan(&basis, &s->meshes, team, &s->report, &plan, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) status = session_update_distances(&s->meshes, team, error);

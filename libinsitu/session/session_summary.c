@@ -33,11 +33,22 @@ static bool is_field_in_use(const session_mesh *mesh, int field)
     return false;
 }
 
+static int64_t index_entries(const session_mesh *mesh, const insitu_field *field)
+{
+    return field->centring == INSITU_VERTEX ? mesh->given.vertex_count : mesh->given.cell_count;
+}
+
 static void report_field(session_report *out, const session_mesh *mesh, int index)
 {
     const insitu_field *field = &mesh->fields[index].given;
+    const int64_t copied = mesh->fields[index].copy_bytes;
+    out->numbers.bytes_copied += copied;
+    if (copied)
+        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" by its index: %lld bytes", mesh->name,
+                         field->name, (long long)copied);
     if (is_field_in_use(mesh, index))
-        out->numbers.bytes_borrowed += array_bytes(&field->values, field->count) * field->component_count;
+        out->numbers.bytes_borrowed += array_bytes(&field->values, field->count) * field->component_count +
+                                       array_bytes(&field->index, index_entries(mesh, field));
     else if (out->numbers.images)
         session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", mesh->name, field->name);
 }
@@ -88,6 +99,10 @@ static void report_topology(session_report *out, const session_mesh *mesh)
                          "mesh \"%s\": %lld of %lld polyhedra are drawn as the tets, hexes, wedges or pyramids that "
                          "their faces make: %lld bytes",
                          mesh->name, (long long)t->recognised_count, (long long)t->polyhedron_count, bytes);
+    else if (t->has_own_order)
+        session_text_add(&out->copied_why,
+                         "mesh \"%s\": its cells' vertices, one after the other in VTK's order: %lld bytes", mesh->name,
+                         bytes);
     else if (bytes)
         session_text_add(&out->copied_why, "mesh \"%s\": its cells' faces, by owner and neighbour: %lld bytes",
                          mesh->name, bytes);

@@ -53,12 +53,12 @@ typedef struct insitu_array {
     int64_t stride_bytes; /* from one element to the next; 0: packed, the size of the type. Any multiple of the size. */
 } insitu_array;
 
-/* Cell types by VTK's ids, vertices in VTK's order. */
+/* Cell types by VTK's ids, vertices in VTK's order, unless the mesh's vertex_order says otherwise. */
 typedef enum insitu_cell_type {
-    INSITU_TET = 10,       /* 4 vertices */
-    INSITU_HEX = 12,       /* 8 vertices: the lower quad around, then the upper quad above it */
-    INSITU_WEDGE = 13,     /* 6 vertices: one triangle, then the other; either winding */
-    INSITU_PYRAMID = 14,   /* 5 vertices: the quad around, then the apex */
+    INSITU_TET = 10,        /* 4 vertices */
+    INSITU_HEX = 12,        /* 8 vertices: the lower quad around, then the upper quad above it */
+    INSITU_WEDGE = 13,      /* 6 vertices: one triangle, then the other; either winding */
+    INSITU_PYRAMID = 14,    /* 5 vertices: the quad around, then the apex */
     INSITU_POLYHEDRON = 42, /* any number of faces of any number of vertices, convex or not: see insitu_mesh */
     /* Shells: cells of two dimensions, alone or among others. Layers of outer surfaces show them, one that lies on the
      * face of another cell in place of that face; isosurfaces, volumes, slices and statistics pass them over. Their
@@ -68,6 +68,16 @@ typedef enum insitu_cell_type {
                             vertex that is least by x, then y, then z */
     INSITU_QUAD = 9      /* 4 vertices around it; may be warped */
 } insitu_cell_type;
+
+/* In which order the vertices of a cell stand in connectivity. Types that are not named stand as in VTK in all of them.
+ * Cells that are mirrored are drawn right in any of them. */
+typedef enum insitu_vertex_order {
+    INSITU_ORDER_VTK = 0,           /* as said at insitu_cell_type; also that of CGNS, Exodus II, Gmsh, libMesh, MFEM */
+    INSITU_ORDER_LEXICOGRAPHIC = 1, /* quads, hexes and bases of pyramids by x first, then y, then z: a quad is VTK's 0
+                                       1 3 2. That of deal.II, dolfinx, DUNE and p4est. */
+    INSITU_ORDER_DMPLEX = 2         /* hexes are VTK's 0 3 2 1 4 5 6 7 and wedges VTK's 0 2 1 3 4 5: their two ends run
+                                       opposite ways. That of PETSc's DMPlex. */
+} insitu_vertex_order;
 
 /* What of a mesh or a field differs from the last time it was set. The safe default is everything. Whatever is said,
  * what the description alone tells counts too: other counts or another cell_type are another mesh (ALL); arrays at
@@ -140,6 +150,15 @@ typedef struct insitu_mesh {
      * stays, and, unless all cells are of one type, 5 a cell; twice as much where there are more than 2^31 vertices or
      * faces. */
     int keep_polyhedra; /* 0 by default, or 1 */
+    /* How connectivity has the vertices of cells; polyhedra and polygons are as they are. Cells in another order than
+     * VTK's that are not the same in both, and cells in rows, are copied, once for each topology: 4 bytes for each
+     * entry of connectivity that cells use (8 where there are more than 2^31 vertices), in bytes_copied. */
+    insitu_vertex_order vertex_order; /* INSITU_ORDER_VTK by default */
+    int64_t connectivity_row; /* of cells of one type without offsets: entries of connectivity from the first vertex of
+                                 a cell to that of the next, at least as many as its vertices. So the vertices are taken
+                                 from the nodes of higher order, where they are the first of each row.
+                                 connectivity_count counts the others too; it may end with the last cell's vertices. 0:
+                                 one cell after the other. */
 } insitu_mesh;
 
 /* Whether a field has one value a vertex or one a cell. Of cells, volumes and colours show each value as it is, unless
@@ -151,12 +170,18 @@ typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1 } insitu_centr
 typedef struct insitu_field {
     const char *name;               /* copied; the name by which scenes ask for it */
     insitu_centring centring;       /* vertex by default */
-    int64_t count;                  /* tuples: the mesh's vertex_count or cell_count */
+    int64_t count;                  /* tuples: the mesh's vertex_count or cell_count; any number where index is given */
     int component_count;            /* >= 1; 1 by default. The scene picks one, or the magnitude. */
     int64_t component_stride_bytes; /* from one component to the next; 0: packed, interleaved */
     insitu_array values;            /* float32, float64, int32 or int64. stride_bytes is from tuple to tuple; 0:
                                        component_count elements */
     unsigned changed;               /* INSITU_CHANGED_VALUES or NOTHING; ALL by default */
+    /* Optional, int32 or int64, vertex_count or cell_count: which tuple of values each vertex or cell has, from the
+     * mesh's index_base on, as in vectors of degrees of freedom and arrays with halos. Fields that the scene asks for
+     * are copied in the order of the vertices or cells when a step first needs them, and again when their values
+     * changed: one tuple each, in bytes_copied. Entries of index out of range are told then. Where there are no
+     * vertices or cells its data may be NULL; its type tells that it is given. */
+    insitu_array index;
 } insitu_field;
 
 /* What the last step did, on this rank unless said otherwise. Times are wall-clock milliseconds. */

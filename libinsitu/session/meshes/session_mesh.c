@@ -48,9 +48,20 @@ void session_drop_topology(session_topology *topology)
     *topology = (session_topology){0};
 }
 
+void session_drop_copy(session_field *field)
+{
+    base_free(field->copy);
+    field->copy = NULL;
+    field->copy_bytes = 0;
+    field->is_copy_stale = true;
+}
+
 void session_drop_fields(session_mesh *mesh)
 {
-    for (int i = 0; i < mesh->field_count; i++) base_free((void *)(uintptr_t)mesh->fields[i].given.name);
+    for (int i = 0; i < mesh->field_count; i++) {
+        base_free((void *)(uintptr_t)mesh->fields[i].given.name);
+        session_drop_copy(&mesh->fields[i]);
+    }
     base_free(mesh->fields);
     mesh->fields = NULL;
     mesh->field_count = 0;

@@ -12,6 +12,11 @@ typedef struct session_field {
     grid_array values;
     int64_t component_stride;
     base_error problem; /* of the last insitu_set_field() */
+    bool has_index;     /* the values are read out of a declared copy, in the order of the vertices or cells */
+    bool is_copy_stale; /* it is of other values, or by another index */
+    bool is_wanted;     /* by statistics of this step; what images use has scalars */
+    char *copy;         /* NULL until made; packed tuples, components interleaved */
+    int64_t copy_bytes;
 } session_field;
 
 /* low > high: there are no values. */
@@ -94,6 +99,7 @@ typedef struct session_outer {
  * topology, and are declared copies. */
 typedef struct session_topology {
     bool is_made;                     /* of the cells of now, be it that nothing had to be made */
+    bool has_own_order;               /* connectivity is read, beside the caller's offsets and types */
     bool has_own_cells;               /* those next are read, else the caller's */
     grid_array offsets, connectivity; /* no offsets: all cells are of cell_type */
     unsigned char *cell_types;        /* NULL: all cells are of cell_type */
@@ -174,6 +180,7 @@ void session_drop_scalars(session_mesh *mesh);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
 void session_drop_fields(session_mesh *mesh);
+void session_drop_copy(session_field *field);
 /* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */
 void session_drop_outer(session_outer *outer, bool with_faces);
 /* Of all of a mesh; where cells are new, thresholds go too. */

@@ -196,6 +196,34 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "index_base is %d, expected 0 or 1", mesh->index_base);
     if (mesh->keep_polyhedra != 0 && mesh->keep_polyhedra != 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "keep_polyhedra is %d, expected 0 or 1", mesh->keep_polyhedra);
+    if (mesh->vertex_order != INSITU_ORDER_VTK && mesh->vertex_order != INSITU_ORDER_LEXICOGRAPHIC &&
+        mesh->vertex_order != INSITU_ORDER_DMPLEX)
+        return base_fail(error, INSITU_ERROR_ARGUMENT,
+                         "vertex_order is %d, expected 0 (VTK's), 1 (lexicographic) or 2 (DMPlex's)",
+                         (int)mesh->vertex_order);
+    return INSITU_OK;
+}
+
+/* Rows are what cells are found by, beside nothing else. */
+static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
+{
+    const long long row = mesh->connectivity_row, vertices = grid_type_vertices((int)mesh->cell_type);
+    if (row == 0 || mesh->cell_count == 0) return INSITU_OK;
+    const char *other = mesh->owner.data        ? "owners of faces"
+                        : mesh->offsets.data    ? "offsets"
+                        : mesh->cell_types.data ? "cell types"
+                                                : NULL;
+    if (other)
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "connectivity_row is %lld and %s are given: rows are of cells of one type without offsets",
+                         row, other);
+    if (row < vertices)
+        return base_fail(error, INSITU_ERROR_MESH, "connectivity_row is %lld, a cell has %lld vertices", row, vertices);
+    const long long rest = mesh->connectivity_count - vertices, cells = mesh->cell_count;
+    if (rest < 0 || (cells > 1 && row > rest / (cells - 1)))
+        return base_fail(error, INSITU_ERROR_MESH,
+                         "connectivity_count is %lld, too few for %lld cells of %lld vertices in rows of %lld",
+                         (long long)mesh->connectivity_count, cells, vertices, row);
     return INSITU_OK;
 }
 
@@ -218,7 +246,7 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
                          "unknown cell_type %d (10 tet, 12 hex, 13 wedge, 14 pyramid, 42 polyhedron; 5 triangle, 9 "
                          "quad, 7 polygon)",
                          (int)mesh->cell_type);
-    if (!mesh->offsets.data && mesh->connectivity_count != mesh->cell_count * vertices)
+    if (!mesh->offsets.data && !mesh->connectivity_row && mesh->connectivity_count != mesh->cell_count * vertices)
         return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %d vertices need %lld",
                          (long long)mesh->connectivity_count, (long long)mesh->cell_count, vertices,
                          (long long)(mesh->cell_count * vertices));
@@ -233,6 +261,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     if (!status) status = check_face_lists(mesh, error);
     if (!status) status = check_owner(mesh, error);
     if (!status) status = check_shape(mesh, error);
+    if (!status) status = check_rows(mesh, error);
     return status;
 }
 
@@ -245,6 +274,7 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            !a->offsets.data != !b->offsets.data || !a->ghosts.data != !b->ghosts.data ||
            a->face_count != b->face_count || a->face_connectivity_count != b->face_connectivity_count ||
            a->neighbour_count != b->neighbour_count || a->keep_polyhedra != b->keep_polyhedra ||
+           a->vertex_order != b->vertex_order || a->connectivity_row != b->connectivity_row ||
            !a->owner.data != !b->owner.data || !a->face_lists.data != !b->face_lists.data;
 }
 
@@ -366,6 +396,32 @@ static session_field *add_field(session_mesh *mesh, const char *name, base_error
     return field;
 }
 
+/* Vertices or cells of the mesh. */
+static int64_t count_places(const session_mesh *mesh, const insitu_field *field)
+{
+    return field->centring == INSITU_VERTEX ? mesh->given.vertex_count : mesh->given.cell_count;
+}
+
+/* An array without elements may have no address: then its type tells. */
+static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
+{
+    return field->index.data || (field->index.type && count_places(mesh, field) == 0);
+}
+
+static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
+{
+    const int64_t places = count_places(mesh, field);
+    const bool has_index = is_by_index(mesh, field);
+    if (field->count < 0 || (!has_index && field->count != places))
+        return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s", (long long)field->count,
+                         (long long)places, field->centring == INSITU_VERTEX ? "vertices" : "cells");
+    const array_rule values = {"values", has_index && !places ? 0 : field->count, ALLOW_FLOATS | ALLOW_INTEGERS, false};
+    const array_rule index = {"entries of index", places, ALLOW_INTEGERS, true};
+    insitu_status status = check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
+    if (!status) status = check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
+    return status;
+}
+
 static insitu_status check_field(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
     if (field->centring != INSITU_VERTEX && field->centring != INSITU_CELL)
@@ -374,13 +430,7 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
         return base_fail(error, INSITU_ERROR_ARGUMENT, "component_count is %d", field->component_count);
     if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
-    const bool is_vertex = field->centring == INSITU_VERTEX;
-    const int64_t expected = is_vertex ? mesh->given.vertex_count : mesh->given.cell_count;
-    if (field->count != expected)
-        return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s", (long long)field->count,
-                         (long long)expected, is_vertex ? "vertices" : "cells");
-    const array_rule rule = {"values", field->count, ALLOW_FLOATS | ALLOW_INTEGERS, false};
-    const insitu_status status = check_array(&field->values, &rule, INSITU_ERROR_FIELD, error);
+    const insitu_status status = check_field_arrays(mesh, field, error);
     if (status) return status;
     const int64_t size = session_type_size(field->values.type);
     if (field->values.data && field->component_stride_bytes % size != 0)
@@ -402,7 +452,8 @@ static void spoil_scalars(session_mesh *mesh, int field)
 /* Are the values read from where they were? */
 static bool is_same_place(const insitu_field *a, const insitu_field *b)
 {
-    return is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes;
+    return is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
+           is_same_array(&a->index, &b->index) && a->count == b->count;
 }
 
 static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given)
@@ -410,13 +461,17 @@ static void take_field(session_meshes *meshes, session_mesh *mesh, int index, co
     session_field *field = &mesh->fields[index];
     const bool is_other = !field->values.data || field->given.centring != given->centring ||
                           field->given.component_count != given->component_count || field->problem.status;
+    const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same_place(&field->given, given);
     if (is_other) {
         /* The scalars' components may have changed their meaning. */
         session_drop_scalars(mesh);
         meshes->are_names_changed = true;
-    } else if (given->changed & INSITU_CHANGED_VALUES || !is_same_place(&field->given, given)) {
+    } else if (is_stale) {
         spoil_scalars(mesh, index);
     }
+    field->has_index = is_by_index(mesh, given);
+    if (is_other || !field->has_index || field->given.values.type != given->values.type) session_drop_copy(field);
+    field->is_copy_stale = field->is_copy_stale || is_stale;
     const char *name = field->given.name;
     field->given = *given;
     field->given.name = name;

@@ -24,6 +24,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "session_cell_order.h"
 #include "session_tally.h"
 
 /* ---- arrays --------------------------------------------------------------------------------------------------- */
@@ -78,6 +79,8 @@ void session_read_topology(session_mesh *mesh)
         g.cell_types = (const char *)t->cell_types;
         g.cell_types_stride = g.cell_types_bytes = 1;
         g.cell_type = t->cell_type;
+    } else if (t->has_own_order) {
+        g.connectivity = t->connectivity;
     } else {
         t->connectivity_count = mesh->given.connectivity_count;
     }
@@ -97,9 +100,8 @@ int session_given_type(const session_mesh *mesh, int64_t cell)
     return grid_cell_type(&given, cell);
 }
 
-/* Room for indices up to largest, as narrow as they can be. False where memory runs out. */
-static bool make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
-                         base_error *error)
+bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
+                          base_error *error)
 {
     const bool is_wide = largest > INT32_MAX;
     const int64_t size = is_wide ? (int64_t)sizeof(int64_t) : (int64_t)sizeof(int32_t);
@@ -111,15 +113,6 @@ static bool make_indices(const session_mesh *mesh, const char *what, int64_t cou
     }
     *out = (grid_array){data, size, is_wide, true, 0};
     return true;
-}
-
-static void put_index(const grid_array *array, int64_t i, int64_t value)
-{
-    char *p = (char *)(uintptr_t)array->data + i * array->stride;
-    if (array->is_wide)
-        *(int64_t *)(void *)p = value;
-    else
-        *(int32_t *)(void *)p = (int32_t)value;
 }
 
 static void free_indices(grid_array *array)
@@ -170,8 +163,8 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
     const long long base = given->index_base;
     int64_t at = 0;
     t->has_own_faces = true;
-    if (total < 0 || !make_indices(mesh, "faces' offsets", given->face_count, total, &t->face_offsets, error) ||
-        !make_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
+    if (total < 0 || !session_make_indices(mesh, "faces' offsets", given->face_count, total, &t->face_offsets, error) ||
+        !session_make_indices(mesh, "faces' vertices", total, given->vertex_count, &t->face_connectivity, error))
         return error->status;
     insitu_array list = {NULL, given->face_lists.type, 0};
     for (int64_t face = 0; face < given->face_count; face++) {
@@ -184,9 +177,9 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
                 return base_fail(error, INSITU_ERROR_MESH,
                                  "mesh \"%s\": face %lld: vertex index %lld is outside %lld..%lld (index_base is %lld)",
                                  mesh->name, face + base, vertex + base, base, given->vertex_count - 1 + base, base);
-            put_index(&t->face_connectivity, at++, vertex);
+            session_put_index(&t->face_connectivity, at++, vertex);
         }
-        put_index(&t->face_offsets, face + 1, at);
+        session_put_index(&t->face_offsets, face + 1, at);
     }
     t->face_connectivity_count = total;
     t->face_bytes = (given->face_count + 1) * t->face_offsets.stride + (total + 1) * t->face_connectivity.stride;
@@ -237,7 +230,7 @@ static insitu_status count_faces(const session_mesh *mesh, const face_sides *sid
         sides_of(sides, face, cells);
         if (check_sides(mesh, face, cells, error)) return error->status;
         for (int i = 0; i < 2 && cells[i] >= 0; i++)
-            put_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
+            session_put_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
     }
     return INSITU_OK;
 }
@@ -248,18 +241,18 @@ static void put_faces(const session_mesh *mesh, const face_sides *sides, const s
 {
     const int64_t count = mesh->given.cell_count;
     for (int64_t c = 0; c < count; c++)
-        put_index(&t->offsets, c + 1, grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
+        session_put_index(&t->offsets, c + 1, grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
     for (int64_t face = 0; face < mesh->given.face_count; face++) {
         int64_t cells[2];
         sides_of(sides, face, cells);
         for (int i = 0; i < 2 && cells[i] >= 0; i++) {
             const int64_t at = grid_array_index(&t->offsets, cells[i]);
-            put_index(&t->connectivity, at, face);
-            put_index(&t->offsets, cells[i], at + 1);
+            session_put_index(&t->connectivity, at, face);
+            session_put_index(&t->offsets, cells[i], at + 1);
         }
     }
-    for (int64_t c = count; c > 0; c--) put_index(&t->offsets, c, grid_array_index(&t->offsets, c - 1));
-    put_index(&t->offsets, 0, 0);
+    for (int64_t c = count; c > 0; c--) session_put_index(&t->offsets, c, grid_array_index(&t->offsets, c - 1));
+    session_put_index(&t->offsets, 0, 0);
 }
 
 static insitu_status list_faces(session_mesh *mesh, base_error *error)
@@ -270,11 +263,13 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
     const int64_t most = given->face_count + given->neighbour_count;
     t->has_own_cells = true;
     t->cell_type = GRID_POLYHEDRON;
-    if (!make_indices(mesh, "cells' offsets", given->cell_count, most, &t->offsets, error)) return error->status;
+    if (!session_make_indices(mesh, "cells' offsets", given->cell_count, most, &t->offsets, error))
+        return error->status;
     if (count_faces(mesh, &sides, &t->offsets, error)) return error->status;
     int64_t total = 0;
     for (int64_t c = 0; c < given->cell_count; c++) total += grid_array_index(&t->offsets, c + 1);
-    if (!make_indices(mesh, "cells' faces", total, given->face_count, &t->connectivity, error)) return error->status;
+    if (!session_make_indices(mesh, "cells' faces", total, given->face_count, &t->connectivity, error))
+        return error->status;
     put_faces(mesh, &sides, t);
     t->connectivity_count = total;
     t->cell_bytes = (given->cell_count + 1) * t->offsets.stride + (total + 1) * t->connectivity.stride;
@@ -492,11 +487,11 @@ static void put_cell(const session_mesh *mesh, int64_t cell, int type, int64_t a
     int64_t vertices[GRID_MAX_CELL_VERTICES], first, end;
     if (type == grid_cell_type(g, cell)) {
         grid_cell_faces(g, cell, &first, &end);
-        for (int64_t i = first; i < end; i++) put_index(out, at++, grid_array_index(&g->connectivity, i));
+        for (int64_t i = first; i < end; i++) session_put_index(out, at++, grid_array_index(&g->connectivity, i));
         return;
     }
     recognise(mesh, cell, vertices);
-    for (int i = 0; i < grid_type_vertices(type); i++) put_index(out, at++, vertices[i]);
+    for (int i = 0; i < grid_type_vertices(type); i++) session_put_index(out, at++, vertices[i]);
 }
 
 static void put_offsets(const session_mesh *mesh, const recognition *r, const grid_array *out)
@@ -506,7 +501,7 @@ static void put_offsets(const session_mesh *mesh, const recognition *r, const gr
         int64_t first = 0, end = grid_type_vertices(r->types[cell]);
         if (r->types[cell] == GRID_POLYHEDRON) grid_cell_faces(&mesh->cells, cell, &first, &end);
         at += end - first;
-        put_index(out, cell + 1, at);
+        session_put_index(out, cell + 1, at);
     }
 }
 
@@ -517,9 +512,10 @@ static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads
     const int64_t count = mesh->cells.cell_count, vertices = mesh->cells.vertex_count, faces = mesh->cells.face_count;
     const int type = only_type(r, count), size = grid_type_vertices(type);
     grid_array offsets = {0}, connectivity;
-    if (!make_indices(mesh, "recognised cells", r->entries, vertices > faces ? vertices : faces, &connectivity, error))
+    if (!session_make_indices(mesh, "recognised cells", r->entries, vertices > faces ? vertices : faces, &connectivity,
+                              error))
         return error->status;
-    if (!type && !make_indices(mesh, "recognised cells' offsets", count, r->entries, &offsets, error)) {
+    if (!type && !session_make_indices(mesh, "recognised cells' offsets", count, r->entries, &offsets, error)) {
         free_indices(&connectivity);
         return error->status;
     }
@@ -581,6 +577,7 @@ insitu_status session_make_topology(session_mesh *mesh, int threads, base_error 
     session_read_topology(mesh);
     if (mesh->given.face_lists.data && mesh->given.face_sizes.data) status = copy_lists(mesh, error);
     if (!status && mesh->given.owner.data) status = list_faces(mesh, error);
+    if (!status && session_is_reordered(&mesh->given)) status = session_order_cells(mesh, threads, error);
     session_read_topology(mesh);
     if (!status && !mesh->given.keep_polyhedra && may_have_polyhedra(&mesh->cells))
         status = recognise_mesh(mesh, threads, error);

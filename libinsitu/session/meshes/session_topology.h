@@ -14,10 +14,23 @@ void session_read_topology(session_mesh *mesh);
 /* The type that the caller gave the cell, whatever it is read as. */
 int session_given_type(const session_mesh *mesh, int64_t cell);
 
+/* Room for count indices up to largest and one more, as narrow as they can be, all 0. False where memory runs out. */
+bool session_make_indices(const session_mesh *mesh, const char *what, int64_t count, int64_t largest, grid_array *out,
+                          base_error *error);
+
+static inline void session_put_index(const grid_array *array, int64_t i, int64_t value)
+{
+    char *p = (char *)(uintptr_t)array->data + i * array->stride;
+    if (array->is_wide)
+        *(int64_t *)(void *)p = value;
+    else
+        *(int32_t *)(void *)p = (int32_t)value;
+}
+
 /* Make what the description leaves to the library, once for each topology: cells' faces from owner and neighbour,
- * faces' vertices in one array from lists, and tets, hexes, wedges and pyramids from the polyhedra that are such. Then
- * read it. What is wrong with owner and neighbour or with the lists is told; the rest is not looked at for errors,
- * which is for session_check.c. On an error nothing is made. Local. */
+ * faces' vertices in one array from lists, cells' vertices in VTK's order, and tets, hexes, wedges and pyramids from
+ * the polyhedra that are such. Then read it. What is wrong with owner and neighbour or with the lists is told; the rest
+ * is not looked at for errors, which is for session_check.c. On an error nothing is made. Local. */
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
 
 #endif

@@ -25,8 +25,9 @@ static void warn_of_order(session_report *report, const char *mesh, const int64_
     session_warn(
         report, &(session_warning){WARNING_ORDER, NULL, mesh, 0}, are_crossed,
         "mesh \"%s\": the vertices of its hexes or pyramids seem to be in lexicographic order: their quads cross "
-        "themselves, so that little of the cells is seen; VTK's order goes around each quad (counted from 0, exchange "
-        "vertices 2 and 3, of hexes 6 and 7 as well)",
+        "themselves, so that little of the cells is seen; set vertex_order of the mesh to INSITU_ORDER_LEXICOGRAPHIC "
+        "(where "
+        "it is that, the vertices seem to be in VTK's order)",
         mesh);
     session_warn(
         report, &(session_warning){WARNING_ORDER, NULL, mesh, 1}, are_flat,

@@ -10,6 +10,7 @@
 #include "session_agree.h"
 #include "session_candidates.h"
 #include "session_events.h"
+#include "session_indexed.h"
 #include "session_scalars.h"
 
 /* ---- can the image be drawn? --------------------------------------------------------------------------------- */
@@ -311,7 +312,7 @@ static void take_images(const session_plan_basis *basis, session_report *report,
     }
 }
 
-insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, MPI_Comm comm,
+insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, const session_team *team,
                                 session_report *report, session_plan *out, base_error *error)
 {
     const size_t due = (size_t)session_count_due(basis->scene, basis->moment);
@@ -320,8 +321,11 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     if (plan.images) take_images(basis, report, &plan);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);
-    if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
-    const insitu_status status = session_agree(comm, error);
+    if (!is_whole)
+        session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
+    else
+        session_copy_used(meshes, team->threads, error);
+    const insitu_status status = session_agree(team->comm, error);
     if (status)
         session_plan_free(&plan);
     else

@@ -48,9 +48,9 @@ int session_count_due(const scene *scene, const session_moment *moment);
 /* Are the fields there whose statistics the step wants? images: those of conditions too. Local, the same everywhere. */
 insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
-/* Find which of the due images can be drawn, and mark on this rank's meshes and scalars what they need. An image that
- * cannot be drawn is no error of this call. Collective. */
-insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, MPI_Comm comm,
+/* Find which of the due images can be drawn, mark on this rank's meshes and scalars what they need, and copy values
+ * that have an index. An image that cannot be drawn is no error of this call. Collective. */
+insitu_status session_make_plan(const session_plan_basis *basis, session_meshes *meshes, const session_team *team,
                                 session_report *report, session_plan *out, base_error *error);
 
 void session_plan_free(session_plan *plan);

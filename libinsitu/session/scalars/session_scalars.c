@@ -46,23 +46,27 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
                        field->at_vertices && given->centring == INSITU_CELL);
 }
 
-/* As the caller gave it. */
-static grid_field given_field(const session_mesh *mesh, const session_scalar *scalar)
+grid_field session_given_field(const session_mesh *mesh, int index, int component)
 {
-    const session_field *field = &mesh->fields[scalar->field];
-    return (grid_field){.values = field->values,
-                        .component_stride = field->component_stride,
-                        .component_count = field->given.component_count,
-                        .component = scalar->component,
-                        .is_cell_centred = field->given.centring == INSITU_CELL};
+    const session_field *field = &mesh->fields[index];
+    grid_field out = {.values = field->values,
+                      .component_stride = field->component_stride,
+                      .component_count = field->given.component_count,
+                      .component = component,
+                      .is_cell_centred = field->given.centring == INSITU_CELL};
+    if (!field->has_index) return out;
+    out.component_stride = field->values.is_wide ? 8 : 4;
+    out.values.data = field->copy;
+    out.values.stride = out.component_stride * out.component_count;
+    return out;
 }
 
 bool session_find_values(const session_mesh *mesh, const scene_field *field, grid_field *out)
 {
-    session_scalar scalar = {.field = find_field(mesh, field)};
-    if (scalar.field < 0) return false;
-    scalar.component = session_resolve_component(field, mesh->fields[scalar.field].given.component_count);
-    *out = given_field(mesh, &scalar);
+    const int index = find_field(mesh, field);
+    if (index < 0) return false;
+    *out =
+        session_given_field(mesh, index, session_resolve_component(field, mesh->fields[index].given.component_count));
     return true;
 }
 
@@ -72,7 +76,7 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
         return (grid_field){.values = {(const char *)scalar->distances, (int64_t)sizeof(float), false, false},
                             .component_stride = (int64_t)sizeof(float),
                             .component_count = 1};
-    if (!scalar->is_recentred) return given_field(mesh, scalar);
+    if (!scalar->is_recentred) return session_given_field(mesh, scalar->field, scalar->component);
     return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
                         .component_stride = (int64_t)sizeof(double),
                         .component_count = 1,
@@ -104,7 +108,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
         scalar->is_recentred = field->at_vertices && given->centring == INSITU_CELL;
     }
     scalar->is_used = true;
-    scalar->own = given_field(mesh, scalar);
+    scalar->own = session_given_field(mesh, index, scalar->component);
     scalar->wants_ranges = scalar->wants_ranges || wants_ranges;
     mesh->is_needed = mesh->is_needed || wants_ranges;
     *marked = scalar;

@@ -16,6 +16,9 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
 /* This rank's scalar for a layer's field: NULL where the mesh does not have it. */
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field);
 
+/* The mesh's field, or a component of it, as the caller gave it, in the order of the vertices or cells. */
+grid_field session_given_field(const session_mesh *mesh, int field, int component);
+
 /* The field's values as the caller gave them, with no scalar for it; false where the mesh does not have it. */
 bool session_find_values(const session_mesh *mesh, const scene_field *field, grid_field *out);
 

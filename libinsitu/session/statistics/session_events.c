@@ -2,6 +2,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_indexed.h"
 #include "session_statistics_file.h"
 
 bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle)
@@ -90,6 +91,8 @@ insitu_status session_update_events(session_events *events, const scene *scene, 
 {
     event_work work;
     if (!work_create(scene, now->cycle, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
+    for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
+    if (!error->status) session_copy_wanted(meshes, team->threads, error);
     insitu_status status = session_agree(team->comm, error);
     if (!status) status = session_find_statistics(meshes, team, work.wishes, work.count, work.found, error);
     if (!status) {

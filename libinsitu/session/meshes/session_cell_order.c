@@ -1,0 +1,112 @@
+/* The rooms below read each cell's vertices one after the other, in VTK's order. Kernels that take eight cells at once
+ * rely on it, so another order is a copy of connectivity rather than a case in each of them. What is the same in both
+ * orders, as tets are, is not copied. */
+#include "session_cell_order.h"
+
+#include "session_topology.h"
+
+enum { ORDERS = INSITU_ORDER_DMPLEX + 1 };
+
+/* Where VTK's vertices stand in the other order; NULL: where they do in VTK's. Each turn is its own inverse. */
+static const signed char *turn_of(insitu_vertex_order order, int type)
+{
+    static const signed char lexicographic[GRID_MAX_CELL_VERTICES] = {0, 1, 3, 2, 4, 5, 7, 6};
+    static const signed char plex_hex[] = {0, 3, 2, 1, 4, 5, 6, 7}, plex_wedge[] = {0, 2, 1, 3, 4, 5};
+    if (order == INSITU_ORDER_LEXICOGRAPHIC && (type == GRID_HEX || type == GRID_QUAD || type == GRID_PYRAMID))
+        return lexicographic;
+    if (order == INSITU_ORDER_DMPLEX && type == GRID_HEX) return plex_hex;
+    if (order == INSITU_ORDER_DMPLEX && type == GRID_WEDGE) return plex_wedge;
+    return NULL;
+}
+
+bool session_is_reordered(const insitu_mesh *given)
+{
+    if (given->cell_count == 0 || given->owner.data) return false;
+    if (given->cell_types.data) return given->vertex_order != INSITU_ORDER_VTK;
+    const int type = (int)given->cell_type;
+    const bool has_gaps = given->connectivity_row && given->connectivity_row != grid_type_vertices(type);
+    return has_gaps || turn_of(given->vertex_order, type);
+}
+
+/* Of mixed cells. */
+static bool has_turned_cells(const session_mesh *mesh)
+{
+    const grid *g = &mesh->cells;
+    int64_t cell = 0;
+    while (cell < g->cell_count && !turn_of(mesh->given.vertex_order, grid_cell_type(g, cell))) cell++;
+    return cell < g->cell_count;
+}
+
+/* Entries of the caller's connectivity that cells use, and where they stand. */
+typedef struct cell_rows {
+    const grid_array *connectivity;
+    int64_t count, row, used; /* of each row so many are used */
+} cell_rows;
+
+static int64_t entry_of(const cell_rows *rows, int64_t i)
+{
+    return grid_array_index(rows->connectivity,
+                            rows->row == rows->used ? i : i / rows->used * rows->row + i % rows->used);
+}
+
+static cell_rows rows_of(const session_mesh *mesh)
+{
+    const insitu_mesh *given = &mesh->given;
+    cell_rows rows = {&mesh->cells.connectivity, given->connectivity_count, 1, 1};
+    if (!given->connectivity_row) return rows;
+    rows.row = given->connectivity_row;
+    rows.used = grid_type_vertices((int)given->cell_type);
+    rows.count = given->cell_count * rows.used;
+    return rows;
+}
+
+/* What does not fit into 4 bytes is no index of a vertex unless there are so many, and is to be told as it is. */
+static bool fit_narrow(const cell_rows *rows, int threads)
+{
+    int64_t least = 0, most = 0;
+#pragma omp parallel for num_threads(threads) schedule(static) reduction(min : least) reduction(max : most)
+    for (int64_t i = 0; i < rows->count; i++) {
+        const int64_t entry = entry_of(rows, i);
+        least = entry < least ? entry : least;
+        most = entry > most ? entry : most;
+    }
+    return least >= INT32_MIN && most <= INT32_MAX;
+}
+
+/* The cell's place in the copy; false where its offsets are bad. */
+static bool place_of(const grid *g, int64_t cell, int count, int64_t entries, int64_t *first)
+{
+    *first = cell * count;
+    if (!g->offsets.data) return true;
+    *first = grid_array_index(&g->offsets, cell);
+    return *first >= 0 && *first <= entries - count && grid_array_index(&g->offsets, cell + 1) - *first == count;
+}
+
+static void turn_cell(const session_mesh *mesh, int64_t cell, int64_t entries, const grid_array *out)
+{
+    const int type = grid_cell_type(&mesh->cells, cell), count = grid_type_vertices(type);
+    const signed char *turn = turn_of(mesh->given.vertex_order, type);
+    int64_t vertices[GRID_MAX_CELL_VERTICES], first;
+    if (!turn || !place_of(&mesh->cells, cell, count, entries, &first)) return;
+    for (int i = 0; i < count; i++) vertices[i] = grid_array_index(out, first + turn[i]);
+    for (int i = 0; i < count; i++) session_put_index(out, first + i, vertices[i]);
+}
+
+insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *error)
+{
+    session_topology *t = &mesh->topology;
+    const cell_rows rows = rows_of(mesh);
+    const int64_t count = mesh->cells.cell_count;
+    if (mesh->cells.cell_types && !has_turned_cells(mesh)) return INSITU_OK;
+    const int64_t largest = fit_narrow(&rows, threads) ? 0 : INT64_MAX;
+    if (!session_make_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
+        return error->status;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t i = 0; i < rows.count; i++) session_put_index(&t->connectivity, i, entry_of(&rows, i));
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t cell = 0; cell < count; cell++) turn_cell(mesh, cell, rows.count, &t->connectivity);
+    t->has_own_order = true;
+    t->connectivity_count = rows.count;
+    t->cell_bytes = (rows.count + 1) * t->connectivity.stride;
+    return INSITU_OK;
+}
