@@ -1,0 +1,408 @@
+/* Cells whose vertices stand in another order than VTK's, or are the first of longer rows, as codes of finite elements
+ * hold them: they draw the pictures of the same cells in VTK's order, to the bit. What is copied for it is told, what
+ * need not be is not, and what is wrong on one rank alone is told to all. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, PIXELS = 64 * 48, PICTURES = 3, ROW = 27 };
+
+static const char scene_text[] =
+    "images:\n  - name: a\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n"
+    "      - isosurface: {field: f, values: [0.1, 0.7], opacity: 0.6, colour_by: {field: f, map: turbo}}\n"
+    "      - surface: {opacity: 0.2, edges: {}}\n      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n"
+    "    outputs: [{path: a.exr}]\n"
+    "  - name: b\n    size: [64, 48]\n    layers: [{isosurface: {field: f, values: [0.1]}}]\n"
+    "    outputs: [{path: b.exr}]\n"
+    "  - name: c\n    size: [64, 48]\n    layers: [{volume: {field: f}}]\n"
+    "    outputs: [{path: c.exr}]\n";
+
+/* ---- orders --------------------------------------------------------------------------------------------------- */
+
+/* Where the n-th vertex of VTK's stands, by where it is in the unit cell, and by how a face is run around. */
+static int place_in(insitu_vertex_order order, int type, int n)
+{
+    const int x = n % 4 == 1 || n % 4 == 2, y = n % 4 / 2, z = n / 4;
+    const bool has_quads = type == INSITU_HEX || type == INSITU_QUAD || (type == INSITU_PYRAMID && n < 4);
+    if (order == INSITU_ORDER_LEXICOGRAPHIC && has_quads) return x + 2 * y + 4 * z;
+    if (order == INSITU_ORDER_DMPLEX && type == INSITU_HEX && n < 4) return (4 - n) % 4;
+    if (order == INSITU_ORDER_DMPLEX && type == INSITU_WEDGE && n < 3) return (3 - n) % 3;
+    return n;
+}
+
+static void turn_cells(test_mesh *part, insitu_vertex_order order)
+{
+    for (int64_t cell = 0; cell < part->cell_count; cell++) {
+        int64_t *first = part->connectivity + part->offsets[cell], held[8];
+        const int64_t count = part->offsets[cell + 1] - part->offsets[cell];
+        if (part->types[cell] == INSITU_POLYHEDRON) continue;
+        memcpy(held, first, (size_t)count * sizeof *first);
+        for (int n = 0; n < count; n++) first[place_in(order, part->types[cell], n)] = held[n];
+    }
+}
+
+/* ---- layouts -------------------------------------------------------------------------------------------------- */
+
+typedef enum layout { WITH_TYPES, PACKED, ROWS, NARROW, NARROW_ROWS, LAYOUTS } layout;
+
+static const insitu_cell_type type_of_kind[] = {[TEST_TETS] = INSITU_TET,
+                                                [TEST_HEXES] = INSITU_HEX,
+                                                [TEST_WEDGES] = INSITU_WEDGE,
+                                                [TEST_PYRAMIDS] = INSITU_PYRAMID};
+
+/* Arrays that the description is moved to. */
+typedef struct moved {
+    void *connectivity;
+    float *coordinates, *values;
+} moved;
+
+static void free_moved(moved *m)
+{
+    free(m->connectivity), free(m->coordinates), free(m->values);
+    *m = (moved){NULL};
+}
+
+static void put(const moved *m, bool is_narrow, int64_t i, int64_t value)
+{
+    if (is_narrow)
+        ((int32_t *)m->connectivity)[i] = (int32_t)value;
+    else
+        ((int64_t *)m->connectivity)[i] = value;
+}
+
+/* Of one type without offsets; in rows of ROW entries, what is beside the vertices no index. The last row is short. */
+static void move_connectivity(session_input *in, layout how, moved *m)
+{
+    const test_mesh *part = &in->part;
+    const bool is_narrow = how >= NARROW, has_rows = how == ROWS || how == NARROW_ROWS;
+    const int64_t corners = part->cell_count ? part->offsets[1] - part->offsets[0] : 1, row = has_rows ? ROW : corners;
+    m->connectivity = malloc((size_t)(part->cell_count * row + 1) * 8);
+    assert_non_null(m->connectivity);
+    for (int64_t i = 0; i < part->cell_count * row; i++) put(m, is_narrow, i, -1000000);
+    for (int64_t i = 0; i < part->connectivity_count; i++)
+        put(m, is_narrow, i / corners * row + i % corners, part->connectivity[i] + in->mesh.index_base);
+    in->mesh.cell_type = type_of_kind[in->kind];
+    in->mesh.cell_types = in->mesh.offsets = in->mesh.ghosts = (insitu_array){0};
+    in->mesh.connectivity = (insitu_array){m->connectivity, is_narrow ? INSITU_INT32 : INSITU_INT64, 0};
+    in->mesh.connectivity_row = has_rows ? ROW : 0;
+    if (has_rows && part->cell_count) in->mesh.connectivity_count = (part->cell_count - 1) * ROW + corners;
+}
+
+static moved move_arrays(session_input *in, layout how)
+{
+    const test_mesh *part = &in->part;
+    moved m = {NULL};
+    if (how == WITH_TYPES) return m;
+    move_connectivity(in, how, &m);
+    if (how < NARROW) return m;
+    m.coordinates = malloc((size_t)(3 * part->vertex_count + 1) * sizeof(float));
+    m.values = malloc((size_t)(part->vertex_count + 1) * sizeof(float));
+    assert_true(m.coordinates && m.values);
+    for (int64_t i = 0; i < 3 * part->vertex_count; i++) m.coordinates[i] = (float)part->coordinates[i];
+    for (int64_t i = 0; i < part->vertex_count; i++) m.values[i] = (float)part->values[i];
+    insitu_mesh_interleaved(&in->mesh, m.coordinates, INSITU_FLOAT32);
+    in->field.values = (insitu_array){m.values, INSITU_FLOAT32, 0};
+    return m;
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------- */
+
+typedef struct drawing {
+    caught_picture pictures[PICTURES];
+    int64_t copied;
+    bool is_warned, tells_why;
+} drawing;
+
+static drawing step_and_catch(insitu_session *session, int cycle)
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+    const insitu_report *report = insitu_last_report(session);
+    drawing out = {.copied = report->bytes_copied,
+                   .is_warned = strstr(report->warnings, "INSITU_ORDER_") != NULL,
+                   .tells_why =
+                       strstr(report->copied_why, "cells' vertices, one after the other in VTK's order") != NULL};
+    for (int i = 0; i < PICTURES && own_rank == 0; i++) out.pictures[i] = caught[i];
+    caught_count = 0;
+    return out;
+}
+
+static drawing draw(const session_input *in)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    const insitu_status status = hand_over(session, in);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+    drawing out = step_and_catch(session, 0);
+    insitu_destroy(&session);
+    return out;
+}
+
+static bool are_same(const drawing *a, const drawing *b)
+{
+    bool same = true;
+    for (int i = 0; i < PICTURES && own_rank == 0; i++)
+        same = same && memcmp(a->pictures[i].rgba, b->pictures[i].rgba, PIXELS * 4 * sizeof(float)) == 0 &&
+               memcmp(a->pictures[i].depth, b->pictures[i].depth, PIXELS * sizeof(float)) == 0;
+    return same;
+}
+
+static void free_drawing(drawing *d)
+{
+    for (int i = 0; i < PICTURES; i++) free(d->pictures[i].rgba), free(d->pictures[i].depth);
+}
+
+/* Is any cell another one in this order? */
+static bool has_turned(const test_mesh *part, insitu_vertex_order order)
+{
+    bool turned = false;
+    for (int64_t cell = 0; cell < part->cell_count; cell++)
+        for (int n = 0; n < part->offsets[cell + 1] - part->offsets[cell] && part->types[cell] != INSITU_POLYHEDRON;
+             n++)
+            turned = turned || place_in(order, part->types[cell], n) != n;
+    return turned;
+}
+
+static void check(test_mesh_kind kind, insitu_vertex_order order, layout how, int base)
+{
+    session_input plain = {0}, in = {0};
+    input_create(&plain, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    turn_cells(&in.part, order);
+    in.mesh.vertex_order = order;
+    in.mesh.index_base = base;
+    moved plain_arrays = move_arrays(&plain, how >= NARROW ? NARROW : how == ROWS ? PACKED : how);
+    moved arrays = move_arrays(&in, how);
+    drawing expected = draw(&plain), drawn = draw(&in);
+    const bool is_copied = in.part.cell_count && (in.mesh.connectivity_row || has_turned(&in.part, order));
+    everywhere(are_same(&expected, &drawn));
+    everywhere(drawn.copied == expected.copied + is_copied * 4 * (in.part.connectivity_count + 1));
+    everywhere(drawn.tells_why == is_copied && !drawn.is_warned);
+    free_drawing(&expected);
+    free_drawing(&drawn);
+    free_moved(&plain_arrays);
+    free_moved(&arrays);
+    input_free(&plain);
+    input_free(&in);
+}
+
+static void every_order_and_layout_draws_the_same(void **state)
+{
+    (void)state;
+    for (int order = INSITU_ORDER_VTK; order <= INSITU_ORDER_DMPLEX; order++) {
+        for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+            check(kind, (insitu_vertex_order)order, WITH_TYPES, 0);
+        for (test_mesh_kind kind = TEST_TETS; kind <= TEST_PYRAMIDS; kind++)
+            for (layout how = PACKED; how < LAYOUTS; how++)
+                check(kind, (insitu_vertex_order)order, how, how == ROWS || how == NARROW);
+    }
+}
+
+/* Hexes of which half are given by their faces: those are recognised beside those that stand in another order. */
+static void recognised_cells_go_with_any_order(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    test_mesh_to_polyhedra(&in.part, 0.5);
+    input_describe(&in);
+    drawing expected = draw(&in);
+    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
+    in.mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    drawing drawn = draw(&in);
+    everywhere(are_same(&expected, &drawn) && expected.copied == drawn.copied);
+    in.mesh.keep_polyhedra = 1;
+    drawing kept = draw(&in);
+    everywhere(kept.copied < drawn.copied && kept.tells_why);
+    free_drawing(&kept);
+    free_drawing(&expected);
+    free_drawing(&drawn);
+    input_free(&in);
+}
+
+/* The lower quads of hexes, as shells in a table of nodes. */
+static void quads_are_shells_in_any_order(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    drawing drawn[2];
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, rank_count);
+    in.mesh.cell_type = INSITU_QUAD;
+    in.mesh.cell_types = in.mesh.offsets = (insitu_array){0};
+    in.mesh.connectivity_row = 8;
+    drawn[0] = draw(&in);
+    for (int64_t cell = 0; cell < in.part.cell_count; cell++) {
+        int64_t *quad = in.part.connectivity + 8 * cell, held = quad[2];
+        quad[2] = quad[3], quad[3] = held;
+    }
+    in.mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    drawn[1] = draw(&in);
+    everywhere(are_same(&drawn[0], &drawn[1]));
+    in.mesh.vertex_order = INSITU_ORDER_VTK;
+    free_drawing(&drawn[1]);
+    drawn[1] = draw(&in);
+    everywhere(own_rank != 0 || !are_same(&drawn[0], &drawn[1]));
+    free_drawing(&drawn[0]);
+    free_drawing(&drawn[1]);
+    input_free(&in);
+}
+
+/* Said to stand in an order that they do not stand in, they are warned of; and set right, they are drawn, whatever the
+ * caller says of changes. A mesh that moves keeps its copy. */
+static void the_order_may_be_set_right(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    drawing expected = draw(&in);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC);
+    for (int step = 0; step < 3; step++) {
+        in.mesh.changed = step == 2 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
+        in.mesh.vertex_order = step ? INSITU_ORDER_LEXICOGRAPHIC : INSITU_ORDER_VTK;
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        drawing drawn = step_and_catch(session, step);
+        everywhere(drawn.is_warned == (step == 0));
+        everywhere(own_rank != 0 || are_same(&expected, &drawn) == (step > 0));
+        free_drawing(&drawn);
+    }
+    insitu_destroy(&session);
+    turn_cells(&in.part, INSITU_ORDER_LEXICOGRAPHIC); /* back again */
+    drawing drawn = draw(&in);
+    everywhere(drawn.is_warned);
+    free_drawing(&drawn);
+    free_drawing(&expected);
+    input_free(&in);
+}
+
+/* ---- errors --------------------------------------------------------------------------------------------------- */
+
+static const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
+                                  "    outputs: [{path: a.exr}]\n";
+static moved spoilt;
+
+static void in_rows(session_input *in)
+{
+    free_moved(&spoilt);
+    spoilt = move_arrays(in, ROWS);
+}
+static void unknown_order(session_input *in)
+{
+    in->mesh.vertex_order = (insitu_vertex_order)3;
+}
+static void negative_row(session_input *in)
+{
+    in_rows(in);
+    in->mesh.connectivity_row = -8;
+}
+static void short_row(session_input *in)
+{
+    in_rows(in);
+    in->mesh.connectivity_row = 7;
+}
+static void huge_row(session_input *in)
+{
+    in_rows(in);
+    in->mesh.connectivity_row = INT64_MAX;
+}
+static void missing_entry(session_input *in)
+{
+    in_rows(in);
+    in->mesh.connectivity_count--;
+}
+static void no_entries(session_input *in)
+{
+    in_rows(in);
+    in->mesh.connectivity_count = 4;
+}
+static void rows_and_offsets(session_input *in)
+{
+    in->mesh.cell_types.data = NULL;
+    in->mesh.cell_type = INSITU_HEX;
+    in->mesh.connectivity_row = 8;
+}
+static void rows_and_types(session_input *in)
+{
+    in->mesh.offsets.data = NULL;
+    in->mesh.connectivity_row = 8;
+}
+static void vertex_in_row(session_input *in)
+{
+    in_rows(in);
+    in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    ((int64_t *)spoilt.connectivity)[3 * ROW + 2] = -5;
+}
+/* As 4 bytes it would be a good one. */
+static void far_vertex_in_row(session_input *in)
+{
+    in_rows(in);
+    ((int64_t *)spoilt.connectivity)[ROW + 1] = ((int64_t)1 << 32) + 1;
+}
+static void vertex_before_one(session_input *in)
+{
+    in->mesh.index_base = 1;
+    in_rows(in);
+    ((int64_t *)spoilt.connectivity)[ROW + 7] = 0;
+}
+static void offsets_in_order(session_input *in)
+{
+    in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    in->part.offsets[2]++;
+}
+static void far_offsets_in_order(session_input *in)
+{
+    in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    in->part.offsets[1] = INT64_MAX - 3;
+}
+static void type_in_order(session_input *in)
+{
+    in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    in->part.types[1] = 99;
+}
+
+static const spoilt_case cases[] = {
+    {"order", unknown_order, INSITU_ERROR_ARGUMENT, true, {"vertex_order is 3, expected 0 (VTK's), 1 (lexicographic)"}},
+    {"row -8", negative_row, INSITU_ERROR_MESH, true, {"connectivity_row is -8, a cell has 8 vertices"}},
+    {"row 7", short_row, INSITU_ERROR_MESH, true, {"connectivity_row is 7, a cell has 8 vertices"}},
+    {"huge row", huge_row, INSITU_ERROR_MESH, true, {"too few for ", "in rows of 9223372036854775807"}},
+    {"one less", missing_entry, INSITU_ERROR_MESH, true, {"too few for ", "cells of 8 vertices in rows of 27"}},
+    {"four", no_entries, INSITU_ERROR_MESH, true, {"connectivity_count is 4, too few for "}},
+    {"offsets", rows_and_offsets, INSITU_ERROR_MESH, true, {"connectivity_row is 8 and offsets are given"}},
+    {"types", rows_and_types, INSITU_ERROR_MESH, true, {"offsets are not given, cell types are"}},
+    {"vertex", vertex_in_row, INSITU_ERROR_MESH, false, {"cell 3 (hex): vertex index -5 is outside 0.."}},
+    {"far", far_vertex_in_row, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index 4294967297 is outside 0.."}},
+    {"0 of 1", vertex_before_one, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index 0 is outside 1..", "is 1)"}},
+    {"bad offsets", offsets_in_order, INSITU_ERROR_MESH, false, {"cell 1 (hex): offsets "}},
+    {"far offsets", far_offsets_in_order, INSITU_ERROR_MESH, false, {"cell 0 (hex): offsets "}},
+    {"bad type", type_in_order, INSITU_ERROR_MESH, false, {"cell 1: unknown cell type 99"}},
+};
+
+static void what_is_wrong_is_told_to_all(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &in, &cases[i]);
+    insitu_destroy(&session);
+    input_free(&in);
+    free_moved(&spoilt);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_order_and_layout_draws_the_same), cmocka_unit_test(recognised_cells_go_with_any_order),
+        cmocka_unit_test(quads_are_shells_in_any_order), cmocka_unit_test(the_order_may_be_set_right),
+        cmocka_unit_test(what_is_wrong_is_told_to_all)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}

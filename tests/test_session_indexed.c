@@ -1,0 +1,373 @@
+/* Fields whose values stand in another order than the mesh's vertices or cells, as in vectors of degrees of freedom:
+ * found by an index they draw the pictures of the same values in order, to the bit, at each step and as they change.
+ * What is wrong with an index on one rank alone is told to all. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_meshes.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, PIXELS = 64 * 48, PICTURES = 4, STEPS = 4 };
+
+static const char scene_text[] =
+    "images:\n  - name: a\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n"
+    "      - isosurface: {field: f, values: [0.1, 0.3], opacity: 0.6, colour_by: {field: f, map: turbo}}\n"
+    "      - surface: {opacity: 0.2, edges: {}, colour_by: {field: f}}\n"
+    "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n"
+    "    outputs: [{path: a.exr}]\n"
+    "  - name: b\n    size: [64, 48]\n    layers: [{isosurface: {field: f, values: [0.1]}}]\n"
+    "    outputs: [{path: b.exr}]\n"
+    "  - name: c\n    size: [64, 48]\n    layers: [{volume: {field: f}}]\n    when: {field: f, above: -5}\n"
+    "    outputs: [{path: c.exr}]\n"
+    "  - name: d\n    size: [64, 48]\n    layers: [{surface: {threshold: {field: f, above: 0.05}}}]\n"
+    "    outputs: [{path: d.exr}]\n";
+
+/* ---- fields --------------------------------------------------------------------------------------------------- */
+
+typedef struct form {
+    bool at_cells, is_narrow; /* float and int32, the index with other numbers between */
+    int components, base;
+} form;
+
+/* One field twice: in order, and by an index among more values, which are not numbers. */
+typedef struct twice {
+    form of;
+    int64_t places, count;
+    char *plain, *shuffled, *index;
+} twice;
+
+static double value_at(const session_input *in, const form *of, int64_t place, int component)
+{
+    const double own = of->at_cells ? test_uniform_in((uint64_t)place + 1, 5, -1, 1) : in->part.values[place];
+    return component ? own * component - 0.2 : own;
+}
+
+static void put_number(const form *of, char *array, int64_t i, double value)
+{
+    if (of->is_narrow)
+        ((float *)(void *)array)[i] = (float)value;
+    else
+        ((double *)(void *)array)[i] = value;
+}
+
+static void put_index(const form *of, char *array, int64_t i, int64_t value)
+{
+    if (of->is_narrow)
+        ((int32_t *)(void *)array)[2 * i] = (int32_t)value, ((int32_t *)(void *)array)[2 * i + 1] = -7;
+    else
+        ((int64_t *)(void *)array)[i] = value;
+}
+
+static void fill(twice *t, const session_input *in, double scale)
+{
+    const form *of = &t->of;
+    for (int64_t i = 0; i < t->count * of->components; i++) put_number(of, t->shuffled, i, (double)NAN);
+    for (int64_t i = 0; i < t->places; i++) {
+        const int64_t at = t->count - 1 - 2 * i - i % 2; /* backwards, with gaps: injective */
+        put_index(of, t->index, i, at + of->base);
+        for (int c = 0; c < of->components; c++) {
+            const double value = scale * value_at(in, of, i, c);
+            put_number(of, t->plain, i * of->components + c, value);
+            put_number(of, t->shuffled, at * of->components + c, value);
+        }
+    }
+}
+
+static twice make_twice(const session_input *in, const form *of)
+{
+    const int64_t places = of->at_cells ? in->part.cell_count : in->part.vertex_count, count = 2 * places + 3;
+    const size_t tuple = sizeof(double) * (size_t)of->components;
+    twice t = {
+        *of, places, count, malloc(tuple * (size_t)count), malloc(tuple * (size_t)count), malloc(8 * (size_t)count)};
+    assert_true(t.plain && t.shuffled && t.index);
+    fill(&t, in, 1);
+    return t;
+}
+
+static void free_twice(twice *t)
+{
+    free(t->plain), free(t->shuffled), free(t->index);
+}
+
+static insitu_field describe(const twice *t, bool is_by_index)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "f";
+    field.centring = t->of.at_cells ? INSITU_CELL : INSITU_VERTEX;
+    field.component_count = t->of.components;
+    field.count = is_by_index ? t->count : t->places;
+    field.values =
+        (insitu_array){is_by_index ? t->shuffled : t->plain, t->of.is_narrow ? INSITU_FLOAT32 : INSITU_FLOAT64, 0};
+    if (is_by_index) field.index = (insitu_array){t->index, t->of.is_narrow ? INSITU_INT32 : INSITU_INT64, 8};
+    return field;
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------- */
+
+typedef struct drawing {
+    caught_picture pictures[STEPS][PICTURES];
+    int64_t copied, borrowed;
+    bool tells_why;
+} drawing;
+
+static void count_from_one(session_input *in)
+{
+    test_mesh *part = &in->part;
+    for (int64_t i = 0; i < part->connectivity_count; i++) part->connectivity[i]++;
+    for (int64_t i = 0; i <= part->cell_count; i++) part->offsets[i]++;
+    for (int64_t i = 0; i <= part->face_count && part->face_count; i++) part->face_offsets[i]++;
+    for (int64_t i = 0; i < part->face_connectivity_count; i++) part->face_connectivity[i]++;
+    in->mesh.index_base = 1;
+}
+
+static void step_and_catch(insitu_session *session, int cycle, caught_picture out[PICTURES])
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+    everywhere(own_rank != 0 || caught_count == PICTURES);
+    for (int i = 0; i < PICTURES && own_rank == 0; i++) out[i] = caught[i];
+    caught_count = 0;
+}
+
+/* As it is, halved in the same arrays, set as unchanged, and as it was again. */
+static drawing draw(const session_input *in, twice *t, bool is_by_index)
+{
+    drawing out = {.copied = 0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    insitu_field field = describe(t, is_by_index);
+    everywhere(insitu_set_mesh(session, "m", &in->mesh) == INSITU_OK);
+    for (int step = 0; step < STEPS; step++) {
+        fill(t, in, step % 3 ? 0.5 : 1);
+        field.changed = step == 2 ? INSITU_CHANGED_NOTHING : INSITU_CHANGED_VALUES;
+        const insitu_status status = insitu_set_field(session, "m", &field);
+        if (status) fprintf(stderr, "%s\n", insitu_error(session));
+        everywhere(status == INSITU_OK);
+        step_and_catch(session, step, out.pictures[step]);
+    }
+    const insitu_report *report = insitu_last_report(session);
+    out.copied = report->bytes_copied;
+    out.borrowed = report->bytes_borrowed;
+    out.tells_why = strstr(report->copied_why, "field \"f\" by its index: ") != NULL;
+    insitu_destroy(&session);
+    return out;
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, PIXELS * 4 * sizeof(float)) == 0 &&
+           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
+}
+
+static void compare(drawing *a, drawing *b)
+{
+    bool same = true, differ = own_rank != 0;
+    for (int step = 0; step < STEPS && own_rank == 0; step++)
+        for (int i = 0; i < PICTURES; i++) {
+            same = same && are_same(&a->pictures[step][i], &b->pictures[step][i]);
+            differ = differ || !are_same(&a->pictures[0][i], &a->pictures[step][i]);
+        }
+    everywhere(same);
+    everywhere(differ); /* the values of the second step are seen */
+    for (int step = 0; step < STEPS && own_rank == 0; step++)
+        for (int i = 0; i < PICTURES; i++) {
+            free(a->pictures[step][i].rgba), free(a->pictures[step][i].depth);
+            free(b->pictures[step][i].rgba), free(b->pictures[step][i].depth);
+        }
+}
+
+static void check(test_mesh_kind kind, const form *of)
+{
+    session_input in = {0};
+    input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    if (of->base) count_from_one(&in);
+    twice t = make_twice(&in, of);
+    drawing plain = draw(&in, &t, false), indexed = draw(&in, &t, true);
+    const int64_t size = of->is_narrow ? 4 : 8, tuples = size * of->components;
+    everywhere(indexed.copied == plain.copied + t.places * tuples);
+    everywhere(indexed.borrowed == plain.borrowed + (t.count - t.places) * tuples + t.places * size);
+    everywhere(indexed.tells_why && !plain.tells_why);
+    compare(&plain, &indexed);
+    free_twice(&t);
+    input_free(&in);
+}
+
+static void an_index_draws_what_values_in_order_draw(void **state)
+{
+    (void)state;
+    static const form forms[] = {{false, false, 1, 0}, {false, true, 1, 1},  {true, false, 1, 1},
+                                 {true, true, 1, 0},   {false, false, 3, 0}, {true, true, 2, 0}};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) check(kind, &forms[i]);
+}
+
+/* Of a field that no scene asks for nothing is copied, and nothing looked at. */
+static void an_index_that_nobody_needs_is_left_alone(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    caught_picture pictures[PICTURES];
+    twice t = make_twice(&in, &(form){false, false, 1, 0});
+    insitu_field other = describe(&t, true);
+    other.name = "other";
+    ((int64_t *)(void *)t.index)[0] = -9;
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    step_and_catch(session, 0, pictures);
+    const int64_t copied = insitu_last_report(session)->bytes_copied;
+    everywhere(insitu_set_field(session, "m", &other) == INSITU_OK);
+    step_and_catch(session, 1, pictures);
+    everywhere(insitu_last_report(session)->bytes_copied == copied);
+    insitu_destroy(&session);
+    free_twice(&t);
+    input_free(&in);
+}
+
+/* ---- errors --------------------------------------------------------------------------------------------------- */
+
+static const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
+                                  "    outputs: [{path: a.exr}]\n";
+static int64_t *spoilt;
+
+static void by_index(session_input *in)
+{
+    free(spoilt);
+    spoilt = malloc((size_t)(in->part.vertex_count + in->part.cell_count) * sizeof *spoilt);
+    assert_non_null(spoilt);
+    for (int64_t i = 0; i < in->part.vertex_count + in->part.cell_count; i++) spoilt[i] = i;
+    in->field.index = (insitu_array){spoilt, INSITU_INT64, 0};
+}
+static void index_large(session_input *in)
+{
+    by_index(in);
+    spoilt[7] = in->part.vertex_count;
+    spoilt[9] = -1; /* the first is told */
+}
+static void index_far(session_input *in)
+{
+    by_index(in);
+    spoilt[2] = INT64_MAX;
+}
+static void index_negative(session_input *in)
+{
+    by_index(in);
+    spoilt[3] = -1;
+}
+static void index_before_one(session_input *in)
+{
+    by_index(in);
+    count_from_one(in);
+    for (int64_t i = 1; i < in->part.vertex_count; i++) spoilt[i]++;
+}
+static void index_of_cell(session_input *in)
+{
+    by_index(in);
+    in->field.centring = INSITU_CELL;
+    spoilt[in->part.cell_count - 1] = 1000000;
+}
+static void fewer_values(session_input *in)
+{
+    by_index(in);
+    in->field.count = 5;
+}
+static void no_values(session_input *in)
+{
+    by_index(in);
+    in->field.count = 0;
+}
+static void negative_values(session_input *in)
+{
+    by_index(in);
+    in->field.count = -2;
+}
+static void values_are_null(session_input *in)
+{
+    by_index(in);
+    in->field.values.data = NULL;
+}
+static void float_index(session_input *in)
+{
+    by_index(in);
+    in->field.index.type = INSITU_FLOAT64;
+}
+static void odd_stride(session_input *in)
+{
+    by_index(in);
+    in->field.index.stride_bytes = 12;
+}
+static void type_alone(session_input *in)
+{
+    in->field.index.type = INSITU_INT32;
+    in->field.count++;
+}
+
+static const spoilt_case cases[] = {
+    {"large", index_large, INSITU_ERROR_FIELD, false, {"field \"f\": the index of vertex 7 is ", "outside 0.."}},
+    {"far", index_far, INSITU_ERROR_FIELD, false, {"the index of vertex 2 is 9223372036854775807, outside 0.."}},
+    {"-1", index_negative, INSITU_ERROR_FIELD, false, {"the index of vertex 3 is -1, outside 0..", "index_base is 0"}},
+    {"0 of 1", index_before_one, INSITU_ERROR_FIELD, false, {"index of vertex 1 is 0, outside 1..", "index_base is 1"}},
+    {"cell", index_of_cell, INSITU_ERROR_FIELD, false, {"the index of cell ", " is 1000000, outside 0.."}},
+    {"fewer", fewer_values, INSITU_ERROR_FIELD, false, {"the index of vertex 5 is 5, outside 0..4"}},
+    {"none", no_values, INSITU_ERROR_FIELD, false, {"the index of vertex 0 is 0, outside 0..-1"}},
+    {"negative", negative_values, INSITU_ERROR_FIELD, true, {"field \"f\": has -2 values"}},
+    {"NULL", values_are_null, INSITU_ERROR_FIELD, true, {"values are not given"}},
+    {"float", float_index, INSITU_ERROR_ARGUMENT, true, {"entries of index are of element type 2, not int32 or int64"}},
+    {"stride", odd_stride, INSITU_ERROR_FIELD, true, {"entries of index have a stride of 12 bytes"}},
+    {"type alone", type_alone, INSITU_ERROR_FIELD, true, {"values, the mesh has "}},
+};
+
+static void what_is_wrong_is_told_to_all(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &in, &cases[i]);
+    insitu_destroy(&session);
+    input_free(&in);
+    free(spoilt);
+}
+
+/* All cells are the first rank's: the others have no vertex, and hand over their halves of the vector all the same, by
+ * an index at no address. */
+static void ranks_without_vertices_have_values(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    double vector[4] = {1, 2, 3, 4};
+    input_create(&in, TEST_HEXES, SIDE, TEST_BLOCK, own_rank, 1);
+    by_index(&in);
+    if (own_rank) {
+        in.mesh.vertex_count = in.mesh.cell_count = in.mesh.connectivity_count = 0;
+        in.mesh.offsets = in.mesh.cell_types = in.mesh.ghosts = (insitu_array){0};
+        in.field.count = 4;
+        in.field.values.data = vector;
+        in.field.index.data = NULL;
+    }
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    step_is_good(session, 0);
+    insitu_destroy(&session);
+    input_free(&in);
+    free(spoilt);
+    spoilt = NULL;
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(an_index_draws_what_values_in_order_draw),
+                                       cmocka_unit_test(an_index_that_nobody_needs_is_left_alone),
+                                       cmocka_unit_test(ranks_without_vertices_have_values),
+                                       cmocka_unit_test(what_is_wrong_is_told_to_all)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
