@@ -21,7 +21,7 @@ static const char scene_text[] =
     "    outputs: [{path: b.exr}]\n"
     "  - name: c\n    size: [64, 48]\n    layers: [{volume: {field: f}}]\n    when: {field: f, above: -5}\n"
     "    outputs: [{path: c.exr}]\n"
-    "  - name: d\n    size: [64, 48]\n    layers: [{surface: {threshold: {field: f, above: 0.05}}}]\n"
+    "  - name: d\n    size: [64, 48]\n    layers: [{surface: {threshold: {field: f, from: 0.05}}}]\n"
     "    outputs: [{path: d.exr}]\n";
 
 /* ---- fields --------------------------------------------------------------------------------------------------- */
@@ -264,12 +264,6 @@ static void index_before_one(session_input *in)
     count_from_one(in);
     for (int64_t i = 1; i < in->part.vertex_count; i++) spoilt[i]++;
 }
-static void index_of_cell(session_input *in)
-{
-    by_index(in);
-    in->field.centring = INSITU_CELL;
-    spoilt[in->part.cell_count - 1] = 1000000;
-}
 static void fewer_values(session_input *in)
 {
     by_index(in);
@@ -311,7 +305,6 @@ static const spoilt_case cases[] = {
     {"far", index_far, INSITU_ERROR_FIELD, false, {"the index of vertex 2 is 9223372036854775807, outside 0.."}},
     {"-1", index_negative, INSITU_ERROR_FIELD, false, {"the index of vertex 3 is -1, outside 0..", "index_base is 0"}},
     {"0 of 1", index_before_one, INSITU_ERROR_FIELD, false, {"index of vertex 1 is 0, outside 1..", "index_base is 1"}},
-    {"cell", index_of_cell, INSITU_ERROR_FIELD, false, {"the index of cell ", " is 1000000, outside 0.."}},
     {"fewer", fewer_values, INSITU_ERROR_FIELD, false, {"the index of vertex 5 is 5, outside 0..4"}},
     {"none", no_values, INSITU_ERROR_FIELD, false, {"the index of vertex 0 is 0, outside 0..-1"}},
     {"negative", negative_values, INSITU_ERROR_FIELD, true, {"field \"f\": has -2 values"}},
@@ -331,6 +324,28 @@ static void what_is_wrong_is_told_to_all(void **state)
     insitu_destroy(&session);
     input_free(&in);
     free(spoilt);
+}
+
+/* The centring is one on all ranks, so this cannot be the last one's alone. */
+static void cells_are_told_too(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    by_index(&in);
+    in.field.centring = INSITU_CELL;
+    if (own_rank == rank_count - 1) spoilt[in.part.cell_count - 1] = 1000000;
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    for (int step = 0; step < 2; step++)
+        told_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD,
+                        "mesh \"m\": field \"f\": the index of cell ", " is 1000000, outside 0..");
+    spoilt[in.part.cell_count - 1] = 0;
+    step_is_good(session, 2); /* mended in place, for nothing was taken of it */
+    insitu_destroy(&session);
+    input_free(&in);
+    free(spoilt);
+    spoilt = NULL;
 }
 
 /* All cells are the first rank's: the others have no vertex, and hand over their halves of the vector all the same, by
@@ -363,6 +378,7 @@ static int run(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(an_index_draws_what_values_in_order_draw),
                                        cmocka_unit_test(an_index_that_nobody_needs_is_left_alone),
                                        cmocka_unit_test(ranks_without_vertices_have_values),
+                                       cmocka_unit_test(cells_are_told_too),
                                        cmocka_unit_test(what_is_wrong_is_told_to_all)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
