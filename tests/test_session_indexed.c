@@ -11,18 +11,21 @@
 
 enum { SIDE = 4, PIXELS = 64 * 48, PICTURES = 4, STEPS = 4 };
 
-static const char scene_text[] =
-    "images:\n  - name: a\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n"
-    "      - isosurface: {field: f, values: [0.1, 0.3], opacity: 0.6, colour_by: {field: f, map: turbo}}\n"
-    "      - surface: {opacity: 0.2, edges: {}, colour_by: {field: f}}\n"
-    "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n"
-    "    outputs: [{path: a.exr}]\n"
-    "  - name: b\n    size: [64, 48]\n    layers: [{isosurface: {field: f, values: [0.1]}}]\n"
-    "    outputs: [{path: b.exr}]\n"
-    "  - name: c\n    size: [64, 48]\n    layers: [{volume: {field: f}}]\n    when: {field: f, above: -5}\n"
-    "    outputs: [{path: c.exr}]\n"
-    "  - name: d\n    size: [64, 48]\n    layers: [{surface: {threshold: {field: f, from: 0.05}}}]\n"
-    "    outputs: [{path: d.exr}]\n";
+/* A condition has the values read before images are planned. */
+#define SCENE(condition)                                                                                               \
+    "images:\n  - name: a\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n"                            \
+    "      - isosurface: {field: f, values: [0.1, 0.3], opacity: 0.6, colour_by: {field: f, map: turbo}}\n"            \
+    "      - surface: {opacity: 0.2, edges: {}, colour_by: {field: f}}\n"                                              \
+    "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n"                                                       \
+    "    outputs: [{path: a.exr}]\n"                                                                                   \
+    "  - name: b\n    size: [64, 48]\n    layers: [{isosurface: {field: f, values: [0.1]}}]\n"                         \
+    "    outputs: [{path: b.exr}]\n"                                                                                   \
+    "  - name: c\n    size: [64, 48]\n    layers: [{volume: {field: f}}]\n" condition "    outputs: [{path: c.exr}]\n" \
+    "  - name: d\n    size: [64, 48]\n    layers: [{surface: {threshold: {field: f, from: 0.05}}}]\n"                  \
+    "    outputs: [{path: d.exr}]\n"
+
+static const char scene_text[] = SCENE("");
+static const char conditional_scene[] = SCENE("    when: {field: f, above: -5}\n");
 
 /* ---- fields --------------------------------------------------------------------------------------------------- */
 
@@ -138,7 +141,7 @@ static void step_and_catch(insitu_session *session, int cycle, caught_picture ou
 static drawing draw(const session_input *in, twice *t, bool is_by_index)
 {
     drawing out = {.copied = 0};
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(t->of.base ? conditional_scene : scene_text));
     insitu_field field = describe(t, is_by_index);
     everywhere(insitu_set_mesh(session, "m", &in->mesh) == INSITU_OK);
     for (int step = 0; step < STEPS; step++) {
