@@ -13,6 +13,8 @@ program test_fortran
     integer, parameter :: face_count = 3*n*(n - 1)**2
     integer(int32), target :: faces(4, face_count), face_offsets(face_count + 1), owner(face_count), neighbour(face_count)
     integer(int8), target :: types(cells), ghosts(cells)
+    real(real64), target :: vector(2*vertices)
+    integer(int32), target :: places(vertices), nodes(27, cells)
     character(:), allocatable :: prefix, plain
     integer :: rank, status
 
@@ -33,6 +35,10 @@ program test_fortran
     call make_faces()
     call same(picture('faces', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(pressure), with_owner=.true.), &
         'owner and neighbour')
+    call make_dofs()
+    call same(picture('rows', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), insitu_borrow(pressure)), 'first rows')
+    call same(picture('nodes', insitu_points(xyz), insitu_borrow(nodes(1:8, :)), insitu_borrow(vector), with_dofs=.true.), &
+        'nodes in lexicographic order, values by an index')
     call errors_are_told()
     call MPI_Finalize()
 
@@ -114,6 +120,18 @@ contains
         reshaped(1:size(hexes)) => hexes
     end function reshaped
 
+    ! As codes of finite elements hold them: nodes of second order, the corners first, and a vector of other unknowns too.
+    subroutine make_dofs()
+        integer :: v
+        nodes = -5
+        nodes(1:8, :) = hexes([1, 2, 4, 3, 5, 6, 8, 7], :)
+        vector = -1000
+        do v = 1, vertices
+            places(v) = 2*(vertices - v) + 1
+            vector(places(v)) = pressure(v)
+        end do
+    end subroutine make_dofs
+
     subroutine expect(is_well, what)
         logical, intent(in) :: is_well
         character(*), intent(in) :: what
@@ -137,11 +155,11 @@ contains
     end function scene_of
 
     ! The file's bytes, on rank 0.
-    function picture(name, points, connectivity, values, component, with_types, with_owner) result(out)
+    function picture(name, points, connectivity, values, component, with_types, with_owner, with_dofs) result(out)
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity, values
         character(*), intent(in), optional :: component
-        logical, intent(in), optional :: with_types, with_owner
+        logical, intent(in), optional :: with_types, with_owner, with_dofs
         character(:), allocatable :: out
         type(insitu_session) :: session
         type(insitu_report) :: report
@@ -158,11 +176,18 @@ contains
         else if (present(with_owner)) then
             call session%set_mesh_of_faces('m', points, connectivity, insitu_borrow(face_offsets), insitu_borrow(owner), &
                 insitu_borrow(neighbour), cells, status, ghosts=insitu_borrow(ghosts))
+        else if (present(with_dofs)) then
+            call session%set_mesh('m', points, connectivity, status, cell_type=INSITU_HEX, &
+                vertex_order=INSITU_ORDER_LEXICOGRAPHIC)
         else
             call session%set_mesh('m', points, connectivity, status, cell_type=INSITU_HEX)
         end if
         call expect(status == INSITU_OK, session%error())
-        call session%set_field('m', 'p', values, status)
+        if (present(with_dofs)) then
+            call session%set_field('m', 'p', values, status, index=insitu_borrow(places))
+        else
+            call session%set_field('m', 'p', values, status)
+        end if
         call expect(status == INSITU_OK, session%error())
         call session%step(7, 0.5_real64, status)
         call expect(status == INSITU_OK, session%error())
@@ -198,8 +223,12 @@ contains
         call session%create_from_text(MPI_COMM_WORLD, scene_of('none', 'x'), status)
         call session%set_mesh('m', insitu_points(axes), insitu_borrow(hexes), status)
         call refused(session, 'first extent than 3')
-        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), status, cell_type=INSITU_HEX)
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), status, cell_type=INSITU_HEX, &
+            offsets=insitu_borrow(offsets_8))
         call refused(session, 'gaps between their columns')
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(nodes(1:8, :)), status, cell_type=INSITU_HEX, &
+            vertex_order=7)
+        call refused(session, 'vertex_order is 7')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_TET)
         call refused(session, 'another first extent than cells')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX, &
@@ -212,6 +241,14 @@ contains
         call expect(status == INSITU_OK, session%error())
         call session%set_field('m', 'p', insitu_borrow(pressure(2:)), status)
         call refused(session, 'p')
+        call session%set_field('m', 'p', insitu_borrow(vector), status, index=insitu_borrow(places(2:)))
+        call refused(session, 'index has not as many entries')
+        call session%set_field('m', 'p', insitu_borrow(vector), status, index=insitu_borrow(nodes(1:8, :)))
+        call refused(session, 'index is a list')
+        places(5) = 0
+        call session%set_field('m', 'p', insitu_borrow(vector), status, index=insitu_borrow(places))
+        call session%step(0, 0.0_real64, status)
+        call refused(session, 'the index of vertex 5 is 0, outside 1..250')
         call session%set_field('m', 'p', insitu_borrow(pressure), status)
         hexes(3, 2) = 0
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)

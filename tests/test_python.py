@@ -102,6 +102,9 @@ def what_cannot_be_borrowed_is_refused():
             (dict(connectivity=hexes.astype("uint64")), TypeError, "uint64"),
             (dict(connectivity=numpy.asfortranarray(hexes)), ValueError, "rows that follow one another"),
             (dict(connectivity=hexes[:, :7].copy()), ValueError, "expected 8"),
+            (dict(connectivity=hexes[:, :7]), ValueError, "has 7 columns, expected 8"),
+            (dict(connectivity=numpy.zeros((64, 27), "i4")[:, :8], offsets=8 * numpy.arange(65)), ValueError, "gaps"),
+            (dict(vertex_order=7), insitu.Error, "vertex_order is 7"),
             (dict(ghosts=numpy.zeros(63, "u1")), ValueError, "63 elements, expected 64"),
             (dict(ghosts=numpy.broadcast_to(numpy.uint8(0), 64)), ValueError, "repeats one element"),
         ]:
@@ -175,6 +178,32 @@ def finite_volumes_are_their_hexes():
             everywhere(s.report["cells_recognised"] == 0, "polyhedra are left")
 
 
+def finite_elements_are_their_hexes():
+    xyz, hexes, f = lattice()
+    plain = picture("corners", lambda: xyz.copy(), lambda: hexes.copy(), lambda: f.copy())
+    nodes = numpy.full((len(hexes), 27), -5, "i4")  # of second order, the corners first, as dolfinx has them
+    nodes[:, :8] = hexes[:, [0, 1, 3, 2, 4, 5, 7, 6]]
+    dofs = 2 * numpy.arange(len(xyz))[::-1].astype("i4")
+    vector = numpy.full(2 * len(xyz), numpy.nan)
+    vector[dofs] = f
+    with insitu.Session(comm, scene_text=SCENE.format(name="nodes", folder=folder)) as s:
+        s.set_mesh("m", coordinates=xyz, connectivity=nodes[:, :8], cell_type=insitu.HEX,
+                   vertex_order=insitu.ORDER_LEXICOGRAPHIC)
+        raises(ValueError, "index: has 124 elements, expected 125", s.set_field, "m", "f", vector, index=dofs[1:])
+        raises(ValueError, "index: has 125 elements, expected 64", s.set_field, "m", "f", vector, index=dofs, centring=insitu.CELL)
+        s.set_field("m", "f", vector, index=dofs.copy())
+        s.step(0, 0.0)
+        everywhere("field \"f\" by its index" in s.report["copied_why"], s.report["copied_why"])
+        everywhere("in VTK's order" in s.report["copied_why"] and not s.report["warnings"], s.report["warnings"])
+        dofs[3] = 250
+        s.set_field("m", "f", vector, index=dofs)
+        raises(insitu.Error, "the index of vertex 3 is 250, outside 0..249", s.step, 1, 0.0)
+    if comm.rank == 0:
+        with open(f"{folder}/nodes.png", "rb") as file:
+            same = file.read() == plain
+    everywhere(comm.rank != 0 or same, "nodes and a vector of unknowns draw the plain picture")
+
+
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
@@ -192,4 +221,5 @@ layouts_draw_the_same_picture()
 what_cannot_be_borrowed_is_refused()
 pictures_are_arrays()
 finite_volumes_are_their_hexes()
+finite_elements_are_their_hexes()
 structures_are_those_of_the_header()

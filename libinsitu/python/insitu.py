@@ -258,7 +258,8 @@ class Session:
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
                  keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL):
         """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h). Of
-        cells of one type connectivity may be some first columns of a table: nodes[:, :8]. In place of connectivity, cell_type, cell_types and offsets: owner, neighbour and cell_count, of finite volumes."""
+        cells of one type connectivity may be the first columns of a table: nodes[:, :8]. In place of connectivity,
+        cell_type, cell_types and offsets: owner, neighbour and cell_count, of finite volumes."""
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
         axes, mesh.vertex_count, held = _axes(coordinates)
