@@ -25,9 +25,8 @@ static void warn_of_order(session_report *report, const char *mesh, const int64_
     session_warn(
         report, &(session_warning){WARNING_ORDER, NULL, mesh, 0}, are_crossed,
         "mesh \"%s\": the vertices of its hexes or pyramids seem to be in lexicographic order: their quads cross "
-        "themselves, so that little of the cells is seen; set vertex_order of the mesh to INSITU_ORDER_LEXICOGRAPHIC "
-        "(where "
-        "it is that, the vertices seem to be in VTK's order)",
+        "themselves, so that little of the cells is seen; VTK's order goes around each quad; set "
+        "vertex_order of the mesh to INSITU_ORDER_LEXICOGRAPHIC, or, where it is that already, to INSITU_ORDER_VTK",
         mesh);
     session_warn(
         report, &(session_warning){WARNING_ORDER, NULL, mesh, 1}, are_flat,
