@@ -117,10 +117,17 @@ typedef enum render_root {
 } render_root;
 
 typedef enum render_normal {
-    RENDER_GRADIENT,   /* of the cell that holds the hit */
-    RENDER_DIFFERENCES /* central ones (thesis, 4.3.4), over this rank's cells: one-sided where a sample is in none of
-                          them, the cell's gradient where an axis has neither. May differ by the partition. */
+    RENDER_GRADIENT,    /* of the cell that holds the hit */
+    RENDER_DIFFERENCES, /* central ones (thesis, 4.3.4), over this rank's cells: one-sided where a sample is in none of
+                           them, the cell's gradient where an axis has neither. May differ by the partition. */
+    RENDER_VERTEX /* gradients that the caller gives at the vertices, interpolated in the hit's cell as values are */
 } render_normal;
+
+/* Gradients at a part's vertices, of any length. Every vertex of the cells that the layer's isovalues cross has one. */
+typedef struct render_vertex_gradients {
+    const int32_t *entries; /* of each vertex: which of the gradients; -1: none. NULL: the part has no such cells */
+    const float (*gradients)[3]; /* world axes */
+} render_vertex_gradients;
 
 typedef struct render_surface_layer {
     render_field field; /* vertex-centred */
@@ -136,8 +143,9 @@ typedef struct render_surface_layer {
     int root_steps; /* N of Neubauer's method (thesis, 4.3.3), 0 .. 64 */
     render_normal normal;
     double difference; /* h of central differences, > 0, in sizes of the hit's cell (cube root of its box's volume) */
-    float edge_width;  /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
-                          of three such vertices or pyramids on four */
+    const render_vertex_gradients *gradients; /* of RENDER_VERTEX: part by part */
+    float edge_width; /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
+                         of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
     uint32_t clips;       /* of the job's, a bit each */
 } render_surface_layer;
@@ -206,8 +214,8 @@ typedef struct render_clip {
     double centre[3], radius;   /* sphere */
 } render_clip;
 
-/* What hits are painted with: their colours, lit; or numbers of the pixel's nearest surface, as red, green and blue. Then
- * surfaces are to be opaque, and volumes none. */
+/* What hits are painted with: their colours, lit; or numbers of the pixel's nearest surface, as red, green and blue.
+ * Then surfaces are to be opaque, and volumes none. */
 typedef enum render_paint {
     RENDER_LIGHT,
     RENDER_NORMALS, /* the unit normal that light falls on, towards the eye, in world axes */

@@ -203,6 +203,8 @@ static insitu_status check_job(const render_job *job, base_error *error)
             return base_fail(error, INSITU_ERROR_ARGUMENT,
                              "isosurface %d: differences over %g cell sizes, expected more than 0", i,
                              job->surfaces[i].difference);
+        if (job->surfaces[i].normal == RENDER_VERTEX && !job->surfaces[i].gradients)
+            return base_fail(error, INSITU_ERROR_ARGUMENT, "isosurface %d: no gradients at vertices were given", i);
     }
     if (job->camera.width < 1 || job->camera.height < 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "image of %d x %d pixels, expected at least 1 x 1",

@@ -16,6 +16,7 @@
 #include "session_guard.h"
 #include "session_isovalues.h"
 #include "session_recentre.h"
+#include "session_smooth.h"
 #include "session_summary.h"
 #include "session_surfaces.h"
 #include "session_vertex_order.h"
@@ -63,8 +64,7 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
 
 static void note_drawn(insitu_session *s, const session_plan *plan)
 {
-    for (int i = 0; i < plan->image_count; i++)
-        s->events.drawn |= (uint64_t)1 << plan->images[i]->variant.source;
+    for (int i = 0; i < plan->image_count; i++) s->events.drawn |= (uint64_t)1 << plan->images[i]->variant.source;
 }
 
 /* The phases of a step in which something is due. What the plan does not name is not computed. */
@@ -76,9 +76,9 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     const session_extent *extent = &s->space.extent;
     session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent};
     base_error of_events = {.status = INSITU_OK};
-    const session_drawing drawing = {team,      s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
-                                     &s->space, &s->run_ranges,     &s->report,     &s->kept, basis.scene, &s->cinema,
-                                    &s->catalogue};
+    const session_drawing drawing = {team,       s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
+                                     &s->space,  &s->run_ranges,     &s->report,     &s->kept,   basis.scene,
+                                     &s->cinema, &s->catalogue};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
@@ -90,6 +90,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = session_make_plan(&basis, &s->meshes, team, &s->report, &plan, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
+    if (!status) status = session_smooth(&plan, &s->catalogue, &s->meshes, team, extent, error);
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
     if (!status && plan.slice_count) status = session_update_distances(&s->meshes, team, error);
     if (!status && plan.surface_count)

@@ -63,6 +63,13 @@ static void report_scalar(session_report *out, const session_mesh *mesh, const s
         session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" recentred from cells to vertices: %lld bytes",
                          mesh->name, name, (long long)bytes);
     }
+    if (scalar->gradients) {
+        const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof *scalar->gradient_entries +
+                              scalar->gradient_count * (int64_t)sizeof *scalar->gradients;
+        out->numbers.bytes_copied += bytes;
+        session_text_add(&out->copied_why, "mesh \"%s\": gradients of field \"%s\" at vertices: %lld bytes", mesh->name,
+                         name, (long long)bytes);
+    }
     if (scalar->distances) {
         const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof(float);
         out->numbers.bytes_copied += bytes;

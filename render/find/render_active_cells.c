@@ -187,7 +187,7 @@ static bool can_keep(const kernel_frame *frame, int surface, int part)
 {
     const kernel_surface *s = &frame->surfaces[surface];
     const grid *cells = frame->job->parts[part].cells;
-    if (surface >= frame->opaque_count || s->layer->colour_map || s->layer->normal == RENDER_DIFFERENCES) return false;
+    if (surface >= frame->opaque_count || s->layer->colour_map || s->layer->normal != RENDER_GRADIENT) return false;
     if (!s->layer->field.ranges[part].low || !frame->job->parts[part].tree->node_count) return false;
     if (!is_in_view(frame, frame->job->parts[part].tree)) return false;
     return cells->cell_type == GRID_TET || (cells->cell_type == GRID_HEX && s->layer->root == RENDER_ROBUST);

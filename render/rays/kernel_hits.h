@@ -9,11 +9,18 @@
 /* Nearest opaque hits so far; and the crossings of transparent surfaces, by which volume fragments are cut. */
 enum { KERNEL_MAX_CUTS = 32 };
 
+/* What rays hit; part -1: no cell that is looked at again. */
+typedef struct kernel_hit_cells {
+    vi part, index;
+} kernel_hit_cells;
+
 typedef struct kernel_hits {
     vm found;
-    vf normal[3]; /* along the gradient, camera axes, any length */
-    vf colour[3]; /* unlit */
-    vf reach;     /* of differences; only where asked for */
+    vf normal[3];           /* along the gradient, camera axes, any length; of RENDER_VERTEX until the end: the place
+                               in the cell, its own coordinates */
+    kernel_hit_cells cells; /* only of RENDER_VERTEX */
+    vf colour[3];           /* unlit */
+    vf reach;               /* of differences; only where asked for */
     vf kind;
     int cut_count;           /* rows: the n-th that was found of each ray, +inf where it has fewer */
     vf cut[KERNEL_MAX_CUTS]; /* in the order in which they were found */
@@ -25,6 +32,7 @@ static inline void kernel_hits_begin(kernel_hits *hits)
     hits->found = hits->crowded = vm_none();
     hits->cut_count = 0;
     hits->kind = hits->reach = vf_set(0);
+    hits->cells.part = hits->cells.index = vi_set(-1);
     for (int a = 0; a < 3; a++) hits->normal[a] = hits->colour[a] = vf_set(0);
 }
 

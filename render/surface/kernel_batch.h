@@ -117,6 +117,7 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
 static __attribute__((noinline)) void kernel_batch_cell(const kernel_batch *b, int n, kernel_cell *c)
 {
     kernel_placed_cell(&b->tets, n, c);
+    c->part = b->part;
     c->index = b->cell[n];
     c->has_normal = true;
     for (int a = 0; a < 3; a++) c->normal[a] = b->normal[a][n];
@@ -262,30 +263,50 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
     return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, r->far)));
 }
 
-/* kernel_accept() of one ray, for two of a packet may be of one pixel. colour: not lit. Returns its block, where
- * something is nearer. */
-SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, int value, float depth, const float normal[3],
-                                       const float colour[3])
+/* What one ray hits. */
+typedef struct kernel_ray_hit {
+    int part, value;
+    uint32_t cell;
+    float depth;
+    float normal[3]; /* as in kernel_hits */
+    float colour[3]; /* not lit */
+} kernel_ray_hit;
+
+/* Of one ray that hits in the place of the nearest. */
+static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, const kernel_surface *s, int ray,
+                                                            const kernel_ray_hit *hit)
+{
+    const vm tied = vm_from_bits(1u << ray);
+    const vf depth = vf_set(hit->depth);
+    const vf colour[3] = {vf_set(hit->colour[0]), vf_set(hit->colour[1]), vf_set(hit->colour[2])};
+    const kernel_hit_cells cells = {vi_set(hit->part), vi_set((int32_t)hit->cell)};
+    vf normal[3] = {vf_set(hit->normal[0]), vf_set(hit->normal[1]), vf_set(hit->normal[2])};
+    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, depth, &cells, normal);
+    kernel_emit_tied(p, s, hit->value, tied, depth, normal, colour);
+}
+
+/* kernel_accept() of one ray, for two of a packet may be of one pixel. Returns its block, where something is nearer. */
+SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_ray_hit *hit)
 {
     const kernel_surface *s = t->surface;
     const int ray = at % SIMD_WIDTH;
     kernel_packet *p = &t->packets[at / SIMD_WIDTH];
     kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
     const float far = p->t_far[ray];
-    if (!(depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
-    if (depth == far && far < INFINITY) {
-        const vf own_normal[3] = {vf_set(normal[0]), vf_set(normal[1]), vf_set(normal[2])};
-        const vf own_colour[3] = {vf_set(colour[0]), vf_set(colour[1]), vf_set(colour[2])};
-        kernel_emit_tied(p, s, value, vm_from_bits(1u << ray), vf_set(depth), own_normal, own_colour);
+    if (!(hit->depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
+    if (hit->depth == far && far < INFINITY) {
+        kernel_ray_tied(p, s, ray, hit);
         return 0;
     }
-    p->t_far[ray] = depth;
+    p->t_far[ray] = hit->depth;
     vm_set_lane(&hits->found, ray);
     for (int a = 0; a < 3; a++) {
-        hits->normal[a][ray] = normal[a];
-        hits->colour[a][ray] = colour[a];
+        hits->normal[a][ray] = hit->normal[a];
+        hits->colour[a][ray] = hit->colour[a];
     }
-    hits->kind[ray] = (float)((int)s->first_kind + value);
+    hits->cells.part[ray] = hit->part;
+    hits->cells.index[ray] = (int32_t)hit->cell;
+    hits->kind[ray] = (float)((int)s->first_kind + hit->value);
     return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
 }
 
@@ -297,9 +318,14 @@ static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, const
     if (!b->has_normals) kernel_batch_normals(b, t->frame);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), n = lanes[i];
-        const float normal[3] = {b->normal[0][n], b->normal[1][n], b->normal[2][n]};
-        blocks |=
-            kernel_ray_accept(t, r->at[i], b->value[n], depth[i], normal, t->surface->layer->colours + 3 * b->value[n]);
+        const float *colour = t->surface->layer->colours + 3 * b->value[n];
+        const kernel_ray_hit one = {.part = b->part,
+                                    .value = b->value[n],
+                                    .cell = b->cell[n],
+                                    .depth = depth[i],
+                                    .normal = {b->normal[0][n], b->normal[1][n], b->normal[2][n]},
+                                    .colour = {colour[0], colour[1], colour[2]}};
+        blocks |= kernel_ray_accept(t, r->at[i], &one);
     }
     return blocks;
 }

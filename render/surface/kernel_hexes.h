@@ -74,6 +74,7 @@ SIMD_INLINE void kernel_hex_ready(kernel_hexes *h, int n)
     if (h->ready >> n & 1) return;
     h->ready |= 1u << n;
     kernel_placed_hex_cell(&h->placed, n, &h->cells[n]);
+    h->cells[n].part = h->part;
     h->cells[n].index = h->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
     h->polys[n].is_set_up = false;
@@ -262,7 +263,7 @@ static __attribute__((noinline)) void kernel_hexes_fetch_colours(const kernel_ti
         }
 }
 
-/* Where lanes hit: r, of the cells' own coordinates, is looked at for colours alone. */
+/* Where lanes hit: r, of the cells' own coordinates, is looked at for colours, normal as in kernel_hits. */
 typedef struct kernel_hexes_places {
     vf t, normal[3], r[3];
 } kernel_hexes_places;
@@ -281,20 +282,28 @@ static __attribute__((noinline)) unsigned kernel_hexes_accept(kernel_tile_trace 
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
         const int i = __builtin_ctz(hit), value = h->value[rays->lane[first + i]];
-        const float normal[3] = {places->normal[0][i], places->normal[1][i], places->normal[2][i]};
         const float *plain = layer->colours + 3 * value;
-        const float colour[3] = {layer->colour_map ? colours[0][i] : plain[0],
-                                 layer->colour_map ? colours[1][i] : plain[1],
-                                 layer->colour_map ? colours[2][i] : plain[2]};
-        blocks |= kernel_ray_accept(t, at[i], value, places->t[i], normal, colour);
+        const kernel_ray_hit one = {.part = h->part,
+                                    .value = value,
+                                    .cell = h->cell[rays->lane[first + i]],
+                                    .depth = places->t[i],
+                                    .normal = {places->normal[0][i], places->normal[1][i], places->normal[2][i]},
+                                    .colour = {layer->colour_map ? colours[0][i] : plain[0],
+                                               layer->colour_map ? colours[1][i] : plain[1],
+                                               layer->colour_map ? colours[2][i] : plain[2]}};
+        blocks |= kernel_ray_accept(t, at[i], &one);
     }
     return blocks;
 }
 
-/* kernel_map_normal() and kernel_unshear(). */
+/* kernel_map_normal() and kernel_unshear(); or r, where kernel_vertex_normals() wants it. */
 SIMD_INLINE void kernel_hexes_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
                                      vf normal[3])
 {
+    if (t->surface->layer->normal == RENDER_VERTEX) {
+        for (int a = 0; a < 3; a++) normal[a] = r[a];
+        return;
+    }
     kernel_lanes_normal(map, r, normal);
     normal[2] -= normal[0] * t->tile.shear_x + normal[1] * t->tile.shear_y;
 }
@@ -524,6 +533,7 @@ SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const k
     h->polys[n] = *t->poly;
     for (int i = 0; i < 8; i++) h->colours[i][n] = t->cell->g[i];
     h->ready |= 1u << n;
+    h->cell[n] = candidate->cell;
     h->value[n] = value;
     h->near[n] = candidate->near;
     kernel_hexes_bounds_put(&h->bounds, n, &t->poly->bounds, t->cell->z);

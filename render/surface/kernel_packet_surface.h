@@ -17,6 +17,7 @@
 #include "kernel_surface.h"
 #include "kernel_traverse.h"
 #include "kernel_types.h"
+#include "kernel_vertex_normals.h"
 #include "render.h"
 #include "simd.h"
 
@@ -101,6 +102,7 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         const vm write = vm_and(hits->found, mine);
         if (!vm_any(write)) continue;
         if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, write, hits);
+        if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, write, p->t_far, &hits->cells, hits->normal);
         kernel_fragments lit = {
             p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
         kernel_paint(p, s, hits->normal, hits->kind, lit.colour);

@@ -131,6 +131,68 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c
     }
 }
 
+/* ---- gradients at vertices ---- */
+
+/* The mean of the vertices' gradients, in camera axes, as the centre has the mean of their values. */
+static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhedron *c,
+                                            const render_vertex_gradients *gradients, double out[3])
+{
+    out[0] = out[1] = out[2] = 0;
+    for (int i = 0; i < c->vertex_count; i++) {
+        double g[3];
+        kernel_vertex_gradient(f, gradients, c->vertices[i], g);
+        for (int a = 0; a < 3; a++) out[a] += g[a] / c->vertex_count;
+    }
+}
+
+/* The tet that holds the hit, or is nearest to it, of those that do not lie outside; -1: none. */
+static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
+{
+    vf nearest = vf_set(INFINITY);
+    vi facet = vi_set(-1);
+    for (int n = 0; n < r->segment_count; n++) {
+        const kernel_tet_span *s = &r->segments[n];
+        const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
+        const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
+        if (s->sign < 0) continue;
+        nearest = vf_select(nearer, away, nearest);
+        facet = vi_select(nearer, vi_set(s->facet), facet);
+    }
+    memcpy(out, &facet, sizeof facet);
+}
+
+/* Normals of RENDER_VERTEX. */
+static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
+                                                               const render_surface_layer *layer,
+                                                               const kernel_passage *r, vm hit, vf t, vf out[3])
+{
+    const render_vertex_gradients *gradients = &layer->gradients[c->part];
+    const int centre = c->vertex_count;
+    int32_t facets[SIMD_WIDTH];
+    double of_centre[3];
+    kernel_polyhedron_facets(r, hit, t, facets);
+    kernel_polyhedron_mean_gradient(p->frame, c, gradients, of_centre);
+    for (int a = 0; a < 3; a++) out[a] = vf_set((float)of_centre[a]);
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int ray = __builtin_ctz(left);
+        if (facets[ray] < 0) continue;
+        double corner[4][3], g[4][3], point[3], share[4];
+        for (int i = 0; i < 4; i++) {
+            const int v = i < 3 ? c->facets[facets[ray]].vertex[i] : centre;
+            corner[i][0] = (double)c->x[v];
+            corner[i][1] = (double)c->y[v];
+            corner[i][2] = (double)c->z[v];
+            if (i < 3) kernel_vertex_gradient(p->frame, gradients, c->vertices[v], g[i]);
+        }
+        memcpy(g[3], of_centre, sizeof g[3]);
+        kernel_ray_point(p, ray, t[ray], point);
+        kernel_barycentric((const double(*)[3])corner, point, share);
+        for (int a = 0; a < 3; a++)
+            out[a][ray] =
+                (float)((share[0] * g[0][a] + share[1] * g[1][a]) + (share[2] * g[2][a] + share[3] * g[3][a]));
+    }
+}
+
 /* ---- which rays to follow ---- */
 
 /* The steepest that the tet's field falls and rises along rays of the tile, a unit of depth. */
@@ -271,7 +333,10 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
     kernel_hit_places at = {.t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
     kernel_passage_segments(c, rays, r);
-    kernel_polyhedron_normal(p, c, r, hit, walk->t, at.normal);
+    if (state->surface->layer->normal == RENDER_VERTEX)
+        kernel_polyhedron_smooth(p, c, state->surface->layer, r, hit, walk->t, at.normal);
+    else
+        kernel_polyhedron_normal(p, c, r, hit, walk->t, at.normal);
     kernel_accept(p, state, NULL, value, hit, &at);
 }
 

@@ -9,6 +9,7 @@
 #define RENDER_KERNEL_SURFACE_H
 
 #include <math.h>
+#include <string.h>
 
 #include "grid.h"
 #include "kernel_bounds.h"
@@ -25,6 +26,7 @@
 #include "kernel_roots.h"
 #include "kernel_tet.h"
 #include "kernel_types.h"
+#include "kernel_vertex_normals.h"
 #include "render.h"
 #include "simd.h"
 
@@ -117,7 +119,8 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
-/* Where rays hit: the depth, a vector along the normal, and the value that the surface is coloured by. */
+/* Where rays hit: the depth, a vector along the normal (or what kernel_vertex_normals() makes one of), and the value
+ * that the surface is coloured by. */
 typedef struct kernel_hit_places {
     vf t, normal[3], w;
 } kernel_hit_places;
@@ -137,8 +140,9 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     kernel_hits *hits = state->hits;
     const vf t = at->t;
     vf *normal = at->normal, colour[3];
-    const bool by_differences = s->layer->normal == RENDER_DIFFERENCES;
-    /* Polyhedra (no cell given) have their own gradient always. */
+    const bool by_differences = s->layer->normal == RENDER_DIFFERENCES, by_vertices = s->layer->normal == RENDER_VERTEX;
+    const kernel_hit_cells cells = {vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
+    /* Polyhedra (no cell given) have their own gradient always, or come with what their vertices make. */
     const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
     kernel_base_colour(s, value, at->w, colour);
     if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
@@ -148,8 +152,10 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     if (state->is_opaque) {
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
         if (__builtin_expect(vm_any(tied), 0)) {
-            if (by_differences) kernel_differences(p, s, value, tied, t, reach, normal);
-            kernel_emit_tied(p, s, value, tied, t, normal, colour);
+            vf own[3] = {normal[0], normal[1], normal[2]};
+            if (by_differences) kernel_differences(p, s, value, tied, t, reach, own);
+            if (by_vertices) kernel_vertex_normals(p, s, tied, t, &cells, own);
+            kernel_emit_tied(p, s, value, tied, t, own, colour);
             hit = vm_andnot(hit, tied);
         }
         p->t_far = vf_select(hit, t, p->t_far);
@@ -160,10 +166,15 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
             hits->colour[a] = vf_select(hit, colour[a], hits->colour[a]);
         }
         if (by_differences) hits->reach = vf_select(hit, reach, hits->reach);
+        if (by_vertices) {
+            hits->cells.part = vi_select(hit, cells.part, hits->cells.part);
+            hits->cells.index = vi_select(hit, cells.index, hits->cells.index);
+        }
         hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
         return;
     }
     if (by_differences) kernel_differences(p, s, value, hit, t, reach, normal);
+    if (by_vertices) kernel_vertex_normals(p, s, hit, t, &cells, normal);
     kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), colour);
     const float opacity = s->layer->opacity;
     const kernel_fragments f = {
@@ -300,8 +311,12 @@ SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state,
     const vm hit = kernel_visible(p, state->surface, found, at->t);
     if (!vm_any(hit)) return hit;
     kernel_hit_places places = {.t = at->t, .w = vf_set(0)};
-    kernel_map_normal(&poly->map, at->r, places.normal);
-    kernel_unshear(p, places.normal);
+    if (state->surface->layer->normal == RENDER_VERTEX) {
+        memcpy(places.normal, at->r, sizeof places.normal);
+    } else {
+        kernel_map_normal(&poly->map, at->r, places.normal);
+        kernel_unshear(p, places.normal);
+    }
     if (state->surface->layer->colour_map) places.w = kernel_map_value(&poly->map, &poly->map.colour, at->r);
     kernel_accept(p, state, c, poly->value, hit, &places);
     return hit;

@@ -6,11 +6,21 @@
 #include "memory.h"
 #include "session_agree.h"
 
+void session_drop_gradients(session_scalar *scalar)
+{
+    base_free(scalar->gradient_entries);
+    base_free(scalar->gradients);
+    scalar->gradient_entries = NULL;
+    scalar->gradients = NULL;
+    scalar->gradient_count = 0;
+}
+
 void session_drop_scalars(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->scalar_count; i++) {
         base_free(mesh->scalars[i].vertex_values);
         base_free(mesh->scalars[i].distances);
+        session_drop_gradients(&mesh->scalars[i]);
         base_free(mesh->scalars[i].pairs);
         base_free(mesh->scalars[i].intervals);
     }

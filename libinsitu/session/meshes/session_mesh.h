@@ -44,10 +44,14 @@ typedef struct session_scalar {
     bool needs_all;     /* an image of this step may need any cell */
     int interval_count; /* else the values that this step's images show: cells with some are candidates */
     mmbvh_interval *intervals;
-    session_plane plane;   /* of distances: what they are from */
-    float *distances;      /* at vertices, a declared copy; NULL until computed */
-    double *vertex_values; /* recentred values, a declared copy; NULL until computed */
-    grid_field own;        /* of a recentred one in use: the cells' */
+    session_plane plane;       /* of distances: what they are from */
+    float *distances;          /* at vertices, a declared copy; NULL until computed */
+    double *vertex_values;     /* recentred values, a declared copy; NULL until computed */
+    grid_field own;            /* of a recentred one in use: the cells' */
+    int32_t *gradient_entries; /* a declared copy, for smooth normals of the last step that drew some: of each vertex,
+                                  which of the gradients, or -1; NULL until computed */
+    float (*gradients)[3];
+    int64_t gradient_count;
     bool are_values_stale; /* recentred ones are to be computed again */
     bool is_suspect;       /* the values were set anew: they may have changed */
     bool has_checksum;
@@ -177,6 +181,7 @@ void session_remove_mesh(session_meshes *meshes, const char *name);
 
 /* Free what depends on the fields' values, on the cells, or all that is known of the mesh. */
 void session_drop_scalars(session_mesh *mesh);
+void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
 void session_drop_fields(session_mesh *mesh);

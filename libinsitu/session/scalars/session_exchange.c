@@ -35,6 +35,14 @@ bool session_keys_create(session_key_table *table, int64_t most)
     return true;
 }
 
+int64_t session_keys_find(const session_key_table *table, const session_key *key)
+{
+    uint64_t slot = session_key_hash(key) & table->mask;
+    for (; table->slots[slot] >= 0; slot = (slot + 1) & table->mask)
+        if (memcmp(&table->keys[table->slots[slot]], key, sizeof *key) == 0) return table->slots[slot];
+    return -1;
+}
+
 int64_t session_keys_add(session_key_table *table, const session_key *key)
 {
     uint64_t slot = session_key_hash(key) & table->mask;

@@ -25,6 +25,8 @@ typedef struct session_key_table {
 
 /* Room for up to most keys. False where memory runs out; there is nothing to free then. */
 bool session_keys_create(session_key_table *table, int64_t most);
+/* The key's number, or -1. */
+int64_t session_keys_find(const session_key_table *table, const session_key *key);
 int64_t session_keys_add(session_key_table *table, const session_key *key);
 void session_keys_free(session_key_table *table);
 

@@ -91,7 +91,7 @@ typedef struct scene_material {
     float ambient, diffuse, specular, shininess;
 } scene_material;
 
-typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES } scene_normal;
+typedef enum scene_normal { SCENE_GRADIENT, SCENE_DIFFERENCES, SCENE_VERTEX } scene_normal;
 
 typedef struct scene_isosurface {
     scene_field field;

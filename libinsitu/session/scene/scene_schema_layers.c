@@ -8,7 +8,8 @@ static const cyaml_schema_value_t opacity_point = {CYAML_VALUE_SEQUENCE_FIXED(CY
 #define MAP_WORD(word, name) {name, COLOUR_MAP_##word},
 static const cyaml_strval_t map_words[] = {COLOUR_MAPS(MAP_WORD)};
 static const cyaml_strval_t scale_words[] = {{"linear", SCENE_LINEAR}, {"log", SCENE_LOG}, {"symlog", SCENE_SYMLOG}};
-static const cyaml_strval_t normal_words[] = {{"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}};
+static const cyaml_strval_t normal_words[] = {
+    {"gradient", SCENE_GRADIENT}, {"differences", SCENE_DIFFERENCES}, {"vertex", SCENE_VERTEX}};
 static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"vertex", SCENE_BY_VERTEX}};
 
 #define FIELD_HELP "Name of the field, as the simulation or the file gives it; at most 255 bytes."
@@ -195,8 +196,10 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
     X(CYAML_FIELD_MAPPING_PTR("material", OPTIONAL, scene_file_isosurface, material, material_fields),                 \
       .help = "How the surfaces take light.", .by_default = "a slight gloss", .child = &material_mapping)              \
     X(CHOICE("normals", scene_file_isosurface, normals, normal_words),                                                 \
-      .help = "What light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, or "      \
-              "central `differences` about the hit, smoother and slower, over the cells of one rank.",                 \
+      .help =                                                                                                          \
+          "What light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, or "          \
+          "smooth: gradients at each `vertex`, over its cells on all ranks, interpolated within cells; or central "    \
+          "`differences` about the hit, slower and over the cells of one rank, so that ranks' borders may show.",      \
       .by_default = "`gradient`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
       .help = "Distance between the two samples of a difference, in sizes of the cell that is hit.",                   \

@@ -40,10 +40,11 @@ static bool allocate_layers(const session_meshes *meshes, const scene_image *ima
     out->fields = base_calloc(fields, sizeof *out->fields);
     out->field_count = (int64_t)fields;
     out->gathered = base_calloc(fields, sizeof *out->gathered);
+    out->gradients = base_calloc((size_t)out->part_count * (size_t)image->isosurface_count, sizeof *out->gradients);
     out->distances = base_calloc(surfaces, sizeof *out->distances);
     out->ranges = base_calloc(fields, sizeof *out->ranges);
     return out->parts && out->surfaces && out->volumes && out->transfers && out->fields && out->gathered &&
-           out->distances && out->ranges;
+           out->gradients && out->distances && out->ranges;
 }
 
 void session_layers_free(session_layers *layers)
@@ -56,6 +57,7 @@ void session_layers_free(session_layers *layers)
     base_free(layers->fields);
     for (int64_t i = 0; i < layers->field_count && layers->gathered; i++) base_free(layers->gathered[i]);
     base_free(layers->gathered);
+    base_free(layers->gradients);
     base_free(layers->distances);
     base_free(layers->ranges);
     *layers = (session_layers){0};
@@ -94,6 +96,22 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
         const session_scalar *scalar = session_find_scalar(mesh, field);
         layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
         if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
+        at++;
+    }
+    return out;
+}
+
+/* Gradients at the vertices of the meshes that have the field. */
+static const render_vertex_gradients *place_gradients(const session_meshes *meshes, session_layers *layers, int index,
+                                                      const scene_field *field)
+{
+    render_vertex_gradients *const out = layers->gradients + (ptrdiff_t)index * layers->part_count;
+    int at = 0;
+    for (int i = 0; i < session_part_slots(meshes); i++) {
+        const session_mesh *mesh = session_part(meshes, i);
+        if (!is_part(mesh)) continue;
+        const session_scalar *scalar = session_find_scalar(mesh, field);
+        if (scalar) out[at] = (render_vertex_gradients){scalar->gradient_entries, (const float(*)[3])scalar->gradients};
         at++;
     }
     return out;
@@ -146,6 +164,8 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
                                   session_layers *layers, base_error *error)
 {
+    static const render_normal normals[] = {
+        [SCENE_GRADIENT] = RENDER_GRADIENT, [SCENE_DIFFERENCES] = RENDER_DIFFERENCES, [SCENE_VERTEX] = RENDER_VERTEX};
     render_surface_layer *out = &layers->surfaces[index];
     const scene_material *m = &layer->material;
     *out = (render_surface_layer){.field = place_field(basis->meshes, layers, 2 * index, &layer->field, true),
@@ -155,9 +175,10 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .opacity = layer->opacity,
                                   .material = {m->ambient, m->diffuse, m->specular, m->shininess},
                                   .root = RENDER_ROBUST,
-                                  .normal = layer->normals == SCENE_DIFFERENCES ? RENDER_DIFFERENCES : RENDER_GRADIENT,
+                                  .normal = normals[layer->normals],
                                   .difference = layer->difference,
                                   .clips = layer->clips};
+    if (layer->normals == SCENE_VERTEX) out->gradients = place_gradients(basis->meshes, layers, index, &layer->field);
     if (!layer->has_colour_by) return INSITU_OK;
     out->colour_field = place_field(basis->meshes, layers, 2 * index + 1, &layer->colour_by, false);
     out->colour_map = &layers->transfers[index].transfer;

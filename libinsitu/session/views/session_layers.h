@@ -20,9 +20,10 @@ typedef struct session_layers {
     double *distances;           /* of surfaces: the isovalues of planes; 0 */
     grid_field *fields;          /* part_count a surface, a surface's colour, and a volume */
     int64_t field_count;
-    double **gathered;           /* as the fields: values at outer faces; NULL where they are not such */
-    mmbvh_ranges *ranges;        /* as the fields */
-    render_active_cells *active; /* the step's (session_draw.h), for the caller to set; NULL: none are stored */
+    render_vertex_gradients *gradients; /* part_count an isosurface */
+    double **gathered;                  /* as the fields: values at outer faces; NULL where they are not such */
+    mmbvh_ranges *ranges;               /* as the fields */
+    render_active_cells *active;        /* the step's (session_draw.h), for the caller to set; NULL: none are stored */
 } session_layers;
 
 /* What layers are made of. */

@@ -1,0 +1,14 @@
+/* Gradients at vertices, for isosurfaces whose normals are interpolated between them. */
+#ifndef SESSION_SMOOTH_H
+#define SESSION_SMOOTH_H
+
+#include "session_plan.h"
+#include "session_team.h"
+
+/* Compute, for the isosurfaces of the plan that ask for it, the gradients at the vertices of the cells that they cross:
+ * over the cells around each on all ranks, to the same bits on any partition. Vertices are one where recentring takes
+ * them as one. extent: the global bounds. Collective. */
+insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
+                             const session_team *team, const session_extent *extent, base_error *error);
+
+#endif
