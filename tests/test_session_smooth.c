@@ -1,0 +1,444 @@
+/* Normals by gradients at vertices: against gradients solved for at every vertex in double and drawn as three fields
+ * that colour the surface; the gradient itself where the field is linear; and the same to the bit on any partition. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "session.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, WIDTH = 56, HEIGHT = 48, PIXELS = WIDTH * HEIGHT, MAX_ENDS = 512 };
+enum { NX, NY, NZ, VALUE, LAYER, SURFACE, CHANNELS };
+
+#define SCENE(layer)                                                                                                   \
+    "images:\n  - name: a\n    size: [56, 48]\n    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"     \
+    "    layers:\n" layer "    outputs: [{path: a.exr, data: true}]\n"
+#define SMOOTH(more) "      - isosurface: {field: f, values: [0.1, 0.6], normals: vertex" more "}\n"
+#define COLOURED(field) "      - isosurface: {field: f, values: [0.1, 0.6], colour_by: {field: " field "}}\n"
+
+/* ---- gradients at vertices, by Gaussian elimination ------------------------------------------------------------ */
+
+static void *zeros(int64_t count, size_t size)
+{
+    void *out = calloc((size_t)count, size);
+    assert_non_null(out);
+    return out;
+}
+
+typedef struct gradients {
+    double (*sum)[4]; /* of the weighted gradients, and of the weights */
+    double *component[3];
+} gradients;
+
+/* x: 3 × 4, the right side last. False where it is singular. */
+static bool eliminate(double x[3][4], double *determinant)
+{
+    *determinant = 1;
+    for (int c = 0; c < 3; c++) {
+        int pivot = c;
+        for (int r = c + 1; r < 3; r++)
+            if (fabs(x[r][c]) > fabs(x[pivot][c])) pivot = r;
+        if (x[pivot][c] == 0) return false;
+        for (int k = 0; k < 4; k++) {
+            const double swap = x[c][k];
+            x[c][k] = x[pivot][k];
+            x[pivot][k] = swap;
+        }
+        *determinant *= x[c][c];
+        for (int r = 0; r < 3; r++)
+            for (int k = 3; k >= c && r != c; k--) x[r][k] -= x[r][c] / x[c][c] * x[c][k];
+    }
+    for (int c = 0; c < 3; c++) x[c][3] /= x[c][c];
+    return true;
+}
+
+/* One corner: a place and a value, and three others. */
+static void add_corner(gradients *g, int64_t vertex, const double corner[4], const double ends[3][4])
+{
+    double x[3][4], determinant, squares = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 4; k++) x[i][k] = ends[i][k] - corner[k];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) squares += x[i][k] * x[i][k];
+    if (!eliminate(x, &determinant)) return;
+    const double weight = fabs(determinant) / pow(squares, 2);
+    for (int k = 0; k < 3; k++) g->sum[vertex][k] += weight * x[k][3];
+    g->sum[vertex][3] += weight;
+}
+
+static void node_of(const test_mesh *mesh, int64_t vertex, double out[4])
+{
+    memcpy(out, mesh->coordinates + 3 * vertex, 3 * sizeof *out);
+    out[3] = mesh->values[vertex];
+}
+
+static void add_ends(gradients *g, const test_mesh *mesh, const int64_t *cell, int corner, int a, int b, int c)
+{
+    double at[4], ends[3][4];
+    node_of(mesh, cell[corner], at);
+    node_of(mesh, cell[a], ends[0]);
+    node_of(mesh, cell[b], ends[1]);
+    node_of(mesh, cell[c], ends[2]);
+    add_corner(g, cell[corner], at, (const double(*)[4])ends);
+}
+
+static void add_plain_cell(gradients *g, const test_mesh *mesh, int type, const int64_t *cell)
+{
+    static const int around[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* a hex's corners as bits, and back */
+    for (int i = 0; i < 8 && type == INSITU_HEX; i++)
+        add_ends(g, mesh, cell, i, around[around[i] ^ 1], around[around[i] ^ 2], around[around[i] ^ 4]);
+    for (int i = 0; i < 4 && type == INSITU_TET; i++) add_ends(g, mesh, cell, i, (i + 1) % 4, (i + 2) % 4, (i + 3) % 4);
+    for (int i = 0; i < 6 && type == INSITU_WEDGE; i++)
+        add_ends(g, mesh, cell, i, i / 3 * 3 + (i + 1) % 3, i / 3 * 3 + (i + 2) % 3, (i + 3) % 6);
+    for (int i = 0; i < 4 && type == INSITU_PYRAMID; i++) {
+        add_ends(g, mesh, cell, i, (i + 1) % 4, (i + 3) % 4, 4);
+        add_ends(g, mesh, cell, 4, i, (i + 1) % 4, (i + 2) % 4);
+    }
+}
+
+/* The centre is the mean of the vertices, each once. */
+static void add_polyhedron(gradients *g, const test_mesh *mesh, const int64_t *faces, int64_t face_count)
+{
+    int64_t known[MAX_ENDS];
+    int count = 0;
+    double centre[4] = {0};
+    for (int64_t f = 0; f < face_count; f++)
+        for (int64_t i = mesh->face_offsets[faces[f]]; i < mesh->face_offsets[faces[f] + 1]; i++) {
+            const int64_t vertex = mesh->face_connectivity[i];
+            int at = 0;
+            while (at < count && known[at] != vertex) at++;
+            if (at == count) known[count++] = vertex;
+        }
+    for (int i = 0; i < count; i++) {
+        double node[4];
+        node_of(mesh, known[i], node);
+        for (int k = 0; k < 4; k++) centre[k] += node[k] / count;
+    }
+    for (int64_t f = 0; f < face_count; f++) {
+        const int64_t first = mesh->face_offsets[faces[f]], corners = mesh->face_offsets[faces[f] + 1] - first;
+        for (int64_t i = 0; i < corners; i++) {
+            double at[4], ends[3][4];
+            node_of(mesh, mesh->face_connectivity[first + i], at);
+            node_of(mesh, mesh->face_connectivity[first + (i + 1) % corners], ends[0]);
+            node_of(mesh, mesh->face_connectivity[first + (i + corners - 1) % corners], ends[1]);
+            memcpy(ends[2], centre, sizeof centre);
+            add_corner(g, mesh->face_connectivity[first + i], at, (const double(*)[4])ends);
+        }
+    }
+}
+
+static void solve_gradients(const test_mesh *mesh, gradients *g)
+{
+    g->sum = zeros(mesh->vertex_count, sizeof *g->sum);
+    for (int k = 0; k < 3; k++) g->component[k] = zeros(mesh->vertex_count, sizeof *g->component[k]);
+    for (int64_t cell = 0; cell < mesh->cell_count; cell++) {
+        const int64_t *const entries = mesh->connectivity + mesh->offsets[cell];
+        if (mesh->types[cell] == INSITU_POLYHEDRON)
+            add_polyhedron(g, mesh, entries, mesh->offsets[cell + 1] - mesh->offsets[cell]);
+        else
+            add_plain_cell(g, mesh, mesh->types[cell], entries);
+    }
+    for (int64_t v = 0; v < mesh->vertex_count; v++)
+        for (int k = 0; k < 3; k++) g->component[k][v] = g->sum[v][k] / g->sum[v][3];
+}
+
+static void gradients_free(gradients *g)
+{
+    free(g->sum);
+    for (int k = 0; k < 3; k++) free(g->component[k]);
+}
+
+/* ---- pictures -------------------------------------------------------------------------------------------------- */
+
+/* g: NULL, or fields "gx", "gy" and "gz" of the whole mesh. */
+static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, const gradients *g)
+{
+    static const char *const names[] = {"gx", "gy", "gz"};
+    caught_picture picture = {0};
+    insitu_session *session = NULL;
+    forget_pictures();
+    insitu_status status = insitu_create_from_text(comm, scene, &session);
+    if (!status) status = hand_over(session, in);
+    for (int k = 0; k < 3 && g && !status; k++) {
+        insitu_field field;
+        insitu_field_defaults(&field);
+        field.name = names[k];
+        field.count = in->part.vertex_count;
+        field.values = (insitu_array){g->component[k], INSITU_FLOAT64, 0};
+        status = insitu_set_field(session, "m", &field);
+    }
+    if (!status) status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+    free(picture->data);
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, PIXELS * 4 * sizeof *a->rgba) == 0 &&
+           memcmp(a->depth, b->depth, PIXELS * sizeof *a->depth) == 0 &&
+           memcmp(a->data, b->data, CHANNELS * PIXELS * sizeof *a->data) == 0;
+}
+
+/* ---- meshes ---------------------------------------------------------------------------------------------------- */
+
+static double swirl(const double p[3])
+{
+    return sin(2.1 * p[0] + 0.3) * cos(1.7 * p[1]) + 0.4 * p[2] * p[2] - 0.3 * p[0] * p[2] + 0.2 * p[1];
+}
+
+/* Every kind, and polyhedra of the hexes and of a half of the mixture. */
+typedef struct mesh_case {
+    const char *name;
+    test_mesh_kind kind;
+    double as_polyhedra; /* the share of cells */
+} mesh_case;
+
+static const mesh_case cases[] = {
+    {"tets", TEST_TETS, 0},
+    {"hexes", TEST_HEXES, 0},
+    {"wedges", TEST_WEDGES, 0},
+    {"pyramids", TEST_PYRAMIDS, 0},
+    {"mixed", TEST_MIXED, 0},
+    {"hexes as polyhedra", TEST_HEXES, 1},
+    {"mixed, half of them polyhedra", TEST_MIXED, 0.5},
+    {"polyhedra", TEST_POLYHEDRA, 0}, /* concave: last, see below */
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+static void describe(session_input *in)
+{
+    input_describe(in);
+    in->mesh.keep_polyhedra = 1;
+}
+
+static void whole_create(const mesh_case *c, test_function *f, session_input *whole)
+{
+    *whole = (session_input){0};
+    test_mesh_lattice(c->kind, SIDE, 0.2, f, &whole->part);
+    if (c->as_polyhedra > 0) test_mesh_to_polyhedra(&whole->part, c->as_polyhedra);
+    describe(whole);
+}
+
+/* ---- what normals are ------------------------------------------------------------------------------------------ */
+
+/* The largest sine of the angle between what was drawn and what is expected, over pixels with a surface: one gradient,
+ * or what the three pictures have for values. far: pixels where it is more than 3e-4. */
+static double worst_angle(const caught_picture *picture, const caught_picture *expected, const double *gradient,
+                          int *pixels, int *far)
+{
+    double worst = 0;
+    *pixels = *far = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        double n[3], g[3], cross = 0, length = 0;
+        if (picture->data[LAYER * PIXELS + i] < 0) continue;
+        ++*pixels;
+        for (int k = 0; k < 3; k++) {
+            n[k] = (double)picture->data[(NX + k) * PIXELS + i];
+            g[k] = gradient ? gradient[k] : (double)expected[k].data[VALUE * PIXELS + i];
+            length += g[k] * g[k];
+        }
+        for (int k = 0; k < 3; k++) {
+            const double c = n[(k + 1) % 3] * g[(k + 2) % 3] - n[(k + 2) % 3] * g[(k + 1) % 3];
+            cross += c * c;
+        }
+        worst = test_worse(worst, sqrt(cross / length));
+        *far += !(sqrt(cross / length) <= 3e-4);
+    }
+    return worst;
+}
+
+/* Components are between -3 and 3, and gradients 0.3 long or more on these surfaces. Each component, drawn as a field,
+ * is off by some units of 6e-8 of 3, and by the place's 1.5e-5 (test_session_surfaces.c) times its own slope, 6 at
+ * most: 9e-5 in all, and a normal by 3e-4 of its length. Polyhedra draw fields otherwise near quads, where they have
+ * the bilinear value of a neighbour that is a hex, and where tets overlap, where a field is the sum of all and the
+ * normal one tet's: of those of triangles alone, some of them concave, nine pixels of ten are to be right. */
+static void normals_are_the_interpolated_gradients(void **state)
+{
+    static const char *const scenes[] = {SCENE(COLOURED("gx")), SCENE(COLOURED("gy")), SCENE(COLOURED("gz"))};
+    (void)state;
+    for (int c = 0; c < CASES && own_rank == 0; c++) {
+        session_input whole;
+        gradients g;
+        caught_picture expected[3];
+        int pixels, far;
+        if (cases[c].as_polyhedra > 0) continue;
+        whole_create(&cases[c], swirl, &whole);
+        solve_gradients(&whole.part, &g);
+        caught_picture smooth = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+        for (int k = 0; k < 3; k++) expected[k] = draw(MPI_COMM_SELF, scenes[k], &whole, &g);
+        const double worst = worst_angle(&smooth, expected, NULL, &pixels, &far);
+        printf("%s: %d pixels, normals within %.2g of the interpolated gradients, %d beyond 3e-4\n", cases[c].name,
+               pixels, worst, far);
+        assert_true(pixels > 300 && far <= (cases[c].kind == TEST_POLYHEDRA ? pixels / 10 : 0));
+        free_picture(&smooth);
+        for (int k = 0; k < 3; k++) free_picture(&expected[k]);
+        gradients_free(&g);
+        input_free(&whole);
+    }
+}
+
+/* The lattice's corners are of doubles, each gradient good to some units of 1e-16 over a corner's determinant; what is
+ * left is the rounding of gradients, coordinates and normals to float32, some units of 6e-8. */
+static void a_linear_field_has_its_gradient(void **state)
+{
+    static const double gradient[3] = {0.3, -0.7, 0.5};
+    (void)state;
+    for (int c = 0; c < CASES && own_rank == 0; c++) {
+        session_input whole;
+        int pixels, far;
+        whole_create(&cases[c], test_linear, &whole);
+        caught_picture smooth = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+        const double worst = worst_angle(&smooth, NULL, gradient, &pixels, &far);
+        if (!(worst < 1e-6)) fprintf(stderr, "%s: off by %g\n", cases[c].name, worst);
+        assert_true(pixels > 300 && worst < 1e-6);
+        free_picture(&smooth);
+        input_free(&whole);
+    }
+}
+
+/* ---- on any partition ------------------------------------------------------------------------------------------ */
+
+/* This rank's part, its cells listed in a way of its own; with_ghosts: of all cells, those of others flagged. */
+static void part_create(const test_mesh *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
+{
+    int *owners = zeros(whole->cell_count, sizeof *owners);
+    int *all = zeros(whole->cell_count, sizeof *all);
+    *out = (session_input){0};
+    test_partition(whole, dealt, SIDE, rank_count, owners);
+    test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
+    for (int64_t cell = 0; cell < out->part.cell_count && with_ghosts; cell++)
+        out->part.ghosts[cell] = owners[cell] != own_rank;
+    if (!with_ghosts) test_mesh_turn(&out->part, 77 + (uint64_t)own_rank);
+    free(owners);
+    free(all);
+    describe(out);
+}
+
+/* whole: of rank 0. */
+static void same_as_alone(const char *name, const char *scene, const session_input *whole, const session_input *part)
+{
+    caught_picture ours = draw(MPI_COMM_WORLD, scene, part, NULL), alone = {0};
+    bool is_well = true;
+    if (own_rank == 0) {
+        alone = draw(MPI_COMM_SELF, scene, whole, NULL);
+        is_well = are_same(&ours, &alone);
+        if (!is_well) fprintf(stderr, "%s: not the same on %d ranks\n", name, rank_count);
+    }
+    everywhere(is_well);
+    free_picture(&ours);
+    free_picture(&alone);
+}
+
+static void any_partition_has_the_same_bits(void **state)
+{
+    (void)state;
+    for (int c = 0; c < CASES; c++)
+        for (test_partition_kind dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+            session_input whole, part;
+            whole_create(&cases[c], swirl, &whole);
+            part_create(&whole.part, dealt, false, &part);
+            same_as_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
+            same_as_alone(cases[c].name, SCENE(SMOOTH(", opacity: 0.4")), &whole, &part);
+            input_free(&part);
+            part_create(&whole.part, dealt, true, &part);
+            same_as_alone(cases[c].name, SCENE(SMOOTH("")), &whole, &part);
+            input_free(&part);
+            input_free(&whole);
+        }
+}
+
+/* Tets of both, whose vertices stay apart. */
+static void join(const test_mesh halves[2], test_mesh *out)
+{
+    *out = (test_mesh){.vertex_count = halves[0].vertex_count + halves[1].vertex_count,
+                       .cell_count = halves[0].cell_count + halves[1].cell_count,
+                       .connectivity_count = halves[0].connectivity_count + halves[1].connectivity_count};
+    out->coordinates = zeros(out->vertex_count * 3, sizeof *out->coordinates);
+    out->values = zeros(out->vertex_count, sizeof *out->values);
+    out->connectivity = zeros(out->connectivity_count, sizeof *out->connectivity);
+    out->offsets = zeros(out->cell_count + 1, sizeof *out->offsets);
+    out->types = zeros(out->cell_count, 1);
+    out->ghosts = zeros(out->cell_count, 1);
+    for (int i = 0; i < 2; i++) {
+        const test_mesh *half = &halves[i];
+        const int64_t first = i ? halves[0].vertex_count : 0, at = i ? halves[0].connectivity_count : 0;
+        memcpy(out->coordinates + 3 * first, half->coordinates, (size_t)half->vertex_count * 3 * sizeof(double));
+        memcpy(out->values + first, half->values, (size_t)half->vertex_count * sizeof(double));
+        for (int64_t n = 0; n < half->connectivity_count; n++)
+            out->connectivity[at + n] = half->connectivity[n] + first;
+    }
+    for (int64_t cell = 0; cell < out->cell_count; cell++) out->types[cell] = INSITU_TET;
+    for (int64_t cell = 0; cell <= out->cell_count; cell++) out->offsets[cell] = 4 * cell;
+}
+
+/* A crack, on one rank: the cells on the two sides of a plane have vertices of their own there. */
+static void doubled_vertices_are_one(void **state)
+{
+    session_input whole, cracked = {0};
+    test_mesh halves[2];
+    (void)state;
+    if (own_rank > 0) return;
+    whole_create(&cases[0], swirl, &whole);
+    int *owners = zeros(whole.part.cell_count, sizeof *owners);
+    test_partition(&whole.part, TEST_BLOCK, SIDE, 2, owners);
+    for (int i = 0; i < 2; i++) test_mesh_part(&whole.part, owners, i, &halves[i]);
+    join(halves, &cracked.part);
+    describe(&cracked);
+    caught_picture one = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+    caught_picture two = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &cracked, NULL);
+    assert_true(cracked.part.vertex_count > whole.part.vertex_count && are_same(&one, &two));
+    free_picture(&one);
+    free_picture(&two);
+    for (int i = 0; i < 2; i++) test_mesh_free(&halves[i]);
+    free(owners);
+    input_free(&cracked);
+    input_free(&whole);
+}
+
+/* Cells of values that are not finite are not drawn, and give nothing to the vertices of others. */
+static void rubbish_gives_nothing(void **state)
+{
+    (void)state;
+    session_input whole, part;
+    whole_create(&cases[4], swirl, &whole);
+    whole.part.values[whole.part.vertex_count / 2] = NAN;
+    whole.part.values[whole.part.vertex_count / 3] = INFINITY;
+    part_create(&whole.part, TEST_RANDOM, false, &part);
+    same_as_alone("values that are not finite", SCENE(SMOOTH("")), &whole, &part);
+    if (own_rank == 0) {
+        caught_picture picture = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
+        for (int i = 0; i < 3 * PIXELS; i++) assert_true(isfinite(picture.data[i]));
+        free_picture(&picture);
+    }
+    input_free(&part);
+    input_free(&whole);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(normals_are_the_interpolated_gradients),
+        cmocka_unit_test(a_linear_field_has_its_gradient),
+        cmocka_unit_test(any_partition_has_the_same_bits),
+        cmocka_unit_test(doubled_vertices_are_one),
+        cmocka_unit_test(rubbish_gives_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
