@@ -9,7 +9,8 @@
 #include "bench_layers_vtk.h"
 #include "bench_session.h"
 
-static const bench_picture pictures[] = {BENCH_SLICE, BENCH_SURFACE, BENCH_CLIPPED, BENCH_EDGES, BENCH_ANTIALIASED};
+static const bench_picture pictures[] = {BENCH_SLICE,       BENCH_SURFACE,    BENCH_CLIPPED, BENCH_EDGES,
+                                         BENCH_ANTIALIASED, BENCH_ISOSURFACE, BENCH_SMOOTH,  BENCH_DIFFERENCES};
 enum { PICTURES = sizeof pictures / sizeof *pictures };
 
 static const float *floats(const grid_array *a)
@@ -84,7 +85,8 @@ int main(int argc, char **argv)
     if (!bench_command_parse(
             argc, argv,
             "Measures steps of new values for each MESH (tets or hexes) of N^3 cubes: a slice, the outer\n"
-            "surface, the same clipped, with edges and with 4 samples a pixel, beside VTK's filters and Mesa.",
+            "surface, the same clipped, with edges and with 4 samples a pixel, the first three beside VTK's\n"
+            "filters and Mesa; and an isosurface by each kind of normals.",
             TEST_HEXES, &command))
         command.mesh_count = 0;
     for (int i = 0; i < command.mesh_count; i++) measure(&command, command.meshes[i].kind, command.meshes[i].n);

@@ -39,8 +39,8 @@ const char *bench_change_name(bench_change change)
 const char *bench_picture_name(bench_picture picture)
 {
     static const char *const names[BENCH_PICTURE_COUNT] = {
-        "isosurface",         "isosurfaces",        "volume", "slice", "surface", "clipped surface",
-        "surface with edges", "antialiased surface"};
+        "isosurface", "isosurfaces", "volume",          "smooth isosurface",  "isosurface by differences",
+        "slice",      "surface",     "clipped surface", "surface with edges", "antialiased surface"};
     return names[picture];
 }
 
@@ -146,7 +146,10 @@ static void write_layer(const bench_session *s, FILE *file)
     fprintf(file, "      - isosurface: {field: f, values: [");
     for (int i = 0; i < (s->picture == BENCH_ISOSURFACES ? BENCH_ISOVALUES : 1); i++)
         fprintf(file, "%s%g", i ? ", " : "", bench_isovalues[i]);
-    fprintf(file, "]}\n");
+    fprintf(file, "]%s}\n",
+            s->picture == BENCH_SMOOTH        ? ", normals: vertex"
+            : s->picture == BENCH_DIFFERENCES ? ", normals: differences"
+                                              : "");
 }
 
 /* A session whose picture ends in ending: .exr comes with its depth. */

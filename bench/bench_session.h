@@ -21,6 +21,8 @@ typedef enum bench_picture {
     BENCH_ISOSURFACE,
     BENCH_ISOSURFACES,
     BENCH_VOLUME,
+    BENCH_SMOOTH,      /* the isosurface by normals: vertex */
+    BENCH_DIFFERENCES, /* by normals: differences */
     BENCH_SLICE,       /* by the plane through the origin with the normal bench_plane */
     BENCH_SURFACE,     /* the outer one, coloured by the field */
     BENCH_CLIPPED,     /* the same, cut by the plane */

@@ -297,7 +297,7 @@ static insitu_status make_sums(const session_team *team, const session_extent *e
     const int64_t count = work->keys.count;
     bool is_made = true;
     work->sums = base_calloc((size_t)(count ? count : 1), sizeof *work->sums);
-    if (work->mesh && work->sums) {
+    if (work->mesh && work->sums && count) {
         is_made = find_entries(work, by_id, team->threads);
         basis = basis_of(work, extent, team->threads);
         is_made = is_made && session_list_cells(&basis, &list) && session_largest_gradients(&basis, &list, largest);
@@ -307,7 +307,7 @@ static insitu_status make_sums(const session_team *team, const session_extent *e
     if (!status)
         status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, team->comm),
                              "MPI_Allreduce");
-    if (!status && work->mesh && !session_add_gradients(&basis, &list, largest, work->sums))
+    if (!status && list.count && !session_add_gradients(&basis, &list, largest, work->sums))
         session_no_memory(error, count * 100, "gradients at vertices");
     base_free(list.cells);
     return status ? status : session_agree(team->comm, error);

@@ -19,7 +19,8 @@
 
 #include "memory.h"
 
-enum { HIGH_BITS = 43, LOW_BITS = 44 };
+enum { HIGH_BITS = 43 };
+#define LOW_UNIT 0x1p44 /* of low words, in a high one's last bit */
 
 typedef struct node {
     double at[3], value;
@@ -30,16 +31,24 @@ typedef struct node {
 typedef struct target {
     const session_gradient_basis *basis;
     session_gradient_sum *sums;
+    double scale;   /* of coordinates: a power of two */
     double unit[2]; /* of the components and of the weights, one more than the last bit of a high word */
     double largest[2];
 } target;
 
 /* ---- whole numbers ------------------------------------------------------------------------------------------- */
 
-static void add_number(int64_t words[2], double number, double unit)
+/* The nearest whole number of one below 2^51, without a call. */
+static inline double round_whole(double number)
 {
-    const double scaled = number * unit, high = rint(scaled);
-    const int64_t of_high = (int64_t)high, of_low = (int64_t)rint(ldexp(scaled - high, LOW_BITS));
+    const double shift = 0x1.8p52;
+    return (number + shift) - shift;
+}
+
+static inline void add_number(int64_t words[2], double number, double unit)
+{
+    const double scaled = number * unit, high = round_whole(scaled);
+    const int64_t of_high = (int64_t)high, of_low = (int64_t)round_whole((scaled - high) * LOW_UNIT);
 #pragma omp atomic
     words[0] += of_high;
 #pragma omp atomic
@@ -60,8 +69,9 @@ static void give(target *to, int64_t vertex, const double weighted[3], double we
     const int32_t entry = to->basis->entries[vertex];
     if (entry < 0 || !(weight > 0) || !isfinite(weighted[0] + weighted[1] + weighted[2]) || !isfinite(weight)) return;
     if (!to->sums) {
-        for (int a = 0; a < 3; a++) to->largest[0] = fmax(to->largest[0], fabs(weighted[a]));
-        to->largest[1] = fmax(to->largest[1], weight);
+        for (int a = 0; a < 3; a++)
+            if (fabs(weighted[a]) > to->largest[0]) to->largest[0] = fabs(weighted[a]);
+        if (weight > to->largest[1]) to->largest[1] = weight;
         return;
     }
     int64_t *words = to->sums[entry].words;
@@ -72,7 +82,7 @@ static void give(target *to, int64_t vertex, const double weighted[3], double we
 void session_mean_gradient(const session_gradient_sum *sum, float out[3])
 {
     double numbers[4];
-    for (int i = 0; i < 4; i++) numbers[i] = ldexp((double)sum->words[2 * i], LOW_BITS) + (double)sum->words[2 * i + 1];
+    for (int i = 0; i < 4; i++) numbers[i] = (double)sum->words[2 * i] * LOW_UNIT + (double)sum->words[2 * i + 1];
     for (int a = 0; a < 3; a++) out[a] = numbers[3] > 0 ? (float)(numbers[a] / numbers[3]) : 0;
 }
 
@@ -102,7 +112,7 @@ static void give_corner(target *to, const node *corner, const node *p, const nod
     for (int i = 0; i < 3; i++) {
         rise[i] = ends[i]->value - corner->value;
         for (int a = 0; a < 3; a++) {
-            edge[i][a] = (ends[i]->at[a] - corner->at[a]) / to->basis->length;
+            edge[i][a] = (ends[i]->at[a] - corner->at[a]) * to->scale;
             squares += edge[i][a] * edge[i][a];
         }
     }
@@ -287,7 +297,7 @@ static bool give_all(const session_gradient_basis *basis, const session_cell_lis
                                                            : of_gradients, of_weights) reduction(||                    \
                                                                                                  : is_out_of_memory)
     {
-        target to = {basis, sums, {unit[0], unit[1]}, {0, 0}};
+        target to = {basis, sums, 1 / basis->length, {unit[0], unit[1]}, {0, 0}};
         node_list nodes = {0};
 #pragma omp for schedule(static)
         for (int64_t i = 0; i < list->count; i++) {
