@@ -14,7 +14,8 @@ program test_fortran
     integer(int32), target :: faces(4, face_count), face_offsets(face_count + 1), owner(face_count), neighbour(face_count)
     integer(int8), target :: types(cells), ghosts(cells)
     real(real64), target :: vector(2*vertices)
-    integer(int32), target :: places(vertices), nodes(27, cells)
+    integer(int32), target :: places(vertices), nodes(27, cells), own(8, cells), dofs(10, cells)
+    real(real64), target :: doubled(3, 8*cells), at_corners(8*cells), unknowns(10*cells)
     character(:), allocatable :: prefix, plain
     integer :: rank, status
 
@@ -39,6 +40,12 @@ program test_fortran
     call same(picture('rows', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), insitu_borrow(pressure)), 'first rows')
     call same(picture('nodes', insitu_points(xyz), insitu_borrow(nodes(1:8, :)), insitu_borrow(vector), with_dofs=.true.), &
         'nodes in lexicographic order, values by an index')
+    call make_corners()
+    plain = picture('doubled', insitu_points(doubled), insitu_borrow(own), insitu_borrow(at_corners))
+    call same(picture('corners', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(at_corners), at_corner=1), &
+        'values at corners')
+    call same(picture('corner_index', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(unknowns), at_corner=2), &
+        'values at corners by an index')
     call errors_are_told()
     call MPI_Finalize()
 
@@ -132,6 +139,23 @@ contains
         end do
     end subroutine make_dofs
 
+    ! Each cell with values of its own, and the mesh whose vertices are doubled.
+    subroutine make_corners()
+        integer :: cell, corner, at
+        dofs = -5
+        unknowns = -1000
+        do cell = 1, cells
+            do corner = 1, 8
+                at = corner + 8*(cell - 1)
+                own(corner, cell) = at
+                doubled(:, at) = xyz(:, hexes(corner, cell))
+                at_corners(at) = pressure(hexes(corner, cell)) + 0.1_real64*mod(cell, 3)
+                dofs(corner, cell) = 10*cells + 1 - at
+                unknowns(dofs(corner, cell)) = at_corners(at)
+            end do
+        end do
+    end subroutine make_corners
+
     subroutine expect(is_well, what)
         logical, intent(in) :: is_well
         character(*), intent(in) :: what
@@ -155,11 +179,12 @@ contains
     end function scene_of
 
     ! The file's bytes, on rank 0.
-    function picture(name, points, connectivity, values, component, with_types, with_owner, with_dofs) result(out)
+    function picture(name, points, connectivity, values, component, with_types, with_owner, with_dofs, at_corner) result(out)
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity, values
         character(*), intent(in), optional :: component
         logical, intent(in), optional :: with_types, with_owner, with_dofs
+        integer, intent(in), optional :: at_corner
         character(:), allocatable :: out
         type(insitu_session) :: session
         type(insitu_report) :: report
@@ -185,6 +210,10 @@ contains
         call expect(status == INSITU_OK, session%error())
         if (present(with_dofs)) then
             call session%set_field('m', 'p', values, status, index=insitu_borrow(places))
+        else if (present(at_corner)) then
+            if (at_corner == 1) call session%set_field('m', 'p', values, status, centring=INSITU_CORNER)
+            if (at_corner == 2) call session%set_field('m', 'p', values, status, centring=INSITU_CORNER, &
+                index=insitu_borrow(dofs(1:8, :)))
         else
             call session%set_field('m', 'p', values, status)
         end if
@@ -245,6 +274,9 @@ contains
         call refused(session, 'index has not as many entries')
         call session%set_field('m', 'p', insitu_borrow(vector), status, index=insitu_borrow(nodes(1:8, :)))
         call refused(session, 'index is a list')
+        call session%set_field('m', 'p', insitu_borrow(unknowns), status, centring=INSITU_CORNER, &
+            index=insitu_borrow(dofs(1:8, 2:)))
+        call refused(session, 'index has not as many entries')
         places(5) = 0
         call session%set_field('m', 'p', insitu_borrow(vector), status, index=insitu_borrow(places))
         call session%step(0, 0.0_real64, status)

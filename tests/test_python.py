@@ -204,6 +204,34 @@ def finite_elements_are_their_hexes():
     everywhere(comm.rank != 0 or same, "nodes and a vector of unknowns draw the plain picture")
 
 
+def corners_of_hexes_are_torn():
+    xyz, hexes, f = lattice()
+    own = numpy.arange(len(hexes)) % 3 * 0.1
+    at_corners = f[hexes] + own[:, None]
+    doubled = picture("doubled", lambda: xyz[hexes].reshape(-1, 3), lambda: numpy.arange(512).reshape(64, 8),
+                      lambda: at_corners.ravel().copy())
+    dofs = numpy.full((64, 10), -1, "i4")  # of another order than the mesh: the vertices' come first
+    dofs[:, :8] = numpy.arange(640)[::-1].reshape(64, 10)[:, :8]
+    vector = numpy.full(640, numpy.nan)
+    vector[dofs[:, :8]] = at_corners
+    rows = numpy.full((64, 10), numpy.nan)
+    rows[:, :8] = at_corners
+    for values, named in [(at_corners.ravel(), {}), (vector, {"index": dofs[:, :8]}), (rows.ravel(), {"corner_row": 10}),
+                          (vector, {"index": dofs.ravel()[:-2], "corner_row": 10})]:
+        with insitu.Session(comm, scene_text=SCENE.format(name="torn", folder=folder)) as s:
+            s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+            raises(ValueError, "index: has 7 columns, expected 8", s.set_field, "m", "f", vector, index=dofs[:, :7],
+                   centring=insitu.CORNER)
+            raises(ValueError, "index: has 500 elements, expected 512", s.set_field, "m", "f", vector,
+                   index=dofs.ravel()[:500], centring=insitu.CORNER)
+            s.set_field("m", "f", values, centring=insitu.CORNER, **named)
+            s.step(0, 0.0)
+            everywhere("vertices of each cell's own" in s.report["copied_why"], s.report["copied_why"])
+        comm.Barrier()
+        with open(f"{folder}/torn.png", "rb") as file:
+            everywhere(file.read() == doubled, f"{list(named)}: torn hexes are those of doubled vertices")
+
+
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
@@ -222,4 +250,5 @@ what_cannot_be_borrowed_is_refused()
 pictures_are_arrays()
 finite_volumes_are_their_hexes()
 finite_elements_are_their_hexes()
+corners_of_hexes_are_torn()
 structures_are_those_of_the_header()

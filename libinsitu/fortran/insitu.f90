@@ -25,7 +25,7 @@ module insitu
         INSITU_POLYHEDRON = 42, INSITU_TRIANGLE = 5, INSITU_POLYGON = 7, INSITU_QUAD = 9
     integer, parameter, public :: INSITU_CHANGED_NOTHING = 0, INSITU_CHANGED_TOPOLOGY = 1, &
         INSITU_CHANGED_GEOMETRY = 2, INSITU_CHANGED_VALUES = 4, INSITU_CHANGED_ALL = 7
-    integer, parameter, public :: INSITU_VERTEX = 0, INSITU_CELL = 1
+    integer, parameter, public :: INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER = 2
     integer, parameter, public :: INSITU_ORDER_VTK = 0, INSITU_ORDER_LEXICOGRAPHIC = 1, INSITU_ORDER_DMPLEX = 2
 
     integer(c_int), parameter :: float32 = 1, float64 = 2, integer32 = 3, integer64 = 4, bytes = 5
@@ -75,6 +75,7 @@ module insitu
         type(c_array) :: values
         integer(c_int) :: changed
         type(c_array) :: index
+        integer(c_int64_t) :: corner_row
     end type c_field
 
     ! What the last step did, on this rank: as insitu_report in insitu.h.
@@ -94,7 +95,8 @@ module insitu
     ! Of a mesh that was handed over: how long the index of a field must be.
     type :: mesh_size
         character(:), allocatable :: name
-        integer(c_int64_t) :: vertices = 0, cells = 0
+        integer(c_int64_t) :: vertices = 0, cells = 0, corners = 0
+        integer :: cell_size = 0 ! vertices of a cell; 0: cells have offsets
     end type mesh_size
 
     ! A session. create, step and destroy are collective, the others local. status: INSITU_OK, or what error() explains.
@@ -482,7 +484,9 @@ contains
         self%own_error = find_length(mesh%cell_count, mesh%vertex_count, connectivity%rows, corners, given(1:5))
         if (len(self%own_error) > 0) return
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
-        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count))
+        if (present(offsets) .or. present(cell_types)) corners = 0
+        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count, &
+            merge(mesh%cell_count * corners, mesh%connectivity_count, corners > 0), corners))
     end subroutine set_mesh
 
     ! This rank's part of a mesh of finite volumes: faces' vertices, and where each begins; of each face the cell that owns
@@ -531,7 +535,7 @@ contains
         if (present(ghosts)) mesh%ghosts = as_c(ghosts, nothing)
         if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
-        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count))
+        call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
     end subroutine set_mesh_of_faces
 
     ! As find_length(). given: face_offsets, owner, neighbour, ghosts, vertex_ids.
@@ -595,18 +599,24 @@ contains
         sizes = [sizes, new]
     end subroutine note_size
 
-    ! Has the index of a field an entry for each vertex, or cell, of the mesh? What C refuses anyway is well.
-    logical function is_as_long(sizes, mesh, centring, length)
+    ! Has the index of a field an entry for each vertex, cell or corner of the mesh? What C refuses anyway is well.
+    logical function is_as_long(sizes, mesh, centring, row, length)
         type(mesh_size), allocatable, intent(in) :: sizes(:)
         character(*), intent(in) :: mesh
         integer(c_int), intent(in) :: centring
-        integer(c_int64_t), intent(in) :: length
+        integer(c_int64_t), intent(in) :: row, length
         integer :: i
         is_as_long = .true.
         if (.not. allocated(sizes)) return
         do i = 1, size(sizes)
-            if (sizes(i)%name == trim(mesh)) &
-                is_as_long = length == merge(sizes(i)%cells, sizes(i)%vertices, centring == INSITU_CELL)
+            if (sizes(i)%name /= trim(mesh)) cycle
+            select case (centring)
+            case (INSITU_VERTEX); is_as_long = length == sizes(i)%vertices
+            case (INSITU_CELL); is_as_long = length == sizes(i)%cells
+            case default
+                is_as_long = length == sizes(i)%corners
+                if (row > 0) is_as_long = length >= (sizes(i)%cells - 1) * row + sizes(i)%cell_size
+            end select
         end do
     end function is_as_long
 
@@ -619,15 +629,17 @@ contains
         status = c_set_mesh(self%handle, as_c_text(name), c_null_ptr)
     end subroutine remove_mesh
 
-    ! This rank's part of a field: a list, or (components, tuples). index: which tuple each vertex or cell has, from 1, or
-    ! from the mesh's index_base.
-    subroutine set_field(self, mesh, name, values, status, centring, changed, index)
+    ! This rank's part of a field: a list, or (components, tuples). index: which tuple each vertex, cell or corner has, from
+    ! 1, or from the mesh's index_base; of corners a list, or (corners, cells), also some first rows of a matrix. corner_row:
+    ! of corners, tuples (or entries of a list index) from the first of a cell to that of the next.
+    subroutine set_field(self, mesh, name, values, status, centring, changed, index, corner_row)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
         type(insitu_array), intent(in) :: values
         integer, intent(out) :: status
-        integer, intent(in), optional :: centring, changed
+        integer, intent(in), optional :: centring, changed, corner_row
         type(insitu_array), intent(in), optional :: index
+        integer(c_int64_t) :: entries
         character(kind=c_char), target :: c_name(len_trim(name) + 1)
         type(c_field) :: field
         real(real64), target :: nothing
@@ -637,6 +649,7 @@ contains
         field%name = c_loc(c_name)
         if (present(centring)) field%centring = centring
         if (present(changed)) field%changed = changed
+        if (present(corner_row)) field%corner_row = corner_row
         field%count = values%columns
         field%component_count = int(values%rows, c_int)
         field%component_stride = values%row_stride
@@ -645,10 +658,15 @@ contains
         self%own_error = ''
         if (present(index)) then
             field%index = as_c(index, nothing)
-            if (index%rows > 1) then
+            if (field%centring == INSITU_CORNER .and. .not. present(corner_row)) field%corner_row = row_of(index)
+            entries = index%rows * index%columns &
+                + max(0_c_int64_t, field%corner_row - index%rows) * merge(index%columns - 1, 0_c_int64_t, index%rows > 1)
+            if (index%rows > 1 .and. field%centring /= INSITU_CORNER) then
                 self%own_error = 'index is a list, and a matrix is given'
-            else if (.not. is_as_long(self%sizes, mesh, field%centring, index%columns)) then
-                self%own_error = 'index has not as many entries as the mesh has vertices, or cells'
+            else if (field%corner_row == 0 .and. .not. is_list(index)) then
+                self%own_error = 'index has gaps between its columns'
+            else if (.not. is_as_long(self%sizes, mesh, field%centring, field%corner_row, entries)) then
+                self%own_error = 'index has not as many entries as the mesh has vertices, cells or corners'
             end if
             status = INSITU_ERROR_ARGUMENT
             if (len(self%own_error) > 0) return

@@ -20,7 +20,7 @@ from mpi4py import MPI
 TET, HEX, WEDGE, PYRAMID, POLYHEDRON = 10, 12, 13, 14, 42
 TRIANGLE, POLYGON, QUAD = 5, 7, 9
 CHANGED_NOTHING, CHANGED_TOPOLOGY, CHANGED_GEOMETRY, CHANGED_VALUES, CHANGED_ALL = 0, 1, 2, 4, 7
-VERTEX, CELL = 0, 1
+VERTEX, CELL, CORNER = 0, 1, 2
 ORDER_VTK, ORDER_LEXICOGRAPHIC, ORDER_DMPLEX = 0, 1, 2
 
 _TYPES = {"float32": 1, "float64": 2, "int32": 3, "int64": 4, "uint8": 5, "bool": 5}
@@ -79,6 +79,7 @@ class _Field(ctypes.Structure):
         ("values", _Array),
         ("changed", ctypes.c_uint),
         ("index", _Array),
+        ("corner_row", ctypes.c_int64),
     ]
 
 
@@ -245,7 +246,7 @@ class Session:
         if scene is not None and scene_text is not None:
             raise TypeError("scene, scene_text: both are given, expected one of them")
         self._session = ctypes.c_void_p()
-        self._counts = {}  # mesh: its vertices and cells
+        self._counts = {}  # mesh: its vertices, cells and corners, and the vertices of a cell
         self._held = {}  # mesh: {None: what the mesh borrows, field: what that borrows}
         self._retired = []  # borrowed before it was set again: until a step has returned
         create = _library.insitu_create if scene_text is None else _library.insitu_create_from_text
@@ -289,16 +290,19 @@ class Session:
         mesh.cell_count = self._cell_count(counts, cells) if cell_count is None else cell_count
         self._expect_counts(mesh, counts)
         self._hand_over(_library.insitu_set_mesh, name, mesh, None, held)
-        self._counts[name] = mesh.vertex_count, mesh.cell_count
+        size = _CORNERS.get(mesh.cell_type, 0) if cell_types is None and offsets is None else 0
+        corners = mesh.cell_count * size if size else mesh.connectivity_count
+        self._counts[name] = mesh.vertex_count, mesh.cell_count, corners, size
 
     def remove_mesh(self, name):
         """Take this rank's part of a mesh away, and its fields. Local."""
         _check(_library.insitu_set_mesh(self._open(), name.encode(), None), self._session, False)
         self._retired.append(self._held.pop(name, None))
 
-    def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, changed=CHANGED_ALL):
+    def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, changed=CHANGED_ALL):
         """Hand over this rank's part of a field: values of n tuples, or n x components. index: which of the tuples each
-        vertex or cell has, from the mesh's index_base on. Local."""
+        vertex, cell or corner has, from the mesh's index_base on; of corners the first columns of a table will do:
+        dofs[:, :8]. corner_row: of corners, values (or entries of index) from one cell's first to the next one's. Local."""
         array = _view("values", values, (1, 2))
         field = _Field()
         _library.insitu_field_defaults(ctypes.byref(field))
@@ -311,11 +315,9 @@ class Session:
         if array.shape[0] < 2:
             field.values.stride_bytes = 0
         held = [array]
+        field.corner_row = corner_row
         if index is not None:
-            field.index, size, array = _list("index", index)
-            expected = self._counts.get(mesh, (size, size))[centring == CELL]
-            if size != expected:
-                raise ValueError(f"index: has {size} elements, expected {expected}")
+            field.index, size, field.corner_row, array = self._index(mesh, index, centring, corner_row)
             held.append(array)
         self._hand_over(_library.insitu_set_field, mesh, field, name, held)
 
@@ -375,6 +377,27 @@ class Session:
         _check(call(self._open(), mesh.encode(), ctypes.byref(description)), self._session, False)
         self._retired.append(before)
         fields[key] = arrays
+
+    def _index(self, mesh, given, centring, row):
+        """The index of a field, its length, and its row where it is of corners and has gaps."""
+        counts = self._counts.get(mesh)
+        if centring != CORNER or counts is None:
+            borrowed, size, array = _list("index", given)
+            expected = size if counts is None else counts[centring == CELL]
+        elif numpy.ndim(given) == 2:
+            array, expected = _view("index", given, (2,)), counts[2]
+            if counts[3] and array.shape[1] != counts[3]:
+                raise ValueError(f"index: has {array.shape[1]} columns, expected {counts[3]}, a cell's vertices")
+            row = _row(array)
+            borrowed, size = (_strided("index", array, array.strides[1]), array.size) if row else _rows("index", given)[:2]
+        else:
+            borrowed, size, array = _list("index", given)
+            expected = counts[2]
+            if row and counts[1] and size >= (counts[1] - 1) * row + counts[3]:
+                expected = size
+        if size != expected:
+            raise ValueError(f"index: has {size} elements, expected {expected}")
+        return borrowed, size, row, array
 
     @staticmethod
     def _cell_count(counts, cells):

@@ -19,6 +19,7 @@
 #include "session_smooth.h"
 #include "session_summary.h"
 #include "session_surfaces.h"
+#include "session_torn.h"
 #include "session_vertex_order.h"
 
 static double milliseconds_since(double start)
@@ -87,6 +88,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         status = session_update_catalogue(&s->catalogue, &s->meshes, team, changes->are_names_shared, error);
     if ((changes->of_cells || changes->of_names) && !status)
         status = session_check_vertex_order(&s->meshes, &s->catalogue, team->comm, &s->report, error);
+    if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = session_make_plan(&basis, &s->meshes, team, &s->report, &plan, error);
     if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);

@@ -2,6 +2,7 @@
 #include "session_summary.h"
 
 #include "render.h"
+#include "session_mesh_input.h"
 #include "session_scalars.h"
 
 static int64_t array_bytes(const insitu_array *array, int64_t count)
@@ -33,22 +34,20 @@ static bool is_field_in_use(const session_mesh *mesh, int field)
     return false;
 }
 
-static int64_t index_entries(const session_mesh *mesh, const insitu_field *field)
-{
-    return field->centring == INSITU_VERTEX ? mesh->given.vertex_count : mesh->given.cell_count;
-}
-
 static void report_field(session_report *out, const session_mesh *mesh, int index)
 {
     const insitu_field *field = &mesh->fields[index].given;
     const int64_t copied = mesh->fields[index].copy_bytes;
     out->numbers.bytes_copied += copied;
     if (copied)
-        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" by its index: %lld bytes", mesh->name,
-                         field->name, (long long)copied);
+        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" %s: %lld bytes", mesh->name, field->name,
+                         field->index.data   ? "by its index"
+                         : field->corner_row ? "in rows of corners"
+                                             : "at the corners of a torn mesh",
+                         (long long)copied);
     if (is_field_in_use(mesh, index))
         out->numbers.bytes_borrowed += array_bytes(&field->values, field->count) * field->component_count +
-                                       array_bytes(&field->index, index_entries(mesh, field));
+                                       array_bytes(&field->index, session_field_places(&mesh->given, field));
     else if (out->numbers.images)
         session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", mesh->name, field->name);
 }
@@ -58,10 +57,11 @@ static void report_scalar(session_report *out, const session_mesh *mesh, const s
     const char *name = session_scalar_name(mesh, scalar);
     if (scalar->pairs) out->numbers.bytes_trees += mesh->tree.node_count * 2 * (int64_t)sizeof(float);
     if (scalar->vertex_values) {
-        const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof(double);
+        const int64_t bytes = session_vertex_count(mesh) * (int64_t)sizeof(double);
+        const bool is_of_cells = mesh->fields[scalar->field].given.centring == INSITU_CELL;
         out->numbers.bytes_copied += bytes;
-        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" recentred from cells to vertices: %lld bytes",
-                         mesh->name, name, (long long)bytes);
+        session_text_add(&out->copied_why, "mesh \"%s\": field \"%s\" recentred from %s to vertices: %lld bytes",
+                         mesh->name, name, is_of_cells ? "cells" : "corners", (long long)bytes);
     }
     if (scalar->gradients) {
         const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof *scalar->gradient_entries +
@@ -71,7 +71,7 @@ static void report_scalar(session_report *out, const session_mesh *mesh, const s
                          name, (long long)bytes);
     }
     if (scalar->distances) {
-        const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof(float);
+        const int64_t bytes = session_vertex_count(mesh) * (int64_t)sizeof(float);
         out->numbers.bytes_copied += bytes;
         session_text_add(&out->copied_why, "mesh \"%s\": distances of vertices from a slice: %lld bytes", mesh->name,
                          (long long)bytes);
@@ -116,6 +116,11 @@ static void report_topology(session_report *out, const session_mesh *mesh)
     if (face_bytes)
         session_text_add(&out->copied_why, "mesh \"%s\": its faces' vertices, out of lists: %lld bytes", mesh->name,
                          face_bytes);
+    if (!mesh->torn.bytes) return;
+    out->numbers.bytes_copied += mesh->torn.bytes;
+    session_text_add(&out->copied_why,
+                     "mesh \"%s\": vertices of each cell's own, for fields with values at corners: %lld bytes",
+                     mesh->name, (long long)mesh->torn.bytes);
 }
 
 static void report_mesh(session_report *out, const session_mesh *mesh)

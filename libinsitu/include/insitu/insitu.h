@@ -161,27 +161,45 @@ typedef struct insitu_mesh {
                                  one cell after the other. */
 } insitu_mesh;
 
-/* Whether a field has one value a vertex or one a cell. Of cells, volumes and colours show each value as it is, unless
- * the scene says `interpolate: vertex`; then, and for isosurfaces, a vertex gets the mean of its cells on all ranks,
- * ghosts left out: on the boundary that of the cells within. */
-typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1 } insitu_centring;
+/* Whether a field has one value a vertex, one a cell, or one at each corner of each cell. Of cells, volumes and colours
+ * show each value as it is, unless the scene says `interpolate: vertex`; then, and for isosurfaces, a vertex gets the
+ * mean of its cells on all ranks, ghosts left out: on the boundary that of the cells within.
+ *
+ * Corners are for fields that differ from cell to cell at the vertex they share, as those of discontinuous Galerkin
+ * methods: there is one for each entry of connectivity that is a vertex of a cell, in the order of the caller's
+ * connectivity (see corner_row). They are drawn torn: each cell shows its own values, so that an isosurface may have a
+ * step between two cells. Where the scene says `interpolate: vertex`, each vertex gets the mean of its corners on all
+ * ranks, ghosts left out. Polyhedra, whose connectivity has faces, have no corners: a mesh with any is an error.
+ *
+ * A mesh is torn as long as the scene names a corner field of it, for all that is drawn of it: each corner is a vertex of
+ * its own then. In bytes_copied: coordinates, 12 or 24 bytes a corner, and 4 bytes a corner of indices (8 where there
+ * are more than 2^31); fields at vertices that are drawn, a tuple a corner. Values at corners are read where they
+ * are. */
+typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER = 2 } insitu_centring;
 
 /* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
 typedef struct insitu_field {
     const char *name;               /* copied; the name by which scenes ask for it */
     insitu_centring centring;       /* vertex by default */
-    int64_t count;                  /* tuples: the mesh's vertex_count or cell_count; any number where index is given */
+    int64_t count;                  /* tuples: the mesh's vertex_count or cell_count, or the number of its cells'
+                                       corners; any number where index is given */
     int component_count;            /* >= 1; 1 by default. The scene picks one, or the magnitude. */
     int64_t component_stride_bytes; /* from one component to the next; 0: packed, interleaved */
     insitu_array values;            /* float32, float64, int32 or int64. stride_bytes is from tuple to tuple; 0:
                                        component_count elements */
     unsigned changed;               /* INSITU_CHANGED_VALUES or NOTHING; ALL by default */
-    /* Optional, int32 or int64, vertex_count or cell_count: which tuple of values each vertex or cell has, from the
-     * mesh's index_base on, as in vectors of degrees of freedom and arrays with halos. Fields that the scene asks for
-     * are copied in the order of the vertices or cells when a step first needs them, and again when their values
-     * changed: one tuple each, in bytes_copied. Entries of index out of range are told then. Where there are no
-     * vertices or cells its data may be NULL; its type tells that it is given. */
+    /* Optional, int32 or int64, vertex_count, cell_count or the number of corners: which tuple of values each vertex,
+     * cell or corner has, from the mesh's index_base on, as in vectors of degrees of freedom and arrays with halos.
+     * Fields that the scene asks for are copied in the order of the vertices, cells or corners when a step first needs
+     * them, and again when their values changed: one tuple each, in bytes_copied. Entries of index out of range are
+     * told then. Where there are no vertices, cells or corners its data may be NULL; its type tells that it is given. */
     insitu_array index;
+    /* Of corners, where cells are of one type without offsets: tuples of values, or entries of index where that is
+     * given, from the first corner of a cell to that of the next, at least as many as its vertices; further ones, those
+     * of degrees of freedom within edges, faces and cells, are passed over. Values in such rows are copied, as by index.
+     * 0: one cell after the other, as many as a cell has vertices. Cells with offsets have their corners where
+     * connectivity has its entries: connectivity_count of them, and 0 here. */
+    int64_t corner_row;
 } insitu_field;
 
 /* What the last step did, on this rank unless said otherwise. Times are wall-clock milliseconds. */

@@ -1,8 +1,8 @@
 /* Which meshes and fields there are over all ranks. With it every rank finds out alone, and all find out the same,
  * whether a picture can be drawn: a missing field is then nobody's surprise in the middle of a collective call.
  *
- * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <is cell-centred>
- * <name>" is a field of it. Ranks whose tables are alike (the usual case, found by hashes in the step's one
+ * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <centring> <name>"
+ * is a field of it. Ranks whose tables are alike (the usual case, found by hashes in the step's one
  * reduction) exchange nothing; else the texts are gathered by all. */
 #include "session_catalogue.h"
 
@@ -35,8 +35,7 @@ static size_t write_table(const session_meshes *meshes, char *text, size_t capac
                          mesh->name);
         for (int f = 0; f < mesh->field_count; f++) {
             const insitu_field *field = &mesh->fields[f].given;
-            at = append_line(text, capacity, at, 'f', field->component_count, field->centring == INSITU_CELL,
-                             field->name);
+            at = append_line(text, capacity, at, 'f', field->component_count, (int)field->centring, field->name);
         }
     }
     return at;
@@ -105,7 +104,7 @@ static session_catalogue_field *add_field(session_catalogue_mesh *mesh, const ch
     return field;
 }
 
-static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int components, bool is_cell_centred,
+static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, int components, insitu_centring centring,
                        const char *name)
 {
     session_catalogue_field *field = add_field(mesh, name);
@@ -113,9 +112,8 @@ static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, i
     if (field->first_rank < 0) {
         field->first_rank = rank;
         field->component_count = components;
-        field->is_cell_centred = is_cell_centred;
-    } else if (field->odd_rank < 0 &&
-               (field->component_count != components || field->is_cell_centred != is_cell_centred)) {
+        field->centring = centring;
+    } else if (field->odd_rank < 0 && (field->component_count != components || field->centring != centring)) {
         field->odd_rank = rank;
     }
     if (has_cells) field->last_rank = rank;
@@ -149,7 +147,7 @@ static bool take_table(session_catalogue *catalogue, const char *text, size_t si
             if (!mesh) return false;
             has_cells = a != 0;
             has_ids = b != 0;
-        } else if (!take_field(mesh, has_cells, rank, (int)a, b != 0, name)) {
+        } else if (!take_field(mesh, has_cells, rank, (int)a, (insitu_centring)b, name)) {
             return false;
         }
     }

@@ -9,7 +9,7 @@
 typedef struct session_catalogue_field {
     char *name;
     int component_count;
-    bool is_cell_centred;
+    insitu_centring centring;
     int first_rank;   /* that has it */
     int last_rank;    /* that has it together with cells; -1: none */
     int odd_rank;     /* -1, or one that has it with another centring or count of components */

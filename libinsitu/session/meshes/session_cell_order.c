@@ -92,19 +92,23 @@ static void turn_cell(const session_mesh *mesh, int64_t cell, int64_t entries, c
     for (int i = 0; i < count; i++) session_put_index(out, first + i, vertices[i]);
 }
 
+void session_turn_cells(const session_mesh *mesh, int64_t entries, int threads, const grid_array *out)
+{
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int64_t cell = 0; cell < mesh->cells.cell_count; cell++) turn_cell(mesh, cell, entries, out);
+}
+
 insitu_status session_order_cells(session_mesh *mesh, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;
     const cell_rows rows = rows_of(mesh);
-    const int64_t count = mesh->cells.cell_count;
     if (mesh->cells.cell_types && !has_turned_cells(mesh)) return INSITU_OK;
     const int64_t largest = fit_narrow(&rows, threads) ? 0 : INT64_MAX;
     if (!session_make_indices(mesh, "cells' vertices in VTK's order", rows.count, largest, &t->connectivity, error))
         return error->status;
 #pragma omp parallel for num_threads(threads) schedule(static)
     for (int64_t i = 0; i < rows.count; i++) session_put_index(&t->connectivity, i, entry_of(&rows, i));
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t cell = 0; cell < count; cell++) turn_cell(mesh, cell, rows.count, &t->connectivity);
+    session_turn_cells(mesh, rows.count, threads, &t->connectivity);
     t->has_own_order = true;
     t->connectivity_count = rows.count;
     t->cell_bytes = (rows.count + 1) * t->connectivity.stride;

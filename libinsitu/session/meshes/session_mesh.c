@@ -58,6 +58,13 @@ void session_drop_topology(session_topology *topology)
     *topology = (session_topology){0};
 }
 
+void session_drop_torn(session_torn *torn)
+{
+    free_array(&torn->corners);
+    for (int axis = 0; axis < 3; axis++) free_array(&torn->coordinates[axis]);
+    *torn = (session_torn){0};
+}
+
 void session_drop_copy(session_field *field)
 {
     base_free(field->copy);
@@ -150,6 +157,7 @@ void session_drop_contents(session_mesh *mesh)
     session_drop_tree(mesh);
     session_drop_fields(mesh);
     session_drop_topology(&mesh->topology);
+    session_drop_torn(&mesh->torn);
     base_free(mesh->flat);
     mesh->flat = NULL;
 }

@@ -12,7 +12,7 @@ typedef struct session_field {
     grid_array values;
     int64_t component_stride;
     base_error problem; /* of the last insitu_set_field() */
-    bool has_index;     /* the values are read out of a declared copy, in the order of the vertices or cells */
+    bool has_index;
     bool is_copy_stale; /* it is of other values, or by another index */
     bool is_wanted;     /* by statistics of this step; what images use has scalars */
     char *copy;         /* NULL until made; packed tuples, components interleaved */
@@ -116,11 +116,24 @@ typedef struct session_topology {
     int64_t recognised_count; /* of them: read as tets, hexes, wedges or pyramids */
 } session_topology;
 
+/* Vertices of its own for each corner of each cell, read in place of those that cells share (session_torn.h). A
+ * declared copy. Corners count as the caller's connectivity has them, rows without their rests. */
+typedef struct session_torn {
+    bool is_torn; /* else all is empty */
+    bool is_made; /* of the coordinates of now */
+    int64_t corner_count;
+    grid_array shared;  /* the connectivity that is torn */
+    grid_array corners; /* of each entry of it: which corner that is. Its own inverse. */
+    grid_array coordinates[3];
+    int64_t bytes;
+} session_torn;
+
 /* One rank's part of a mesh. */
 typedef struct session_mesh {
     char *name;
     insitu_mesh given;
     session_topology topology;
+    session_torn torn;
     grid cells;
     bool is_given;      /* false after an insitu_set_mesh() that failed: problem says why */
     base_error problem; /* of the last insitu_set_mesh() */
@@ -184,6 +197,7 @@ void session_drop_scalars(session_mesh *mesh);
 void session_drop_gradients(session_scalar *scalar);
 void session_drop_tree(session_mesh *mesh);
 void session_drop_topology(session_topology *topology);
+void session_drop_torn(session_torn *torn);
 void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */
@@ -198,6 +212,12 @@ int session_part_slots(const session_meshes *meshes);
 /* whole: set to the mesh whose outer faces they are, NULL where it is a mesh itself. */
 session_mesh *session_part_of(const session_meshes *meshes, int slot, session_mesh **whole, session_outer **outer);
 session_mesh *session_part(const session_meshes *meshes, int slot);
+
+/* Of the vertices that scalars have values of. */
+static inline int64_t session_vertex_count(const session_mesh *mesh)
+{
+    return mesh->torn.is_torn ? mesh->torn.corner_count : mesh->cells.vertex_count;
+}
 
 /* The first error that a set call left behind, or NULL. */
 const base_error *session_pending_error(const session_meshes *meshes);

@@ -316,12 +316,14 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
         session_drop_scalars(mesh);
         session_drop_tree(mesh);
         session_drop_topology(&mesh->topology);
+        session_drop_torn(&mesh->torn);
         mesh->rent = 0;
         mesh->is_topology_stale = true;
     }
     if (!mesh->given.vertex_ids.data != !given->vertex_ids.data) meshes->are_names_changed = true;
     if (changed & (INSITU_CHANGED_TOPOLOGY | INSITU_CHANGED_GEOMETRY)) {
         mesh->is_check_stale = true;
+        mesh->torn.is_made = false;
         session_drop_outers(mesh, (changed & INSITU_CHANGED_TOPOLOGY) != 0);
         mesh->is_geometry_stale = true;
         meshes->are_cells_changed = true;
@@ -396,25 +398,41 @@ static session_field *add_field(session_mesh *mesh, const char *name, base_error
     return field;
 }
 
-/* Vertices or cells of the mesh. */
-static int64_t count_places(const session_mesh *mesh, const insitu_field *field)
+/* Entries of connectivity that are vertices of cells. */
+int64_t session_corner_count(const insitu_mesh *mesh)
 {
-    return field->centring == INSITU_VERTEX ? mesh->given.vertex_count : mesh->given.cell_count;
+    if (mesh->cell_count == 0) return 0;
+    if (mesh->offsets.data) return mesh->connectivity_count;
+    return mesh->cell_count * grid_type_vertices((int)mesh->cell_type);
+}
+
+/* Vertices, cells or corners of the mesh; of corners in rows: from the first to the last. */
+int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
+{
+    if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
+    if (field->centring == INSITU_CELL) return mesh->cell_count;
+    if (field->corner_row == 0 || mesh->cell_count == 0) return session_corner_count(mesh);
+    return (mesh->cell_count - 1) * field->corner_row + grid_type_vertices((int)mesh->cell_type);
+}
+
+static const char *place_words(insitu_centring centring)
+{
+    return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
 }
 
 /* An array without elements may have no address: then its type tells. */
 static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
 {
-    return field->index.data || (field->index.type && count_places(mesh, field) == 0);
+    return field->index.data || (field->index.type && session_field_places(&mesh->given, field) == 0);
 }
 
 static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    const int64_t places = count_places(mesh, field);
-    const bool has_index = is_by_index(mesh, field);
-    if (field->count < 0 || (!has_index && field->count != places))
-        return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s", (long long)field->count,
-                         (long long)places, field->centring == INSITU_VERTEX ? "vertices" : "cells");
+    const int64_t places = session_field_places(&mesh->given, field);
+    const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
+    if (field->count < 0 || (!has_index && (has_rows ? field->count < places : field->count != places)))
+        return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
+                         (long long)places, place_words(field->centring), has_rows ? ", rows' rests counted" : "");
     const array_rule values = {"values", has_index && !places ? 0 : field->count, ALLOW_FLOATS | ALLOW_INTEGERS, false};
     const array_rule index = {"entries of index", places, ALLOW_INTEGERS, true};
     insitu_status status = check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
@@ -422,15 +440,39 @@ static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_f
     return status;
 }
 
+/* Mixed cells are looked at when they are torn. */
+static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
+{
+    const long long row = field->corner_row, vertices = grid_type_vertices((int)mesh->cell_type);
+    if (field->centring != INSITU_CORNER) {
+        if (row == 0) return INSITU_OK;
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "corner_row is %lld, and its centring %d is not corners (%d)",
+                         row, (int)field->centring, (int)INSITU_CORNER);
+    }
+    if (mesh->cell_count == 0) return INSITU_OK;
+    if (mesh->owner.data || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "has values at corners, and the mesh has polyhedra, whose corners have no order");
+    if (row == 0) return INSITU_OK;
+    if (mesh->offsets.data)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "corner_row is %lld and the mesh has offsets: rows are of cells of one type without offsets",
+                         row);
+    if (row < vertices || row > INT64_MAX / 32 / mesh->cell_count)
+        return base_fail(error, INSITU_ERROR_FIELD, "corner_row is %lld, a cell has %lld vertices", row, vertices);
+    return INSITU_OK;
+}
+
 static insitu_status check_field(const session_mesh *mesh, const insitu_field *field, base_error *error)
 {
-    if (field->centring != INSITU_VERTEX && field->centring != INSITU_CELL)
+    if (field->centring != INSITU_VERTEX && field->centring != INSITU_CELL && field->centring != INSITU_CORNER)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "unknown centring %d", (int)field->centring);
     if (field->component_count < 1)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "component_count is %d", field->component_count);
     if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
         return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
-    const insitu_status status = check_field_arrays(mesh, field, error);
+    insitu_status status = check_corners(&mesh->given, field, error);
+    if (!status) status = check_field_arrays(mesh, field, error);
     if (status) return status;
     const int64_t size = session_type_size(field->values.type);
     if (field->values.data && field->component_stride_bytes % size != 0)
@@ -453,7 +495,7 @@ static void spoil_scalars(session_mesh *mesh, int field)
 static bool is_same_place(const insitu_field *a, const insitu_field *b)
 {
     return is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
-           is_same_array(&a->index, &b->index) && a->count == b->count;
+           is_same_array(&a->index, &b->index) && a->count == b->count && a->corner_row == b->corner_row;
 }
 
 static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given)
@@ -469,8 +511,11 @@ static void take_field(session_meshes *meshes, session_mesh *mesh, int index, co
     } else if (is_stale) {
         spoil_scalars(mesh, index);
     }
-    field->has_index = is_by_index(mesh, given);
-    if (is_other || !field->has_index || field->given.values.type != given->values.type) session_drop_copy(field);
+    const bool has_index = is_by_index(mesh, given);
+    if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
+        field->given.values.type != given->values.type)
+        session_drop_copy(field);
+    field->has_index = has_index;
     field->is_copy_stale = field->is_copy_stale || is_stale;
     const char *name = field->given.name;
     field->given = *given;

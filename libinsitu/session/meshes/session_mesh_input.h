@@ -8,4 +8,9 @@
 insitu_status session_set_mesh(session_meshes *meshes, const char *name, const insitu_mesh *given, base_error *error);
 insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error);
 
+/* How many entries of connectivity are vertices of cells; of cells that are no polyhedra. */
+int64_t session_corner_count(const insitu_mesh *mesh);
+/* How many values the field has without an index, and entries of it with one; of corners in rows: at least. */
+int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field);
+
 #endif

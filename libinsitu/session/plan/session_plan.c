@@ -188,11 +188,11 @@ static bool add_recentring(session_plan *plan, session_recentring item)
 
 static bool add_recentrings(const session_catalogue *catalogue, session_plan *plan, const scene_field *field)
 {
-    if (!field->at_vertices) return true;
     for (int m = 0; m < catalogue->mesh_count; m++) {
         const session_catalogue_mesh *mesh = &catalogue->meshes[m];
         const session_catalogue_field *shown = find_shown(mesh, field);
-        if (!shown || !shown->is_cell_centred) continue;
+        const bool is_wished = shown && session_is_recentred(field, shown->centring);
+        if (!is_wished) continue;
         const session_recentring item = {mesh, shown->name, session_resolve_component(field, shown->component_count)};
         if (!add_recentring(plan, item)) return false;
     }

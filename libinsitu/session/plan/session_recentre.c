@@ -1,4 +1,5 @@
-/* Recentring: the value at a vertex is the mean over its cells on all ranks, and bitwise the same for any partition.
+/* Recentring: the value at a vertex is the mean over its cells (or, of values at corners, over the corners there) on
+ * all ranks, and bitwise the same for any partition.
  *
  * Sums depend on their order, so partial sums of ranks would not do: every rank's single values come together, are
  * sorted, and summed in that order. Vertices are one where their keys are (global ids where all ranks give them, else
@@ -112,28 +113,28 @@ static void group_vertices(const session_mesh *mesh, bool by_id, vertex_groups *
     }
 }
 
-/* Does the cell give its vertices a value? */
-static bool cell_gives(const grid *g, const grid_field *field, int64_t cell, double *value)
+/* The value that the cell, or its corner that is this vertex, gives to the vertex; false where it gives none. */
+static bool gives(const grid_field *field, int64_t cell, int64_t vertex, double *value)
 {
-    if (grid_is_ghost(g, cell)) return false;
-    *value = grid_field_value(field, cell);
+    *value = grid_field_value(field, field->is_cell_centred ? cell : vertex);
     return isfinite(*value);
 }
 
-/* Each cell's value to the groups of its vertices, once to each: last has the last cell that gave to a group. The first
- * pass counts, the second stores. */
+/* Each cell's value to the groups of its vertices, once to each: last has the last cell that gave to a group; of values
+ * at corners each one's. The first pass counts, the second stores. */
 static void give_values(const grid *g, const grid_field *field, vertex_groups *groups, int64_t *last, bool is_stored)
 {
     value_groups *values = &groups->values;
     double value = 0;
     for (int64_t i = 0; i < groups->keys.count; i++) last[i] = -1;
     for (int64_t cell = 0; cell < g->cell_count; cell++) {
-        if (!cell_gives(g, field, cell, &value)) continue;
+        if (grid_is_ghost(g, cell)) continue;
         grid_walk walk = grid_walk_cell(g, cell);
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
             const int64_t group = groups->of_vertex[vertex];
-            if (last[group] == cell) continue;
+            if (field->is_cell_centred && last[group] == cell) continue;
+            if (!gives(field, cell, vertex, &value)) continue;
             last[group] = cell;
             if (is_stored)
                 values->values[values->starts[group]++] = value;
@@ -167,7 +168,7 @@ static void vertex_groups_free(vertex_groups *groups)
 static insitu_status make_groups(const session_mesh *mesh, const grid_field *field, bool by_id, int threads,
                                  vertex_groups *groups, base_error *error)
 {
-    const int64_t count = mesh ? mesh->given.vertex_count : 0;
+    const int64_t count = mesh ? mesh->cells.vertex_count : 0;
     groups->of_vertex = base_alloc((size_t)count * sizeof *groups->of_vertex);
     groups->vertex = base_alloc((size_t)count * sizeof *groups->vertex);
     bool is_made = groups->of_vertex && groups->vertex && session_keys_create(&groups->keys, count);
@@ -358,11 +359,15 @@ static session_scalar *scalar_of(const session_mesh *mesh, const session_recentr
     return NULL;
 }
 
-static void spread_means(const vertex_groups *groups, int64_t count, double *values, int threads)
+/* A corner whose own value is not finite keeps its cell from being drawn, as it would without means; a cell's own value
+ * is looked at elsewhere (grid_field.own). */
+static void spread_means(const vertex_groups *groups, const grid_field *own, int64_t count, double *values, int threads)
 {
 #pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t v = 0; v < count; v++)
-        values[v] = groups->of_vertex[v] < 0 ? NAN : groups->values.means[groups->of_vertex[v]];
+    for (int64_t v = 0; v < count; v++) {
+        const bool is_lost = groups->of_vertex[v] < 0 || (!own->is_cell_centred && !isfinite(grid_field_value(own, v)));
+        values[v] = is_lost ? NAN : groups->values.means[groups->of_vertex[v]];
+    }
 }
 
 static insitu_status recentre(const session_recentring *item, const session_meshes *meshes, const session_team *team,
@@ -373,13 +378,13 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     if (!scalar) mesh = NULL;
     const bool by_id = item->mesh->has_ids;
     vertex_groups groups = {0};
+    grid_field field = {0};
     if (scalar) {
         if (!scalar->vertex_values)
-            scalar->vertex_values = base_alloc((size_t)mesh->given.vertex_count * sizeof(double));
+            scalar->vertex_values = base_alloc((size_t)mesh->cells.vertex_count * sizeof(double));
         if (!scalar->vertex_values)
-            session_no_memory(error, mesh->given.vertex_count * (int64_t)sizeof(double), "recentred values");
-        grid_field field =
-            session_scalar_field(mesh, &(session_scalar){.field = scalar->field, .component = scalar->component});
+            session_no_memory(error, mesh->cells.vertex_count * (int64_t)sizeof(double), "recentred values");
+        field = session_scalar_field(mesh, &(session_scalar){.field = scalar->field, .component = scalar->component});
         if (scalar->vertex_values) make_groups(mesh, &field, by_id, team->threads, &groups, error);
     } else {
         make_groups(NULL, NULL, by_id, team->threads, &groups, error);
@@ -387,7 +392,7 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     insitu_status status = session_agree(team->comm, error);
     if (!status && team->ranks > 1) status = merge_shared(team, mesh, by_id ? 1e-6 * half_diagonal : 0, &groups, error);
     if (!status && scalar) {
-        spread_means(&groups, mesh->given.vertex_count, scalar->vertex_values, team->threads);
+        spread_means(&groups, &field, mesh->cells.vertex_count, scalar->vertex_values, team->threads);
         scalar->are_values_stale = false;
         scalar->is_suspect = true;
     }

@@ -56,7 +56,7 @@ static uint64_t sum_array(const grid_array *a, int64_t count, int threads)
 
 static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_field *field, int threads)
 {
-    const int64_t count = field->is_cell_centred ? mesh->given.cell_count : mesh->given.vertex_count;
+    const int64_t count = field->is_cell_centred ? mesh->given.cell_count : session_vertex_count(mesh);
     const int first = field->component < 0 ? 0 : field->component;
     const int end = field->component < 0 ? field->component_count : first + 1;
     for (int component = first; component < end && field->values.data; component++) {

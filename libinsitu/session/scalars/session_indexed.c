@@ -1,13 +1,16 @@
-/* Values that are found by an index are copied into the order of the vertices or cells, once for all that reads them: a
- * cell would otherwise go through the index at each of its vertices, in each tree and in each layer, and no kernel that
- * takes many cells at once could be used. */
+/* Values that are found by an index are copied into the order of the vertices, cells or corners, once for all that
+ * reads them; so are those at the vertices of a mesh that is torn, into the order of the corners. A cell would
+ * otherwise go through the index at each of its vertices, in each tree and in each layer, and no kernel that takes many
+ * cells at once could be used. */
 #include "session_indexed.h"
 
 #include <string.h>
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_mesh_input.h"
 #include "session_scalars.h"
+#include "session_torn.h"
 #include "session_topology.h"
 
 void session_want_field(const session_meshes *meshes, const scene_field *field)
@@ -20,8 +23,10 @@ void session_want_field(const session_meshes *meshes, const scene_field *field)
 }
 
 typedef struct indexed_values {
-    grid_array index, values;
-    int64_t count, places; /* tuples, and those that have them */
+    const session_torn *torn; /* where the places are its corners, and values are at vertices */
+    grid_array index, values; /* no index: places have the tuples of their numbers */
+    int64_t row, used;        /* of each row of places so many are read */
+    int64_t count, places;    /* tuples, and those that have them */
     int64_t component_stride;
     int component_count;
 } indexed_values;
@@ -31,19 +36,34 @@ static indexed_values values_of(const session_mesh *mesh, const session_field *f
     const insitu_field *given = &field->given;
     indexed_values out = {.index = session_grid_array(&given->index),
                           .values = field->values,
+                          .row = 1,
+                          .used = 1,
                           .count = given->count,
                           .places =
-                              given->centring == INSITU_VERTEX ? mesh->given.vertex_count : mesh->given.cell_count,
+                              given->centring == INSITU_CELL ? mesh->given.cell_count : session_vertex_count(mesh),
                           .component_stride = field->component_stride,
                           .component_count = given->component_count};
     out.index.base = mesh->given.index_base;
+    if (given->centring == INSITU_VERTEX && mesh->torn.is_torn) out.torn = &mesh->torn;
+    if (given->corner_row) {
+        out.row = given->corner_row;
+        out.used = grid_type_vertices((int)mesh->given.cell_type);
+    }
     return out;
+}
+
+/* Where the caller's arrays have the place: the number of the vertex, the cell, or the corner. */
+static int64_t entry_of(const indexed_values *v, int64_t place)
+{
+    if (v->torn) return session_torn_origin(v->torn, place);
+    return v->row == v->used ? place : place / v->used * v->row + place % v->used;
 }
 
 /* One tuple; false where the index is out of range. */
 static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
 {
-    const int64_t at = grid_array_index(&v->index, place);
+    const int64_t entry = entry_of(v, place);
+    const int64_t at = v->index.data ? grid_array_index(&v->index, entry) : entry;
     if (at < 0 || at >= v->count) return false;
     const size_t size = v->values.is_wide ? 8 : 4;
     const char *from = v->values.data + at * v->values.stride;
@@ -54,6 +74,20 @@ static bool copy_tuple(const indexed_values *v, int64_t place, char *out)
         else
             memcpy(out, from, 4);
     return true;
+}
+
+static insitu_status describe_fault(const session_mesh *mesh, const session_field *field, const indexed_values *v,
+                                    int64_t place, base_error *error)
+{
+    static const char *const words[] = {"vertex", "cell", "corner"};
+    const insitu_centring centring = field->given.centring;
+    const int64_t entry = entry_of(v, place);
+    const long long base = v->index.base, number = centring == INSITU_VERTEX ? entry + base : entry;
+    return base_fail(error, INSITU_ERROR_FIELD,
+                     "mesh \"%s\": field \"%s\": the index of %s %lld is %lld, outside %lld..%lld (index_base is "
+                     "%lld)",
+                     mesh->name, field->given.name, words[centring], number,
+                     (long long)grid_array_index(&v->index, entry) + base, base, v->count - 1 + base, base);
 }
 
 static insitu_status copy_values(const session_mesh *mesh, session_field *field, int threads, base_error *error)
@@ -67,14 +101,7 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
 #pragma omp parallel for num_threads(threads) schedule(static) reduction(min : bad)
     for (int64_t place = 0; place < v.places; place++)
         if (!copy_tuple(&v, place, field->copy) && place < bad) bad = place;
-    const long long base = v.index.base;
-    if (bad < v.places)
-        return base_fail(error, INSITU_ERROR_FIELD,
-                         "mesh \"%s\": field \"%s\": the index of %s %lld is %lld, outside %lld..%lld (index_base is "
-                         "%lld)",
-                         mesh->name, field->given.name, field->given.centring == INSITU_VERTEX ? "vertex" : "cell",
-                         field->given.centring == INSITU_VERTEX ? bad + base : bad,
-                         (long long)grid_array_index(&v.index, bad) + base, base, v.count - 1 + base, base);
+    if (bad < v.places) return describe_fault(mesh, field, &v, bad, error);
     field->is_copy_stale = false;
     return INSITU_OK;
 }
@@ -83,7 +110,7 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];
-    if (!field->has_index || !field->is_copy_stale) return INSITU_OK;
+    if (!session_is_copied(mesh, field) || !field->is_copy_stale) return INSITU_OK;
     const insitu_status status = copy_values(mesh, field, threads, error);
     for (int i = 0; i < mesh->scalar_count && !status; i++)
         if (mesh->scalars[i].field == index)

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "session_agree.h"
+#include "session_torn.h"
 
 session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
 {
@@ -11,7 +12,8 @@ session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by
         const insitu_array *ids = &mesh->given.vertex_ids;
         const int64_t size = session_type_size(ids->type);
         const grid_array a = {ids->data, ids->stride_bytes ? ids->stride_bytes : size, size == 8, true, 0};
-        key.words[0] = (uint64_t)grid_array_index(&a, vertex);
+        key.words[0] =
+            (uint64_t)grid_array_index(&a, mesh->torn.is_made ? session_torn_origin(&mesh->torn, vertex) : vertex);
         return key;
     }
     double position[3];

@@ -37,13 +37,25 @@ static int find_field(const session_mesh *mesh, const scene_field *field)
     return scene_field_is_on(field, mesh->name) ? session_find_field(mesh, field->name) : -1;
 }
 
+bool session_is_recentred(const scene_field *field, insitu_centring centring)
+{
+    return centring == INSITU_CELL ? field->at_vertices : centring == INSITU_CORNER && field->joins_corners;
+}
+
+bool session_is_copied(const session_mesh *mesh, const session_field *field)
+{
+    if (field->has_index) return true;
+    if (field->given.centring == INSITU_VERTEX) return mesh->torn.is_torn;
+    return field->given.corner_row && field->given.corner_row != grid_type_vertices((int)mesh->given.cell_type);
+}
+
 session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field *field)
 {
     const int index = find_field(mesh, field);
     if (index < 0) return NULL;
     const insitu_field *given = &mesh->fields[index].given;
     return find_scalar(mesh, index, session_resolve_component(field, given->component_count),
-                       field->at_vertices && given->centring == INSITU_CELL);
+                       session_is_recentred(field, given->centring));
 }
 
 grid_field session_given_field(const session_mesh *mesh, int index, int component)
@@ -54,7 +66,7 @@ grid_field session_given_field(const session_mesh *mesh, int index, int componen
                       .component_count = field->given.component_count,
                       .component = component,
                       .is_cell_centred = field->given.centring == INSITU_CELL};
-    if (!field->has_index) return out;
+    if (!session_is_copied(mesh, field)) return out;
     out.component_stride = field->values.is_wide ? 8 : 4;
     out.values.data = field->copy;
     out.values.stride = out.component_stride * out.component_count;
@@ -80,7 +92,7 @@ grid_field session_scalar_field(const session_mesh *mesh, const session_scalar *
     return (grid_field){.values = {(const char *)scalar->vertex_values, (int64_t)sizeof(double), true, false},
                         .component_stride = (int64_t)sizeof(double),
                         .component_count = 1,
-                        .own = &scalar->own};
+                        .own = scalar->own.is_cell_centred ? &scalar->own : NULL};
 }
 
 session_scalar *session_add_scalar(session_mesh *mesh)
@@ -105,7 +117,7 @@ bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool want
         if (!scalar) return false;
         scalar->field = index;
         scalar->component = session_resolve_component(field, given->component_count);
-        scalar->is_recentred = field->at_vertices && given->centring == INSITU_CELL;
+        scalar->is_recentred = session_is_recentred(field, given->centring);
     }
     scalar->is_used = true;
     scalar->own = session_given_field(mesh, index, scalar->component);

@@ -9,6 +9,9 @@
 /* Which component a layer means, as grid_field.component. */
 int session_resolve_component(const scene_field *field, int component_count);
 
+/* Is a field of this centring shown by means at vertices? */
+bool session_is_recentred(const scene_field *field, insitu_centring centring);
+
 /* Note that an image of this step uses the layer's field on the mesh; *marked: NULL where the mesh does not have it.
  * False where memory ran out. Local. */
 bool session_mark_scalar(session_mesh *mesh, const scene_field *field, bool wants_ranges, session_scalar **marked);
@@ -18,6 +21,9 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
 
 /* The mesh's field, or a component of it, as the caller gave it, in the order of the vertices or cells. */
 grid_field session_given_field(const session_mesh *mesh, int field, int component);
+
+/* Are its values read out of a copy of ours, in the order of the vertices, cells or corners? */
+bool session_is_copied(const session_mesh *mesh, const session_field *field);
 
 /* The field's values as the caller gave them, with no scalar for it; false where the mesh does not have it. */
 bool session_find_values(const session_mesh *mesh, const scene_field *field, grid_field *out);

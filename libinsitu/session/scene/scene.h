@@ -18,12 +18,13 @@ enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 /* A field as a layer shows it: on some of the meshes. */
 typedef struct scene_field {
     char *name;
-    int component;    /* 0 .., or one of the above */
-    bool at_vertices; /* cell values are recentred to the vertices; else they are drawn as they are */
-    int line;         /* of the scene file, for messages about the field */
-    int mesh_count;   /* 0: on the meshes that have the field */
-    char **meshes;    /* a name stands for the meshes below it too: "a" for "a/0" */
-    int meshes_line;  /* for messages about them */
+    int component;      /* 0 .., or one of the above */
+    bool at_vertices;   /* cell values are recentred to the vertices; else they are drawn as they are */
+    bool joins_corners; /* values at cells' corners give way to their means at the vertices */
+    int line;           /* of the scene file, for messages about the field */
+    int mesh_count;     /* 0: on the meshes that have the field */
+    char **meshes;      /* a name stands for the meshes below it too: "a" for "a/0" */
+    int meshes_line;    /* for messages about them */
 } scene_field;
 
 /* Is the layer drawn on a mesh of this name, if that has the field? */
@@ -233,12 +234,7 @@ typedef struct scene_words {
 
 /* What is written and drawn beside the data. */
 /* Boxes around all data, around each mesh, or around what each rank holds. */
-typedef enum scene_boxes {
-    SCENE_NO_BOX,
-    SCENE_BOX_OF_DATA,
-    SCENE_BOXES_OF_MESHES,
-    SCENE_BOXES_OF_RANKS
-} scene_boxes;
+typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
 typedef struct scene_decorations {
     bool is_given; /* else there are none */

@@ -118,7 +118,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 {
     char colour_by_path[SCENE_PATH_SIZE];
     snprintf(colour_by_path, sizeof colour_by_path, "%s.colour_by", path);
-    out->at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
+    out->at_vertices = out->joins_corners = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     const insitu_status status = scene_convert_colour_map(d, colour_by_path, &in->colours, map);
     return status ? status : scene_convert_field(d, path, colour_by_path, in->field, in->component, out);
 }
@@ -144,6 +144,7 @@ static insitu_status convert_isosurface(const scene_document *d, const char *pat
     out->normals = in->normals ? (scene_normal)*in->normals : SCENE_GRADIENT;
     out->difference = in->difference ? *in->difference : 1;
     out->field.at_vertices = true;
+    out->field.joins_corners = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     if (in->interpolate && *in->interpolate == SCENE_BY_CELL)
         return scene_bad(d, path, "interpolate",
                          "cell is not allowed, expected vertex: values that are the same throughout a cell have no "
@@ -189,7 +190,7 @@ static insitu_status convert_volume(const scene_document *d, const char *path, c
                                     scene_volume *out)
 {
     out->unit_distance = in->unit_distance ? *in->unit_distance : 0;
-    out->field.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
+    out->field.at_vertices = out->field.joins_corners = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &in->colours, &out->colour_map);
     if (status == INSITU_OK) status = convert_opacity(d, path, in, out);

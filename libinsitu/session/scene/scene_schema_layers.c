@@ -21,11 +21,12 @@ static const cyaml_strval_t interpolation_words[] = {{"cell", SCENE_BY_CELL}, {"
     "How a field that has one value a cell is drawn: `cell`, as it is, the same throughout each cell; or `vertex`, "   \
     "by "                                                                                                              \
     "the means of the cells at each vertex, on all ranks, interpolated between the vertices (8 bytes a vertex are "    \
-    "held). Of no effect on a field that has one value a vertex."
+    "held). A field that has a value at each corner of each cell is drawn torn by `cell`, and by the means of the "    \
+    "corners at each vertex by `vertex`. Of no effect on a field that has one value a vertex."
 #define ISO_INTERPOLATE_HELP                                                                                           \
     "How a field that has one value a cell is drawn: by the means of the cells at each vertex, on all ranks (8 bytes " \
     "a vertex are held). `cell` is refused: between cells of two values there is a face, not a surface of the value "  \
-    "asked for."
+    "asked for. A field that has a value at each corner of each cell is drawn torn unless this says `vertex`."
 #define RANGE_DEFAULT "`data`"
 
 /* A value of several forms, which is read from the document. */

@@ -50,7 +50,7 @@ insitu_status scene_convert_slice(const scene_document *d, const char *path, con
 {
     out->opacity = in->opacity ? (float)*in->opacity : 1;
     out->material = in->material ? scene_convert_material(in->material) : no_light;
-    out->field.at_vertices = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
+    out->field.at_vertices = out->field.joins_corners = in->interpolate && *in->interpolate == SCENE_BY_VERTEX;
     insitu_status status = scene_convert_field(d, path, path, in->field, in->component, &out->field);
     if (status == INSITU_OK) status = scene_convert_colour_map(d, path, &in->colours, &out->colour_map);
     if (status == INSITU_OK) status = convert_planes(d, path, in, out);

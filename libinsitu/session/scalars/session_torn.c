@@ -1,0 +1,144 @@
+#include "session_torn.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_cell_order.h"
+#include "session_mesh_input.h"
+#include "session_topology.h"
+
+/* ---- which meshes -------------------------------------------------------------------------------------------- */
+
+static bool is_of_corners(const session_mesh *mesh, const scene_field *field)
+{
+    if (!field->name || !scene_field_is_on(field, mesh->name)) return false;
+    const int index = session_find_field(mesh, field->name);
+    return index >= 0 && mesh->fields[index].given.centring == INSITU_CORNER;
+}
+
+static bool is_in_image(const session_mesh *mesh, const scene_image *image)
+{
+    bool is_in = image->when.is_given && is_of_corners(mesh, &image->when.field);
+    for (int i = 0; i < image->isosurface_count; i++) {
+        const scene_isosurface *layer = &image->isosurfaces[i];
+        is_in = is_in || is_of_corners(mesh, &layer->field) ||
+                (layer->has_colour_by && is_of_corners(mesh, &layer->colour_by));
+    }
+    for (int i = 0; i < image->volume_count; i++) is_in = is_in || is_of_corners(mesh, &image->volumes[i].field);
+    for (int i = 0; i < image->slice_count; i++) is_in = is_in || is_of_corners(mesh, &image->slices[i].field);
+    for (int i = 0; i < image->surface_count; i++) {
+        const scene_surface *layer = &image->surfaces[i];
+        is_in = is_in || (layer->has_colour_by && is_of_corners(mesh, &layer->colour_by)) ||
+                (layer->threshold.is_given && is_of_corners(mesh, &layer->threshold.field));
+    }
+    return is_in;
+}
+
+static bool is_named(const session_mesh *mesh, const scene *scene)
+{
+    bool is_in = false;
+    for (int i = 0; i < scene->statistics_count; i++) is_in = is_in || is_of_corners(mesh, &scene->statistics[i].field);
+    for (int i = 0; i < scene->image_count && !is_in; i++) is_in = is_in_image(mesh, &scene->images[i]);
+    return is_in;
+}
+
+/* ---- one mesh ------------------------------------------------------------------------------------------------- */
+
+int64_t session_torn_origin(const session_torn *torn, int64_t corner)
+{
+    return grid_array_index(&torn->shared, grid_array_index(&torn->corners, corner));
+}
+
+static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *error)
+{
+    for (int64_t cell = 0; mesh->given.cell_types.data && cell < mesh->given.cell_count; cell++)
+        if (session_given_type(mesh, cell) == GRID_POLYHEDRON)
+            return base_fail(error, INSITU_ERROR_FIELD,
+                             "mesh \"%s\": a field has values at corners, and cell %lld is a polyhedron, whose corners "
+                             "have no order",
+                             mesh->name, (long long)cell);
+    return INSITU_OK;
+}
+
+/* Packed, of the type that they have. What no cell uses may be no vertex, and is at the first one's place. */
+static bool copy_coordinates(const grid *shared, int threads, session_torn *torn)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const grid_array from = shared->coordinates[axis];
+        const size_t size = from.is_wide ? 8 : 4;
+        char *to = base_alloc((size_t)(torn->corner_count + 1) * size);
+        if (!to) return false;
+        torn->coordinates[axis] = (grid_array){to, (int64_t)size, from.is_wide, false, 0};
+        torn->bytes += torn->corner_count * (int64_t)size;
+#pragma omp parallel for num_threads(threads) schedule(static)
+        for (int64_t corner = 0; corner < torn->corner_count; corner++) {
+            const int64_t vertex = session_torn_origin(torn, corner);
+            const bool is_vertex = vertex >= 0 && vertex < shared->vertex_count;
+            memcpy(to + corner * (int64_t)size, from.data + (is_vertex ? vertex : 0) * from.stride, size);
+        }
+    }
+    return true;
+}
+
+static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
+{
+    session_torn torn = {.is_torn = true, .corner_count = session_corner_count(&mesh->given)};
+    insitu_status status = refuse_polyhedra(mesh, error);
+    if (status) return status;
+    torn.shared = mesh->cells.connectivity;
+    if (!session_make_indices(mesh, "cells' corners", torn.corner_count, torn.corner_count, &torn.corners, error))
+        return error->status;
+    for (int64_t i = 0; i < torn.corner_count; i++) session_put_index(&torn.corners, i, i);
+    session_turn_cells(mesh, torn.corner_count, threads, &torn.corners);
+    torn.bytes = torn.corner_count * torn.corners.stride;
+    torn.is_made = copy_coordinates(&mesh->cells, threads, &torn);
+    if (!torn.is_made) {
+        session_drop_torn(&torn);
+        return session_no_memory(error, session_corner_count(&mesh->given) * 24, "corners' coordinates");
+    }
+    session_drop_torn(&mesh->torn);
+    mesh->torn = torn;
+    session_read_topology(mesh);
+    return INSITU_OK;
+}
+
+/* What was made for other vertices goes. */
+static void forget_vertices(session_mesh *mesh)
+{
+    session_drop_outers(mesh, true);
+    session_drop_scalars(mesh);
+    session_drop_tree(mesh);
+    for (int i = 0; i < mesh->field_count; i++) session_drop_copy(&mesh->fields[i]);
+}
+
+static insitu_status update(session_mesh *mesh, bool is_torn, int threads, base_error *error)
+{
+    const bool was_torn = mesh->torn.is_torn;
+    if (!is_torn && was_torn) {
+        session_drop_torn(&mesh->torn);
+        session_read_topology(mesh);
+    }
+    if (is_torn != was_torn) forget_vertices(mesh);
+    return is_torn && !mesh->torn.is_made ? tear(mesh, threads, error) : INSITU_OK;
+}
+
+/* ---- all of them ----------------------------------------------------------------------------------------------- */
+
+static bool has_corners(const session_catalogue *catalogue)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++)
+        for (int f = 0; f < catalogue->meshes[m].field_count; f++)
+            if (catalogue->meshes[m].fields[f].centring == INSITU_CORNER) return true;
+    return false;
+}
+
+insitu_status session_tear_meshes(const session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
+                                  const session_team *team, base_error *error)
+{
+    for (int m = 0; m < meshes->count && !error->status; m++) {
+        session_mesh *mesh = meshes->items[m];
+        if (mesh->is_given) update(mesh, is_named(mesh, scene), team->threads, error);
+    }
+    return has_corners(catalogue) ? session_agree(team->comm, error) : INSITU_OK;
+}

@@ -1,0 +1,24 @@
+/* Meshes whose cells have vertices of their own, for fields with a value at each corner of each cell.
+ *
+ * The rooms below find values by the number of a vertex. So a mesh with a field at corners is read as one in which
+ * every corner is a vertex: its coordinates are copied corner by corner, and its connectivity counts up. All that is
+ * drawn of the mesh is drawn by it, so that layers of fields at corners, vertices and cells go together. What must know
+ * which vertices are one (means at vertices, outer faces) goes by their ids or coordinates as it is, across corners as
+ * across ranks. */
+#ifndef SESSION_TORN_H
+#define SESSION_TORN_H
+
+#include "scene.h"
+#include "session_catalogue.h"
+#include "session_mesh.h"
+#include "session_team.h"
+
+/* Tear the meshes that have a field at corners which the scene names, where they are not yet, or not by the coordinates
+ * of now; and mend the others. Cells have been checked. Collective. */
+insitu_status session_tear_meshes(const session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
+                                  const session_team *team, base_error *error);
+
+/* Which of the caller's vertices stands at the corner of a torn mesh. */
+int64_t session_torn_origin(const session_torn *torn, int64_t corner);
+
+#endif

@@ -1,0 +1,456 @@
+/* Fields with a value at each corner of each cell. Torn, they draw the pictures of the mesh whose vertices the caller
+ * doubled, to the bit: with fields at vertices and cells beside them, by an index, in rows, in another order of
+ * vertices, with ids, as values and coordinates change. Averaged, they draw those of the means at vertices by brute
+ * force. What is wrong is told to all. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_meshes.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, PIXELS = 64 * 48, PICTURES = 4, STEPS = 3, ROW = 11 };
+
+#define IMAGE(name, layers)                                                                                            \
+    "  - name: " name "\n    size: [64, 48]\n    background: [0, 0, 0, 0]\n    layers:\n" layers                       \
+    "    outputs: [{path: " name ".exr}]\n"
+
+/* clang-format off */
+static const char torn_scene[] =
+    "images:\n"
+    IMAGE("a", "      - isosurface: {field: f, values: [0.1, 0.3], opacity: 0.6, colour_by: {field: g, map: turbo}}\n"
+               "      - isosurface: {field: g, values: [0.2], colour_by: {field: f}}\n")
+    IMAGE("b", "      - volume: {field: f}\n")
+    IMAGE("c", "      - slice: {field: f, planes: [{normal: [1, 2, 3]}]}\n"
+               "      - isosurface: {field: c, values: [0.1]}\n")
+    IMAGE("d", "      - surface: {threshold: {field: f, from: 0.05}, colour_by: {field: f}, edges: {}}\n");
+
+static const char joined_scene[] =
+    "images:\n"
+    IMAGE("a", "      - isosurface: {field: f, interpolate: vertex, values: [0.1, 0.3], opacity: 0.6}\n")
+    IMAGE("b", "      - volume: {field: f, interpolate: vertex}\n")
+    IMAGE("c", "      - slice: {field: f, interpolate: vertex, planes: [{normal: [1, 2, 3]}]}\n")
+    IMAGE("d", "      - surface: {colour_by: {field: f, interpolate: vertex}}\n");
+/* clang-format on */
+
+/* ---- two meshes ------------------------------------------------------------------------------------------------ */
+
+typedef struct form {
+    bool is_by_index, is_in_rows, is_lexicographic, has_ids;
+} form;
+
+/* The fields as plain arrays: of the shared vertices, of the corners, of the cells. */
+typedef struct values {
+    int64_t corners;
+    double *at_vertices, *at_corners, *at_cells, *gathered;
+    double *dealt;  /* corners' values as the form has them */
+    int64_t *index; /* NULL: none */
+    int64_t dealt_count;
+    double *coordinates; /* of the doubled mesh */
+    int64_t *connectivity, *ids, *doubled_ids;
+} values;
+
+static double *numbers(int64_t count)
+{
+    double *out = malloc((size_t)(count + 1) * sizeof *out);
+    assert_non_null(out);
+    return out;
+}
+
+static int64_t *integers(int64_t count)
+{
+    int64_t *out = malloc((size_t)(count + 1) * sizeof *out);
+    assert_non_null(out);
+    return out;
+}
+
+/* One number of the cell, whichever rank has it. */
+static double own_of(const test_mesh *part, int64_t cell)
+{
+    double sum = 0;
+    for (int64_t i = part->offsets[cell]; i < part->offsets[cell + 1]; i++)
+        for (int axis = 0; axis < 3; axis++) sum += (axis + 1) * part->coordinates[3 * part->connectivity[i] + axis];
+    return 0.3 * sin(20 * sum);
+}
+
+static int64_t corner_place(const form *of, const test_mesh *part, int64_t cell, int64_t corner)
+{
+    return of->is_in_rows ? cell * ROW + corner - part->offsets[cell] : corner;
+}
+
+static void fill(values *v, const form *of, const test_mesh *part, double scale)
+{
+    for (int64_t i = 0; i < v->dealt_count; i++) v->dealt[i] = (double)NAN;
+    for (int64_t i = 0; i < part->vertex_count; i++) v->at_vertices[i] = scale * part->values[i];
+    for (int64_t cell = 0; cell < part->cell_count; cell++) {
+        v->at_cells[cell] = own_of(part, cell);
+        for (int64_t i = part->offsets[cell]; i < part->offsets[cell + 1]; i++) {
+            const int64_t place = corner_place(of, part, cell, i),
+                          at = of->is_by_index ? v->dealt_count - 1 - i : place;
+            v->at_corners[i] = scale * (part->values[part->connectivity[i]] + own_of(part, cell));
+            v->gathered[i] = v->at_vertices[part->connectivity[i]];
+            v->dealt[at] = v->at_corners[i];
+            if (of->is_by_index) v->index[place] = at;
+        }
+    }
+}
+
+static void double_vertices(values *v, const test_mesh *part)
+{
+    for (int64_t i = 0; i < part->vertex_count; i++) v->ids[i] = 7 * i;
+    for (int64_t i = 0; i < v->corners; i++) {
+        v->connectivity[i] = i;
+        v->doubled_ids[i] = 7 * part->connectivity[i];
+        memcpy(v->coordinates + 3 * i, part->coordinates + 3 * part->connectivity[i], 3 * sizeof(double));
+    }
+}
+
+static values make_values(const form *of, const test_mesh *part)
+{
+    const int64_t corners = part->connectivity_count, places = of->is_in_rows ? part->cell_count * ROW : corners;
+    values v = {.corners = corners,
+                .at_vertices = numbers(part->vertex_count),
+                .at_corners = numbers(corners),
+                .at_cells = numbers(part->cell_count),
+                .gathered = numbers(corners),
+                .dealt = numbers(places + corners),
+                .index = integers(places),
+                .dealt_count = places + (of->is_by_index ? 5 : 0),
+                .coordinates = numbers(3 * corners)};
+    v.connectivity = integers(corners);
+    v.ids = integers(part->vertex_count);
+    v.doubled_ids = integers(corners);
+    for (int64_t i = 0; i < places; i++) v.index[i] = -1; /* of rows' rests: not looked at */
+    fill(&v, of, part, 1);
+    double_vertices(&v, part);
+    return v;
+}
+
+static void free_values(values *v)
+{
+    free(v->at_vertices), free(v->at_corners), free(v->at_cells), free(v->gathered), free(v->dealt), free(v->index);
+    free(v->coordinates), free(v->connectivity), free(v->ids), free(v->doubled_ids);
+}
+
+/* Each cell's vertices in lexicographic order: a turn that is its own inverse. */
+static void turn_hexes(test_mesh *part)
+{
+    for (int64_t i = 0; i + 3 < part->connectivity_count; i += 4) {
+        const int64_t third = part->connectivity[i + 2];
+        part->connectivity[i + 2] = part->connectivity[i + 3];
+        part->connectivity[i + 3] = third;
+    }
+}
+
+static int type_of(test_mesh_kind kind)
+{
+    static const int types[] = {INSITU_TET, INSITU_HEX, INSITU_WEDGE, INSITU_PYRAMID};
+    return types[kind];
+}
+
+static insitu_mesh shape_mesh(const session_input *in, const values *v, const form *of, bool is_doubled)
+{
+    insitu_mesh mesh = in->mesh;
+    if (of->is_in_rows) {
+        mesh.offsets = mesh.cell_types = (insitu_array){0};
+        mesh.cell_type = type_of(in->kind);
+    }
+    if (of->is_lexicographic) mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    if (of->has_ids) mesh.vertex_ids = (insitu_array){is_doubled ? v->doubled_ids : v->ids, INSITU_INT64, 0};
+    if (!is_doubled) return mesh;
+    mesh.vertex_count = v->corners;
+    insitu_mesh_interleaved(&mesh, v->coordinates, INSITU_FLOAT64);
+    mesh.connectivity = (insitu_array){v->connectivity, INSITU_INT64, 0};
+    return mesh;
+}
+
+static void set_field(insitu_session *session, const char *name, insitu_centring centring, int64_t count,
+                      const double *of, const form *dealt, const values *v)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = name;
+    field.centring = centring;
+    field.count = count;
+    field.values = (insitu_array){of, INSITU_FLOAT64, 0};
+    if (dealt && dealt->is_by_index) field.index = (insitu_array){v->index, INSITU_INT64, 0};
+    if (dealt && dealt->is_in_rows) field.corner_row = ROW;
+    const insitu_status status = insitu_set_field(session, "m", &field);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+}
+
+static void set_fields(insitu_session *session, const session_input *in, const values *v, const form *of,
+                       bool is_doubled)
+{
+    const test_mesh *part = &in->part;
+    set_field(session, "c", INSITU_CELL, part->cell_count, v->at_cells, NULL, v);
+    if (is_doubled) {
+        set_field(session, "f", INSITU_VERTEX, v->corners, v->at_corners, NULL, v);
+        set_field(session, "g", INSITU_VERTEX, v->corners, v->gathered, NULL, v);
+    } else {
+        set_field(session, "f", INSITU_CORNER, v->dealt_count, v->dealt, of, v);
+        set_field(session, "g", INSITU_VERTEX, part->vertex_count, v->at_vertices, NULL, v);
+    }
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------- */
+
+typedef struct drawing {
+    caught_picture pictures[STEPS][PICTURES];
+    int64_t copied;
+} drawing;
+
+static void step_and_catch(insitu_session *session, int cycle, caught_picture out[PICTURES])
+{
+    forget_pictures();
+    const insitu_status status = insitu_step(session, cycle, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    everywhere(status == INSITU_OK);
+    everywhere(own_rank != 0 || caught_count == PICTURES);
+    for (int i = 0; i < PICTURES && own_rank == 0; i++) out[i] = caught[i];
+    caught_count = 0;
+}
+
+static void scale_coordinates(session_input *in, values *v, double scale)
+{
+    for (int64_t i = 0; i < 3 * in->part.vertex_count; i++) in->part.coordinates[i] *= scale;
+    for (int64_t i = 0; i < 3 * v->corners; i++) v->coordinates[i] *= scale;
+}
+
+/* As it is, with other values, and with other coordinates. */
+static drawing draw(session_input *in, values *v, const form *of, bool is_doubled)
+{
+    drawing out = {.copied = 0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(torn_scene));
+    for (int step = 0; step < STEPS; step++) {
+        insitu_mesh mesh = shape_mesh(in, v, of, is_doubled);
+        mesh.changed = step ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_ALL;
+        if (step == 1) mesh.changed = INSITU_CHANGED_NOTHING;
+        if (step == 1) fill(v, of, &in->part, 0.5);
+        if (step == 2) scale_coordinates(in, v, 0.5);
+        everywhere(insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
+        if (step < 2) set_fields(session, in, v, of, is_doubled);
+        step_and_catch(session, step, out.pictures[step]);
+    }
+    out.copied = insitu_last_report(session)->bytes_copied;
+    insitu_destroy(&session);
+    scale_coordinates(in, v, 2);
+    fill(v, of, &in->part, 1);
+    return out;
+}
+
+static bool are_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, PIXELS * 4 * sizeof(float)) == 0 &&
+           memcmp(a->depth, b->depth, PIXELS * sizeof(float)) == 0;
+}
+
+static void compare(drawing *a, drawing *b, int steps)
+{
+    bool same = true, differ = own_rank != 0;
+    for (int step = 0; step < steps && own_rank == 0; step++)
+        for (int i = 0; i < PICTURES; i++) {
+            same = same && are_same(&a->pictures[step][i], &b->pictures[step][i]);
+            differ = differ || steps == 1 || !are_same(&a->pictures[0][i], &a->pictures[step][i]);
+            free(b->pictures[step][i].rgba), free(b->pictures[step][i].depth);
+        }
+    for (int step = 0; step < steps && own_rank == 0; step++)
+        for (int i = 0; i < PICTURES; i++) free(a->pictures[step][i].rgba), free(a->pictures[step][i].depth);
+    everywhere(same);
+    everywhere(differ);
+}
+
+static void check(test_mesh_kind kind, const form *of)
+{
+    session_input in = {0};
+    input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+    if (of->has_ids && rank_count > 1) return input_free(&in); /* the ids are of one rank */
+    if (of->is_lexicographic) turn_hexes(&in.part);
+    values v = make_values(of, &in.part);
+    drawing doubled = draw(&in, &v, of, true), torn = draw(&in, &v, of, false);
+    /* coordinates and an index a corner, g, and f where it is not read in place */
+    const int64_t tuples = 3 * 8 + 4 + 8 + (of->is_by_index || of->is_in_rows ? 8 : 0);
+    everywhere(torn.copied == doubled.copied + tuples * v.corners);
+    compare(&doubled, &torn, STEPS);
+    free_values(&v);
+    input_free(&in);
+}
+
+static void torn_cells_are_those_of_doubled_vertices(void **state)
+{
+    (void)state;
+    static const form forms[] = {{0}, {.is_by_index = true}, {.has_ids = true}};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (size_t i = 0; i < sizeof forms / sizeof forms[0] && kind != TEST_POLYHEDRA; i++) check(kind, &forms[i]);
+}
+
+static void corners_in_rows_and_other_orders_are_plain_ones(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = TEST_TETS; kind <= TEST_PYRAMIDS; kind++) {
+        check(kind, &(form){.is_in_rows = true});
+        check(kind, &(form){.is_in_rows = true, .is_by_index = true});
+    }
+    check(TEST_HEXES, &(form){.is_lexicographic = true});
+    check(TEST_HEXES, &(form){.is_lexicographic = true, .is_in_rows = true, .is_by_index = true});
+}
+
+/* ---- means ---------------------------------------------------------------------------------------------------- */
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The mean over all corners of the whole mesh in one place, summed in their order by size, as the means of cells are.
+ */
+static double mean_at(const test_mesh *whole, const double at[3])
+{
+    double found[256], sum = 0;
+    int count = 0;
+    for (int64_t cell = 0; cell < whole->cell_count; cell++)
+        for (int64_t i = whole->offsets[cell]; i < whole->offsets[cell + 1]; i++)
+            if (memcmp(whole->coordinates + 3 * whole->connectivity[i], at, 3 * sizeof *at) == 0 && count < 256)
+                found[count++] = whole->values[whole->connectivity[i]] + own_of(whole, cell);
+    assert_true(count > 0 && count < 256);
+    qsort(found, (size_t)count, sizeof *found, by_size);
+    for (int i = 0; i < count; i++) sum += found[i];
+    return sum / count;
+}
+
+static void joined_corners_have_their_means(void **state)
+{
+    (void)state;
+    const form plain = {0};
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        if (kind == TEST_POLYHEDRA) continue;
+        session_input in = {0}, whole = {0};
+        input_create(&in, kind, SIDE, TEST_RANDOM, own_rank, rank_count);
+        input_create(&whole, kind, SIDE, TEST_BLOCK, 0, 1);
+        values v = make_values(&plain, &in.part);
+        drawing drawn[2];
+        for (int is_joined = 0; is_joined < 2; is_joined++) {
+            insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(joined_scene));
+            everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+            set_fields(session, &in, &v, &plain, false);
+            for (int64_t i = 0; i < in.part.vertex_count && !is_joined; i++)
+                v.at_vertices[i] = mean_at(&whole.part, in.part.coordinates + 3 * i);
+            if (!is_joined) set_field(session, "f", INSITU_VERTEX, in.part.vertex_count, v.at_vertices, NULL, &v);
+            step_and_catch(session, 0, drawn[is_joined].pictures[0]);
+            insitu_destroy(&session);
+        }
+        compare(&drawn[0], &drawn[1], 1);
+        free_values(&v);
+        input_free(&in);
+        input_free(&whole);
+    }
+}
+
+/* ---- errors --------------------------------------------------------------------------------------------------- */
+
+static const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
+                                  "    outputs: [{path: a.exr}]\n";
+
+static void too_few(session_input *in)
+{
+    in->field.centring = INSITU_CORNER;
+    in->field.count = in->part.connectivity_count - 1;
+}
+static void of_owned_cells(session_input *in)
+{
+    in->field.centring = INSITU_CORNER;
+    in->mesh.cell_types = (insitu_array){0};
+    in->mesh.cell_type = INSITU_POLYHEDRON;
+}
+static void in_short_rows(session_input *in)
+{
+    in->field.centring = INSITU_CORNER;
+    in->mesh.cell_types = in->mesh.offsets = (insitu_array){0};
+    in->mesh.cell_type = INSITU_HEX;
+    in->field.corner_row = 7;
+}
+static void in_rows_of_offsets(session_input *in)
+{
+    in->field.centring = INSITU_CORNER;
+    in->field.corner_row = 8;
+}
+static void in_rows_of_vertices(session_input *in)
+{
+    in->field.corner_row = 8;
+}
+static void unknown_centring(session_input *in)
+{
+    in->field.centring = (insitu_centring)3;
+}
+
+static const spoilt_case cases[] = {
+    {"few", too_few, INSITU_ERROR_FIELD, true, {"field \"f\": has ", "corners of cells"}},
+    {"polyhedra", of_owned_cells, INSITU_ERROR_FIELD, true, {"the mesh has polyhedra, whose corners have no order"}},
+    {"short", in_short_rows, INSITU_ERROR_FIELD, true, {"corner_row is 7, a cell has 8 vertices"}},
+    {"offsets", in_rows_of_offsets, INSITU_ERROR_FIELD, true, {"corner_row is 8 and the mesh has offsets"}},
+    {"vertices", in_rows_of_vertices, INSITU_ERROR_ARGUMENT, true, {"corner_row is 8, and its centring 0"}},
+    {"centring", unknown_centring, INSITU_ERROR_ARGUMENT, true, {"unknown centring 3"}},
+};
+
+static void what_is_wrong_is_told_to_all(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &in, &cases[i]);
+    insitu_destroy(&session);
+    input_free(&in);
+}
+
+/* These are seen by a step; the centring is one on all ranks. */
+static void what_arrays_hold_is_told_to_all(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    const form of = {.is_by_index = true};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
+    values v = make_values(&of, &in.part);
+    everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+    set_field(session, "f", INSITU_CORNER, v.dealt_count, v.dealt, &of, &v);
+    const int64_t good = v.index[9];
+    if (own_rank == rank_count - 1) v.index[9] = v.dealt_count;
+    for (int step = 0; step < 2; step++)
+        told_everywhere(session, insitu_step(session, step, 0), INSITU_ERROR_FIELD, "the index of corner 9 is ",
+                        "outside 0..");
+    v.index[9] = good;
+    step_is_good(session, 2);
+    insitu_destroy(&session);
+    free_values(&v);
+    input_free(&in);
+
+    session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    input_create(&in, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
+    double *zeros = calloc((size_t)in.part.connectivity_count + 1, sizeof *zeros);
+    assert_non_null(zeros);
+    everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+    set_field(session, "f", INSITU_CORNER, in.part.connectivity_count, zeros, NULL, NULL);
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "is a polyhedron, whose corners", "cell ");
+    insitu_destroy(&session);
+    free(zeros);
+    input_free(&in);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(torn_cells_are_those_of_doubled_vertices),
+                                       cmocka_unit_test(corners_in_rows_and_other_orders_are_plain_ones),
+                                       cmocka_unit_test(joined_corners_have_their_means),
+                                       cmocka_unit_test(what_is_wrong_is_told_to_all),
+                                       cmocka_unit_test(what_arrays_hold_is_told_to_all)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
