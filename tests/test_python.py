@@ -5,6 +5,7 @@ import gc
 import os
 import re
 import sys
+import weakref
 
 import numpy
 from mpi4py import MPI
@@ -232,6 +233,82 @@ def corners_of_hexes_are_torn():
             everywhere(file.read() == doubled, f"{list(named)}: torn hexes are those of doubled vertices")
 
 
+def callables_are_asked_in_steps_that_need_them():
+    xyz, hexes, f = lattice()
+    plain = picture("given", lambda: xyz.copy(), lambda: hexes.copy(), lambda: f.copy())
+    calls = []
+
+    def make():
+        calls.append(comm.allreduce(1))
+        return f.copy()  # nobody but the session knows it
+
+    scene = SCENE.format(name="asked", folder=folder).replace("    size:", "    every: 2\n    size:")
+    with insitu.Session(comm, scene_text=scene) as s:
+        s.set_mesh("m", coordinates=xyz, connectivity=hexes, cell_type=insitu.HEX)
+        s.set_field("m", "f", make)
+        for cycle in range(5):
+            s.step(cycle, 0.0)
+        everywhere(calls == 3 * [comm.size], f"{calls}")
+        comm.Barrier()
+        with open(f"{folder}/asked.png", "rb") as file:
+            everywhere(file.read() == plain, "what a callable returns is drawn")
+        s.set_field("m", "f", lambda: 1 / 0 if comm.rank == comm.size - 1 else f)
+        error = raises(insitu.Error, "its fill returned", s.step, 6, 0.0)
+        own = isinstance(error.__cause__, ZeroDivisionError)
+        everywhere(own == (comm.rank == comm.size - 1) and error.on_all_ranks, "the cause is told where it is")
+        s.set_field("m", "f", lambda: f[:, None].repeat(2, axis=1))
+        raises(insitu.Error, "2 components of 1", s.step, 8, 0.0)
+        s.set_field("m", "f", lambda: f[:, None].repeat(2, axis=1), components=2)
+        s.step(10, 0.0)
+
+
+def borrowed_arrays_live_as_long_as_they_are_read_and_no_longer():
+    """Weak references tell when an array is gone: never before a step that may read it has returned."""
+    class Traced(numpy.ndarray):
+        pass
+
+    def traced(array):
+        out = Traced(array.shape, array.dtype)  # which has the memory itself: views refer to it
+        out[...] = array
+        return out
+
+    def is_alive(references):
+        gc.collect()
+        return [reference() is not None for reference in references]
+
+    xyz, hexes, f = lattice()
+    first, second = (tuple(map(traced, (xyz, hexes, f))) for _ in range(2))
+
+    def make():
+        out = traced(f)
+        asked.append(weakref.ref(out))
+        return out
+
+    asked = []
+    of_first, of_second = [weakref.ref(a) for a in first], [weakref.ref(a) for a in second]
+    s = insitu.Session(comm, scene_text=SCENE.format(name="alive", folder=folder))
+    s.set_mesh("m", coordinates=first[0], connectivity=first[1], cell_type=insitu.HEX)
+    s.set_field("m", "f", first[2])
+    del first
+    s.step(0, 0.0)
+    everywhere(all(is_alive(of_first)), "borrowed arrays stay after a step")
+    s.set_mesh("m", coordinates=second[0], connectivity=second[1], cell_type=insitu.HEX)
+    s.set_field("m", "f", second[2])
+    del second
+    everywhere(all(is_alive(of_first) + is_alive(of_second)), "and when others are set, until a step has returned")
+    s.step(1, 0.0)
+    everywhere(not any(is_alive(of_first)) and all(is_alive(of_second)), "then they go")
+    s.set_field("m", "f", make)
+    s.step(2, 0.0)
+    everywhere(len(asked) == 1 and not any(is_alive(asked)), "what a callable made goes with its step")
+    everywhere(is_alive(of_second) == [True, True, False], "and the field before it")
+    s.close()
+    everywhere(not any(is_alive(of_second)), "a closed session holds nothing")
+    of_session = weakref.ref(s)
+    del s
+    everywhere(of_session() is None, "no circle of references is left to the collector")
+
+
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
@@ -251,4 +328,6 @@ pictures_are_arrays()
 finite_volumes_are_their_hexes()
 finite_elements_are_their_hexes()
 corners_of_hexes_are_torn()
+callables_are_asked_in_steps_that_need_them()
+borrowed_arrays_live_as_long_as_they_are_read_and_no_longer()
 structures_are_those_of_the_header()

@@ -30,7 +30,7 @@ static void owner_negative(session_input *in)
 static void owner_before_one(session_input *in)
 {
     by_owner(in, FORM_PAIRS, 1);
-    spoilt.pairs[2 * 4] = 0;
+    spoilt.pairs[2 * 4] = spoilt.pairs[2 * 4 + 1] = 0; /* 0 beside a cell is CGNS's way of a boundary */
 }
 static void neighbour_large(session_input *in)
 {

@@ -76,6 +76,8 @@ module insitu
         integer(c_int) :: changed
         type(c_array) :: index
         integer(c_int64_t) :: corner_row
+        type(c_funptr) :: fill
+        type(c_ptr) :: fill_data
     end type c_field
 
     ! What the last step did, on this rank: as insitu_report in insitu.h.

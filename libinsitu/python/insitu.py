@@ -70,17 +70,23 @@ class _Mesh(ctypes.Structure):
 
 
 class _Field(ctypes.Structure):
-    _fields_ = [
-        ("name", ctypes.c_char_p),
-        ("centring", ctypes.c_int),
-        ("count", ctypes.c_int64),
-        ("component_count", ctypes.c_int),
-        ("component_stride_bytes", ctypes.c_int64),
-        ("values", _Array),
-        ("changed", ctypes.c_uint),
-        ("index", _Array),
-        ("corner_row", ctypes.c_int64),
-    ]
+    pass
+
+
+_Fill = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(_Field))
+_Field._fields_ = [
+    ("name", ctypes.c_char_p),
+    ("centring", ctypes.c_int),
+    ("count", ctypes.c_int64),
+    ("component_count", ctypes.c_int),
+    ("component_stride_bytes", ctypes.c_int64),
+    ("values", _Array),
+    ("changed", ctypes.c_uint),
+    ("index", _Array),
+    ("corner_row", ctypes.c_int64),
+    ("fill", _Fill),
+    ("fill_data", ctypes.c_void_p),
+]
 
 
 class _Report(ctypes.Structure):
@@ -238,6 +244,32 @@ def _axes(given):
     return [array for array, _, _ in axes], axes[0][1], [held for _, _, held in axes]
 
 
+def _put_values(field, given):
+    array = _view("values", given, (1, 2))
+    field.count, field.component_count, field.component_stride_bytes = array.shape[0], 1, 0
+    if array.ndim == 2:
+        field.component_count = array.shape[1]
+        if array.shape[1] > 1:
+            field.component_stride_bytes = _strided("values", array[:1], array.strides[1]).stride_bytes
+    field.values = _strided("values", array, array.strides[0] if array.shape[0] > 1 else -1)
+    if array.shape[0] < 2:
+        field.values.stride_bytes = 0
+    return array
+
+
+def _fill_by(make, index, row, made, raised):
+    """A C function that has make() give the values. made: holds them until the step is over; raised: what went wrong."""
+    def fill(_, field):
+        try:
+            made.append(_put_values(field.contents, make()))
+            field.contents.index, field.contents.corner_row = index, row
+            return 0
+        except BaseException as error:  # C must not be passed by
+            raised.append(error)
+            return 8  # INSITU_ERROR_INTERNAL
+    return _Fill(fill)
+
+
 class Session:
     """A session. Opening and closing it and step() are collective: every rank of the communicator calls them."""
 
@@ -249,6 +281,8 @@ class Session:
         self._counts = {}  # mesh: its vertices, cells and corners, and the vertices of a cell
         self._held = {}  # mesh: {None: what the mesh borrows, field: what that borrows}
         self._retired = []  # borrowed before it was set again: until a step has returned
+        self._made = []  # by callables: until the step has returned
+        self._raised = []  # by callables, in this step
         create = _library.insitu_create if scene_text is None else _library.insitu_create_from_text
         text = scene_text if scene_text is not None else scene
         text = os.fsencode(text) if text is not None else None
@@ -299,33 +333,41 @@ class Session:
         _check(_library.insitu_set_mesh(self._open(), name.encode(), None), self._session, False)
         self._retired.append(self._held.pop(name, None))
 
-    def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, changed=CHANGED_ALL):
+    def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, components=1,
+                  changed=CHANGED_ALL):
         """Hand over this rank's part of a field: values of n tuples, or n x components. index: which of the tuples each
         vertex, cell or corner has, from the mesh's index_base on; of corners the first columns of a table will do:
-        dofs[:, :8]. corner_row: of corners, values (or entries of index) from one cell's first to the next one's. Local."""
-        array = _view("values", values, (1, 2))
-        field = _Field()
+        dofs[:, :8]. corner_row: of corners, values (or entries of index) from one cell's first to the next one's.
+
+        values may be a callable that returns them, of so many components: it is called by the steps that need the field,
+        on all ranks in the same order. Local."""
+        field, held, borrowed = _Field(), [], _Array()
         _library.insitu_field_defaults(ctypes.byref(field))
-        field.name, field.centring, field.count, field.changed = name.encode(), centring, array.shape[0], changed
-        if array.ndim == 2:
-            field.component_count = array.shape[1]
-            if array.shape[1] > 1:
-                field.component_stride_bytes = _strided("values", array[:1], array.strides[1]).stride_bytes
-        field.values = _strided("values", array, array.strides[0] if array.shape[0] > 1 else -1)
-        if array.shape[0] < 2:
-            field.values.stride_bytes = 0
-        held = [array]
-        field.corner_row = corner_row
+        field.name, field.centring, field.changed = name.encode(), centring, changed
         if index is not None:
-            field.index, size, field.corner_row, array = self._index(mesh, index, centring, corner_row)
+            borrowed, _, corner_row, array = self._index(mesh, index, centring, corner_row)
             held.append(array)
+        if callable(values):
+            field.fill = _fill_by(values, borrowed, corner_row, self._made, self._raised)
+            field.component_count = components
+            held.append(field.fill)
+        else:
+            held.append(_put_values(field, values))
+            field.index = borrowed
+        field.corner_row = corner_row
         self._hand_over(_library.insitu_set_field, mesh, field, name, held)
 
     def step(self, cycle, time):
         """Draw what is due. Collective; after an error, which every rank has, the session stays usable."""
         status = _library.insitu_step(self._open(), cycle, time)
         self._retired.clear()
-        _check(status, self._session, True)
+        self._made.clear()
+        raised = self._raised[0] if self._raised else None
+        self._raised.clear()
+        try:
+            _check(status, self._session, True)
+        except Error as error:
+            raise error from raised
 
     @property
     def report(self):

@@ -5,6 +5,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_guard.h"
+#include "session_field_input.h"
 #include "session_mesh_input.h"
 
 /* What insitu_error(NULL) tells: there is no session to ask after a failed insitu_create(). */

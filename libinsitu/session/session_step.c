@@ -13,6 +13,7 @@
 #include "session_distances.h"
 #include "session_draw.h"
 #include "session_events.h"
+#include "session_filled.h"
 #include "session_guard.h"
 #include "session_isovalues.h"
 #include "session_recentre.h"
@@ -59,7 +60,7 @@ static void update_events(insitu_session *s, session_plan_basis *basis, base_err
     s->events.held = 0;
     if (session_has_events(basis->scene, moment->cycle, images) &&
         session_check_event_fields(basis, images, error) == INSITU_OK)
-        session_update_events(&s->events, basis->scene, &s->meshes, &s->team, &now, error);
+        session_update_events(&s->events, basis->scene, &s->meshes, basis->catalogue, &s->team, &now, error);
     basis->let_images = session_let_images(&s->events, basis->scene);
 }
 
@@ -145,6 +146,7 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     const insitu_status status = step(session, cycle, time, &guard, &session->error);
     session_summarize(&session->meshes, &session->trees.parent, session->picture.bytes, session->scene_file.warning,
                       &session->report);
+    session_forget_filled(&session->meshes);
     session->report.numbers.total_ms = milliseconds_since(start);
     session_guard_end(&guard);
     return status;

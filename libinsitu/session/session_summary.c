@@ -2,7 +2,7 @@
 #include "session_summary.h"
 
 #include "render.h"
-#include "session_mesh_input.h"
+#include "session_field_input.h"
 #include "session_scalars.h"
 
 static int64_t array_bytes(const insitu_array *array, int64_t count)

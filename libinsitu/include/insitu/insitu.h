@@ -177,6 +177,18 @@ typedef struct insitu_mesh {
  * are. */
 typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER = 2 } insitu_centring;
 
+struct insitu_field;
+
+/* Gives the values of a field in the steps that need them: field is as it was set, to be completed by values, and what
+ * belongs to them (count, component_stride_bytes, index, corner_row, changed); its name, centring and component_count
+ * stay. Called within insitu_step(), by the thread that called that, at most once a step, where a picture, a
+ * statistic or a condition of this step needs the field; never elsewhere. The arrays are borrowed until the step has
+ * returned. All ranks call the fills of their fields in the same order, by the names of meshes and then of fields: where
+ * all ranks set the field with a fill, it may communicate, on a communicator of the caller's; it must not call the
+ * session. Any other status than INSITU_OK is an error of the step, told on all ranks; the other fills are called all
+ * the same. */
+typedef insitu_status insitu_fill(void *fill_data, struct insitu_field *field);
+
 /* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
 typedef struct insitu_field {
     const char *name;               /* copied; the name by which scenes ask for it */
@@ -200,6 +212,10 @@ typedef struct insitu_field {
      * 0: one cell after the other, as many as a cell has vertices. Cells with offsets have their corners where
      * connectivity has its entries: connectivity_count of them, and 0 here. */
     int64_t corner_row;
+    /* Optional, instead of values, which are not given then: what makes them, when a step needs them. Each call may give
+     * other values, unless it sets changed to INSITU_CHANGED_NOTHING. */
+    insitu_fill *fill;
+    void *fill_data; /* handed to fill as it is */
 } insitu_field;
 
 /* What the last step did, on this rank unless said otherwise. Times are wall-clock milliseconds. */

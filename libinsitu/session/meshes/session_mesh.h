@@ -15,7 +15,9 @@ typedef struct session_field {
     bool has_index;
     bool is_copy_stale; /* it is of other values, or by another index */
     bool is_wanted;     /* by statistics of this step; what images use has scalars */
-    char *copy;         /* NULL until made; packed tuples, components interleaved */
+    bool is_filled;     /* in this step, where given.fill makes the values; or it failed: */
+    base_error fill_problem;
+    char *copy; /* NULL until made; packed tuples, components interleaved */
     int64_t copy_bytes;
 } session_field;
 

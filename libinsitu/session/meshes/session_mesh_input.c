@@ -39,16 +39,14 @@ void insitu_mesh_interleaved(insitu_mesh *mesh, const void *xyz, insitu_type typ
 
 /* ---- descriptions -------------------------------------------------------------------------------------------- */
 
-enum { ALLOW_FLOATS = 1, ALLOW_INTEGERS = 2, ALLOW_BYTES = 4 };
-
 static bool is_allowed(insitu_type type, int allowed)
 {
     switch (type) {
     case INSITU_FLOAT32:
-    case INSITU_FLOAT64: return allowed & ALLOW_FLOATS;
+    case INSITU_FLOAT64: return allowed & SESSION_ALLOW_FLOATS;
     case INSITU_INT32:
-    case INSITU_INT64: return allowed & ALLOW_INTEGERS;
-    case INSITU_UINT8: return allowed & ALLOW_BYTES;
+    case INSITU_INT64: return allowed & SESSION_ALLOW_INTEGERS;
+    case INSITU_UINT8: return allowed & SESSION_ALLOW_BYTES;
     }
     return false;
 }
@@ -56,23 +54,16 @@ static bool is_allowed(insitu_type type, int allowed)
 static const char *allowed_words(int allowed)
 {
     switch (allowed) {
-    case ALLOW_FLOATS: return "float32 or float64";
-    case ALLOW_INTEGERS: return "int32 or int64";
-    case ALLOW_BYTES: return "uint8";
-    case ALLOW_FLOATS | ALLOW_INTEGERS: return "float32, float64, int32 or int64";
+    case SESSION_ALLOW_FLOATS: return "float32 or float64";
+    case SESSION_ALLOW_INTEGERS: return "int32 or int64";
+    case SESSION_ALLOW_BYTES: return "uint8";
+    case SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS: return "float32, float64, int32 or int64";
     default: return "uint8, int32 or int64";
     }
 }
 
-typedef struct array_rule {
-    const char *name;
-    int64_t count;
-    int allowed;
-    bool is_optional;
-} array_rule;
-
-static insitu_status check_array(const insitu_array *array, const array_rule *rule, insitu_status bad,
-                                 base_error *error)
+insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
+                                  base_error *error)
 {
     if (!array->data) {
         if (rule->is_optional || rule->count == 0) return INSITU_OK;
@@ -118,23 +109,23 @@ static insitu_status check_arrays(const insitu_mesh *mesh, base_error *error)
         &mesh->owner,          &mesh->neighbour,      &mesh->face_connectivity};
     const int64_t vertices = mesh->vertex_count, cells = mesh->cell_count, faces = mesh->face_count;
     const bool has_lists = mesh->face_lists.data != NULL;
-    const array_rule rules[] = {
-        {"x coordinates", vertices, ALLOW_FLOATS, false},
-        {"y coordinates", vertices, ALLOW_FLOATS, false},
-        {"z coordinates", vertices, ALLOW_FLOATS, false},
-        {"vertex ids", vertices, ALLOW_INTEGERS, true},
-        {"cell types", cells, ALLOW_INTEGERS | ALLOW_BYTES, true},
-        {"connectivity indices", mesh->connectivity_count, ALLOW_INTEGERS, false},
-        {"offsets", cells, ALLOW_INTEGERS, true},
-        {"ghost flags", cells, ALLOW_BYTES, true},
-        {"face offsets", faces, ALLOW_INTEGERS, has_lists},
-        {"face sizes", faces, ALLOW_INTEGERS, !has_lists},
-        {"owners of faces", faces, ALLOW_INTEGERS, true},
-        {"neighbours of faces", mesh->neighbour_count, ALLOW_INTEGERS, false},
-        {"face vertex indices", mesh->face_connectivity_count, ALLOW_INTEGERS, false},
+    const session_array_rule rules[] = {
+        {"x coordinates", vertices, SESSION_ALLOW_FLOATS, false},
+        {"y coordinates", vertices, SESSION_ALLOW_FLOATS, false},
+        {"z coordinates", vertices, SESSION_ALLOW_FLOATS, false},
+        {"vertex ids", vertices, SESSION_ALLOW_INTEGERS, true},
+        {"cell types", cells, SESSION_ALLOW_INTEGERS | SESSION_ALLOW_BYTES, true},
+        {"connectivity indices", mesh->connectivity_count, SESSION_ALLOW_INTEGERS, false},
+        {"offsets", cells, SESSION_ALLOW_INTEGERS, true},
+        {"ghost flags", cells, SESSION_ALLOW_BYTES, true},
+        {"face offsets", faces, SESSION_ALLOW_INTEGERS, has_lists},
+        {"face sizes", faces, SESSION_ALLOW_INTEGERS, !has_lists},
+        {"owners of faces", faces, SESSION_ALLOW_INTEGERS, true},
+        {"neighbours of faces", mesh->neighbour_count, SESSION_ALLOW_INTEGERS, false},
+        {"face vertex indices", mesh->face_connectivity_count, SESSION_ALLOW_INTEGERS, false},
     };
     for (size_t i = 0; i < sizeof rules / sizeof rules[0]; i++) {
-        const insitu_status status = check_array(arrays[i], &rules[i], INSITU_ERROR_MESH, error);
+        const insitu_status status = session_check_array(arrays[i], &rules[i], INSITU_ERROR_MESH, error);
         if (status) return status;
     }
     return INSITU_OK;
@@ -152,7 +143,7 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
         return base_fail(error, INSITU_ERROR_MESH,
                          "face lists and %s are given: faces have their vertices by one of them",
                          mesh->face_offsets.data ? "face offsets" : "face vertex indices");
-    if (!is_allowed(lists->type, ALLOW_INTEGERS))
+    if (!is_allowed(lists->type, SESSION_ALLOW_INTEGERS))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "face lists are of element type %d, not int32 or int64",
                          (int)lists->type);
     const long long size = sizeof(void *);
@@ -278,7 +269,7 @@ static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
            !a->owner.data != !b->owner.data || !a->face_lists.data != !b->face_lists.data;
 }
 
-static bool is_same_array(const insitu_array *a, const insitu_array *b)
+bool session_is_same_array(const insitu_array *a, const insitu_array *b)
 {
     const grid_array x = session_grid_array(a), y = session_grid_array(b);
     return x.data == y.data && x.stride == y.stride && (!x.data || a->type == b->type);
@@ -289,15 +280,16 @@ static bool is_same_array(const insitu_array *a, const insitu_array *b)
 static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
 {
     bool has_same_cells =
-        is_same_array(&a->cell_types, &b->cell_types) && is_same_array(&a->connectivity, &b->connectivity) &&
-        is_same_array(&a->offsets, &b->offsets) && is_same_array(&a->ghosts, &b->ghosts) &&
-        is_same_array(&a->face_offsets, &b->face_offsets) &&
-        is_same_array(&a->face_connectivity, &b->face_connectivity) && is_same_array(&a->face_sizes, &b->face_sizes) &&
-        is_same_array(&a->face_lists, &b->face_lists) && is_same_array(&a->owner, &b->owner) &&
-        is_same_array(&a->neighbour, &b->neighbour);
-    bool has_same_vertices = is_same_array(&a->vertex_ids, &b->vertex_ids);
+        session_is_same_array(&a->cell_types, &b->cell_types) &&
+        session_is_same_array(&a->connectivity, &b->connectivity) && session_is_same_array(&a->offsets, &b->offsets) &&
+        session_is_same_array(&a->ghosts, &b->ghosts) && session_is_same_array(&a->face_offsets, &b->face_offsets) &&
+        session_is_same_array(&a->face_connectivity, &b->face_connectivity) &&
+        session_is_same_array(&a->face_sizes, &b->face_sizes) &&
+        session_is_same_array(&a->face_lists, &b->face_lists) && session_is_same_array(&a->owner, &b->owner) &&
+        session_is_same_array(&a->neighbour, &b->neighbour);
+    bool has_same_vertices = session_is_same_array(&a->vertex_ids, &b->vertex_ids);
     for (int axis = 0; axis < 3; axis++)
-        has_same_vertices = has_same_vertices && is_same_array(&a->coordinates[axis], &b->coordinates[axis]);
+        has_same_vertices = has_same_vertices && session_is_same_array(&a->coordinates[axis], &b->coordinates[axis]);
     return (has_same_cells ? 0 : INSITU_CHANGED_TOPOLOGY) | (has_same_vertices ? 0 : INSITU_CHANGED_GEOMETRY);
 }
 
@@ -335,8 +327,7 @@ static void take_mesh(session_meshes *meshes, session_mesh *mesh, const insitu_m
     mesh->problem = (base_error){0};
 }
 
-/* Put "mesh "name": " in front of what a check said. */
-static insitu_status place_error(base_error *error, const char *mesh, const char *field, const base_error *what)
+insitu_status session_place_error(base_error *error, const char *mesh, const char *field, const base_error *what)
 {
     if (field) return base_fail(error, what->status, "mesh \"%s\": field \"%s\": %.700s", mesh, field, what->message);
     return base_fail(error, what->status, "mesh \"%s\": %.700s", mesh, what->message);
@@ -363,7 +354,7 @@ static insitu_status set_mesh(session_meshes *meshes, const char *name, const in
     meshes->are_cells_changed = true;
     meshes->are_names_changed = true;
     mesh->problem = (base_error){0};
-    place_error(&mesh->problem, name, NULL, &what);
+    session_place_error(&mesh->problem, name, NULL, &what);
     *error = mesh->problem;
     return error->status;
 }
@@ -379,186 +370,4 @@ insitu_status session_set_mesh(session_meshes *meshes, const char *name, const i
     const insitu_status status = set_mesh(meshes, name, given, error);
     if (status == INSITU_ERROR_MEMORY) meshes->pending = *error;
     return status;
-}
-
-/* ---- fields -------------------------------------------------------------------------------------------------- */
-
-static session_field *add_field(session_mesh *mesh, const char *name, base_error *error)
-{
-    char *copy = base_strdup(name);
-    session_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
-    if (fields) mesh->fields = fields;
-    if (!copy || !fields) {
-        base_free(copy);
-        session_no_memory(error, (int64_t)sizeof *fields, "a field's description");
-        return NULL;
-    }
-    session_field *field = &fields[mesh->field_count++];
-    *field = (session_field){.given = {.name = copy}};
-    return field;
-}
-
-/* Entries of connectivity that are vertices of cells. */
-int64_t session_corner_count(const insitu_mesh *mesh)
-{
-    if (mesh->cell_count == 0) return 0;
-    if (mesh->offsets.data) return mesh->connectivity_count;
-    return mesh->cell_count * grid_type_vertices((int)mesh->cell_type);
-}
-
-/* Vertices, cells or corners of the mesh; of corners in rows: from the first to the last. */
-int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
-{
-    if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
-    if (field->centring == INSITU_CELL) return mesh->cell_count;
-    if (field->corner_row == 0 || mesh->cell_count == 0) return session_corner_count(mesh);
-    return (mesh->cell_count - 1) * field->corner_row + grid_type_vertices((int)mesh->cell_type);
-}
-
-static const char *place_words(insitu_centring centring)
-{
-    return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
-}
-
-/* An array without elements may have no address: then its type tells. */
-static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
-{
-    return field->index.data || (field->index.type && session_field_places(&mesh->given, field) == 0);
-}
-
-static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
-{
-    const int64_t places = session_field_places(&mesh->given, field);
-    const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
-    if (field->count < 0 || (!has_index && (has_rows ? field->count < places : field->count != places)))
-        return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
-                         (long long)places, place_words(field->centring), has_rows ? ", rows' rests counted" : "");
-    const array_rule values = {"values", has_index && !places ? 0 : field->count, ALLOW_FLOATS | ALLOW_INTEGERS, false};
-    const array_rule index = {"entries of index", places, ALLOW_INTEGERS, true};
-    insitu_status status = check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
-    if (!status) status = check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
-    return status;
-}
-
-/* Mixed cells are looked at when they are torn. */
-static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
-{
-    const long long row = field->corner_row, vertices = grid_type_vertices((int)mesh->cell_type);
-    if (field->centring != INSITU_CORNER) {
-        if (row == 0) return INSITU_OK;
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "corner_row is %lld, and its centring %d is not corners (%d)",
-                         row, (int)field->centring, (int)INSITU_CORNER);
-    }
-    if (mesh->cell_count == 0) return INSITU_OK;
-    if (mesh->owner.data || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
-        return base_fail(error, INSITU_ERROR_FIELD,
-                         "has values at corners, and the mesh has polyhedra, whose corners have no order");
-    if (row == 0) return INSITU_OK;
-    if (mesh->offsets.data)
-        return base_fail(error, INSITU_ERROR_FIELD,
-                         "corner_row is %lld and the mesh has offsets: rows are of cells of one type without offsets",
-                         row);
-    if (row < vertices || row > INT64_MAX / 32 / mesh->cell_count)
-        return base_fail(error, INSITU_ERROR_FIELD, "corner_row is %lld, a cell has %lld vertices", row, vertices);
-    return INSITU_OK;
-}
-
-static insitu_status check_field(const session_mesh *mesh, const insitu_field *field, base_error *error)
-{
-    if (field->centring != INSITU_VERTEX && field->centring != INSITU_CELL && field->centring != INSITU_CORNER)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "unknown centring %d", (int)field->centring);
-    if (field->component_count < 1)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "component_count is %d", field->component_count);
-    if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
-        return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
-    insitu_status status = check_corners(&mesh->given, field, error);
-    if (!status) status = check_field_arrays(mesh, field, error);
-    if (status) return status;
-    const int64_t size = session_type_size(field->values.type);
-    if (field->values.data && field->component_stride_bytes % size != 0)
-        return base_fail(error, INSITU_ERROR_FIELD, "has a component stride of %lld bytes, no multiple of its %lld",
-                         (long long)field->component_stride_bytes, (long long)size);
-    return INSITU_OK;
-}
-
-static void spoil_scalars(session_mesh *mesh, int field)
-{
-    for (int i = 0; i < mesh->scalar_count; i++) {
-        session_scalar *scalar = &mesh->scalars[i];
-        if (scalar->field != field) continue;
-        scalar->are_values_stale = true;
-        scalar->is_suspect = true;
-    }
-}
-
-/* Are the values read from where they were? */
-static bool is_same_place(const insitu_field *a, const insitu_field *b)
-{
-    return is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
-           is_same_array(&a->index, &b->index) && a->count == b->count && a->corner_row == b->corner_row;
-}
-
-static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given)
-{
-    session_field *field = &mesh->fields[index];
-    const bool is_other = !field->values.data || field->given.centring != given->centring ||
-                          field->given.component_count != given->component_count || field->problem.status;
-    const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same_place(&field->given, given);
-    if (is_other) {
-        /* The scalars' components may have changed their meaning. */
-        session_drop_scalars(mesh);
-        meshes->are_names_changed = true;
-    } else if (is_stale) {
-        spoil_scalars(mesh, index);
-    }
-    const bool has_index = is_by_index(mesh, given);
-    if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
-        field->given.values.type != given->values.type)
-        session_drop_copy(field);
-    field->has_index = has_index;
-    field->is_copy_stale = field->is_copy_stale || is_stale;
-    const char *name = field->given.name;
-    field->given = *given;
-    field->given.name = name;
-    field->values = session_grid_array(&given->values);
-    const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
-    if (given->values.stride_bytes == 0) field->values.stride = size * given->component_count;
-    field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;
-    field->problem = (base_error){0};
-}
-
-static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const insitu_field *given, base_error *error)
-{
-    int index = session_find_field(mesh, given->name);
-    if (index < 0) {
-        if (!add_field(mesh, given->name, error)) return INSITU_ERROR_MEMORY;
-        index = mesh->field_count - 1;
-        meshes->are_names_changed = true;
-    }
-    base_error what = {0};
-    if (check_field(mesh, given, &what) == INSITU_OK) {
-        take_field(meshes, mesh, index, given);
-        return INSITU_OK;
-    }
-    session_field *field = &mesh->fields[index];
-    field->problem = (base_error){0};
-    place_error(&field->problem, mesh->name, given->name, &what);
-    *error = field->problem;
-    return error->status;
-}
-
-insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error)
-{
-    *error = (base_error){0};
-    session_mesh *mesh = name ? session_find_mesh(meshes, name) : NULL;
-    if (!name || !field || !field->name || !*field->name)
-        base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_field: no mesh, no field, or a field without a name");
-    else if (!mesh)
-        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field->name, name);
-    else if (!mesh->is_given)
-        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", field->name, name);
-    else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
-        return error->status;
-    meshes->pending = *error;
-    return error->status;
 }

@@ -1,16 +1,30 @@
-/* What the caller says of meshes and fields: checked, and put into the table of meshes. */
+/* What the caller says of meshes: checked, and put into the table of meshes. */
 #ifndef SESSION_MESH_INPUT_H
 #define SESSION_MESH_INPUT_H
 
 #include "session_mesh.h"
 
-/* insitu_set_mesh() and insitu_set_field(). *error is cleared first. Local. */
+/* insitu_set_mesh(). *error is cleared first. Local. */
 insitu_status session_set_mesh(session_meshes *meshes, const char *name, const insitu_mesh *given, base_error *error);
-insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error);
 
-/* How many entries of connectivity are vertices of cells; of cells that are no polyhedra. */
-int64_t session_corner_count(const insitu_mesh *mesh);
-/* How many values the field has without an index, and entries of it with one; of corners in rows: at least. */
-int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field);
+enum { SESSION_ALLOW_FLOATS = 1, SESSION_ALLOW_INTEGERS = 2, SESSION_ALLOW_BYTES = 4 };
+
+/* What an array may be. */
+typedef struct session_array_rule {
+    const char *name;
+    int64_t count;
+    int allowed; /* SESSION_ALLOW_* */
+    bool is_optional;
+} session_array_rule;
+
+/* Is it given, of a type and stride that it may have, and aligned? bad: the status of what is wrong beside types. */
+insitu_status session_check_array(const insitu_array *array, const session_array_rule *rule, insitu_status bad,
+                                  base_error *error);
+
+/* Are they read from the same place in the same way? */
+bool session_is_same_array(const insitu_array *a, const insitu_array *b);
+
+/* Put "mesh "name": ", and the field's name where there is one, in front of what a check said. */
+insitu_status session_place_error(base_error *error, const char *mesh, const char *field, const base_error *what);
 
 #endif

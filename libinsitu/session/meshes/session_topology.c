@@ -206,6 +206,11 @@ static void sides_of(const face_sides *sides, int64_t face, int64_t cells[2])
     if (face >= sides->given->neighbour_count || !sides->neighbour.data) return;
     cells[1] = grid_array_index(&sides->neighbour, face);
     if (cells[1] + sides->given->index_base == -1) cells[1] = -1;
+    /* CGNS has 0 for no cell on either side. */
+    if (sides->given->index_base == 1 && cells[0] == -1 && cells[1] >= 0) {
+        cells[0] = cells[1];
+        cells[1] = -1;
+    }
 }
 
 static insitu_status check_sides(const session_mesh *mesh, int64_t face, const int64_t cells[2], base_error *error)

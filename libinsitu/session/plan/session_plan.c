@@ -10,6 +10,7 @@
 #include "session_agree.h"
 #include "session_candidates.h"
 #include "session_events.h"
+#include "session_filled.h"
 #include "session_indexed.h"
 #include "session_scalars.h"
 
@@ -321,11 +322,13 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     if (plan.images) take_images(basis, report, &plan);
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);
-    if (!is_whole)
-        session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
-    else
-        session_copy_used(meshes, team->threads, error);
-    const insitu_status status = session_agree(team->comm, error);
+    if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
+    insitu_status status = session_agree(team->comm, error); /* what fills fields may be collective */
+    if (!status) {
+        if (session_fill_fields(meshes, basis->catalogue, true, error) == INSITU_OK)
+            session_copy_used(meshes, team->threads, error);
+        status = session_agree(team->comm, error);
+    }
     if (status)
         session_plan_free(&plan);
     else

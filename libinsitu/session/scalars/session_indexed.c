@@ -8,7 +8,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
-#include "session_mesh_input.h"
+#include "session_field_input.h"
 #include "session_scalars.h"
 #include "session_torn.h"
 #include "session_topology.h"

@@ -5,7 +5,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_cell_order.h"
-#include "session_mesh_input.h"
+#include "session_field_input.h"
 #include "session_topology.h"
 
 /* ---- which meshes -------------------------------------------------------------------------------------------- */

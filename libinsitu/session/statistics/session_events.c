@@ -2,6 +2,7 @@
 
 #include "memory.h"
 #include "session_agree.h"
+#include "session_filled.h"
 #include "session_indexed.h"
 #include "session_statistics_file.h"
 
@@ -87,13 +88,16 @@ static void note_conditions(session_events *events, const scene *scene, const ev
 }
 
 insitu_status session_update_events(session_events *events, const scene *scene, const session_meshes *meshes,
-                                    const session_team *team, const session_event_time *now, base_error *error)
+                                    const session_catalogue *catalogue, const session_team *team,
+                                    const session_event_time *now, base_error *error)
 {
     event_work work;
     if (!work_create(scene, now->cycle, &work)) session_no_memory(error, 1 << 12, "statistics of fields");
     for (int i = 0; i < work.count; i++) session_want_field(meshes, work.wishes[i].field);
+    insitu_status status = session_agree(team->comm, error); /* what fills fields may be collective */
+    if (!status) session_fill_fields(meshes, catalogue, false, error);
     if (!error->status) session_copy_wanted(meshes, team->threads, error);
-    insitu_status status = session_agree(team->comm, error);
+    status = session_agree(team->comm, error);
     if (!status) status = session_find_statistics(meshes, team, work.wishes, work.count, work.found, error);
     if (!status) {
         note_conditions(events, scene, &work);

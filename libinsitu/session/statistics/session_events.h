@@ -2,6 +2,7 @@
 #ifndef SESSION_EVENTS_H
 #define SESSION_EVENTS_H
 
+#include "session_catalogue.h"
 #include "session_statistics.h"
 
 typedef struct session_event_time {
@@ -24,7 +25,8 @@ bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle
 /* Find the statistics that are due and those that images wait for, write the former, and note which conditions hold.
  * An error is told when all of them are done. Collective. */
 insitu_status session_update_events(session_events *events, const scene *scene, const session_meshes *meshes,
-                                    const session_team *team, const session_event_time *now, base_error *error);
+                                    const session_catalogue *catalogue, const session_team *team,
+                                    const session_event_time *now, base_error *error);
 
 /* The images that are let through: their condition holds, and where they are wanted `once` they were not drawn. */
 uint64_t session_let_images(const session_events *events, const scene *scene);

@@ -1,0 +1,230 @@
+/* As session_mesh_input.c, of fields. */
+#include "session_field_input.h"
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_mesh_input.h"
+#include "session_topology.h"
+
+static session_field *add_field(session_mesh *mesh, const char *name, base_error *error)
+{
+    char *copy = base_strdup(name);
+    session_field *fields = base_realloc(mesh->fields, (size_t)(mesh->field_count + 1) * sizeof *fields);
+    if (fields) mesh->fields = fields;
+    if (!copy || !fields) {
+        base_free(copy);
+        session_no_memory(error, (int64_t)sizeof *fields, "a field's description");
+        return NULL;
+    }
+    session_field *field = &fields[mesh->field_count++];
+    *field = (session_field){.given = {.name = copy}};
+    return field;
+}
+
+/* Entries of connectivity that are vertices of cells. */
+int64_t session_corner_count(const insitu_mesh *mesh)
+{
+    if (mesh->cell_count == 0) return 0;
+    if (mesh->offsets.data) return mesh->connectivity_count;
+    return mesh->cell_count * grid_type_vertices((int)mesh->cell_type);
+}
+
+/* Vertices, cells or corners of the mesh; of corners in rows: from the first to the last. */
+int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
+{
+    if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
+    if (field->centring == INSITU_CELL) return mesh->cell_count;
+    if (field->corner_row == 0 || mesh->cell_count == 0) return session_corner_count(mesh);
+    return (mesh->cell_count - 1) * field->corner_row + grid_type_vertices((int)mesh->cell_type);
+}
+
+static const char *place_words(insitu_centring centring)
+{
+    return centring == INSITU_VERTEX ? "vertices" : centring == INSITU_CELL ? "cells" : "corners of cells";
+}
+
+/* An array without elements may have no address: then its type tells. */
+static bool is_by_index(const session_mesh *mesh, const insitu_field *field)
+{
+    return field->index.data || (field->index.type && session_field_places(&mesh->given, field) == 0);
+}
+
+static insitu_status check_field_arrays(const session_mesh *mesh, const insitu_field *field, base_error *error)
+{
+    const int64_t places = session_field_places(&mesh->given, field);
+    const bool has_index = is_by_index(mesh, field), has_rows = field->corner_row != 0;
+    if (field->count < 0 || (!has_index && (has_rows ? field->count < places : field->count != places)))
+        return base_fail(error, INSITU_ERROR_FIELD, "has %lld values, the mesh has %lld %s%s", (long long)field->count,
+                         (long long)places, place_words(field->centring), has_rows ? ", rows' rests counted" : "");
+    const session_array_rule values = {"values", has_index && !places ? 0 : field->count,
+                                       SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS, false};
+    const session_array_rule index = {"entries of index", places, SESSION_ALLOW_INTEGERS, true};
+    insitu_status status = session_check_array(&field->values, &values, INSITU_ERROR_FIELD, error);
+    if (!status) status = session_check_array(&field->index, &index, INSITU_ERROR_FIELD, error);
+    return status;
+}
+
+/* Mixed cells are looked at when they are torn. */
+static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *field, base_error *error)
+{
+    const long long row = field->corner_row, vertices = grid_type_vertices((int)mesh->cell_type);
+    if (field->centring != INSITU_CORNER) {
+        if (row == 0) return INSITU_OK;
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "corner_row is %lld, and its centring %d is not corners (%d)",
+                         row, (int)field->centring, (int)INSITU_CORNER);
+    }
+    if (mesh->cell_count == 0) return INSITU_OK;
+    if (mesh->owner.data || (!mesh->cell_types.data && mesh->cell_type == INSITU_POLYHEDRON))
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "has values at corners, and the mesh has polyhedra, whose corners have no order");
+    if (row == 0) return INSITU_OK;
+    if (mesh->offsets.data)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "corner_row is %lld and the mesh has offsets: rows are of cells of one type without offsets",
+                         row);
+    if (row < vertices || row > INT64_MAX / 32 / mesh->cell_count)
+        return base_fail(error, INSITU_ERROR_FIELD, "corner_row is %lld, a cell has %lld vertices", row, vertices);
+    return INSITU_OK;
+}
+
+/* Before it was called. */
+static insitu_status check_fill(const insitu_field *field, base_error *error)
+{
+    if (!field->values.data && !field->index.data) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_FIELD, "values and fill are given: values are given by one of them");
+}
+
+static insitu_status check_field(const session_mesh *mesh, const insitu_field *field, base_error *error)
+{
+    if (field->centring != INSITU_VERTEX && field->centring != INSITU_CELL && field->centring != INSITU_CORNER)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "unknown centring %d", (int)field->centring);
+    if (field->component_count < 1)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "component_count is %d", field->component_count);
+    if (field->changed & ~(unsigned)INSITU_CHANGED_ALL)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "changed is %u, unknown bits are set", field->changed);
+    insitu_status status = check_corners(&mesh->given, field, error);
+    if (!status && field->fill) return check_fill(field, error);
+    if (!status) status = check_field_arrays(mesh, field, error);
+    if (status) return status;
+    const int64_t size = session_type_size(field->values.type);
+    if (field->values.data && field->component_stride_bytes % size != 0)
+        return base_fail(error, INSITU_ERROR_FIELD, "has a component stride of %lld bytes, no multiple of its %lld",
+                         (long long)field->component_stride_bytes, (long long)size);
+    return INSITU_OK;
+}
+
+static void spoil_scalars(session_mesh *mesh, int field)
+{
+    for (int i = 0; i < mesh->scalar_count; i++) {
+        session_scalar *scalar = &mesh->scalars[i];
+        if (scalar->field != field) continue;
+        scalar->are_values_stale = true;
+        scalar->is_suspect = true;
+    }
+}
+
+/* Are the values read from where they were? */
+static bool is_same_place(const insitu_field *a, const insitu_field *b)
+{
+    return session_is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
+           session_is_same_array(&a->index, &b->index) && a->count == b->count && a->corner_row == b->corner_row;
+}
+
+/* The arrays, and what of their copy is to be made again. */
+static void read_values(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
+                        bool is_stale)
+{
+    const bool has_index = is_by_index(mesh, given);
+    if (is_other || field->has_index != has_index || field->given.corner_row != given->corner_row ||
+        field->given.values.type != given->values.type)
+        session_drop_copy(field);
+    field->has_index = has_index;
+    field->is_copy_stale = field->is_copy_stale || is_stale;
+    const char *name = field->given.name;
+    field->given = *given;
+    field->given.name = name;
+    field->values = session_grid_array(&given->values);
+    const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
+    if (given->values.stride_bytes == 0) field->values.stride = size * given->component_count;
+    field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;
+}
+
+static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given)
+{
+    session_field *field = &mesh->fields[index];
+    const bool is_other = (!field->values.data && !field->given.fill) || field->given.centring != given->centring ||
+                          field->given.component_count != given->component_count || field->problem.status;
+    const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same_place(&field->given, given);
+    if (is_other) {
+        /* The scalars' components may have changed their meaning. */
+        session_drop_scalars(mesh);
+        meshes->are_names_changed = true;
+    } else if (is_stale) {
+        spoil_scalars(mesh, index);
+    }
+    read_values(mesh, field, given, is_other, is_stale);
+    field->problem = (base_error){0};
+}
+
+static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const insitu_field *given, base_error *error)
+{
+    int index = session_find_field(mesh, given->name);
+    if (index < 0) {
+        if (!add_field(mesh, given->name, error)) return INSITU_ERROR_MEMORY;
+        index = mesh->field_count - 1;
+        meshes->are_names_changed = true;
+    }
+    base_error what = {0};
+    if (check_field(mesh, given, &what) == INSITU_OK) {
+        take_field(meshes, mesh, index, given);
+        return INSITU_OK;
+    }
+    session_field *field = &mesh->fields[index];
+    field->problem = (base_error){0};
+    session_place_error(&field->problem, mesh->name, given->name, &what);
+    *error = field->problem;
+    return error->status;
+}
+
+insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error)
+{
+    *error = (base_error){0};
+    session_mesh *mesh = name ? session_find_mesh(meshes, name) : NULL;
+    if (!name || !field || !field->name || !*field->name)
+        base_fail(error, INSITU_ERROR_ARGUMENT, "insitu_set_field: no mesh, no field, or a field without a name");
+    else if (!mesh)
+        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" is not set", field->name, name);
+    else if (!mesh->is_given)
+        base_fail(error, INSITU_ERROR_FIELD, "field \"%s\": its mesh \"%s\" was refused", field->name, name);
+    else if (set_field(meshes, mesh, field, error) != INSITU_ERROR_MEMORY)
+        return error->status;
+    meshes->pending = *error;
+    return error->status;
+}
+
+/* What scalars and statistics are of is as it was promised. */
+static insitu_status check_filled(const session_mesh *mesh, const insitu_field *promised, const insitu_field *filled,
+                                  base_error *error)
+{
+    insitu_field values = *filled;
+    values.fill = NULL;
+    if (filled->centring != promised->centring || filled->component_count != promised->component_count)
+        return base_fail(
+            error, INSITU_ERROR_FIELD, "its fill made centring %d of %d, and %d components of %d: they are to stay",
+            (int)filled->centring, (int)promised->centring, filled->component_count, promised->component_count);
+    return check_field(mesh, &values, error);
+}
+
+insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error)
+{
+    session_field *field = &mesh->fields[index];
+    const insitu_field promised = field->given;
+    base_error what = {0};
+    if (check_filled(mesh, &promised, filled, &what))
+        return session_place_error(error, mesh->name, promised.name, &what);
+    read_values(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
+    field->given.fill = promised.fill;
+    field->given.fill_data = promised.fill_data;
+    if (filled->changed & INSITU_CHANGED_VALUES) spoil_scalars(mesh, index);
+    return INSITU_OK;
+}

@@ -1,0 +1,19 @@
+/* What the caller says of fields: checked, and put into the table of meshes. */
+#ifndef SESSION_FIELD_INPUT_H
+#define SESSION_FIELD_INPUT_H
+
+#include "session_mesh.h"
+
+/* insitu_set_field(). *error is cleared first. Local. */
+insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error);
+
+/* What fill has made of a field's description, which lacked values: checked and taken. The error names the mesh and the
+ * field. Local. */
+insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
+
+/* How many entries of connectivity are vertices of cells; of cells that are no polyhedra. */
+int64_t session_corner_count(const insitu_mesh *mesh);
+/* How many values the field has without an index, and entries of it with one; of corners in rows: at least. */
+int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field);
+
+#endif

@@ -1,0 +1,70 @@
+#include "session_filled.h"
+
+#include "session_field_input.h"
+#include "session_scalars.h"
+
+static bool is_needed(const session_mesh *mesh, int index, bool of_images)
+{
+    bool is_used = !of_images && mesh->fields[index].is_wanted;
+    for (int i = 0; i < mesh->scalar_count && of_images; i++)
+        is_used = is_used || (mesh->scalars[i].is_used && mesh->scalars[i].field == index);
+    return is_used;
+}
+
+static insitu_status call_fill(const session_mesh *mesh, const insitu_field *given, insitu_field *out,
+                               base_error *error)
+{
+    *out = *given;
+    out->changed = INSITU_CHANGED_ALL;
+    const insitu_status status = given->fill(given->fill_data, out);
+    if (status == INSITU_OK) return status;
+    return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": its fill returned %d (%s)", mesh->name,
+                     given->name, (int)status, insitu_status_name(status));
+}
+
+/* One that failed fails for all that need it. */
+static insitu_status fill_field(session_mesh *mesh, int index, base_error *error)
+{
+    session_field *field = &mesh->fields[index];
+    insitu_field filled;
+    *error = field->fill_problem;
+    if (field->is_filled) return error->status;
+    field->is_filled = true;
+    insitu_status status = call_fill(mesh, &field->given, &filled, error);
+    if (!status) status = session_take_filled(mesh, index, &filled, error);
+    for (int i = 0; i < mesh->scalar_count && !status; i++)
+        if (mesh->scalars[i].field == index)
+            mesh->scalars[i].own = session_given_field(mesh, index, mesh->scalars[i].component);
+    field->fill_problem = *error;
+    return status;
+}
+
+insitu_status session_fill_fields(const session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
+                                  base_error *error)
+{
+    for (int m = 0; m < catalogue->mesh_count; m++) {
+        const session_catalogue_mesh *all = &catalogue->meshes[m];
+        session_mesh *mesh = session_find_mesh(meshes, all->name);
+        for (int f = 0; f < all->field_count && mesh && mesh->is_given; f++) {
+            base_error own = {0};
+            const int index = session_find_field(mesh, all->fields[f].name);
+            if (index < 0 || !mesh->fields[index].given.fill || !is_needed(mesh, index, of_images)) continue;
+            if (fill_field(mesh, index, &own) && !error->status) *error = own;
+        }
+    }
+    return error->status;
+}
+
+void session_forget_filled(const session_meshes *meshes)
+{
+    for (int m = 0; m < meshes->count; m++)
+        for (int f = 0; f < meshes->items[m]->field_count; f++) {
+            session_field *field = &meshes->items[m]->fields[f];
+            field->is_wanted = false;
+            if (!field->given.fill) continue;
+            field->is_filled = false;
+            field->fill_problem = (base_error){0};
+            field->given.values.data = field->given.index.data = NULL;
+            field->values.data = NULL;
+        }
+}

@@ -1,0 +1,206 @@
+/* Fields whose values a function makes: it is called once in a step that needs the field, for a picture, a statistic or
+ * a condition, and in no other; it may communicate; what it makes draws the pictures of the same values given. What
+ * goes wrong in it is told to all. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <mpi.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, PIXELS = 24 * 16, STEPS = 13 };
+
+#define IMAGE(name, every, layer)                                                                                      \
+    "  - name: " name "\n    size: [24, 16]\n    every: " every "\n    layers: [" layer                                \
+    "]\n    outputs: [{path: " name ".exr}]\n"
+
+static const char scene_text[] =
+    "statistics: [{field: h, every: 5, path: filled.csv}]\nimages:\n" IMAGE("a", "2", "{volume: {field: f}}")
+        IMAGE("b", "4", "{isosurface: {field: f, values: [0.1], colour_by: {field: g}}}")
+            IMAGE("c", "3", "{surface: {colour_by: {field: g}}}");
+
+/* What a fill is told, and what it did. */
+typedef struct maker {
+    const session_input *in;
+    double *values, scale;
+    int calls;
+    insitu_status status;
+    void (*spoil)(insitu_field *field);
+    unsigned changed;
+} maker;
+
+static insitu_status make(void *data, insitu_field *field)
+{
+    maker *m = data;
+    int one = 1, ranks = 0;
+    MPI_Allreduce(&one, &ranks, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD); /* ends only where all ranks call it */
+    const int64_t count = m->in->part.vertex_count;
+    for (int64_t i = 0; i < count; i++) m->values[i] = ranks == rank_count ? m->scale * m->in->part.values[i] : 0;
+    m->calls++;
+    field->count = count;
+    field->values = (insitu_array){m->values, INSITU_FLOAT64, 0};
+    field->changed = m->changed;
+    if (m->spoil) m->spoil(field);
+    return m->status;
+}
+
+static maker make_maker(const session_input *in, double scale)
+{
+    double *values = calloc((size_t)in->part.vertex_count + 1, sizeof *values);
+    assert_non_null(values);
+    return (maker){.in = in, .values = values, .scale = scale, .changed = INSITU_CHANGED_ALL};
+}
+
+static insitu_field describe(const char *name, maker *m, bool is_filled)
+{
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = name;
+    if (is_filled) {
+        field.fill = make;
+        field.fill_data = m;
+        return field;
+    }
+    field.count = m->in->part.vertex_count;
+    field.values = (insitu_array){m->values, INSITU_FLOAT64, 0};
+    return field;
+}
+
+/* Pictures one after the other, as rank 0 has them. */
+typedef struct album {
+    int count;
+    float *pixels;
+} album;
+
+static void keep(album *out)
+{
+    out->pixels = realloc(out->pixels, (size_t)(out->count + caught_count + 1) * PIXELS * 4 * sizeof(float));
+    assert_non_null(out->pixels);
+    for (int i = 0; i < caught_count; i++)
+        memcpy(out->pixels + (size_t)out->count++ * PIXELS * 4, caught[i].rgba, PIXELS * 4 * sizeof(float));
+}
+
+/* The values change at each step. */
+static album draw(const session_input *in, bool is_filled)
+{
+    static const char *const names[] = {"f", "g", "h"};
+    album out = {0};
+    maker makers[3];
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene_text));
+    everywhere(insitu_set_mesh(session, "m", &in->mesh) == INSITU_OK);
+    for (int i = 0; i < 3; i++) {
+        const int k = own_rank % 2 ? 2 - i : i; /* ranks set them in different orders */
+        makers[k] = make_maker(in, k + 1);
+        const insitu_field field = describe(names[k], &makers[k], is_filled);
+        everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+    }
+    for (int step = 0; step < STEPS; step++) {
+        const int needs[3] = {step % 2 == 0, step % 4 == 0 || step % 3 == 0, step % 5 == 0};
+        for (int k = 0; k < 3; k++) {
+            makers[k].scale = 1 + 0.1 * step + k;
+            makers[k].calls = 0;
+            for (int64_t i = 0; i < in->part.vertex_count && !is_filled; i++)
+                makers[k].values[i] = makers[k].scale * in->part.values[i];
+            const insitu_field field = describe(names[k], &makers[k], is_filled);
+            if (!is_filled) everywhere(insitu_set_field(session, "m", &field) == INSITU_OK);
+        }
+        forget_pictures();
+        const insitu_status status = insitu_step(session, step, 0);
+        if (status) fprintf(stderr, "%s\n", insitu_error(session));
+        everywhere(status == INSITU_OK);
+        for (int k = 0; k < 3; k++) everywhere(makers[k].calls == (is_filled ? needs[k] : 0));
+        if (own_rank == 0) keep(&out);
+    }
+    insitu_destroy(&session);
+    for (int k = 0; k < 3; k++) free(makers[k].values);
+    return out;
+}
+
+static void what_a_function_makes_is_drawn_and_nothing_else_made(void **state)
+{
+    (void)state;
+    session_input in = {0};
+    input_create(&in, TEST_MIXED, SIDE, TEST_RANDOM, own_rank, rank_count);
+    album given = draw(&in, false), filled = draw(&in, true);
+    const size_t bytes = (size_t)given.count * PIXELS * 4 * sizeof(float);
+    everywhere(own_rank != 0 || given.count == 7 + 4 + 5);
+    everywhere(given.count == filled.count && (bytes == 0 || memcmp(given.pixels, filled.pixels, bytes) == 0));
+    everywhere(bytes == 0 || memcmp(given.pixels, given.pixels + (ptrdiff_t)(given.count - 1) * PIXELS * 4,
+                                    PIXELS * 4 * sizeof(float)) != 0);
+    free(given.pixels);
+    free(filled.pixels);
+    input_free(&in);
+}
+
+/* ---- errors --------------------------------------------------------------------------------------------------- */
+
+static void too_few(insitu_field *field)
+{
+    field->count--;
+}
+static void no_values(insitu_field *field)
+{
+    field->values.data = NULL;
+}
+static void other_components(insitu_field *field)
+{
+    field->component_count = 2;
+}
+static void other_centring(insitu_field *field)
+{
+    field->centring = INSITU_CELL;
+}
+
+static void what_goes_wrong_is_told_to_all(void **state)
+{
+    (void)state;
+    static const struct {
+        insitu_status status;
+        void (*spoil)(insitu_field *field);
+        const char *words;
+    } cases[] = {{INSITU_ERROR_IO, NULL, "field \"f\": its fill returned 5 (INSITU_ERROR_IO)"},
+                 {INSITU_OK, too_few, "field \"f\": has "},
+                 {INSITU_OK, no_values, "field \"f\": values are not given"},
+                 {INSITU_OK, other_components, "field \"f\": its fill made centring 0 of 0, and 2 components of 1"},
+                 {INSITU_OK, other_centring, "field \"f\": its fill made centring 1 of 0"}};
+    static const char text[] = "statistics: [{field: f, path: filled.csv}]\nimages:\n" IMAGE(
+        "a", "1", "{isosurface: {field: f, values: [0.1], colour_by: {field: g}}}");
+    session_input in = {0};
+    input_create(&in, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
+    maker f = make_maker(&in, 1), g = make_maker(&in, 2);
+    const insitu_field fields[] = {describe("f", &f, true), describe("g", &g, true)};
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+    everywhere(insitu_set_mesh(session, "m", &in.mesh) == INSITU_OK);
+    for (int i = 0; i < 2; i++) everywhere(insitu_set_field(session, "m", &fields[i]) == INSITU_OK);
+    for (int i = 0; i < (int)(sizeof cases / sizeof cases[0]); i++) {
+        f.calls = g.calls = 0;
+        if (own_rank == rank_count - 1) f.status = cases[i].status, f.spoil = cases[i].spoil;
+        forget_pictures();
+        told_everywhere(session, insitu_step(session, 2 * i, 0), INSITU_ERROR_FIELD, cases[i].words, "rank ");
+        everywhere(caught_count == 0 && f.calls == 1 && g.calls == 1);
+        f.status = INSITU_OK;
+        f.spoil = NULL;
+        step_is_good(session, 2 * i + 1);
+    }
+    insitu_field both = fields[0];
+    both.values = (insitu_array){f.values, INSITU_FLOAT64, 0};
+    everywhere(insitu_set_field(session, "m", &both) == INSITU_ERROR_FIELD);
+    told_everywhere(session, insitu_step(session, 20, 0), INSITU_ERROR_FIELD, "values and fill are given");
+    insitu_destroy(&session);
+    free(f.values);
+    free(g.values);
+    input_free(&in);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_a_function_makes_is_drawn_and_nothing_else_made),
+                                       cmocka_unit_test(what_goes_wrong_is_told_to_all)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
