@@ -1,9 +1,33 @@
 ! test_fortran PREFIX: every kind of array that insitu_borrow takes draws the same picture, whose file is compared to the
 ! byte; what cannot be borrowed, and what the library refuses, is a status and a text on every rank.
+module test_fortran_maker
+    use, intrinsic :: iso_fortran_env, only: real64
+    use mpi_f08
+    use insitu
+    implicit none
+    real(real64), pointer :: made_of(:)
+    integer :: calls = 0
+    logical :: fails = .false.
+
+contains
+
+    ! Called by the steps that need the field: it may communicate.
+    subroutine make_values(values, status)
+        type(insitu_array), intent(out) :: values
+        integer, intent(out) :: status
+        integer :: ranks
+        call MPI_Allreduce(1, ranks, 1, MPI_INTEGER, MPI_SUM, MPI_COMM_WORLD)
+        calls = calls + ranks
+        values = insitu_borrow(made_of)
+        status = merge(INSITU_ERROR_IO, INSITU_OK, fails)
+    end subroutine make_values
+end module test_fortran_maker
+
 program test_fortran
     use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32, real64, error_unit
     use mpi_f08
     use insitu
+    use test_fortran_maker
     implicit none
     integer, parameter :: n = 5, vertices = n**3, cells = (n - 1)**3
     real(real64), target :: xyz(3, vertices), axes(vertices, 3), gaps(6, 2*vertices), pressure(vertices)
@@ -46,6 +70,7 @@ program test_fortran
         'values at corners')
     call same(picture('corner_index', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(unknowns), at_corner=2), &
         'values at corners by an index')
+    call procedures_make_values()
     call errors_are_told()
     call MPI_Finalize()
 
@@ -236,6 +261,46 @@ contains
         read (unit) out
         close (unit)
     end function picture
+
+    subroutine procedures_make_values()
+        type(insitu_session) :: session
+        type(insitu_picture), allocatable :: given(:), made(:)
+        real(real32) :: rgba(4, 48, 32)
+        integer :: ranks
+        call MPI_Comm_size(MPI_COMM_WORLD, ranks)
+        call session%create_from_text(MPI_COMM_WORLD, 'images: [{name: a, every: 2, size: [48, 32], layers: '// &
+            '[{isosurface: {field: p, values: [1.3]}}], outputs: [{path: '//prefix//'made.png}]}]', status)
+        call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
+        call session%set_field('m', 'p', insitu_borrow(pressure), status)
+        call session%step(0, 0.0_real64, status)
+        made = session%pictures()
+        call expect(size(made) == 0, 'nothing is kept that was not asked for')
+        call session%keep_pictures(.true., status)
+        call expect(status == INSITU_OK, session%error())
+        call session%step(2, 0.0_real64, status)
+        given = session%pictures()
+        call expect(size(given) == merge(1, 0, rank == 0), 'rank 0 has the picture')
+        made_of => pressure
+        rgba = 0
+        if (rank == 0) rgba = given(1)%rgba
+        call session%set_filled_field('m', 'p', make_values, status)
+        call expect(status == INSITU_OK, session%error())
+        call session%step(3, 0.0_real64, status)
+        call expect(calls == 0, 'nothing is made in a step that draws nothing')
+        call session%step(4, 0.0_real64, status)
+        call expect(status == INSITU_OK .and. calls == ranks, 'a step that draws makes it once')
+        made = session%pictures()
+        if (rank == 0) then
+            call expect(made(1)%image == 'a' .and. all(abs(made(1)%rgba - rgba) <= 0) .and. &
+                all(shape(made(1)%depth) == [48, 32]) .and. any(made(1)%depth < 100), 'it is the picture of the values')
+        else
+            call expect(size(made) == 0, 'other ranks have none')
+        end if
+        fails = rank == 0
+        call session%step(6, 0.0_real64, status)
+        call refused(session, 'its fill returned 5')
+        call session%destroy(status)
+    end subroutine procedures_make_values
 
     subroutine refused(session, words)
         type(insitu_session), intent(in) :: session

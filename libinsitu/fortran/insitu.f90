@@ -94,6 +94,37 @@ module insitu
         type(c_ptr) :: copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr ! texts: insitu_text()
     end type insitu_report
 
+    type, bind(C) :: c_picture
+        type(c_ptr) :: image
+        integer(c_int) :: width, height
+        type(c_ptr) :: rgba, depth
+    end type c_picture
+
+    ! A picture of the last step, on rank 0, in the session's memory: valid until the next step.
+    type, public :: insitu_picture
+        character(:), allocatable :: image                           ! its name in the scene
+        real(real32), pointer, contiguous :: rgba(:, :, :) => null() ! (4, width, height), the top row first
+        real(real32), pointer, contiguous :: depth(:, :) => null()   ! (width, height); huge or infinite: nothing
+    end type insitu_picture
+
+    ! Makes the values of a field, in the steps that need them: values = insitu_borrow(...), of an array that stays until
+    ! the step has returned. It may communicate (insitu_fill in insitu.h); status: INSITU_OK, or any other to fail.
+    abstract interface
+        subroutine insitu_fill(values, status)
+            import :: insitu_array
+            type(insitu_array), intent(out) :: values
+            integer, intent(out) :: status
+        end subroutine insitu_fill
+    end interface
+    public :: insitu_fill
+
+    ! What C is given beside the function that it calls: these stay where they are until the session ends.
+    type :: fill_record
+        character(:), allocatable :: mesh, field
+        procedure(insitu_fill), pointer, nopass :: fill => null()
+        type(fill_record), pointer :: next => null()
+    end type fill_record
+
     ! Of a mesh that was handed over: how long the index of a field must be.
     type :: mesh_size
         character(:), allocatable :: name
@@ -107,11 +138,13 @@ module insitu
         type(c_ptr) :: handle = c_null_ptr
         character(:), allocatable :: own_error ! of an argument that C was not told
         type(mesh_size), allocatable :: sizes(:)
+        type(fill_record), pointer :: fills => null()
     contains
         procedure, private :: create_integer, create_f08, text_integer, text_f08
         generic :: create => create_integer, create_f08                   ! (comm, scene_file, status)
         generic :: create_from_text => text_integer, text_f08             ! (comm, scene_text, status)
-        procedure :: set_mesh, set_mesh_of_faces, remove_mesh, set_field, step, report, error, destroy
+        procedure :: set_mesh, set_mesh_of_faces, remove_mesh, set_field, set_filled_field, step, report, error, destroy
+        procedure :: keep_pictures, pictures
     end type insitu_session
 
     ! An array of any kind that the library takes: reals and integers of 4 and 8 bytes, integers of 1 byte; a list, or a
@@ -164,6 +197,16 @@ module insitu
             import :: c_ptr
             type(c_ptr), value :: session
         end function c_report
+        integer(c_int) function c_keep_pictures(session, keep) bind(C, name='insitu_keep_pictures')
+            import :: c_int, c_ptr
+            type(c_ptr), value :: session
+            integer(c_int), value :: keep
+        end function c_keep_pictures
+        type(c_ptr) function c_pictures(session, count) bind(C, name='insitu_last_pictures')
+            import :: c_int, c_ptr
+            type(c_ptr), value :: session
+            integer(c_int), intent(out) :: count
+        end function c_pictures
         type(c_ptr) function c_error(session) bind(C, name='insitu_error')
             import :: c_ptr
             type(c_ptr), value :: session
@@ -676,6 +719,94 @@ contains
         status = c_set_field(self%handle, as_c_text(mesh), field)
     end subroutine set_field
 
+    ! What C calls: the caller's procedure, whose array it is told of.
+    function run_fill(data, field) bind(C) result(status)
+        type(c_ptr), value :: data
+        type(c_field), intent(inout) :: field
+        integer(c_int) :: status
+        type(fill_record), pointer :: record
+        type(insitu_array) :: values
+        real(real64), target, save :: nothing = 0
+        integer :: own_status
+        call c_f_pointer(data, record)
+        call record%fill(values, own_status)
+        status = int(own_status, c_int)
+        if (own_status /= INSITU_OK) return
+        field%count = values%columns
+        field%component_count = int(values%rows, c_int)
+        field%component_stride = values%row_stride
+        field%values = as_c(values, nothing)
+        field%values%stride = values%stride
+    end function run_fill
+
+    ! The record of the field, a new one where it has none.
+    function record_of(self, mesh, name) result(out)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: mesh, name
+        type(fill_record), pointer :: out
+        out => self%fills
+        do while (associated(out))
+            if (out%mesh == trim(mesh) .and. out%field == trim(name)) return
+            out => out%next
+        end do
+        allocate (out)
+        out%mesh = trim(mesh)
+        out%field = trim(name)
+        out%next => self%fills
+        self%fills => out
+    end function record_of
+
+    ! This rank's part of a field whose values fill makes, in the steps that need them, of so many components.
+    subroutine set_filled_field(self, mesh, name, fill, status, centring, components)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: mesh, name
+        procedure(insitu_fill) :: fill
+        integer, intent(out) :: status
+        integer, intent(in), optional :: centring, components
+        character(kind=c_char), target :: c_name(len_trim(name) + 1)
+        type(fill_record), pointer :: record
+        type(c_field) :: field
+        c_name = as_c_text(name)
+        record => record_of(self, mesh, name)
+        record%fill => fill
+        call c_field_defaults(field)
+        field%name = c_loc(c_name)
+        if (present(centring)) field%centring = centring
+        if (present(components)) field%component_count = components
+        field%fill = c_funloc(run_fill)
+        field%fill_data = c_loc(record)
+        self%own_error = ''
+        status = c_set_field(self%handle, as_c_text(mesh), field)
+    end subroutine set_filled_field
+
+    ! From now on keep each step's pictures in memory, on rank 0, or no longer. Collective; rank 0's keep counts.
+    subroutine keep_pictures(self, keep, status)
+        class(insitu_session), intent(inout) :: self
+        logical, intent(in) :: keep
+        integer, intent(out) :: status
+        self%own_error = ''
+        status = c_keep_pictures(self%handle, merge(1_c_int, 0_c_int, keep))
+    end subroutine keep_pictures
+
+    ! Those of the last step; none on other ranks, and where none are kept.
+    function pictures(self) result(out)
+        class(insitu_session), intent(in) :: self
+        type(insitu_picture), allocatable :: out(:)
+        type(c_picture), pointer :: kept(:)
+        type(c_ptr) :: first
+        integer(c_int) :: count
+        integer :: i
+        first = c_pictures(self%handle, count)
+        allocate (out(count))
+        if (count == 0) return
+        call c_f_pointer(first, kept, [count])
+        do i = 1, count
+            out(i)%image = insitu_text(kept(i)%image)
+            call c_f_pointer(kept(i)%rgba, out(i)%rgba, [4, int(kept(i)%width), int(kept(i)%height)])
+            call c_f_pointer(kept(i)%depth, out(i)%depth, [int(kept(i)%width), int(kept(i)%height)])
+        end do
+    end function pictures
+
     ! Draw what is due. Collective; after an error, which every rank has, the session stays usable.
     subroutine step(self, cycle, time, status)
         class(insitu_session), intent(inout) :: self
@@ -710,7 +841,13 @@ contains
     subroutine destroy(self, status)
         class(insitu_session), intent(inout) :: self
         integer, intent(out) :: status
+        type(fill_record), pointer :: record
         self%own_error = ''
         status = c_destroy(self%handle)
+        do while (associated(self%fills))
+            record => self%fills
+            self%fills => record%next
+            deallocate (record)
+        end do
     end subroutine destroy
 end module insitu

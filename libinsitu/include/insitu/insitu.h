@@ -131,7 +131,8 @@ typedef struct insitu_mesh {
      * cells, as codes of finite volumes have them (docs/finite_volume.md). The faces' vertices stay where they are; the
      * library makes, once for each topology, the faces of each cell, in the order of their numbers: 4 bytes a cell and
      * up to 8 a face (twice that where there are more than 2^31 of them), in bytes_copied. */
-    insitu_array owner;      /* int32 or int64, face_count: the cell on one side of each face */
+    insitu_array owner;      /* int32 or int64, face_count: the cell on one side of each face. Where index_base is 1 it
+                                may be 0 beside a neighbour, as in CGNS: the neighbour is the face's only cell. */
     int64_t neighbour_count; /* elements in neighbour; at most face_count */
     insitu_array neighbour;  /* int32 or int64, neighbour_count: the cell on the other side of each face, another than
                                 the owner. Faces on the boundary have -1, or 0 where index_base is 1, or are the last
@@ -171,10 +172,10 @@ typedef struct insitu_mesh {
  * step between two cells. Where the scene says `interpolate: vertex`, each vertex gets the mean of its corners on all
  * ranks, ghosts left out. Polyhedra, whose connectivity has faces, have no corners: a mesh with any is an error.
  *
- * A mesh is torn as long as the scene names a corner field of it, for all that is drawn of it: each corner is a vertex of
- * its own then. In bytes_copied: coordinates, 12 or 24 bytes a corner, and 4 bytes a corner of indices (8 where there
- * are more than 2^31); fields at vertices that are drawn, a tuple a corner. Values at corners are read where they
- * are. */
+ * A mesh is torn as long as the scene names a corner field of it, for all that is drawn of it: each corner is a vertex
+ * of its own then. In bytes_copied: coordinates, 12 or 24 bytes a corner, and 4 bytes a corner of indices (8 where
+ * there are more than 2^31); fields at vertices that are drawn, a tuple a corner. Values at corners are read where
+ * they are. */
 typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER = 2 } insitu_centring;
 
 struct insitu_field;
@@ -183,10 +184,10 @@ struct insitu_field;
  * belongs to them (count, component_stride_bytes, index, corner_row, changed); its name, centring and component_count
  * stay. Called within insitu_step(), by the thread that called that, at most once a step, where a picture, a
  * statistic or a condition of this step needs the field; never elsewhere. The arrays are borrowed until the step has
- * returned. All ranks call the fills of their fields in the same order, by the names of meshes and then of fields: where
- * all ranks set the field with a fill, it may communicate, on a communicator of the caller's; it must not call the
- * session. Any other status than INSITU_OK is an error of the step, told on all ranks; the other fills are called all
- * the same. */
+ * returned. All ranks call the fills of their fields in the same order, by the names of meshes and then of fields:
+ * where all ranks set the field with a fill, it may communicate, on a communicator of the caller's; it must not call
+ * the session. Any other status than INSITU_OK is an error of the step, told on all ranks; the other fills are called
+ * all the same. */
 typedef insitu_status insitu_fill(void *fill_data, struct insitu_field *field);
 
 /* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
@@ -204,16 +205,17 @@ typedef struct insitu_field {
      * cell or corner has, from the mesh's index_base on, as in vectors of degrees of freedom and arrays with halos.
      * Fields that the scene asks for are copied in the order of the vertices, cells or corners when a step first needs
      * them, and again when their values changed: one tuple each, in bytes_copied. Entries of index out of range are
-     * told then. Where there are no vertices, cells or corners its data may be NULL; its type tells that it is given. */
+     * told then. Where there are no vertices, cells or corners its data may be NULL; its type tells that it is
+     * given. */
     insitu_array index;
     /* Of corners, where cells are of one type without offsets: tuples of values, or entries of index where that is
      * given, from the first corner of a cell to that of the next, at least as many as its vertices; further ones, those
-     * of degrees of freedom within edges, faces and cells, are passed over. Values in such rows are copied, as by index.
-     * 0: one cell after the other, as many as a cell has vertices. Cells with offsets have their corners where
+     * of degrees of freedom within edges, faces and cells, are passed over. Values in such rows are copied, as by
+     * index. 0: one cell after the other, as many as a cell has vertices. Cells with offsets have their corners where
      * connectivity has its entries: connectivity_count of them, and 0 here. */
     int64_t corner_row;
-    /* Optional, instead of values, which are not given then: what makes them, when a step needs them. Each call may give
-     * other values, unless it sets changed to INSITU_CHANGED_NOTHING. */
+    /* Optional, instead of values, which are not given then: what makes them, when a step needs them. Each call may
+     * give other values, unless it sets changed to INSITU_CHANGED_NOTHING. */
     insitu_fill *fill;
     void *fill_data; /* handed to fill as it is */
 } insitu_field;
