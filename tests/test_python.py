@@ -173,6 +173,19 @@ def finite_volumes_are_their_hexes():
             comm.Barrier()
             with open(f"{folder}/volumes.png", "rb") as file:
                 everywhere(file.read() == plain, "the picture of the hexes")
+            lists = {**mesh, "faces": [face.astype(kind) + base for face in faces]}
+            del lists["face_offsets"]
+            raises(ValueError, "faces[3]: is strided", s.set_mesh, "m",
+                   **{**lists, "faces": lists["faces"][:3] + [numpy.zeros(8, kind)[::2]]})
+            s.set_mesh("m", **lists)
+            del lists
+            gc.collect()
+            s.set_field("m", "f", f)
+            s.step(2, 0.0)
+            comm.Barrier()
+            with open(f"{folder}/volumes.png", "rb") as file:
+                everywhere(file.read() == plain, "the picture of the hexes, by lists of faces")
+            comm.Barrier()
             s.set_mesh("m", keep_polyhedra=True, **mesh)
             s.set_field("m", "f", f)
             s.step(1, 0.0)

@@ -212,6 +212,19 @@ def _rows(what, given):
     return _strided(what, array, array.strides[-1]), array.size, array
 
 
+def _lists(what, given):
+    """A list of arrays, one a face: tables of their lengths and addresses, and what keeps both alive."""
+    arrays = [_view(f"{what}[{i}]", one, (1,)) for i, one in enumerate(given)]
+    for i, array in enumerate(arrays):
+        if array.dtype != arrays[0].dtype or (array.size > 1 and array.strides[0] != array.itemsize):
+            raise ValueError(f"{what}[{i}]: is strided, or of another type than the first, expected packed arrays of one type")
+    sizes = numpy.array([array.size for array in arrays], numpy.int64)
+    addresses = numpy.array([array.ctypes.data for array in arrays], numpy.uintp)
+    kind = _TYPES[arrays[0].dtype.name] if arrays else 4
+    table = _Array(addresses.ctypes.data if arrays else _nothing.ctypes.data, kind, 0)
+    return _list(what, sizes)[0], table, [arrays, sizes, addresses]
+
+
 def _row(array):
     """Elements from one row's first to the next one's, where there are others between; else 0."""
     if array.ndim != 2 or array.shape[0] < 2 or array.strides[1] == 0 or array.strides[0] % array.strides[1] != 0:
@@ -292,7 +305,8 @@ class Session:
     def set_mesh(self, name, *, coordinates, connectivity=None, cell_type=TET, cell_types=None, offsets=None, faces=None,
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
                  keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL):
-        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h). Of
+        """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h),
+        or a list of arrays, one a face, without face_offsets. Of
         cells of one type connectivity may be the first columns of a table: nodes[:, :8]. In place of connectivity,
         cell_type, cell_types and offsets: owner, neighbour and cell_count, of finite volumes."""
         mesh, held = _Mesh(), []
@@ -316,10 +330,14 @@ class Session:
                 borrowed, counts[key], array = _list(key, given)
                 setattr(mesh, key, borrowed)
                 held.append(array)
-        if faces is not None:
+        mesh.face_count = max(counts.get("face_offsets", 0) - 1, 0)
+        if isinstance(faces, (list, tuple)):
+            mesh.face_count = len(faces)
+            mesh.face_sizes, mesh.face_lists, arrays = _lists("faces", faces)
+            held.append(arrays)
+        elif faces is not None:
             mesh.face_connectivity, mesh.face_connectivity_count, array = _rows("faces", faces)
             held.append(array)
-        mesh.face_count = max(counts.get("face_offsets", 0) - 1, 0)
         mesh.neighbour_count = counts.get("neighbour", 0)
         mesh.cell_count = self._cell_count(counts, cells) if cell_count is None else cell_count
         self._expect_counts(mesh, counts)
