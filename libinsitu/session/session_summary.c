@@ -64,7 +64,7 @@ static void report_scalar(session_report *out, const session_mesh *mesh, const s
                          mesh->name, name, is_of_cells ? "cells" : "corners", (long long)bytes);
     }
     if (scalar->gradients) {
-        const int64_t bytes = mesh->given.vertex_count * (int64_t)sizeof *scalar->gradient_entries +
+        const int64_t bytes = session_vertex_count(mesh) * (int64_t)sizeof *scalar->gradient_entries +
                               scalar->gradient_count * (int64_t)sizeof *scalar->gradients;
         out->numbers.bytes_copied += bytes;
         session_text_add(&out->copied_why, "mesh \"%s\": gradients of field \"%s\" at vertices: %lld bytes", mesh->name,

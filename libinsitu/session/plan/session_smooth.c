@@ -137,7 +137,7 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
 {
     const mmbvh_wish wish = {&work->values, item->value_count, item->values};
     const mmbvh_options options = {.threads = threads};
-    const int64_t vertices = work->mesh->given.vertex_count;
+    const int64_t vertices = work->mesh->cells.vertex_count;
     mmbvh_selection crossed;
     int64_t unusable;
     work->entries = base_alloc((size_t)(vertices ? vertices : 1) * sizeof *work->entries);
@@ -192,7 +192,7 @@ static bool find_places(const smooth_work *work, bool by_id, double (**out)[3])
 {
     *out = base_alloc((size_t)(work->own_count ? work->own_count : 1) * sizeof **out);
     if (!*out) return false;
-    for (int64_t v = 0; work->mesh && v < work->mesh->given.vertex_count; v++) {
+    for (int64_t v = 0; work->mesh && v < work->mesh->cells.vertex_count; v++) {
         if (work->entries[v] < 0) continue;
         const session_key key = session_vertex_key(work->mesh, v, by_id);
         grid_vertex(&work->mesh->cells, v, (*out)[session_keys_find(&work->keys, &key)]);
@@ -270,7 +270,7 @@ static bool find_entries(smooth_work *work, bool by_id, int threads)
     key_filter filter;
     if (!filter_create(&work->keys, &filter)) return false;
 #pragma omp parallel for num_threads(threads) schedule(static)
-    for (int64_t v = 0; v < work->mesh->given.vertex_count; v++) {
+    for (int64_t v = 0; v < work->mesh->cells.vertex_count; v++) {
         const session_key key = session_vertex_key(work->mesh, v, by_id);
         const uint64_t bit = session_key_hash(&key) >> 32 & filter.mask;
         const bool may_be = filter.bits[bit / 64] >> bit % 64 & 1;
@@ -397,7 +397,7 @@ static insitu_status end_work(smooth_work *work, base_error *error)
     scalar->gradients = base_alloc((size_t)(count ? count : 1) * sizeof *scalar->gradients);
     if (!scalar->gradients) return session_no_memory(error, count * 12, "gradients at vertices");
     for (int64_t i = 0; i < count; i++) session_mean_gradient(&work->sums[i], scalar->gradients[i]);
-    for (int64_t v = 0; v < work->mesh->given.vertex_count; v++)
+    for (int64_t v = 0; v < work->mesh->cells.vertex_count; v++)
         if (work->entries[v] >= count) work->entries[v] = -1;
     scalar->gradient_count = count;
     scalar->gradient_entries = work->entries;
