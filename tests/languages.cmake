@@ -1,16 +1,19 @@
 # Other languages than C: each example draws the pictures of six_calls.c, to the byte, on 2 ranks.
+set(truth $<TARGET_FILE:six_calls>)
 function(insitu_add_same_pictures_test name)
   add_test(NAME ${name}
-    COMMAND ${CMAKE_COMMAND} "-DPROGRAM=${ARGN}" -DTRUTH=$<TARGET_FILE:six_calls>
+    COMMAND ${CMAKE_COMMAND} "-DPROGRAM=${ARGN}" "-DTRUTH=${truth}"
       -DSCENE=${PROJECT_SOURCE_DIR}/examples/six_calls.yaml -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}/${name}
       "-DMPIRUN=${MPIEXEC_EXECUTABLE};${MPIEXEC_NUMPROC_FLAG}" -P ${CMAKE_CURRENT_SOURCE_DIR}/languages_run.cmake)
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120 PROCESSORS 2)
 endfunction()
 
-# Not another language, but another description of the mesh: faces by owner and neighbour.
-add_executable(finite_volume ${PROJECT_SOURCE_DIR}/examples/finite_volume.c)
-target_link_libraries(finite_volume PRIVATE insitu insitu_flags m)
-insitu_add_same_pictures_test(finite_volume_example_draws_on_2_ranks $<TARGET_FILE:finite_volume>)
+# Not other languages, but other descriptions of the mesh: faces by owner and neighbour; nodes of higher order.
+foreach(example finite_volume finite_elements)
+  add_executable(${example} ${PROJECT_SOURCE_DIR}/examples/${example}.c)
+  target_link_libraries(${example} PRIVATE insitu insitu_flags m)
+  insitu_add_same_pictures_test(${example}_example_draws_on_2_ranks $<TARGET_FILE:${example}>)
+endforeach()
 
 # C++: from the header alone, under more warnings than our own code has. MPI's header is the system's, and not asked.
 add_executable(six_calls_cpp ${PROJECT_SOURCE_DIR}/examples/six_calls.cpp)
@@ -57,12 +60,23 @@ else()
   set(python_path PYTHONPATH=${CMAKE_LIBRARY_OUTPUT_DIRECTORY} PYTHONDONTWRITEBYTECODE=1)
   insitu_add_same_pictures_test(python_example_draws_on_2_ranks ${INSITU_TEST_PYTHON}
     ${PROJECT_SOURCE_DIR}/examples/six_calls.py)
+  insitu_add_same_pictures_test(discontinuous_example_draws_on_2_ranks ${INSITU_TEST_PYTHON}
+    ${PROJECT_SOURCE_DIR}/examples/discontinuous.py)
+  # What is said of changes saves work, and changes no picture: the program that says nothing draws the same.
+  set(moving_mesh ${PROJECT_SOURCE_DIR}/examples/moving_mesh.py)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${moving_mesh})
+  file(READ ${moving_mesh} text)
+  string(REGEX REPLACE ", changed=[^)]*" "" silent "${text}")
+  file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/silent_mesh.py "${silent}")
+  set(truth ${INSITU_TEST_PYTHON} ${CMAKE_CURRENT_BINARY_DIR}/silent_mesh.py)
+  insitu_add_same_pictures_test(moving_mesh_example_draws_on_2_ranks ${INSITU_TEST_PYTHON} ${moving_mesh})
   foreach(ranks 1 2)
     add_test(NAME python_np${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${INSITU_TEST_PYTHON}
       ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py ${CMAKE_CURRENT_BINARY_DIR}/python_np${ranks}
       ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu/insitu.h)
   endforeach()
-  foreach(test python_example_draws_on_2_ranks python_np1 python_np2)
+  foreach(test python_example_draws_on_2_ranks discontinuous_example_draws_on_2_ranks
+      moving_mesh_example_draws_on_2_ranks python_np1 python_np2)
     set_tests_properties(${test} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}" TIMEOUT 120
       PROCESSORS 2)
   endforeach()

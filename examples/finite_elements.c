@@ -1,0 +1,96 @@
+/* The simulation of six_calls.c as a finite element code would hold it: hexahedra of order 2, 27 nodes in the row of
+ * each, the corners first and in lexicographic order, and a vector of degrees of freedom in an order of its own. The
+ * pictures are the same to the byte, since the corners are what is drawn. */
+#include <insitu/insitu.h>
+
+#include <math.h>
+#include <stdio.h>
+
+enum { NX = 12, NY = 24, NZ = 24, CELLS = NX * NY * NZ };
+enum { SIDE_X = 2 * NX + 1, SIDE_Y = 2 * NY + 1, SIDE_Z = 2 * NZ + 1, NODES = SIDE_X * SIDE_Y * SIDE_Z };
+enum { NODES_PER_CELL = 27, GHOST_DOFS = 100, DOFS = GHOST_DOFS + NODES };
+
+static double nodes[NODES][3], solution[DOFS];
+static int cell_nodes[CELLS][NODES_PER_CELL], dof_of_node[NODES];
+
+static int node(int i, int j, int k)
+{
+    return i + SIDE_X * (j + SIDE_Y * k);
+}
+
+/* The cell's 3 x 3 x 3 nodes, x first, but the eight corners before all others. */
+static void put_cell(int cell)
+{
+    const int i = cell % NX, j = cell / NX % NY, k = cell / NX / NY;
+    int corners = 0, others = 8;
+    for (int n = 0; n < NODES_PER_CELL; n++) {
+        const int x = n % 3, y = n / 3 % 3, z = n / 9;
+        const int place = x == 1 || y == 1 || z == 1 ? others++ : corners++;
+        cell_nodes[cell][place] = node(2 * i + x, 2 * j + y, 2 * k + z);
+    }
+}
+
+static void make_mesh(int rank)
+{
+    for (int n = 0; n < NODES; n++) {
+        nodes[n][0] = 0.5 * (n % SIDE_X) + rank * NX;
+        nodes[n][1] = 0.5 * (n / SIDE_X % SIDE_Y);
+        nodes[n][2] = 0.5 * (n / SIDE_X / SIDE_Y);
+        dof_of_node[n] = GHOST_DOFS + (int)(7919LL * n % NODES); /* as scattered as a solver's */
+    }
+    for (int c = 0; c < CELLS; c++) put_cell(c);
+}
+
+static void advance(double time)
+{
+    for (int n = 0; n < NODES; n++)
+        solution[dof_of_node[n]] = cos(0.6 * hypot(hypot(nodes[n][0] - 12, nodes[n][1] - 12), nodes[n][2] - 12) - time);
+}
+
+static void hand_over(insitu_session *session)
+{
+    insitu_mesh mesh;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = NODES;
+    insitu_mesh_interleaved(&mesh, nodes, INSITU_FLOAT64);
+    mesh.cell_count = CELLS;
+    mesh.cell_type = INSITU_HEX;
+    mesh.connectivity_count = CELLS * NODES_PER_CELL;
+    mesh.connectivity = (insitu_array){.data = cell_nodes, .type = INSITU_INT32};
+    mesh.connectivity_row = NODES_PER_CELL; /* from one cell's first corner to the next one's */
+    mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
+    insitu_set_mesh(session, "slab", &mesh);
+}
+
+int main(int argc, char **argv)
+{
+    int rank;
+    MPI_Init(&argc, &argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    make_mesh(rank);
+
+    insitu_session *session = NULL;
+    if (insitu_create(MPI_COMM_WORLD, argc > 1 ? argv[1] : "scene.yaml", &session) != INSITU_OK) {
+        if (rank == 0) fprintf(stderr, "no pictures: %s\n", insitu_error(NULL));
+        MPI_Finalize();
+        return 1;
+    }
+    hand_over(session);
+
+    insitu_field field;
+    insitu_field_defaults(&field);
+    field.name = "pressure";
+    field.count = DOFS; /* the vector as it is, ghosts included */
+    field.values = (insitu_array){.data = solution, .type = INSITU_FLOAT64};
+    field.index = (insitu_array){.data = dof_of_node, .type = INSITU_INT32}; /* one entry a vertex of the mesh */
+    for (int cycle = 0; cycle < 4; cycle++) {
+        advance(0.5 * cycle);
+        insitu_set_field(session, "slab", &field);
+        if (insitu_step(session, cycle, 0.5 * cycle) != INSITU_OK && rank == 0)
+            fprintf(stderr, "cycle %d: %s\n", cycle, insitu_error(session));
+    }
+
+    insitu_destroy(&session);
+    MPI_Finalize();
+    return 0;
+}
