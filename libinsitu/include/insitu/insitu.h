@@ -258,6 +258,7 @@ typedef struct insitu_report {
                              every rank. */
 } insitu_report;
 
+/* An open session: its scene, what was handed over, and what is kept from step to step. */
 typedef struct insitu_session insitu_session;
 
 /* A picture in memory, as the last step drew it: without decorations, its background behind it. */
