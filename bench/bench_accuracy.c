@@ -1,9 +1,8 @@
 /* Speed against error: isosurfaces and volumes at every setting that trades one for the other, and VTK's volume mappers
  * beside them, of the same meshes, cameras and transfer functions. Prints CSV: a setting a row. */
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
+#include <getopt.h>
 #include <omp.h>
 
 #include "accuracy_rows.h"
@@ -68,27 +67,34 @@ static int usage(int status)
 
 int main(int argc, char **argv)
 {
+    enum { HELP = 1, LARGE, QUICK, SMOKE, NO_HEAD, NO_PEERS };
+    static const struct option list[] = {{"help", no_argument, NULL, HELP},
+                                         {"large", no_argument, NULL, LARGE},
+                                         {"quick", no_argument, NULL, QUICK},
+                                         {"smoke", no_argument, NULL, SMOKE},
+                                         {"no-head", no_argument, NULL, NO_HEAD},
+                                         {"no-peers", no_argument, NULL, NO_PEERS},
+                                         {0}};
     const accuracy_effort *effort = &whole;
     bool with_peers = bench_vtk_is_there(), with_head = true;
-    int i = 1;
-    for (; i < argc && !strncmp(argv[i], "--", 2); i++) {
-        if (!strcmp(argv[i], "--help")) return usage(0);
-        if (!strcmp(argv[i], "--large"))
+    for (int found; (found = getopt_long(argc, argv, "", list, NULL)) != -1;) {
+        if (found == HELP) return usage(0);
+        if (found == LARGE)
             effort = &large;
-        else if (!strcmp(argv[i], "--quick"))
+        else if (found == QUICK)
             effort = &quick;
-        else if (!strcmp(argv[i], "--smoke"))
+        else if (found == SMOKE)
             effort = &smoke;
-        else if (!strcmp(argv[i], "--no-head"))
+        else if (found == NO_HEAD)
             with_head = false;
-        else if (!strcmp(argv[i], "--no-peers"))
+        else if (found == NO_PEERS)
             with_peers = false;
         else
-            return usage(2);
+            return usage(2); /* getopt_long() has said why */
     }
-    if (i == argc) return usage(2);
+    if (optind == argc) return usage(2);
     if (with_head) accuracy_print_head();
-    for (; i < argc; i++)
-        if (!measure(argv[i], effort, with_peers)) return 1;
+    for (; optind < argc; optind++)
+        if (!measure(argv[optind], effort, with_peers)) return 1;
     return 0;
 }

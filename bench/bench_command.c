@@ -1,5 +1,6 @@
 #include "bench_command.h"
 
+#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,26 +40,45 @@ static bool add_mesh(const char *text, test_mesh_kind last, bench_command *comma
     return false;
 }
 
+static bool read_count(const char *name, int most, int *out)
+{
+    char *end;
+    const long count = strtol(optarg, &end, 10);
+    if (end == optarg || *end || count < 1 || count > most) {
+        fprintf(stderr, "--%s: expected 1 to %d, got %s\n", name, most, optarg);
+        return false;
+    }
+    *out = (int)count;
+    return true;
+}
+
 bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kind last, bench_command *command)
 {
-    bool head = true;
+    enum { HELP = 1, NO_HEAD, RUNS, SHRINK, DEPTHS };
+    static const struct option list[] = {
+        {"help", no_argument, NULL, HELP},           {"no-head", no_argument, NULL, NO_HEAD},
+        {"runs", required_argument, NULL, RUNS},     {"shrink", required_argument, NULL, SHRINK},
+        {"depths", required_argument, NULL, DEPTHS}, {0}};
+    bool head = true, is_good = true;
     *command = (bench_command){.runs = 5, .shrink = 1};
-    for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--help")) return usage(argv[0], about, command, 0);
-        if (!strcmp(argv[i], "--no-head"))
+    for (int found; is_good && (found = getopt_long(argc, argv, "", list, NULL)) != -1;) {
+        if (found == HELP) return usage(argv[0], about, command, 0);
+        if (found == NO_HEAD)
             head = false;
-        else if (!strcmp(argv[i], "--runs") && i + 1 < argc)
-            command->runs = atoi(argv[++i]);
-        else if (!strcmp(argv[i], "--shrink") && i + 1 < argc)
-            command->shrink = atoi(argv[++i]);
-        else if (!strcmp(argv[i], "--depths") && i + 1 < argc)
-            command->depths = argv[++i];
-        else if (!add_mesh(argv[i], last, command))
-            return usage(argv[0], about, command, 2);
+        else if (found == RUNS)
+            is_good = read_count("runs", BENCH_MAX_RUNS, &command->runs);
+        else if (found == SHRINK)
+            is_good = read_count("shrink", 16, &command->shrink);
+        else if (found == DEPTHS)
+            command->depths = optarg;
+        else
+            is_good = false; /* getopt_long() has said why */
     }
-    if (!command->mesh_count || command->runs < 1 || command->runs > BENCH_MAX_RUNS || command->shrink < 1 ||
-        command->shrink > 16)
-        return usage(argv[0], about, command, 2);
+    for (; is_good && optind < argc; optind++) {
+        is_good = add_mesh(argv[optind], last, command);
+        if (!is_good) fprintf(stderr, "%s: expected a mesh as tets:31, at most %d\n", argv[optind], BENCH_MAX_MESHES);
+    }
+    if (!is_good || !command->mesh_count) return usage(argv[0], about, command, 2);
     if (render_isa_warning() && *render_isa_warning()) fprintf(stderr, "%s: %s\n", argv[0], render_isa_warning());
     if (head) bench_print_head();
     return true;

@@ -1,7 +1,8 @@
-/* Options are "--name value" or "--name=value". Each is a row of a table: a flag, or a reader of its value. */
+/* getopt_long() finds options and their values; each is a row of a table: a flag, or a reader of its value. */
 #include "wave_options.h"
 
 #include <errno.h>
+#include <getopt.h>
 #include <limits.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -124,50 +125,78 @@ typedef struct raw_options {
 #define AT(field) offsetof(raw_options, field)
 
 static const option_row rows[] = {
-    {"--cells", read_choice, AT(cells), "tet|hex|wedge|pyramid|mixed", NULL, 0, 0},
-    {"--size", read_size, AT(size), "N or X,Y,Z, each 1 to 8192", NULL, 1, 8192},
-    {"--steps", read_integer, AT(steps), "0 to 1000000000", NULL, 0, 1e9},
-    {"--precision", read_choice, AT(real_bytes), "float|double", of_bytes, 0, 0},
-    {"--index", read_choice, AT(index_bytes), "int32|int64", of_bytes, 0, 0},
-    {"--layout", read_choice, AT(apart), "aos|soa", NULL, 0, 0},
-    {"--partition", read_choice, AT(partition), "block|morton|random|checkerboard", NULL, 0, 0},
-    {"--boundary", read_choice, AT(reflecting), "absorb|reflect", NULL, 0, 0},
-    {"--order", read_choice, AT(order), "1|2", of_order, 0, 0},
-    {"--jitter", read_number, AT(jitter), "a number from 0 to 0.3", NULL, 0, 0.3},
-    {"--swell", read_number, AT(swell), "a number from 0 to 10", NULL, 0, 10},
-    {"--centring", read_choice, AT(at_vertices), "cell|vertex", NULL, 0, 0},
-    {"--scene", read_text, AT(scene), "a file", NULL, 0, 0},
-    {"--moving", NULL, AT(moving), NULL, NULL, 0, 0},
-    {"--ghosts", NULL, AT(ghosts), NULL, NULL, 0, 0},
-    {"--ids", NULL, AT(ids), NULL, NULL, 0, 0},
-    {"--no-insitu", NULL, AT(no_insitu), NULL, NULL, 0, 0},
-    {"--help", NULL, AT(help), NULL, NULL, 0, 0},
+    {"cells", read_choice, AT(cells), "tet|hex|wedge|pyramid|mixed", NULL, 0, 0},
+    {"size", read_size, AT(size), "N or X,Y,Z, each 1 to 8192", NULL, 1, 8192},
+    {"steps", read_integer, AT(steps), "0 to 1000000000", NULL, 0, 1e9},
+    {"precision", read_choice, AT(real_bytes), "float|double", of_bytes, 0, 0},
+    {"index", read_choice, AT(index_bytes), "int32|int64", of_bytes, 0, 0},
+    {"layout", read_choice, AT(apart), "aos|soa", NULL, 0, 0},
+    {"partition", read_choice, AT(partition), "block|morton|random|checkerboard", NULL, 0, 0},
+    {"boundary", read_choice, AT(reflecting), "absorb|reflect", NULL, 0, 0},
+    {"order", read_choice, AT(order), "1|2", of_order, 0, 0},
+    {"jitter", read_number, AT(jitter), "a number from 0 to 0.3", NULL, 0, 0.3},
+    {"swell", read_number, AT(swell), "a number from 0 to 10", NULL, 0, 10},
+    {"centring", read_choice, AT(at_vertices), "cell|vertex", NULL, 0, 0},
+    {"scene", read_text, AT(scene), "a file", NULL, 0, 0},
+    {"moving", NULL, AT(moving), NULL, NULL, 0, 0},
+    {"ghosts", NULL, AT(ghosts), NULL, NULL, 0, 0},
+    {"ids", NULL, AT(ids), NULL, NULL, 0, 0},
+    {"no-insitu", NULL, AT(no_insitu), NULL, NULL, 0, 0},
+    {"help", NULL, AT(help), NULL, NULL, 0, 0},
 };
 
-static const option_row *find_row(const char *argument, size_t length)
+enum { ROW_COUNT = sizeof rows / sizeof *rows };
+
+/* getopt_long() is told of row i by i + 1: 0 is what it says of none. */
+static void list_options(struct option list[ROW_COUNT + 1])
 {
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
-        if (strlen(rows[i].name) == length && strncmp(rows[i].name, argument, length) == 0) return &rows[i];
-    }
-    return NULL;
+    for (int i = 0; i < ROW_COUNT; ++i)
+        list[i] = (struct option){rows[i].name, rows[i].read ? required_argument : no_argument, NULL, i + 1};
+    list[ROW_COUNT] = (struct option){0};
 }
 
-static bool read_option(int argc, char **argv, int *at, raw_options *raw, char *message, size_t size)
+static bool read_option(const option_row *row, raw_options *raw, char *message, size_t size)
 {
-    const char *argument = argv[*at], *equals = strchr(argument, '=');
-    const option_row *row = find_row(argument, equals ? (size_t)(equals - argument) : strlen(argument));
-    if (!row) {
-        snprintf(message, size, "%s: no such option; --help lists them", argument);
+    void *field = (char *)raw + row->offset;
+    if (!row->read)
+        *(bool *)field = true;
+    else if (!row->read(row, optarg, field)) {
+        snprintf(message, size, "--%s: expected %s, got %s", row->name, row->expected, optarg);
         return false;
     }
-    if (!row->read) {
-        if (equals) snprintf(message, size, "%s takes no value", row->name);
-        *((bool *)((char *)raw + row->offset)) = true;
-        return !equals;
+    return true;
+}
+
+/* What is wrong with an option that getopt_long() does not take; optopt is its row where it knows that. */
+static void tell_fault(int found, const char *argument, char *message, size_t size)
+{
+    if (optopt > ROW_COUNT) /* a letter of "-abc" */
+        snprintf(message, size, "-%c: no such option; --help lists them", optopt);
+    else if (optopt < 1)
+        snprintf(message, size, "%s: no such option; --help lists them", argument);
+    else if (found == ':')
+        snprintf(message, size, "--%s: expected %s, got nothing", rows[optopt - 1].name, rows[optopt - 1].expected);
+    else
+        snprintf(message, size, "--%s takes no value", rows[optopt - 1].name);
+}
+
+/* Without a word of getopt's own, which would come from every rank. */
+static bool read_options(int argc, char **argv, raw_options *raw, char *message, size_t size)
+{
+    struct option list[ROW_COUNT + 1];
+    list_options(list);
+    opterr = 0;
+    optind = 0; /* from the beginning, whoever was here before */
+    int found;
+    while ((found = getopt_long(argc, argv, ":", list, NULL)) != -1) {
+        if (found == ':' || found == '?') {
+            tell_fault(found, argv[optind - 1], message, size);
+            return false;
+        }
+        if (!read_option(&rows[found - 1], raw, message, size)) return false;
     }
-    const char *value = equals ? equals + 1 : *at + 1 < argc ? argv[++*at] : NULL;
-    if (value && row->read(row, value, (char *)raw + row->offset)) return true;
-    snprintf(message, size, "%s: expected %s, got %s", row->name, row->expected, value ? value : "nothing");
+    if (optind == argc) return true;
+    snprintf(message, size, "%s: no such option; --help lists them", argv[optind]);
     return false;
 }
 
@@ -180,9 +209,7 @@ bool wave_options_parse(int argc, char **argv, wave_options *options, char *mess
                        .order = 2,
                        .swell = 0.2,
                        .scene = "examples/wave.yaml"};
-    for (int i = 1; i < argc; ++i) {
-        if (!read_option(argc, argv, &i, &raw, message, (size_t)message_size)) return false;
-    }
+    if (!read_options(argc, argv, &raw, message, (size_t)message_size)) return false;
     *options = (wave_options){
         .cells = (wave_cells)raw.cells,
         .size = {raw.size[0], raw.size[1], raw.size[2]},

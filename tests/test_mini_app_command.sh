@@ -32,6 +32,8 @@ expect 1 "--size: expected .* got 4,5" "$@" "$wave" --size 4,5
 expect 1 "--steps: expected .* got nothing" "$@" "$wave" --steps
 expect 1 "--jitter: expected .* got nan" "$@" "$wave" --jitter nan
 expect 1 "--speed: no such option" "$@" "$wave" --speed 3
+expect 1 "insitu-wave: -x: no such option" "$@" "$wave" -xy
+expect 1 "insitu-wave: tet: no such option" "$@" "$wave" --steps 1 tet
 expect 1 "--ghosts takes no value" "$@" "$wave" --ghosts=1
 expect 0 "mpirun -n 4 insitu-wave" "$@" "$wave" --help
 expect 0 "^simulated in" "$@" "$wave" $small --no-insitu --size=1,2,1 --partition random --cells mixed

@@ -221,12 +221,13 @@ void errors_are_one_line(void **)
 
 void wrong_options_are_named(void **)
 {
-    expect(run_tool("--fast"), 1, "--fast: unknown option");
+    expect(run_tool("--fast"), 1, "not expected: --fast; see insitu-render --help");
+    expect(run_tool("--pieces=some scene.yaml row.vtu"), 1, "--pieces = some");
     expect(run_tool("--steps 3:1 scene.yaml row.vtu"), 1, "the first step is after the last");
     expect(run_tool("--steps x scene.yaml row.vtu"), 1, "--steps x: expected");
     expect(run_tool("--steps 4: scene.yaml row.vtu"), 1, "none chosen of 1");
     expect(run_tool("--partition round scene.yaml row.vtu"), 1, "--partition round: expected");
-    expect(run_tool("--steps"), 1, "a value is missing");
+    expect(run_tool("--steps"), 1, "--steps: 1 required A:B missing");
     expect(run_tool(""), 1, "missing");
     expect(run_tool("scene.yaml"), 1, "data files are missing");
     expect(run_tool("--size 3 row.vtu"), 1, "--size 3: expected WIDTHxHEIGHT");

@@ -1,5 +1,7 @@
-/* Parsed by hand rather than by getopt, which prints by itself, once a rank. */
+/* By CLI11, which throws rather than prints: every rank reads the same line, and one tells what is wrong with it. */
 #include "render_options.h"
+
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cctype>
@@ -107,47 +109,64 @@ void order_by_number(std::vector<std::string> &files)
     for (size_t i = 0; i < files.size(); i++) files[i] = sorted[i].path;
 }
 
-/* The value of "--name value" or "--name=value"; moves i past it. */
-bool takes_value(const std::string &name, int argc, char **argv, int &i, std::string &value)
+void parse_partition_name(const std::string &text, options &o)
 {
-    const std::string argument = argv[i];
-    if (argument.rfind(name + "=", 0) == 0) {
-        value = argument.substr(name.size() + 1);
-        return true;
-    }
-    if (argument != name) return false;
-    if (i + 1 >= argc) throw std::runtime_error(name + ": a value is missing");
-    value = argv[++i];
-    return true;
+    if (!parse_partition(text, o.how))
+        throw std::runtime_error("--partition " + text + ": expected block, random or checkerboard");
 }
 
-void parse_argument(int argc, char **argv, int &i, options &o, std::vector<std::string> &names)
+const char *const about = "Draw the pictures that a scene file describes, from files of unstructured cells. Several\n"
+                          "files are time steps, in order; a file with time steps inside is stepped through. Pictures\n"
+                          "go where the scene's outputs say, relative to the working directory. Without a scene the\n"
+                          "outer surface is drawn, coloured by a field, to NAME_CYCLE.png.";
+
+struct help_formatter : CLI::Formatter {
+    help_formatter() { column_width(23); }
+    std::string make_usage(const CLI::App *, std::string) const override
+    {
+        return "usage: insitu-render [options] [scene.yaml] file...\n"
+               "       mpirun -n ranks insitu-render [options] [scene.yaml] file...\n"
+               "       insitu-render --info file...\n\n" +
+               std::string(about) + "\n";
+    }
+    std::string make_option_opts(const CLI::Option *option) const override
+    {
+        return option->get_type_size() ? " " + option->get_type_name() : "";
+    }
+    std::string make_positionals(const CLI::App *) const override { return ""; } // the usage has them
+};
+
+using value_reader = void (*)(const std::string &text, options &o);
+
+/* Of an option that is given twice the last value counts. */
+void add_value(CLI::App &app, options &o, const char *name, const char *type, value_reader read, const char *meaning)
 {
-    const std::string argument = argv[i];
-    std::string value;
-    if (argument == "--help" || argument == "-h")
-        o.help = true;
-    else if (argument == "--version")
-        o.version = true;
-    else if (argument == "--info")
-        o.info = true;
-    else if (argument == "--pieces")
-        o.pieces = true;
-    else if (takes_value("--steps", argc, argv, i, value))
-        parse_steps(value, o);
-    else if (takes_value("--size", argc, argv, i, value))
-        parse_size(value, o);
-    else if (takes_value("--camera", argc, argv, i, value))
-        parse_camera(value, o);
-    else if (takes_value("--field", argc, argv, i, value))
-        o.field = value;
-    else if (takes_value("--partition", argc, argv, i, value)) {
-        if (!parse_partition(value, o.how))
-            throw std::runtime_error("--partition " + value + ": expected block, random or checkerboard");
-    } else if (argument.size() > 1 && argument[0] == '-')
-        throw std::runtime_error(argument + ": unknown option; see insitu-render --help");
-    else
-        names.push_back(argument);
+    app.add_option_function<std::string>(
+           name, [&o, read](const std::string &text) { read(text, o); }, meaning)
+        ->type_name(type)
+        ->take_last();
+}
+
+void declare(CLI::App &app, options &o, std::vector<std::string> &names)
+{
+    app.formatter(std::make_shared<help_formatter>());
+    app.footer("Files read: " + known_endings() + "\nExit status: 0, or 1 after a message on stderr.");
+    app.set_help_flag();
+    app.add_flag("--info", o.info, "list cells by type, bounds, fields with their ranges, and times");
+    add_value(app, o, "--steps", "A:B", parse_steps, "only steps A to B, counting from 0; A:, :B and A do too");
+    app.add_flag("--pieces", o.pieces, "the files are pieces of one step, not steps");
+    add_value(app, o, "--partition", "HOW", parse_partition_name,
+              "how cells are dealt out to ranks: block (default), random or\n"
+              "checkerboard; pictures do not depend on it");
+    add_value(
+        app, o, "--field", "NAME", [](const std::string &text, options &to) { to.field = text; },
+        "without a scene: the field; the first is the default");
+    add_value(app, o, "--size", "WxH", parse_size, "without a scene: the picture's size; 1280x720 is the default");
+    add_value(app, o, "--camera", "X,Y,Z", parse_camera, "without a scene: the direction from the data to the eye");
+    app.add_flag("--version", o.version, "print the version");
+    app.add_flag("--help", o.help, "print this");
+    app.add_flag("-h", o.help)->group(""); // not listed
+    app.add_option("file", names);
 }
 
 } // namespace
@@ -156,7 +175,13 @@ options parse_options(int argc, char **argv)
 {
     options o;
     std::vector<std::string> names;
-    for (int i = 1; i < argc; i++) parse_argument(argc, argv, i, o, names);
+    CLI::App app;
+    declare(app, o, names);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError &error) {
+        throw std::runtime_error(std::string(error.what()) + "; see insitu-render --help");
+    }
     if (o.help || o.version) return o;
     if (!o.info) {
         if (names.empty())
@@ -174,30 +199,11 @@ options parse_options(int argc, char **argv)
 
 std::string help_text()
 {
-    return "usage: insitu-render [options] [scene.yaml] file...\n"
-           "       mpirun -n ranks insitu-render [options] [scene.yaml] file...\n"
-           "       insitu-render --info file...\n"
-           "\n"
-           "Draw the pictures that a scene file describes, from files of unstructured cells. Several\n"
-           "files are time steps, in order; a file with time steps inside is stepped through. Pictures\n"
-           "go where the scene's outputs say, relative to the working directory. Without a scene the\n"
-           "outer surface is drawn, coloured by a field, to NAME_CYCLE.png.\n"
-           "\n"
-           "  --info               list cells by type, bounds, fields with their ranges, and times\n"
-           "  --steps A:B          only steps A to B, counting from 0; A:, :B and A do too\n"
-           "  --pieces             the files are pieces of one step, not steps\n"
-           "  --partition HOW      how cells are dealt out to ranks: block (default), random or\n"
-           "                       checkerboard; pictures do not depend on it\n"
-           "  --field NAME         without a scene: the field; the first is the default\n"
-           "  --size WxH           without a scene: the picture's size; 1280x720 is the default\n"
-           "  --camera X,Y,Z       without a scene: the direction from the data to the eye\n"
-           "  --version            print the version\n"
-           "  --help               print this\n"
-           "\n"
-           "Files read: " +
-           known_endings() +
-           "\n"
-           "Exit status: 0, or 1 after a message on stderr.\n";
+    options o;
+    std::vector<std::string> names;
+    CLI::App app;
+    declare(app, o, names);
+    return app.help();
 }
 
 } // namespace render_tool
