@@ -1,7 +1,7 @@
 /* Every allocation of a session's life fails in turn, on one rank or on all: as it is created, as meshes and fields are
  * set and drawn, as its scene is edited. What comes of it is an error on all ranks or the picture, to the bit; and the
- * next step draws the picture, whatever failed before. The heap that fails is the process's own, so that what libyaml,
- * libcyaml and the C library ask for is of it. */
+ * next step draws the picture, whatever failed before. The heap that fails is the process's own, so that what libyaml
+ * and the C library ask for is of it. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,8 +1,8 @@
-/* Reading a scene: the document is checked against the schema, libcyaml loads it into the file's own structs, and those
- * become a struct scene, in which every default is filled in and every colour is linear.
+/* Reading a scene: the document is checked against the schema and read into the file's own structs, and those become a
+ * struct scene, in which every default is filled in and every colour is linear.
  *
- * libcyaml and strtod() read numbers by the locale. A simulation may run under one with a decimal comma; the thread is
- * put into the C locale while a scene is read, and back. */
+ * strtod() reads numbers by the locale. A simulation may run under one with a decimal comma; the thread is put into the
+ * C locale while a scene is read, and back. */
 #include "scene.h"
 
 #include <stdio.h>
@@ -12,64 +12,6 @@
 #include "memory.h"
 #include "scene_convert.h"
 #include "text_file.h"
-
-/* ---- libcyaml ---- */
-
-static void *cyaml_memory(void *context, void *block, size_t size)
-{
-    (void)context;
-    if (size) return base_realloc(block, size);
-    base_free(block);
-    return NULL;
-}
-
-/* The first line libcyaml logs says what it does not like; a backtrace follows. */
-static void keep_first_line(cyaml_log_t level, void *context, const char *format, va_list arguments)
-{
-    base_error *first = context;
-    (void)level;
-    if (first->message[0] == '\0') vsnprintf(first->message, sizeof first->message, format, arguments);
-}
-
-static cyaml_config_t reader_settings(base_error *log)
-{
-    return (cyaml_config_t){.log_fn = keep_first_line,
-                            .log_ctx = log,
-                            .mem_fn = cyaml_memory,
-                            .log_level = CYAML_LOG_ERROR,
-                            .flags = CYAML_CFG_NO_ALIAS};
-}
-
-/* libyaml has read the text twice before: what it cannot do now is for want of memory. */
-static bool is_lack_of_memory(cyaml_err_t result)
-{
-    switch (result) {
-    case CYAML_ERR_OOM:
-    case CYAML_ERR_LIBYAML_EVENT_INIT:
-    case CYAML_ERR_LIBYAML_PARSER_INIT:
-    case CYAML_ERR_LIBYAML_PARSER: return true;
-    default: return false;
-    }
-}
-
-/* What the document check lets pass, libcyaml reads; were the two ever to disagree, its own words are passed on. */
-static insitu_status load_file(const scene_document *d, const char *text, size_t size, scene_file **file)
-{
-    base_error log = {.status = INSITU_OK};
-    const cyaml_config_t settings = reader_settings(&log);
-    const cyaml_err_t result =
-        cyaml_load_data((const uint8_t *)text, size, &settings, &scene_top_value, (cyaml_data_t **)file, NULL);
-    if (result == CYAML_OK) return INSITU_OK;
-    if (is_lack_of_memory(result)) return scene_no_memory(d);
-    return base_fail(d->error, INSITU_ERROR_SCENE, "%.300s:1: %s (%.400s)", d->file_name, cyaml_strerror(result),
-                     log.message);
-}
-
-static void free_file(scene_file *file)
-{
-    const cyaml_config_t settings = reader_settings(&(base_error){.status = INSITU_OK});
-    cyaml_free(&settings, &scene_top_value, file, 0);
-}
 
 /* ---- images ---- */
 
@@ -256,10 +198,8 @@ static insitu_status parse_in_c_locale(const char *text, size_t size, const char
     insitu_status status = scene_document_open(&document, text, size, file_name, error);
     if (status != INSITU_OK) return status;
     document.attachments = attachments;
-    status = scene_document_check(&document);
-    if (status == INSITU_OK) status = load_file(&document, text, size, &file);
+    status = scene_document_read(&document, &file);
     if (status == INSITU_OK) status = convert_file(&document, file, out);
-    free_file(file);
     scene_document_close(&document);
     return status;
 }

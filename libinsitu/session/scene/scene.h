@@ -1,5 +1,5 @@
-/* The scene file: what to draw, when, and where to put it. Read from YAML text by a schema (libcyaml); docs/scene.md is
- * drawn from the same schema. Colours in the file are sRGB in [0, 1]; they are linear here. */
+/* The scene file: what to draw, when, and where to put it. Read from YAML text by a schema; docs/scene.md is drawn
+ * from the same schema. Colours in the file are sRGB in [0, 1]; they are linear here. */
 #ifndef SCENE_SCENE_H
 #define SCENE_SCENE_H
 

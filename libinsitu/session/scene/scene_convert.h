@@ -1,4 +1,4 @@
-/* From what libcyaml read to struct scene: defaults filled in, and what the schema cannot say is checked. */
+/* From the schema's structs to struct scene: defaults filled in, and what the schema cannot say is checked. */
 #ifndef SCENE_SCENE_CONVERT_H
 #define SCENE_SCENE_CONVERT_H
 

@@ -1,7 +1,7 @@
-/* A scene file is read three times over, it being small: as events, to refuse what could hurt (depth, and aliases,
- * which can make a few lines stand for billions of nodes) before anything grows; as a tree, which is held against the
- * schema, because only here are a value, its key and its line together for a message a person can use; and then by
- * libcyaml into structs (scene.c), which by then has nothing left to refuse. */
+/* A scene file is read as events, to refuse what could hurt (depth, and aliases, which can make a few lines stand for
+ * billions of nodes) before anything grows, and as a tree. The tree is held against the schema, because only here are a
+ * value, its key and its line together for a message a person can use; what is right goes into the schema's structs in
+ * the same walk. */
 #include "scene_document.h"
 
 #include <errno.h>
@@ -11,7 +11,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "memory.h"
+
 enum { path_size = 256, quote_size = 48 };
+
+/* Memory of the structs; what is behind it is aligned for anything. */
+struct scene_block {
+    scene_block *next;
+    max_align_t room[];
+};
 
 static insitu_status bad_line(const scene_document *d, size_t line, const char *what)
 {
@@ -114,6 +122,11 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
 void scene_document_close(scene_document *d)
 {
     yaml_document_delete(&d->yaml);
+    while (d->blocks) {
+        scene_block *next = d->blocks->next;
+        base_free(d->blocks);
+        d->blocks = next;
+    }
 }
 
 /* ---- nodes ---- */
@@ -265,7 +278,7 @@ static insitu_status bad_value(const scene_document *d, const char *path, const 
     return scene_bad(d, path, "", "%s is not allowed, expected %s", quoted, expected);
 }
 
-/* Decimal only: libcyaml would take 010 for 8. */
+/* Decimal only, and 010 is neither 10 nor 8. */
 static bool read_whole_number(const char *text, double *number)
 {
     const char *digits = text + (*text == '-' || *text == '+');
@@ -290,12 +303,13 @@ static bool is_in_range(double number, const scene_key *key)
     return key->is_high_excluded ? number < key->high : number <= key->high;
 }
 
-static bool is_choice(const char *text, const cyaml_schema_value_t *value)
+/* NULL: none of them. */
+static const cyaml_strval_t *find_choice(const char *text, const cyaml_schema_value_t *value)
 {
     for (uint32_t i = 0; i < value->enumeration.count; i++) {
-        if (strcmp(text, value->enumeration.strings[i].str) == 0) return true;
+        if (strcmp(text, value->enumeration.strings[i].str) == 0) return &value->enumeration.strings[i];
     }
-    return false;
+    return NULL;
 }
 
 static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t *value, const scene_key *key)
@@ -309,17 +323,49 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     case CYAML_INT: return read_whole_number(text, &number) && is_in_range(number, key);
     case CYAML_FLOAT: return read_number(text, &number) && is_in_range(number, key);
     case CYAML_BOOL: return strcmp(text, "true") == 0 || strcmp(text, "false") == 0;
-    case CYAML_ENUM: return is_choice(text, value);
+    case CYAML_ENUM: return find_choice(text, value) != NULL;
     case CYAML_IGNORE: return length >= 1 && length <= SCENE_NAME_BYTES;
     default: return length >= value->string.min && length <= value->string.max;
     }
 }
 
-static insitu_status check_value(const scene_document *d, const char *path, const yaml_node_t *node,
-                                 const cyaml_schema_value_t *value, const scene_key *key);
+/* Take `count` things at *to, or, of a pointer there, where it will point. NULL at *to: the value is not stored, but
+ * read from the document. */
+static bool make_room(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
+{
+    if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;
+    scene_block *block = base_calloc(1, sizeof *block + (size_t)count * value->data_size);
+    if (!block) return false;
+    block->next = d->blocks;
+    d->blocks = block;
+    void *made = block->room;
+    memcpy(*to, &made, sizeof made);
+    *to = made;
+    return true;
+}
 
-static insitu_status check_list(const scene_document *d, const char *path, const yaml_node_t *node,
-                                const cyaml_schema_value_t *value, const scene_key *key)
+/* A scalar that is right. Texts are the document's own. */
+static insitu_status store_scalar(scene_document *d, const yaml_node_t *node, const cyaml_schema_value_t *value,
+                                  void *to)
+{
+    const char *text = text_of(node);
+    if (to && value->type == CYAML_STRING) memcpy(to, &text, sizeof text);
+    if (!to || value->type == CYAML_STRING) return INSITU_OK;
+    if (!make_room(d, value, 1, &to)) return scene_no_memory(d);
+    switch (value->type) {
+    case CYAML_INT: *(int *)to = (int)strtol(text, NULL, 10); break;
+    case CYAML_ENUM: *(int *)to = (int)find_choice(text, value)->val; break;
+    case CYAML_BOOL: *(bool *)to = *text == 't'; break;
+    default: *(double *)to = strtod(text, NULL); break;
+    }
+    return INSITU_OK;
+}
+
+static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
+                                 const cyaml_schema_value_t *value, const scene_key *key, void *to);
+
+static insitu_status check_list(scene_document *d, const char *path, const yaml_node_t *node,
+                                const cyaml_schema_value_t *value, const scene_key *key, void *to)
 {
     if (node->type != YAML_SEQUENCE_NODE) return bad_value(d, path, node, value, key);
     const int count = item_count(node);
@@ -328,17 +374,20 @@ static insitu_status check_list(const scene_document *d, const char *path, const
         scene_value_words(value, key, expected);
         return scene_bad(d, path, "", "a list of %d is not allowed, expected %s", count, expected);
     }
+    if (!make_room(d, value, count, &to)) return scene_no_memory(d);
     insitu_status status = INSITU_OK;
     for (int i = 0; i < count && status == INSITU_OK; i++) {
         char item_path[path_size];
         snprintf(item_path, sizeof item_path, "%s[%d]", path, i);
-        status = check_value(d, item_path, node_of(d, node->data.sequence.items.start[i]), value->sequence.entry, key);
+        void *item = to ? (char *)to + (size_t)i * value->data_size : NULL;
+        status =
+            check_value(d, item_path, node_of(d, node->data.sequence.items.start[i]), value->sequence.entry, key, item);
     }
     return status;
 }
 
 /* A name, or a list of names. */
-static insitu_status check_names(const scene_document *d, const char *path, const yaml_node_t *node,
+static insitu_status check_names(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
     const bool is_list = node->type == YAML_SEQUENCE_NODE;
@@ -360,20 +409,20 @@ static bool takes(const cyaml_schema_value_t *value, const yaml_node_t *node)
 }
 
 /* The first of the forms that the node can be is the one that it is held against. */
-static insitu_status check_forms(const scene_document *d, const char *path, const yaml_node_t *node,
+static insitu_status check_forms(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {
     for (int i = 0; i < key->form_count; i++) {
         const scene_form *form = &key->forms[i];
         if (!takes(&form->value, node)) continue;
         if (node->type == YAML_SCALAR_NODE && !is_scalar_right(node, &form->value, &form->key)) break;
-        return check_value(d, path, node, &form->value, &form->key);
+        return check_value(d, path, node, &form->value, &form->key, NULL);
     }
     return bad_value(d, path, node, value, key);
 }
 
-static insitu_status bad_key(const scene_document *d, const char *path, const yaml_node_t *name,
-                             const scene_mapping *mapping, const char *fault)
+static insitu_status bad_key(scene_document *d, const char *path, const yaml_node_t *name, const scene_mapping *mapping,
+                             const char *fault)
 {
     const scene_key holder = {.child = mapping};
     const cyaml_schema_value_t value = {.type = CYAML_MAPPING};
@@ -395,8 +444,8 @@ static const char *why_gone(const char *key)
     return NULL;
 }
 
-static insitu_status check_pair(const scene_document *d, const char *path, const yaml_node_pair_t *pair,
-                                const scene_mapping *mapping, unsigned *seen)
+static insitu_status check_pair(scene_document *d, const char *path, const yaml_node_pair_t *pair,
+                                const scene_mapping *mapping, unsigned *seen, void *to)
 {
     const yaml_node_t *name = node_of(d, pair->key);
     int i = 0;
@@ -412,17 +461,23 @@ static insitu_status check_pair(const scene_document *d, const char *path, const
     *seen |= 1u << i;
     char value_path[path_size];
     snprintf(value_path, sizeof value_path, "%s%s%s", path, *path ? "." : "", mapping->fields[i].key);
-    return check_value(d, value_path, node_of(d, pair->value), &mapping->fields[i].value, &mapping->keys[i]);
+    const cyaml_schema_field_t *field = &mapping->fields[i];
+    const yaml_node_t *node = node_of(d, pair->value);
+    if (field->value.type == CYAML_IGNORE) to = NULL;
+    if (to && field->value.type == CYAML_SEQUENCE && node->type == YAML_SEQUENCE_NODE)
+        *(int *)((char *)to + field->count_offset) = item_count(node);
+    void *place = to ? (char *)to + field->data_offset : NULL;
+    return check_value(d, value_path, node, &field->value, &mapping->keys[i], place);
 }
 
-static insitu_status check_mapping(const scene_document *d, const char *path, const yaml_node_t *node,
-                                   const scene_mapping *mapping)
+static insitu_status check_mapping(scene_document *d, const char *path, const yaml_node_t *node,
+                                   const scene_mapping *mapping, void *to)
 {
     unsigned seen = 0;
     insitu_status status = INSITU_OK;
     const yaml_node_pair_t *end = node->data.mapping.pairs.top;
     for (const yaml_node_pair_t *p = node->data.mapping.pairs.start; p < end && status == INSITU_OK; p++) {
-        status = check_pair(d, path, p, mapping, &seen);
+        status = check_pair(d, path, p, mapping, &seen, to);
     }
     for (int i = 0; mapping->fields[i].key && status == INSITU_OK; i++) {
         if (seen & 1u << i || mapping->fields[i].value.flags & CYAML_FLAG_OPTIONAL) continue;
@@ -433,25 +488,28 @@ static insitu_status check_mapping(const scene_document *d, const char *path, co
     return status;
 }
 
-static insitu_status check_value(const scene_document *d, const char *path, const yaml_node_t *node,
-                                 const cyaml_schema_value_t *value, const scene_key *key)
+static insitu_status check_value(scene_document *d, const char *path, const yaml_node_t *node,
+                                 const cyaml_schema_value_t *value, const scene_key *key, void *to)
 {
     switch (value->type) {
     case CYAML_MAPPING:
         if (node->type != YAML_MAPPING_NODE) return bad_value(d, path, node, value, key);
-        return check_mapping(d, path, node, key->child);
+        if (!make_room(d, value, 1, &to)) return scene_no_memory(d);
+        return check_mapping(d, path, node, key->child, to);
     case CYAML_SEQUENCE:
-    case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key);
+    case CYAML_SEQUENCE_FIXED: return check_list(d, path, node, value, key, to);
     case CYAML_IGNORE: return (key->forms ? check_forms : check_names)(d, path, node, value, key);
-    default: return is_scalar_right(node, value, key) ? INSITU_OK : bad_value(d, path, node, value, key);
+    default:
+        return is_scalar_right(node, value, key) ? store_scalar(d, node, value, to)
+                                                 : bad_value(d, path, node, value, key);
     }
 }
 
-insitu_status scene_document_check(const scene_document *d)
+insitu_status scene_document_read(scene_document *d, scene_file **file)
 {
     const scene_key key = {.child = &scene_top};
     const yaml_node_t *root = yaml_document_get_root_node((yaml_document_t *)&d->yaml);
-    return check_value(d, "", root, &scene_top_value, &key);
+    return check_value(d, "", root, &scene_top_value, &key, file);
 }
 
 /* ---- the schema in words, for messages and for docs/scene.md alike --------------------------------------------- */

@@ -1,5 +1,5 @@
-/* A scene file as a tree of YAML nodes with their lines: where its errors are found and worded, before and beside what
- * libcyaml reads. */
+/* A scene file as a tree of YAML nodes with their lines: where its errors are found and worded, and what it says goes
+ * into the schema's structs. */
 #ifndef SCENE_SCENE_DOCUMENT_H
 #define SCENE_SCENE_DOCUMENT_H
 
@@ -8,11 +8,14 @@
 #include "error.h"
 #include "scene_schema.h"
 
+typedef struct scene_block scene_block;
+
 typedef struct scene_document {
     const char *file_name;                 /* borrowed */
     base_error *error;                     /* borrowed; where messages go */
     struct scene_attachments *attachments; /* borrowed; NULL: none may be named */
     yaml_document_t yaml;
+    scene_block *blocks; /* memory of what was read */
 } scene_document;
 
 /* Read text into *d: one YAML document, of bounded size and depth, without anchors, aliases and tags. On an error there
@@ -23,8 +26,9 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
 
 void scene_document_close(scene_document *d);
 
-/* Hold the document against the schema: keys known, given once, none missing; types, counts and ranges right. */
-insitu_status scene_document_check(const scene_document *d);
+/* Hold the document against the schema (keys known, given once, none missing; types, counts and ranges right) and make
+ * *file of it, which is the document's, and valid until that is closed. Undefined on an error. */
+insitu_status scene_document_read(scene_document *d, scene_file **file);
 
 /* The line (from 1) of a path such as "images[0].size[1]"; of as much of it as there is. */
 int scene_document_line(const scene_document *d, const char *path);

@@ -1,4 +1,5 @@
-/* The scene file's schema: what libcyaml reads into, and beside each key what it may hold and what it means.
+/* The scene file's schema: what is read into, and beside each key what it may hold and what it means. libcyaml's header
+ * has the words for it; nothing of the library is called.
  *
  * Everything optional is a pointer, NULL where the file does not give it; defaults are filled in by scene.c. */
 #ifndef SCENE_SCENE_SCHEMA_H
@@ -273,11 +274,11 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* libcyaml has no word for "a name or a list of names", nor for values of several forms: CYAML_IGNORE stands for both
+/* There is no word there for "a name or a list of names", nor for values of several forms: CYAML_IGNORE stands for both
  * here, and they are read from the document (scene_document_texts(), scene_document_kind()). */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64 };
 
-/* The mapping at the top of a file, of a scene_file, and libcyaml's view of the same. */
+/* The mapping at the top of a file, of a scene_file, and the same as a value. */
 extern const scene_mapping scene_top;
 extern const cyaml_schema_value_t scene_top_value;
 

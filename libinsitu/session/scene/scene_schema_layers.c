@@ -41,7 +41,7 @@ static const scene_form path_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER,
 static const scene_form name_forms[] = {{{CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, 255)}, {0}}};
 typedef struct no_members {
     char unused;
-} no_members; /* libcyaml reads nothing of a mapping that stands for one of several forms */
+} no_members; /* a mapping that stands for one of several forms is read from the document */
 
 #define MAP_KEYS(X)                                                                                                    \
     X(CYAML_FIELD_IGNORE("colours", OPTIONAL),                                                                         \
