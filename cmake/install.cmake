@@ -42,7 +42,7 @@ if(TARGET insitu-render)
 endif()
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/insituConfig.cmake.in
-  ${PROJECT_BINARY_DIR}/insituConfig.cmake INSTALL_DESTINATION ${insitu_package_dir})
+  ${PROJECT_BINARY_DIR}/insituConfig.cmake INSTALL_DESTINATION ${insitu_package_dir} PATH_VARS CMAKE_INSTALL_INCLUDEDIR)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/insituConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/insituConfig.cmake ${PROJECT_BINARY_DIR}/insituConfigVersion.cmake
   DESTINATION ${insitu_package_dir} COMPONENT dev)

@@ -14,13 +14,21 @@ file(RENAME ${FOLDER}/installed ${FOLDER}/moved)
 set(prefix ${FOLDER}/moved)
 
 run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE} -B ${FOLDER}/project -DCMAKE_PREFIX_PATH=${prefix}
-  -DCMAKE_FIND_USE_PACKAGE_REGISTRY=OFF -DWITH_VTK=${WITH_VTK} -DCMAKE_C_COMPILER=${CC} -DCMAKE_CXX_COMPILER=${CXX}
+  -DCMAKE_FIND_USE_PACKAGE_REGISTRY=OFF -DWITH_VTK=${WITH_VTK} -DWITH_FORTRAN=${WITH_FORTRAN}
+  -DFORTRAN_EXAMPLE=${SOURCE}/../../examples/six_calls.f90 -DCMAKE_C_COMPILER=${CC} -DCMAKE_CXX_COMPILER=${CXX}
   "-DCMAKE_C_FLAGS=${FLAGS}" "-DCMAKE_CXX_FLAGS=${FLAGS}")
 run(${CMAKE_COMMAND} --build ${FOLDER}/project)
 run(${FOLDER}/project/outside_user)
 run(${FOLDER}/project/outside_user_cpp)
 if(WITH_VTK)
   run(${FOLDER}/project/outside_vtk)
+endif()
+if(WITH_FORTRAN)
+  file(WRITE ${FOLDER}/scene.yaml "images: [{name: a, layers: [{surface: {}}], outputs: [{path: fortran.png}]}]")
+  run(${CMAKE_COMMAND} -E chdir ${FOLDER} project/outside_fortran scene.yaml)
+  if(NOT EXISTS ${FOLDER}/fortran.png)
+    message(FATAL_ERROR "the program in Fortran drew nothing")
+  endif()
 endif()
 
 # Python's module finds the library from where it is installed.
