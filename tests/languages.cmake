@@ -75,6 +75,17 @@ else()
       ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py ${CMAKE_CURRENT_BINARY_DIR}/python_np${ranks}
       ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu/insitu.h)
   endforeach()
+  # No borrowed array is read after it is gone: Python gives and takes memory by malloc then, so that valgrind knows. Of
+  # values that are not initialized the interpreter has its own.
+  find_program(INSITU_VALGRIND valgrind)
+  if(INSITU_VALGRIND)
+    add_test(NAME python_under_valgrind COMMAND ${CMAKE_COMMAND} -E env PYTHONMALLOC=malloc HWLOC_COMPONENTS=-x86
+      OMP_NUM_THREADS=1 INSITU_ISA=plain ${INSITU_VALGRIND} -q --undef-value-errors=no --error-exitcode=99
+      ${INSITU_TEST_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/test_python.py ${CMAKE_CURRENT_BINARY_DIR}/python_under_valgrind
+      ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu/insitu.h CONFIGURATIONS Long)
+    set_tests_properties(python_under_valgrind PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}"
+      TIMEOUT 7200 LABELS long)
+  endif()
   foreach(test python_example_draws_on_2_ranks discontinuous_example_draws_on_2_ranks
       moving_mesh_example_draws_on_2_ranks python_np1 python_np2)
     set_tests_properties(${test} PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT};${python_path}" TIMEOUT 120
