@@ -16,15 +16,14 @@ low, high = slice(None, -1), slice(1, None)
 corners = [number[z][:, y, x] for z in (low, high) for y in (low, high) for x in (low, high)]  # lexicographic
 cells = numpy.stack(corners, axis=-1).reshape(-1, 8)
 
-xyz = points[cells].reshape(-1, 3)  # every cell has vertices of its own, once for each topology
-own = numpy.arange(len(xyz)).reshape(cells.shape)
 dofs = numpy.empty(cells.shape)  # cells x corners: the solver's vector
+xyz = points[cells].reshape(-1, 3)
 distance = numpy.hypot(numpy.hypot(xyz[:, 0] - 12, xyz[:, 1] - 12), xyz[:, 2] - 12).reshape(cells.shape)
 
 with insitu.Session(MPI.COMM_WORLD, sys.argv[1] if len(sys.argv) > 1 else "scene.yaml") as session:
-    session.set_mesh("slab", coordinates=xyz, connectivity=own, cell_type=insitu.HEX,
+    session.set_mesh("slab", coordinates=points, connectivity=cells, cell_type=insitu.HEX,
                      vertex_order=insitu.ORDER_LEXICOGRAPHIC)
     for cycle in range(4):
         dofs[:] = numpy.cos(0.6 * distance - 0.5 * cycle)
-        session.set_field("slab", "pressure", dofs.reshape(-1))  # a view of the same memory
+        session.set_field("slab", "pressure", dofs.reshape(-1), centring=insitu.CORNER)
         session.step(cycle, 0.5 * cycle)
