@@ -17,6 +17,10 @@ const double bench_plane[3] = {0.4, 0.6, 0.7};
 /* The depths of the last picture, where it came with them. */
 static float *caught_depths;
 
+bool session_writes_behind;
+
+void session_load_image_library(void) {}
+
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)
 {

@@ -37,7 +37,7 @@ insitu_add_mpi_test(session_clips test_session_clips 1 2 3 7 TIMEOUT 120 ARGS ${
 insitu_session_program(test_session_index_base)
 insitu_add_mpi_test(session_index_base test_session_index_base 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
-foreach(name indexed cell_order corners filled)
+foreach(name indexed cell_order corners filled writer)
   insitu_session_program(test_session_${name})
   insitu_add_mpi_test(session_${name} test_session_${name} 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 endforeach()

@@ -28,17 +28,24 @@ static void assert_everywhere(bool is_well, int line)
 }
 #define everywhere(condition) assert_everywhere((condition), __LINE__)
 
-static void write_scene(const char *output)
+static void write_scene_of(const char *keys, const char *output)
 {
     if (own_rank == 0) {
         FILE *file = fopen(scene_name, "w");
-        fprintf(file,
-                "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - isosurface: {field: x, values: [0.4]}\n"
-                "    outputs:\n      - path: %s\n",
-                output);
+        fprintf(
+            file,
+            "%simages:\n  - name: a\n    size: [24, 16]\n    layers:\n      - isosurface: {field: x, values: [0.4]}\n"
+            "    outputs:\n      - path: %s\n",
+            keys, output);
         fclose(file);
     }
     MPI_Barrier(MPI_COMM_WORLD);
+}
+
+/* Pictures are there when the step is over. */
+static void write_scene(const char *output)
+{
+    write_scene_of("writing: step\n", output);
 }
 
 /* A hex a rank, side by side along y. */
@@ -111,6 +118,30 @@ static void folder_that_cannot_be_written_is_named(void **context)
         everywhere(strstr(insitu_error(session), "rank 0: image \"a\": ") && strstr(insitu_error(session), scene_name));
     }
     insitu_destroy(&session);
+}
+
+/* Written in the background: the steps go on, and one of them tells which cycle's pictures are not there. What none of
+ * them has told is told at the end. */
+static void picture_that_is_not_written_is_told_later(void **context)
+{
+    (void)context;
+    char output[2048];
+    snprintf(output, sizeof output, "%s/{cycle}.png", scene_name);
+    write_scene_of("", output);
+    insitu_session *session = NULL;
+    everywhere(insitu_create(MPI_COMM_WORLD, scene_name, &session) == INSITU_OK);
+    hand_over(session);
+    insitu_status status = insitu_step(session, 20, 0);
+    everywhere(status == INSITU_OK && insitu_last_report(session)->images == 1);
+    for (int cycle = 21; cycle < 600 && status == INSITU_OK; cycle++) {
+        usleep(10000);
+        status = insitu_step(session, cycle, 0);
+    }
+    everywhere(status == INSITU_ERROR_IO && strstr(insitu_error(session), "cycle 20: image \"a\": ") &&
+               strstr(insitu_error(session), scene_name));
+    everywhere(insitu_destroy(&session) == INSITU_ERROR_IO && !session);
+    everywhere(strstr(insitu_error(NULL), "image \"a\": ") && strstr(insitu_error(NULL), scene_name));
+    everywhere(insitu_destroy(&session) == INSITU_OK);
 }
 
 static int handled;
@@ -306,6 +337,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(picture_is_written_where_the_scene_says),
         cmocka_unit_test(folder_that_cannot_be_written_is_named),
+        cmocka_unit_test(picture_that_is_not_written_is_told_later),
         cmocka_unit_test(callers_error_handler_stays),
         cmocka_unit_test(sessions_of_split_ranks_live_side_by_side),
         cmocka_unit_test(scene_given_as_text_draws_what_its_file_draws),

@@ -15,6 +15,7 @@ import insitu
 comm = MPI.COMM_WORLD
 folder = sys.argv[1]
 SCENE = """
+writing: step
 images:
   - name: {name}
     size: [48, 32]

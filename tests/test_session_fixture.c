@@ -11,6 +11,7 @@ int own_rank, rank_count;
 caught_picture caught[MAX_CAUGHT];
 int caught_count;
 const char *unwritable;
+void (*before_writing)(void);
 
 static const char *folder = ".";
 static char scene_name[1024];
@@ -176,10 +177,15 @@ void forget_pictures(void)
     caught_count = 0;
 }
 
+bool session_writes_behind;
+
+void session_load_image_library(void) {}
+
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)
 {
     (void)format;
+    if (before_writing) before_writing();
     if (unwritable && strstr(path, unwritable)) return base_fail(error, INSITU_ERROR_IO, "%s: cannot be written", path);
     if (caught_count == MAX_CAUGHT) return base_fail(error, INSITU_ERROR_INTERNAL, "too many pictures for the test");
     const size_t pixels = (size_t)image->width * (size_t)image->height;

@@ -91,4 +91,8 @@ void forget_pictures(void);
 /* Paths with this in them cannot be written. NULL: all can. */
 extern const char *unwritable;
 
+/* Pictures are written before a step is over, unless session_writes_behind (session_image.h) is set. Called first then,
+ * by the thread that writes; NULL: nothing is. */
+extern void (*before_writing)(void);
+
 #endif

@@ -87,6 +87,13 @@ class stage
         insitu_vtk_destroy(&adaptor_);
         (void)insitu_destroy(&session_);
     }
+
+    /* Collective: the pictures are written, all of them, or this throws. */
+    void close()
+    {
+        insitu_vtk_destroy(&adaptor_);
+        if (insitu_destroy(&session_) != INSITU_OK) throw std::runtime_error(insitu_error(nullptr));
+    }
     stage(const stage &) = delete;
     stage &operator=(const stage &) = delete;
 
@@ -242,6 +249,7 @@ void draw(const world &w, const options &o)
     run_state run;
     progress bar(w.is_root(), source->count());
     for (size_t i = 0; i < source->count(); i++) draw_step(w, *source, on, i, run, bar);
+    on.close();
     bar.line(std::to_string(source->count()) + (source->count() == 1 ? " step, " : " steps, ") +
              std::to_string(run.images) + (run.images == 1 ? " picture" : " pictures") + " in " + working_folder());
 }

@@ -102,6 +102,8 @@ class _Report(ctypes.Structure):
         ("volume_ms", ctypes.c_double),
         ("composite_ms", ctypes.c_double),
         ("write_ms", ctypes.c_double),
+        ("background_ms", ctypes.c_double),
+        ("pictures_waiting", ctypes.c_int),
         ("cells", ctypes.c_int64),
         ("cells_ghost", ctypes.c_int64),
         ("cells_unusable", ctypes.c_int64),
@@ -410,11 +412,12 @@ class Session:
                 for i in range(count.value)]
 
     def close(self):
-        """End the session and let go of what it borrowed. Collective. A closed session may be closed again."""
-        if self._session:
-            _library.insitu_destroy(ctypes.byref(self._session))
+        """End the session and let go of what it borrowed; pictures that wait are written first, and Error is raised where
+        one could not be. Collective. A closed session may be closed again."""
+        status = _library.insitu_destroy(ctypes.byref(self._session)) if self._session else 0
         self._held.clear()
         self._retired.clear()
+        _check(status, None, True)
 
     def __enter__(self):
         return self

@@ -47,11 +47,11 @@ static bool is_mpi_running(void)
 
 static void free_session(insitu_session *session)
 {
+    session_writer_end(&session->writer); /* before the scene that it writes by */
     session_meshes_free(&session->meshes);
     session_catalogue_free(&session->catalogue);
     session_trees_free(&session->trees);
     session_scene_file_free(&session->scene_file);
-    session_drop_picture(&session->picture);
     session_drop_kept(&session->kept);
     session_run_ranges_free(&session->run_ranges);
     session_cinema_free(&session->cinema);
@@ -64,7 +64,10 @@ static insitu_status create(const session_team *team, const session_scene_source
                             base_error *error)
 {
     insitu_session *session = base_calloc(1, sizeof *session);
-    if (!session) session_no_memory(error, (int64_t)sizeof *session, "the session");
+    if (session)
+        session_writer_create(&session->writer);
+    else
+        session_no_memory(error, (int64_t)sizeof *session, "the session");
     if (!out) base_fail(error, INSITU_ERROR_ARGUMENT, "%s: no place for the session", source->call);
     insitu_status status = session_agree(team->comm, error);
     if (status) goto fail;
@@ -74,6 +77,7 @@ static insitu_status create(const session_team *team, const session_scene_source
     session_report_create(&session->report);
     status = session_load_scene(&session->scene_file, &session->team, source, error);
     if (status) goto fail;
+    if (team->rank == 0) session_writer_begin(&session->writer, &session->scene_file.scene);
     *out = session;
     return INSITU_OK;
 fail:
@@ -153,9 +157,16 @@ const insitu_picture *insitu_last_pictures(const insitu_session *session, int *c
 insitu_status insitu_destroy(insitu_session **session)
 {
     if (!session || !*session) return INSITU_OK;
+    insitu_session *s = *session;
     thread_error = (base_error){0};
-    if (is_mpi_running()) session_team_free(&(*session)->team);
-    free_session(*session);
+    session_writer_drain(&s->writer);
+    session_writer_collect(&s->writer, &s->report);
+    if (s->writer.failures) thread_error = session_writer_failure(&s->writer);
+    if (is_mpi_running()) {
+        session_share_error(s->team.comm, 0, &thread_error);
+        session_team_free(&s->team);
+    }
+    free_session(s);
     *session = NULL;
-    return INSITU_OK;
+    return thread_error.status;
 }

@@ -18,6 +18,7 @@
 #include "session_team.h"
 #include "session_threads.h"
 #include "session_trees.h"
+#include "session_writer.h"
 
 struct insitu_session {
     session_team team;
@@ -27,7 +28,7 @@ struct insitu_session {
     session_catalogue catalogue;
     session_space space;
     session_trees trees;
-    session_picture picture; /* rank 0 */
+    session_writer writer; /* rank 0 */
     session_kept_pictures kept;
     session_run_ranges run_ranges;
     session_cinema cinema; /* rank 0 */

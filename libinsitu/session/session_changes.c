@@ -1,7 +1,8 @@
 /* The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
  * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
  * all tables of names are alike, whether any rank lacks threads, the lowest of the instruction sets, and, from rank 0,
- * the time and whether the scene file was edited. After it, ranks decide alike without another word. */
+ * the time, whether the scene file was edited, and whether pictures could not be written. After it, ranks decide alike
+ * without another word. */
 #include "session_changes.h"
 
 #include <string.h>
@@ -19,6 +20,7 @@ enum change_word {
     NAMES_LOW,
     SCENE_CHANGED,
     THREADS_LACKING,
+    UNWRITTEN,
     ISA_LOW,
     ROOT_TIME, /* the bits of rank 0's */
     CHANGE_WORDS
@@ -53,6 +55,7 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[NAMES_LOW] = ~names;
     words[SCENE_CHANGED] = session_is_scene_edited(file, team->rank);
     words[THREADS_LACKING] = session_lacks_threads(&session->threads, file->scene.threads, team->node_ranks);
+    words[UNWRITTEN] = session->writer.failures;
     words[ISA_LOW] = -render_isa_level();
     words[ROOT_TIME] = team->rank == 0 ? bits_of(time) : INT64_MIN;
 }
@@ -74,6 +77,7 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .of_names = all[NAMES_CHANGED],
                              .are_names_shared = all[NAMES_HIGH] == ~all[NAMES_LOW],
                              .are_threads_lacking = all[THREADS_LACKING],
+                             .are_unwritten = all[UNWRITTEN],
                              .isa_level = (int)-all[ISA_LOW]};
     return INSITU_OK;
 }

@@ -12,7 +12,8 @@ typedef struct session_changes {
     bool of_scene, of_cells, of_names;
     bool are_names_shared; /* all ranks have the same tables of names */
     bool are_threads_lacking;
-    int isa_level; /* the lowest of the ranks' instruction sets (render_isa.h) */
+    bool are_unwritten; /* pictures of earlier steps */
+    int isa_level;      /* the lowest of the ranks' instruction sets (render_isa.h) */
 } session_changes;
 
 /* One small reduction. Collective. */

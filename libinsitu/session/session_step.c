@@ -31,8 +31,10 @@ static double milliseconds_since(double start)
 /* What was made for images of the old scene goes. */
 static void reload_scene(insitu_session *s)
 {
+    session_writer_drain(&s->writer);
+    session_writer_collect(&s->writer, &s->report); /* pictures that are written no longer need the old scene */
     if (!session_reload_scene(&s->scene_file, &s->team)) return;
-    session_drop_picture(&s->picture);
+    session_writer_drop_memory(&s->writer);
     session_run_ranges_free(&s->run_ranges);
     session_cinema_free(&s->cinema);
     s->events = (session_events){0};
@@ -80,7 +82,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {team,       s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
                                      &s->space,  &s->run_ranges,     &s->report,     &s->kept,   basis.scene,
-                                     &s->cinema, &s->catalogue};
+                                     &s->cinema, &s->writer,         &s->catalogue};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
@@ -103,35 +105,44 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
         status =
             session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
     if (!status) status = session_check_isovalues(&plan, &s->meshes, team, &s->report, error);
-    if (!status) status = session_draw_images(&drawing, &plan, &s->picture, error);
+    if (!status) status = session_draw_images(&drawing, &plan, error);
     if (!status) note_drawn(s, &plan);
     session_plan_free(&plan);
     if (!status) *error = of_events;
     return error->status;
 }
 
-/* The phases of every step, then those above. */
-static insitu_status step(insitu_session *s, int64_t cycle, double time, const session_guard *guard, base_error *error)
+/* The phases of every step but the first, then those above. */
+static insitu_status step(insitu_session *s, const session_changes *changes, const session_guard *guard,
+                          base_error *error)
 {
-    session_changes changes;
-    insitu_status status = session_find_changes(s, cycle, time, &changes, error);
-    if (status) return status;
-    s->report.numbers.time = changes.time;
-    if (changes.of_scene) reload_scene(s);
-    session_begin_cinema(&s->cinema, changes.cycle);
-    status = session_check_input(&changes, &s->meshes, &s->team, error);
-    const session_moment moment = {changes.cycle, changes.time, s->last_time, !s->has_stepped};
+    s->report.numbers.time = changes->time;
+    if (changes->of_scene) reload_scene(s);
+    if (s->team.rank == 0) session_writer_begin(&s->writer, &s->scene_file.scene);
+    session_begin_cinema(&s->cinema, changes->cycle);
+    insitu_status status = session_check_input(changes, &s->meshes, &s->team, error);
+    const session_moment moment = {changes->cycle, changes->time, s->last_time, !s->has_stepped};
     s->has_stepped = true;
-    s->last_time = changes.time;
+    s->last_time = changes->time;
     const bool are_images_due = session_count_due(&s->scene_file.scene, &moment) > 0;
     if (status || !(are_images_due || session_has_events(&s->scene_file.scene, moment.cycle, false))) return status;
-    use_common_kernels(changes.isa_level, &s->report);
+    use_common_kernels(changes->isa_level, &s->report);
     status = session_begin_threads(&s->threads, &s->team, s->scene_file.scene.threads,
-                                   changes.are_threads_lacking || changes.of_scene, guard, &s->report, error);
+                                   changes->are_threads_lacking || changes->of_scene, guard, &s->report, error);
     if (status) return status;
-    status = draw_due_images(s, &changes, &moment, error);
+    status = draw_due_images(s, changes, &moment, error);
     session_guard_end_team(s->team.threads);
     return status;
+}
+
+/* Pictures of earlier steps that could not be written are told where this step has nothing else to tell. Collective. */
+static insitu_status tell_unwritten(insitu_session *s, base_error *error)
+{
+    base_error told = {.status = INSITU_OK};
+    if (s->team.rank == 0) told = session_writer_failure(&s->writer);
+    session_share_error(s->team.comm, 0, &told);
+    *error = told;
+    return error->status;
 }
 
 insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
@@ -143,8 +154,14 @@ insitu_status insitu_step(insitu_session *session, int64_t cycle, double time)
     session->error = (base_error){0};
     session_drop_kept(&session->kept);
     session_report_begin(&session->report, cycle, time);
-    const insitu_status status = step(session, cycle, time, &guard, &session->error);
-    session_summarize(&session->meshes, &session->trees.parent, session->picture.bytes, session->scene_file.warning,
+    session_changes changes;
+    session_writer_collect(&session->writer, &session->report);
+    insitu_status status = session_find_changes(session, cycle, time, &changes, &session->error);
+    if (!status) {
+        status = step(session, &changes, &guard, &session->error);
+        if (!status && changes.are_unwritten) status = tell_unwritten(session, &session->error);
+    }
+    session_summarize(&session->meshes, &session->trees.parent, &session->writer, session->scene_file.warning,
                       &session->report);
     session_forget_filled(&session->meshes);
     session->report.numbers.total_ms = milliseconds_since(start);

@@ -155,7 +155,7 @@ static void report_mesh(session_report *out, const session_mesh *mesh)
             mesh->name, (long long)(mesh->drawn_count - mesh->tree.cell_count), (long long)mesh->drawn_count);
 }
 
-void session_summarize(const session_meshes *meshes, const mmbvh *parent, size_t picture_bytes,
+void session_summarize(const session_meshes *meshes, const mmbvh *parent, session_writer *writer,
                        const char *scene_warning, session_report *out)
 {
     insitu_report *report = &out->numbers;
@@ -164,6 +164,6 @@ void session_summarize(const session_meshes *meshes, const mmbvh *parent, size_t
     session_warn(out, &(session_warning){WARNING_ISA, NULL, NULL, 0}, *isa != '\0', "%s", isa);
     for (int i = 0; i < meshes->count; i++) report_mesh(out, meshes->items[i]);
     report->bytes_trees += mmbvh_bytes(parent);
-    report->bytes_pictures = (int64_t)picture_bytes;
+    report->bytes_pictures = session_writer_bytes(writer, &report->pictures_waiting);
     session_report_end(out);
 }

@@ -233,7 +233,10 @@ typedef struct insitu_report {
     double volume_ms;       /* volumes traced */
     double composite_ms;    /* fragments exchanged, merged and gathered, waiting included; alone: the slowest
                                thread's */
-    double write_ms;        /* images written, on rank 0 */
+    double write_ms;        /* on rank 0: pictures written in the step, or given to the thread that writes them, waiting
+                               until there is room included */
+    double background_ms;   /* on rank 0: that thread's, for pictures that it finished since the last step */
+    int pictures_waiting;   /* on rank 0: given to it and not yet written when the step ended */
     int64_t cells;          /* handed over, ghosts included */
     int64_t cells_ghost;    /* not drawn: flagged as ghosts */
     int64_t cells_unusable; /* not drawn: a field value, its own or a vertex's, that is not finite */
@@ -248,7 +251,8 @@ typedef struct insitu_report {
     int64_t bytes_borrowed;   /* of the caller's arrays in use */
     int64_t bytes_copied;     /* of the caller's data held in copies, with reasons in copied_why */
     int64_t bytes_trees;      /* of all trees held */
-    int64_t bytes_pictures;   /* of the last picture, kept on rank 0 for the next one; at most 64 MiB */
+    int64_t bytes_pictures;   /* on rank 0: of pictures that wait to be written, at most 128 MiB or one, and kept for
+                                 those to come, at most 64 MiB */
     int64_t bytes_peak;       /* most bytes the library held at once in this step */
     const char *copied_why;   /* "" or a list of what was copied and why; valid until the next step */
     const char *left_out;     /* "" or a list of what the scene does not need and was not computed; as above */
@@ -313,6 +317,9 @@ INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *m
  * on any rank is returned on every rank, with the rank and the place in the message; images that could be drawn
  * are drawn, and the session stays usable: the simulation goes on.
  *
+ * Pictures are written by a thread of rank 0 while the simulation goes on, unless the scene says `writing: step`. One
+ * that could not be written is an error of the next step that has nothing else to tell. The thread calls no MPI.
+ *
  * A step that draws works on threads of OpenMP's, as many as the scene asks for, there are cores for, and can be
  * started; within a parallel region of the caller's, on the calling thread alone. That one needs 320 kB of stack, the
  * others 256 kB (OMP_STACKSIZE); less is an error. Traps and rounding modes of the caller's are off meanwhile, on all
@@ -339,7 +346,9 @@ INSITU_API const insitu_picture *insitu_last_pictures(const insitu_session *sess
  * thread that failed. */
 INSITU_API const char *insitu_error(const insitu_session *session);
 
-/* Close a session and set *session to NULL. Collective. NULL, or a pointer to NULL, is fine. */
+/* Close a session and set *session to NULL. Collective. NULL, or a pointer to NULL, is fine. Pictures that wait are
+ * written first; one that could not be is an error, if no step has told it, and the session is closed all the same. A
+ * run that ends without it has its pictures written in MPI_Finalize(), or as the process exits; it is told nothing. */
 INSITU_API insitu_status insitu_destroy(insitu_session **session);
 
 /* The name of a status, as in "INSITU_ERROR_MESH". Local. */

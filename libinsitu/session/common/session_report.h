@@ -1,8 +1,8 @@
 /* The report of a step while it is written: its numbers, its lists of words, and which warnings were told.
  *
- * A warning says that something is drawn as asked but hardly as meant. All but WARNING_ISA and WARNING_WORDS are the same on every rank,
- * because they are found from what ranks share. A warning is told in the first step in which it holds. It is told again
- * if it has not held in between, or if the scene was edited. */
+ * A warning says that something is drawn as asked but hardly as meant. All but the last three are the same on every
+ * rank, because they are found from what ranks share. A warning is told in the first step in which it holds. It is told
+ * again if it has not held in between, or if the scene was edited. */
 #ifndef SESSION_REPORT_H
 #define SESSION_REPORT_H
 
@@ -48,6 +48,7 @@ typedef enum session_warning_kind {
     WARNING_GREY,     /* a surface has not the field that colours it */
     WARNING_OVERLAP,  /* cells overlap in some pixels */
     WARNING_WORDS,    /* rank 0 has no font for the words of a picture */
+    WARNING_WRITER,   /* rank 0 has no thread to write pictures */
     WARNING_ISA       /* INSITU_ISA of this rank's environment is not taken */
 } session_warning_kind;
 

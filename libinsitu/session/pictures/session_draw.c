@@ -12,7 +12,6 @@
 #include "session_channels.h"
 #include "session_decorations.h"
 #include "session_frame.h"
-#include "session_image.h"
 #include "session_layers.h"
 #include "session_view.h"
 
@@ -21,9 +20,10 @@ enum { overlap_fragments = 1 << 22 };
 
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
 typedef struct canvas {
-    image frame;   /* its memory is the session's picture */
-    float *depth;  /* the frame's, put by while it is drawn without */
-    image samples; /* where edges alone take more than one frame: those, and their sums */
+    image frame;
+    session_picture memory; /* of the frame; the writer's, to which it goes with the picture */
+    float *depth;           /* the frame's, put by while it is drawn without */
+    image samples;          /* where edges alone take more than one frame: those, and their sums */
     int64_t edge_count, *edges;
     double *edge_sums;
     double *sum; /* NULL: there is one frame */
@@ -31,12 +31,9 @@ typedef struct canvas {
     session_decorations *decorations; /* NULL: there are none, and the frame has its background */
 } canvas;
 
-/* A picture's memory stays for the next one, unless it is more than this. */
-enum { kept_bytes = 64 << 20 };
-
-static void canvas_free(canvas *c, session_picture *picture)
+static void canvas_free(canvas *c, session_writer *writer)
 {
-    if (picture->bytes > kept_bytes) session_drop_picture(picture);
+    if (c->memory.pixels) session_writer_release(writer, &c->memory);
     base_free(c->sum);
     base_free(c->samples.rgba);
     base_free(c->edges);
@@ -58,8 +55,15 @@ static bool has_edges_alone(const scene_image *image)
     return image->antialias > 1 && image->volume_count == 0;
 }
 
-static insitu_status canvas_create(const session_drawing *d, const scene_image *image, session_picture *picture,
-                                   canvas *out, base_error *error)
+static void reserve_frame(const session_drawing *d, size_t bytes, canvas *c)
+{
+    const double start = MPI_Wtime();
+    c->memory = session_writer_reserve(d->writer, bytes);
+    c->frame.rgba = c->memory.pixels;
+    d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start); /* waiting for room */
+}
+
+static insitu_status canvas_create(const session_drawing *d, const scene_image *image, canvas *out, base_error *error)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     const size_t bytes = pixels * (wants_depth(d, image) ? 5 : 4) * sizeof(float);
@@ -67,7 +71,7 @@ static insitu_status canvas_create(const session_drawing *d, const scene_image *
     out->frame.width = out->samples.width = image->width;
     out->frame.height = out->samples.height = image->height;
     if (d->team->rank != 0) return INSITU_OK;
-    out->frame.rgba = session_reserve_picture(picture, bytes);
+    reserve_frame(d, bytes, out);
     if (wants_depth(d, image) && out->frame.rgba) out->frame.depth = out->frame.rgba + 4 * pixels;
     if (is_summed) out->sum = base_calloc(pixels * 4, sizeof *out->sum);
     if (!out->frame.rgba || (is_summed && !out->sum))
@@ -271,60 +275,44 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
 
 /* ---- outputs ------------------------------------------------------------------------------------------------- */
 
-static insitu_image_format format_of(scene_format format)
-{
-    switch (format) {
-    case SCENE_PNG8: return INSITU_PNG8;
-    case SCENE_PNG16: return INSITU_PNG16;
-    case SCENE_EXR: return INSITU_EXR;
-    }
-    return INSITU_PNG8;
-}
-
 static scene_moment moment_of(const session_drawing *d, const scene_image *image)
 {
     return scene_moment_of(image, d->cycle, d->report->numbers.time);
 }
 
-static void write_output(const session_drawing *d, const scene_image *image, const scene_output *output,
-                         const canvas *source, base_error *error)
+/* Rank 0: what was drawn goes to the writer, and the canvas is left without it. */
+static void give_picture(const session_drawing *d, const scene_image *image, canvas *c, base_error *error)
 {
-    const session_decorations *decorations = source->decorations;
-    const scene_moment moment = moment_of(d, image);
-    char *path = scene_expand(output->path, &moment);
-    if (!path) {
-        base_fail(error, INSITU_ERROR_MEMORY, "no memory for the name of a picture");
+    session_files *files = base_calloc(1, sizeof *files);
+    if (!files) {
+        session_no_memory(error, (int64_t)sizeof *files, "a picture that is to be written");
         return;
     }
-    const insitu_image picture = {.width = image->width,
-                                  .height = image->height,
-                                  .rgba = source->frame.rgba,
-                                  .depth = output->format == SCENE_EXR ? source->frame.depth : NULL,
-                                  .channel_count = output->has_data ? SESSION_CHANNELS : 0,
-                                  .channels = source->channels.items,
-                                  .decorations = !decorations              ? NULL
-                                                 : output->has_decorations ? &decorations->all
-                                                                           : &decorations->background};
-    base_error reason = {0};
-    if (session_write_image(&picture, format_of(output->format), path, &reason) != INSITU_OK)
-        base_fail(error, reason.status, "image \"%s\": %.900s", image->name, reason.message);
-    else if (output->database >= 0)
-        session_note_picture(d->cinema, d->scene, image, output, &moment, error);
-    const session_warning warning = {WARNING_WORDS, image->name, NULL, 0};
-    session_warn(d->report, &warning, reason.status == INSITU_OK && *reason.message, "image \"%s\": %.900s",
-                 image->name, reason.message);
-    base_free(path);
+    files->scene = d->scene;
+    files->cinema = d->cinema;
+    files->has_picture = true;
+    files->image = *image;
+    files->moment = moment_of(d, image);
+    files->frame = c->frame;
+    files->memory = c->memory;
+    files->channels = c->channels;
+    files->decorations = c->decorations;
+    c->memory = (session_picture){0};
+    c->channels = (session_channels){0};
+    c->decorations = NULL;
+    session_writer_give(d->writer, files, d->report, error);
 }
 
 /* ranges: NULL, or those of the run. */
-static insitu_status write_outputs(const session_drawing *d, const scene_image *image, const canvas *source,
+static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
                                    session_image_ranges *ranges, base_error *error)
 {
     const double start = MPI_Wtime();
-    for (int i = 0; i < image->output_count && d->team->rank == 0; i++)
-        write_output(d, image, &image->outputs[i], source, error);
-    if (ranges && d->team->rank == 0) session_write_run_ranges(ranges, error);
-    if (d->team->rank == 0) d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+    if (d->team->rank == 0) {
+        give_picture(d, image, c, error);
+        if (ranges) session_write_run_ranges(ranges, error);
+        d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+    }
     return session_agree(d->team->comm, error);
 }
 
@@ -404,7 +392,7 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
 
 /* active: NULL, or for the image's frames to fill and to draw from. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
-                                session_picture *picture, base_error *error)
+                                base_error *error)
 {
     session_layer_basis basis = {d->meshes, d->team, d->space->extent.half_diagonal, d->report, NULL, image};
     session_view view;
@@ -416,7 +404,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     if (status) return status;
     layers.active = active;
     status = decorate(d, image, &view, &layers, &canvas, error);
-    if (!status) canvas_create(d, image, picture, &canvas, error);
+    if (!status) canvas_create(d, image, &canvas, error);
     if (!status) status = session_agree(d->team->comm, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
@@ -425,7 +413,7 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
         d->report->numbers.images++;
     }
     session_layers_free(&layers);
-    canvas_free(&canvas, picture);
+    canvas_free(&canvas, d->writer);
     return status;
 }
 
@@ -443,15 +431,23 @@ static void write_tables(const session_drawing *d, base_error *first)
 {
     base_error reason = {.status = INSITU_OK};
     if (d->scene->database_count == 0) return;
-    const double start = MPI_Wtime();
-    if (d->team->rank == 0) session_write_cinema(d->cinema, &reason);
-    if (d->team->rank == 0) d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+    if (d->team->rank == 0) {
+        const double start = MPI_Wtime();
+        session_files *files = base_calloc(1, sizeof *files);
+        if (files) {
+            files->scene = d->scene;
+            files->cinema = d->cinema;
+            files->moment.cycle = d->cycle;
+            session_writer_give(d->writer, files, d->report, &reason);
+        } else
+            session_no_memory(&reason, (int64_t)sizeof *files, "the tables of databases");
+        d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
+    }
     session_agree_as_is(d->team->comm, &reason);
     if (!first->status) *first = reason;
 }
 
-insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, session_picture *picture,
-                                  base_error *error)
+insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, base_error *error)
 {
     base_error first = plan->refusal;
     render_active_cells *active = NULL;
@@ -459,7 +455,7 @@ insitu_status session_draw_images(const session_drawing *d, const session_plan *
         base_error reason = {0};
         scene_image placed = *plan->images[i]; /* where its camera is now; all else is the scene's */
         placed.camera = scene_camera_at(&placed.camera, d->cycle, d->report->numbers.time);
-        draw_image(d, &placed, active_cells_for(plan, plan->images[i], &active), picture, &reason);
+        draw_image(d, &placed, active_cells_for(plan, plan->images[i], &active), &reason);
         if (first.status == INSITU_OK) first = reason;
     }
     render_active_cells_free(active);

@@ -11,6 +11,7 @@
 #include "session_run_ranges.h"
 #include "session_space.h"
 #include "session_team.h"
+#include "session_writer.h"
 
 /* What images are drawn of. */
 typedef struct session_drawing {
@@ -25,6 +26,7 @@ typedef struct session_drawing {
     session_kept_pictures *kept;
     const scene *scene;
     session_cinema *cinema; /* rank 0's */
+    session_writer *writer; /* rank 0's */
     const session_catalogue *catalogue;
 } session_drawing;
 
@@ -33,9 +35,8 @@ typedef struct session_drawing {
  */
 bool session_active_cells_pay(const session_plan *plan, const scene_image *image);
 
-/* Draw and write the plan's images. One that fails is left out; the first reason, the plan's refusal before all others,
- * is the error. Collective. */
-insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, session_picture *picture,
-                                  base_error *error);
+/* Draw the plan's images and give them to the writer. One that fails is left out; the first reason, the plan's refusal
+ * before all others, is the error. Collective. */
+insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, base_error *error);
 
 #endif

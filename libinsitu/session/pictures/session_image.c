@@ -120,13 +120,28 @@ static insitu_status load(base_error *error)
     return INSITU_OK;
 }
 
-insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
-                                  base_error *error)
+bool session_writes_behind = true;
+
+static insitu_status load_once(base_error *error, insitu_image_write_function **writer)
 {
     pthread_mutex_lock(&lock);
     const insitu_status status = loaded_writer ? INSITU_OK : load(error);
-    insitu_image_write_function *write = loaded_writer;
+    *writer = loaded_writer;
     pthread_mutex_unlock(&lock);
+    return status;
+}
+
+void session_load_image_library(void)
+{
+    insitu_image_write_function *unused;
+    load_once(NULL, &unused);
+}
+
+insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
+                                  base_error *error)
+{
+    insitu_image_write_function *write;
+    const insitu_status status = load_once(error, &write);
     if (status != INSITU_OK) return status;
 
     char message[sizeof error->message / 2] = "";

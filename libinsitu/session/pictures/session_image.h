@@ -2,6 +2,8 @@
 #ifndef SESSION_IMAGE_H
 #define SESSION_IMAGE_H
 
+#include <stdbool.h>
+
 #include "error.h"
 #include "insitu/image_output.h"
 
@@ -9,5 +11,12 @@
  * call tries again. Local. Thread-safe. */
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);
+
+/* Load it ahead of the first picture. An error is told by that. Local. Thread-safe. */
+void session_load_image_library(void);
+
+/* May pictures be written by a thread of their own (session_writer.h)? Tests that take the place of this file say no.
+ */
+extern bool session_writes_behind;
 
 #endif

@@ -7,6 +7,7 @@ static const cyaml_strval_t statistic_words[] = {
     {"minimum", SCENE_MINIMUM}, {"maximum", SCENE_MAXIMUM}, {"mean", SCENE_MEAN}};
 static const cyaml_strval_t tree_words[] = {
     {"auto", SCENE_TREE_AUTO}, {"full", SCENE_TREE_FULL}, {"partial", SCENE_TREE_PARTIAL}};
+static const cyaml_strval_t writing_words[] = {{"background", SCENE_WRITE_BEHIND}, {"step", SCENE_WRITE_IN_STEP}};
 static const cyaml_strval_t anchor_words[] = {{"top_left", SCENE_TOP_LEFT},   {"top", SCENE_TOP},
                                               {"top_right", SCENE_TOP_RIGHT}, {"left", SCENE_LEFT},
                                               {"right", SCENE_RIGHT},         {"bottom_left", SCENE_BOTTOM_LEFT},
@@ -285,6 +286,13 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .help = "What the trees are built over: all cells (`full`), those that the images can show (`partial`), or "     \
               "whichever has cost less so far (`auto`). Changes the speed, not the images.",                           \
       .by_default = "`auto`")                                                                                          \
+    X(CHOICE("writing", scene_file, writing, writing_words),                                                           \
+      .help =                                                                                                          \
+          "When pictures are written: by a thread of rank 0 while the simulation goes on (`background`), or "          \
+          "before `insitu_step` returns (`step`). In the background at most 128 MiB of pictures wait, or one, and "    \
+          "a picture that cannot be written is an error of the next step, or of `insitu_destroy`, which waits "        \
+          "for all.",                                                                                                  \
+      .by_default = "`background`")                                                                                    \
     X(CYAML_FIELD_SEQUENCE("images", CYAML_FLAG_POINTER, scene_file, images, &image, 1, SCENE_MAX_IMAGES),             \
       .help =                                                                                                          \
           "The images to draw. Three frames or more of a step that show the same isosurface, opaque, in one colour a " \

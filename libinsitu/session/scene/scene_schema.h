@@ -239,7 +239,8 @@ typedef struct scene_file_image {
 
 typedef struct scene_file {
     int *threads;
-    int *tree; /* scene_tree */
+    int *tree;    /* scene_tree */
+    int *writing; /* scene_writing */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;

@@ -1,0 +1,74 @@
+#include "session_files.h"
+
+#include <time.h>
+
+#include "memory.h"
+#include "session_image.h"
+
+int64_t session_files_bytes(const session_files *files)
+{
+    const int64_t frame = (int64_t)files->frame.width * files->frame.height * 4 * (int64_t)sizeof(float);
+    return (int64_t)files->memory.bytes + (files->channels.normals ? 2 * frame : 0);
+}
+
+static insitu_image_format format_of(scene_format format)
+{
+    switch (format) {
+    case SCENE_PNG8: return INSITU_PNG8;
+    case SCENE_PNG16: return INSITU_PNG16;
+    case SCENE_EXR: return INSITU_EXR;
+    }
+    return INSITU_PNG8;
+}
+
+static void write_output(session_files *files, const scene_output *output)
+{
+    const session_decorations *decorations = files->decorations;
+    char *path = scene_expand(output->path, &files->moment);
+    if (!path) {
+        base_fail(&files->error, INSITU_ERROR_MEMORY, "no memory for the name of a picture");
+        return;
+    }
+    const insitu_image picture = {.width = files->frame.width,
+                                  .height = files->frame.height,
+                                  .rgba = files->frame.rgba,
+                                  .depth = output->format == SCENE_EXR ? files->frame.depth : NULL,
+                                  .channel_count = output->has_data ? SESSION_CHANNELS : 0,
+                                  .channels = files->channels.items,
+                                  .decorations = !decorations              ? NULL
+                                                 : output->has_decorations ? &decorations->all
+                                                                           : &decorations->background};
+    base_error reason = {0};
+    if (session_write_image(&picture, format_of(output->format), path, &reason) != INSITU_OK)
+        base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
+    else if (output->database >= 0)
+        session_note_picture(files->cinema, files->scene, &files->image, output, &files->moment, &files->error);
+    if (!reason.status && *reason.message) files->warning = reason;
+    base_free(path);
+}
+
+/* By no call of MPI, which this thread may not make. */
+static double milliseconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
+}
+
+void session_write_files(session_files *files)
+{
+    const double start = milliseconds();
+    if (!files->has_picture) session_write_cinema(files->cinema, &files->error);
+    for (int i = 0; files->has_picture && i < files->image.output_count; i++)
+        write_output(files, &files->image.outputs[i]);
+    files->ms = milliseconds() - start;
+}
+
+void session_files_free(session_files *files)
+{
+    if (!files) return;
+    session_drop_picture(&files->memory);
+    session_free_channels(&files->channels);
+    session_free_decorations(files->decorations);
+    base_free(files);
+}

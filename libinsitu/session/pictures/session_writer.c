@@ -1,0 +1,308 @@
+/* Some library behind OpenImageIO starts threads and makes static objects as it is loaded. These are destroyed as the
+ * process exits, in the reverse of the order in which they were made; so that no picture is written with what is left
+ * of them, the wait at exit is registered again once the library is there, and goes before. */
+#include "session_writer.h"
+
+#include <mpi.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "memory.h"
+#include "session_image.h"
+
+static const int64_t most_waiting_bytes = (int64_t)128 << 20, most_free_bytes = (int64_t)64 << 20;
+
+/* ---- the process's end ---------------------------------------------------------------------------------------- */
+
+static pthread_mutex_t all_mutex = PTHREAD_MUTEX_INITIALIZER;
+static session_writer *all_writers;
+static pid_t process; /* that the threads are of: a fork has none of them */
+
+static void wait_for_thread(session_writer *w)
+{
+    pthread_mutex_lock(&w->mutex);
+    while (w->first || w->is_loading) pthread_cond_wait(&w->has_changed, &w->mutex);
+    pthread_mutex_unlock(&w->mutex);
+}
+
+static void wait_for_all(void)
+{
+    if (getpid() != process) return;
+    pthread_mutex_lock(&all_mutex);
+    for (session_writer *w = all_writers; w; w = w->next)
+        if (!pthread_equal(w->thread, pthread_self())) wait_for_thread(w);
+    pthread_mutex_unlock(&all_mutex);
+}
+
+/* MPI_Finalize() begins with the attributes of MPI_COMM_SELF (MPI-3.1, 8.7.1). */
+static int wait_in_finalize(MPI_Comm comm, int key, void *value, void *state)
+{
+    (void)comm, (void)key, (void)value, (void)state;
+    wait_for_all();
+    return MPI_SUCCESS;
+}
+
+static void wait_at_end(void)
+{
+    int key = MPI_KEYVAL_INVALID;
+    process = getpid();
+    atexit(wait_for_all);
+    if (MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, wait_in_finalize, &key, NULL) == MPI_SUCCESS)
+        MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
+}
+
+static void enlist(session_writer *w)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, wait_at_end);
+    pthread_mutex_lock(&all_mutex);
+    w->next = all_writers;
+    all_writers = w;
+    pthread_mutex_unlock(&all_mutex);
+}
+
+static void strike_off(session_writer *w)
+{
+    pthread_mutex_lock(&all_mutex);
+    for (session_writer **at = &all_writers; *at; at = &(*at)->next)
+        if (*at == w) {
+            *at = w->next;
+            break;
+        }
+    pthread_mutex_unlock(&all_mutex);
+}
+
+/* ---- memory of pictures --------------------------------------------------------------------------------------- */
+
+/* Locked. */
+static int64_t free_bytes(const session_writer *w)
+{
+    int64_t bytes = 0;
+    for (int i = 0; i < SESSION_FREE_PICTURES; i++) bytes += (int64_t)w->free_memory[i].bytes;
+    return bytes;
+}
+
+/* Fresh pages cost as much as filling them, so some are kept. Locked. */
+static void keep_memory(session_writer *w, session_picture *memory)
+{
+    for (int i = 0; i < SESSION_FREE_PICTURES; i++)
+        if (!w->free_memory[i].pixels && free_bytes(w) + (int64_t)memory->bytes <= most_free_bytes) {
+            w->free_memory[i] = *memory;
+            *memory = (session_picture){0};
+        }
+    session_drop_picture(memory);
+}
+
+/* Locked. None that is large enough: *memory stays empty, and one that is too small goes. */
+static void take_memory(session_writer *w, size_t bytes, session_picture *memory)
+{
+    int small = -1;
+    for (int i = 0; i < SESSION_FREE_PICTURES && !memory->pixels; i++) {
+        if (w->free_memory[i].bytes < bytes) {
+            if (w->free_memory[i].pixels) small = i;
+            continue;
+        }
+        *memory = w->free_memory[i];
+        w->free_memory[i] = (session_picture){0};
+    }
+    if (!memory->pixels && small >= 0) session_drop_picture(&w->free_memory[small]);
+}
+
+session_picture session_writer_reserve(session_writer *w, size_t bytes)
+{
+    session_picture out = {0};
+    pthread_mutex_lock(&w->mutex);
+    while (w->first && w->waiting_bytes + (int64_t)bytes > most_waiting_bytes)
+        pthread_cond_wait(&w->has_changed, &w->mutex);
+    for (;;) {
+        take_memory(w, bytes, &out);
+        if (out.pixels || session_reserve_picture(&out, bytes) || !w->first) break;
+        pthread_cond_wait(&w->has_changed, &w->mutex);
+    }
+    pthread_mutex_unlock(&w->mutex);
+    return out;
+}
+
+void session_writer_release(session_writer *w, session_picture *memory)
+{
+    pthread_mutex_lock(&w->mutex);
+    keep_memory(w, memory);
+    pthread_mutex_unlock(&w->mutex);
+}
+
+void session_writer_drop_memory(session_writer *w)
+{
+    pthread_mutex_lock(&w->mutex);
+    for (int i = 0; i < SESSION_FREE_PICTURES; i++) session_drop_picture(&w->free_memory[i]);
+    pthread_mutex_unlock(&w->mutex);
+}
+
+int64_t session_writer_bytes(session_writer *w, int *waiting)
+{
+    pthread_mutex_lock(&w->mutex);
+    const int64_t bytes = w->waiting_bytes + free_bytes(w);
+    *waiting = w->waiting;
+    pthread_mutex_unlock(&w->mutex);
+    return bytes;
+}
+
+/* ---- the thread ----------------------------------------------------------------------------------------------- */
+
+/* Locked. */
+static void append(session_files **first, session_files **last, session_files *files)
+{
+    files->next = NULL;
+    if (*first)
+        (*last)->next = files;
+    else
+        *first = files;
+    *last = files;
+}
+
+/* Locked. */
+static void finish_first(session_writer *w)
+{
+    session_files *files = w->first;
+    w->first = files->next;
+    w->waiting -= files->has_picture;
+    w->waiting_bytes -= session_files_bytes(files);
+    keep_memory(w, &files->memory);
+    session_free_channels(&files->channels);
+    append(&w->done, &w->last_done, files);
+    pthread_cond_broadcast(&w->has_changed);
+}
+
+static void *run(void *of_writer)
+{
+    session_writer *w = of_writer;
+    session_load_image_library();
+    atexit(wait_for_all);
+    pthread_mutex_lock(&w->mutex);
+    w->is_loading = false;
+    pthread_cond_broadcast(&w->has_changed);
+    for (;;) {
+        while (!w->first && !w->is_ending) pthread_cond_wait(&w->has_changed, &w->mutex);
+        if (!w->first) break;
+        pthread_mutex_unlock(&w->mutex);
+        session_write_files(w->first);
+        pthread_mutex_lock(&w->mutex);
+        finish_first(w);
+    }
+    pthread_mutex_unlock(&w->mutex);
+    return NULL;
+}
+
+void session_writer_create(session_writer *w)
+{
+    *w = (session_writer){0};
+    pthread_mutex_init(&w->mutex, NULL);
+    pthread_cond_init(&w->has_changed, NULL);
+}
+
+void session_writer_begin(session_writer *w, const scene *scene)
+{
+    sigset_t all, before;
+    if (w->is_running || w->is_refused || scene->writing != SCENE_WRITE_BEHIND || !session_writes_behind) return;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    w->is_loading = true;
+    w->is_running = pthread_create(&w->thread, NULL, run, w) == 0;
+    w->is_refused = !w->is_running;
+    if (w->is_refused) w->is_loading = false;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (w->is_running) enlist(w);
+}
+
+/* ---- what goes in and what comes out -------------------------------------------------------------------------- */
+
+static void warn(const session_files *files, session_report *report)
+{
+    const session_warning warning = {WARNING_WORDS, files->image.name, NULL, 0};
+    if (files->has_picture)
+        session_warn(report, &warning, *files->warning.message != '\0', "image \"%s\": %.900s", files->image.name,
+                     files->warning.message);
+}
+
+void session_writer_give(session_writer *w, session_files *files, session_report *report, base_error *error)
+{
+    const bool is_behind = w->is_running && files->scene->writing == SCENE_WRITE_BEHIND;
+    if (is_behind) {
+        pthread_mutex_lock(&w->mutex);
+        append(&w->first, &w->last, files);
+        w->waiting += files->has_picture;
+        w->waiting_bytes += session_files_bytes(files);
+        pthread_cond_broadcast(&w->has_changed);
+        pthread_mutex_unlock(&w->mutex);
+        return;
+    }
+    session_write_files(files);
+    warn(files, report);
+    if (files->error.status && !error->status) *error = files->error;
+    session_writer_release(w, &files->memory);
+    session_files_free(files);
+}
+
+static void collect_one(session_writer *w, const session_files *files, session_report *report)
+{
+    warn(files, report);
+    report->numbers.background_ms += files->ms;
+    if (!files->error.status) return;
+    if (!w->failures++)
+        base_fail(&w->failure, files->error.status, "cycle %lld: %.1000s", files->moment.cycle, files->error.message);
+}
+
+void session_writer_collect(session_writer *w, session_report *report)
+{
+    static const session_warning warning = {WARNING_WRITER, NULL, NULL, 0};
+    pthread_mutex_lock(&w->mutex);
+    session_files *files = w->done;
+    w->done = w->last_done = NULL;
+    pthread_mutex_unlock(&w->mutex);
+    while (files) {
+        session_files *next = files->next;
+        collect_one(w, files, report);
+        session_files_free(files);
+        files = next;
+    }
+    session_warn(report, &warning, w->is_refused, "pictures are written in the step: no thread can be started for it");
+}
+
+base_error session_writer_failure(session_writer *w)
+{
+    base_error out = w->failure;
+    const size_t size = strlen(out.message);
+    if (w->failures > 1)
+        snprintf(out.message + size, sizeof out.message - size, " (and %d more like it)", w->failures - 1);
+    w->failure = (base_error){0};
+    w->failures = 0;
+    return out;
+}
+
+void session_writer_drain(session_writer *w)
+{
+    if (w->is_running) wait_for_thread(w);
+}
+
+void session_writer_end(session_writer *w)
+{
+    if (w->is_running) {
+        strike_off(w);
+        pthread_mutex_lock(&w->mutex);
+        w->is_ending = true;
+        pthread_cond_broadcast(&w->has_changed);
+        pthread_mutex_unlock(&w->mutex);
+        pthread_join(w->thread, NULL);
+        w->is_running = false;
+    }
+    while (w->done) {
+        session_files *next = w->done->next;
+        session_files_free(w->done);
+        w->done = next;
+    }
+    session_writer_drop_memory(w);
+    pthread_cond_destroy(&w->has_changed);
+    pthread_mutex_destroy(&w->mutex);
+}
