@@ -110,7 +110,7 @@ int main(int argc, char **argv)
             fprintf(stderr, "cycle %d: %s\n", cycle, insitu_error(session));
     }
 
-    insitu_destroy(&session);
+    if (insitu_destroy(&session) != INSITU_OK && rank == 0) fprintf(stderr, "%s\n", insitu_error(NULL));
     MPI_Finalize();
     return 0;
 }

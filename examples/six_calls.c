@@ -72,7 +72,7 @@ int main(int argc, char **argv)
             fprintf(stderr, "cycle %d: %s\n", cycle, insitu_error(session)); /* and the simulation goes on */
     }
 
-    insitu_destroy(&session);
+    if (insitu_destroy(&session) != INSITU_OK && rank == 0) fprintf(stderr, "%s\n", insitu_error(NULL));
     MPI_Finalize();
     return 0;
 }

@@ -55,6 +55,6 @@ int main(int argc, char **argv)
                 std::fprintf(stderr, "%s\n", insitu_error(session));
         }
     }
-    insitu_destroy(&session);
+    if (insitu_destroy(&session) != INSITU_OK) std::fprintf(stderr, "%s\n", insitu_error(nullptr));
     return MPI_Finalize();
 }

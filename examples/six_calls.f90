@@ -35,6 +35,7 @@ program six_calls
         if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') pictures%error() ! the run goes on
     end do
     call pictures%destroy(status)
+    if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') pictures%error()
     call MPI_Finalize()
 
 contains

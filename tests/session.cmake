@@ -158,6 +158,13 @@ target_link_libraries(test_api PRIVATE insitu_flags insitu PkgConfig::CMOCKA)
 add_dependencies(test_api insitu_image)
 insitu_add_mpi_test(api test_api 1 2 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+# Each of its runs is a process of its own, without mpiexec.
+add_executable(test_writer_end test_writer_end.c)
+target_link_libraries(test_writer_end PRIVATE insitu_flags insitu)
+add_dependencies(test_writer_end insitu_image)
+add_test(NAME writer_end COMMAND test_writer_end ${CMAKE_CURRENT_BINARY_DIR})
+set_tests_properties(writer_end PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}" TIMEOUT 120)
+
 # An empty entry of LD_LIBRARY_PATH is the working directory. By the shared library, and by a program that has its objects.
 add_library(planted_image MODULE planted_image.c)
 target_link_libraries(planted_image PRIVATE insitu_flags insitu_headers)

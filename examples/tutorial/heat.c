@@ -65,7 +65,7 @@ int main(int argc, char **argv)
             fprintf(stderr, "%s\n", insitu_last_report(session)->warnings);
     }
 
-    insitu_destroy(&session);
+    if (insitu_destroy(&session) != INSITU_OK && rank == 0) fprintf(stderr, "%s\n", insitu_error(NULL));
     MPI_Finalize();
     return 0;
 }

@@ -44,6 +44,7 @@ program heat_program
         if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') session%error()
     end do
     call session%destroy(status)
+    if (status /= INSITU_OK .and. rank == 0) write (error_unit, '(a)') session%error()
     call MPI_Finalize()
 
 contains
