@@ -11,6 +11,7 @@
 #include "session_agree.h"
 #include "session_channels.h"
 #include "session_decorations.h"
+#include "session_files.h"
 #include "session_frame.h"
 #include "session_layers.h"
 #include "session_view.h"

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "memory.h"
+#include "session_files.h"
 #include "session_image.h"
 
 static const int64_t most_waiting_bytes = (int64_t)128 << 20, most_free_bytes = (int64_t)64 << 20;

@@ -16,7 +16,6 @@
 
 #include "error.h"
 #include "scene.h"
-#include "session_files.h"
 #include "session_picture.h"
 #include "session_report.h"
 
@@ -30,8 +29,8 @@ typedef struct session_writer {
     bool is_running, is_refused; /* a thread was started; or could not be */
     bool is_loading;             /* the image library */
     bool is_ending;
-    session_files *first, *last; /* the queue; the thread is at the first */
-    session_files *done, *last_done;
+    struct session_files *first, *last; /* the queue; the thread is at the first */
+    struct session_files *done, *last_done;
     int waiting;                                        /* pictures in the queue */
     int64_t waiting_bytes;                              /* of all that is in the queue */
     session_picture free_memory[SESSION_FREE_PICTURES]; /* for pictures that come */
@@ -56,7 +55,8 @@ void session_writer_release(session_writer *writer, session_picture *memory);
 
 /* Write the files by the thread, or at once where there is none; then what went wrong is in error and the report. files
  * is the writer's from here on. Local. */
-void session_writer_give(session_writer *writer, session_files *files, session_report *report, base_error *error);
+void session_writer_give(session_writer *writer, struct session_files *files, session_report *report,
+                         base_error *error);
 
 /* Take what the thread has written: warnings and its time go to the report, errors to the writer's failure. Local. */
 void session_writer_collect(session_writer *writer, session_report *report);
