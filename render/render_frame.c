@@ -12,12 +12,12 @@
 #include "memory.h"
 #include "pixel_set.h"
 #include "render.h"
+#include "render_active_cells.h"
+#include "render_candidates.h"
 #include "render_fragments.h"
 #include "render_kernels.h"
-#include "render_active_cells.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
-#include "render_candidates.h"
 
 static double now(void)
 {

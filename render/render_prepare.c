@@ -1,4 +1,8 @@
 #include "render_prepare.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "render_pieces.h"
+#include "render_scale.h"
 
 #include <math.h>
 #include <string.h>
@@ -6,12 +10,8 @@
 #include "error.h"
 #include "fragment.h"
 #include "insitu/status.h"
-#include "kernel_types.h"
 #include "memory.h"
 #include "mmbvh.h"
-#include "render.h"
-#include "render_pieces.h"
-#include "render_scale.h"
 
 static float below(double v)
 {

@@ -3,7 +3,7 @@
  * Lengths are in sides of the hull, 1 in the kernels' scaled units. The chord is that of the ray that is traced: how
  * far it is off its tile's middle is rounded to float32, as the kernels have it, and all else is double. What is left
  * is the rounding of the hull's vertices. Along the ray it and that of weights and depths cost 1e-6 at most in two
- * crossings (kernel_line.h). Across the ray a vertex within 1 of the tile's middle is rounded by up to 3e-8 four times:
+ * crossings (kernel_cell.h). Across the ray a vertex within 1 of the tile's middle is rounded by up to 3e-8 four times:
  * when it is placed, and the ray's origin, its slope's share and their difference when it is projected: by 1.2e-7 along
  * an axis; most are within 0.5 and are rounded by half of that, so that both axes together are no more. So the hull is
  * one whose planes lie up to hull_shift = 1.2e-7 off, and a ray that meets them at an angle of the cosine c is longer

@@ -2,9 +2,14 @@
 #include <math.h>
 
 #include "chord_trace.h"
+#include "kernel_cell.h"
 #include "kernel_cell_cache.h"
+#include "kernel_crossings.h"
+#include "kernel_packet.h"
 #include "kernel_polyhedron.h"
+#include "kernel_tile.h"
 #include "kernel_traverse.h"
+#include "kernel_types.h"
 
 typedef struct chord_state {
     chord_rays *rays;

@@ -16,7 +16,7 @@ typedef struct chord_span {
 /* Rays of one tile. Where there are more spans than fit, span_count says so all the same. */
 typedef struct chord_rays {
     int count;
-    bool is_pencil;                              /* edges by their lines (kernel_line.h), as tiles have them? */
+    bool is_pencil;                              /* edges by their lines (kernel_cell.h), as tiles have them? */
     double centre_x, centre_y;                   /* the tile's middle in the image plane: slopes, or offsets */
     double x[CHORD_MAX_RAYS], y[CHORD_MAX_RAYS]; /* the rays */
     int span_count[CHORD_MAX_RAYS];

@@ -109,6 +109,7 @@ static struct {
 } kernel_gauss;
 
 #include "kernel_integral.h"
+#include "kernel_types.h"
 #include "render_pieces.c"
 
 /* Legendre's polynomial and its derivative. */

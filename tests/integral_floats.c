@@ -3,6 +3,7 @@
 
 #include "integral_double.h"
 #include "kernel_integral.h"
+#include "kernel_types.h"
 #include "render_pieces.h"
 
 void integral_on_floats(const render_transfer *t, double length, double v_in, double v_out, double out[4])

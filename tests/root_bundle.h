@@ -2,8 +2,13 @@
 #ifndef ROOT_BUNDLE_H
 #define ROOT_BUNDLE_H
 
-#include "kernel_poly.h"
+#include "kernel_bounds.h"
+#include "kernel_cell.h"
+#include "kernel_crossings.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
 #include "kernel_roots.h"
+#include "kernel_types.h"
 
 typedef struct bundle {
     double values[8]; /* as the test numbers vertices */

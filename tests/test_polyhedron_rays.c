@@ -4,7 +4,7 @@
  *
  * What rounding may decide. Places are off by some 3e-6 of the scene in all: vertices by half a unit of 1 along each
  * axis (1e-7), crossings of sheets by what their weights' roundings may move them, 2.4e-7 along the ray and four times
- * as much across (kernel_line.h), and where tets overlap sums are taken up to 16 times 2.4e-7 beside a sheet. So values
+ * as much across (kernel_cell.h), and where tets overlap sums are taken up to 16 times 2.4e-7 beside a sheet. So values
  * are off by that times the field's slope, and by 2e-6 of their range, some ten roundings of theirs: the band. A
  * crossing is certain where the field passes from beyond the band on one side to beyond it on the other within one stay
  * of the ray in the cell. Each must have a hit, and a hit must be where the field comes within the band. Rays that pass

@@ -24,8 +24,8 @@ enum {
 
 static const char *program;
 
-/* By segments, with steps and a narrow ramp of the opacity: stretches are halved in double (kernel_bisection.h), ray by
- * ray, from the caller's coordinates. */
+/* By segments, with steps and a narrow ramp of the opacity: stretches are halved in double (kernel_cell_segments.h), ray
+ * by ray, from the caller's coordinates. */
 static void set_steps(render_fixture *f)
 {
     static const double values[6] = {-0.7, -0.15, -0.15, 0.3, 0.301, 0.7};

@@ -8,7 +8,9 @@
  * beyond band on the other: the first hit must not come after that, and every hit must lie within band of 0. */
 #include <math.h>
 
-#include "kernel_neubauer.h"
+#include "kernel_cell.h"
+#include "kernel_map.h"
+#include "kernel_surface.h"
 #include "root_bundle.h"
 #include "test_meshes.h"
 

@@ -53,8 +53,8 @@ static void lattices_of_curved_cells(void **state)
 
 /* Two volumes by the step, which is a cell, over one field: the first one's opacity is level but for a step, the second
  * one's throughout. A field off its chord changes nothing but at the step, whose stretches are halved: a share of the
- * mixing's 0.4 RENDER_MIXING_ERROR by length and another by what is absorbed (kernel_bisection.h), beside what mixing
- * itself may cost. */
+ * mixing's 0.4 RENDER_MIXING_ERROR by length and another by what is absorbed (kernel_cell_segments.h), beside what
+ * mixing itself may cost. */
 static double judge_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
 {
     static const float colours[12] = {0.9f, 0.2f, 0.1f, 0.9f, 0.2f, 0.1f, 0.1f, 0.4f, 0.9f, 0.1f, 0.4f, 0.9f};

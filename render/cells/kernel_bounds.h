@@ -11,24 +11,11 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_cell.h"
 #include "kernel_map.h"
-
-#define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */
-#define KERNEL_DOMAIN_RIM 0.03125
-
-/* Of one cell and isovalue. */
-typedef struct kernel_bounds {
-    kernel_polynomial bent[3]; /* N */
-    float inverse[3][3];       /* J0^-1 */
-    float stretch;             /* L */
-    float slope;               /* G */
-    float curve, twist;        /* H, K; of a pyramid: times k */
-    float coarsest;            /* longer pieces are halved in any case */
-    bool is_monotone;          /* the field along any ray of the beam */
-    float level, gradient[3];  /* of L: at vertex 0, and along tile space */
-    float thickness;           /* of |E|, and what rounding adds to it */
-    float jump;                /* a face's value and the field on the ray beside it are never farther apart */
-} kernel_bounds;
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
 
 /* A number at each corner of a cell's domain. */
 typedef double kernel_corners __attribute__((vector_size(64)));
@@ -40,11 +27,6 @@ static inline double kernel_corners_most(kernel_corners v)
     return most;
 }
 
-/* The domain's corners, widened by KERNEL_DOMAIN_RIM on all sides for what rounding takes out of it, a wedge's last two
- * again; of a pyramid a / k, b / k and k. And the centre. */
-#define KERNEL_LOW -KERNEL_DOMAIN_RIM
-#define KERNEL_HIGH (1 + KERNEL_DOMAIN_RIM)
-#define KERNEL_WIDE (1 + 2 * KERNEL_DOMAIN_RIM)
 typedef struct kernel_domain {
     double centre[3], corners[3][8];
 } kernel_domain;
@@ -168,12 +150,6 @@ static inline void kernel_corner_gradient(const double c[8], const kernel_slopes
     }
 }
 
-/* Rays' directions: (x, y, 1), and up to spread off that in both. */
-typedef struct kernel_beam {
-    float x, y, spread;
-    float offset; /* |origin_x|, |origin_y| of no ray are more */
-} kernel_beam;
-
 /* E's largest value at the corners of the domain, and so in it. */
 static inline double kernel_bounds_error(const double e[8], int type)
 {
@@ -290,6 +266,34 @@ static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, 
     b->curve = (float)kernel_hessian_norm(type, field + 4);
     b->twist = (float)sqrt(twist);
     kernel_bounds_linear(b, map, &slopes, (const kernel_corners(*)[3])bend, theta, type, beam);
+}
+
+/* What is set up once for a cell and isovalue, for all packets of a tile: beside each place of the cache. */
+typedef struct kernel_poly {
+    bool is_set_up;
+    int value;
+    kernel_map map;
+    kernel_bounds bounds; /* robust roots alone */
+} kernel_poly;
+
+/* The tile's rays. */
+SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const float shift = fabsf((float)f->depth_shift), radius = tile->radius;
+    return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
+}
+
+SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *tile, kernel_poly *poly,
+                                   const render_surface_layer *layer, const kernel_cell *c, int value)
+{
+    if (poly->is_set_up) return;
+    poly->is_set_up = true;
+    poly->value = value;
+    kernel_map_setup(&poly->map, c);
+    if (layer->colour_map) kernel_map_colour(&poly->map, c);
+    const kernel_beam beam = kernel_tile_beam(f, tile);
+    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type, &beam);
 }
 
 #endif

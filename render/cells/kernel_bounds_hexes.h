@@ -7,7 +7,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernel_bounds.h"
 #include "kernel_map.h"
 #include "kernel_wide.h"
 #include "simd.h"

@@ -15,13 +15,171 @@
 #ifndef RENDER_KERNEL_CELL_H
 #define RENDER_KERNEL_CELL_H
 
+#include <math.h>
 #include <string.h>
 
 #include "grid.h"
-#include "kernel_line.h"
-#include "kernel_packet.h"
+#include "kernel_shapes.h"
 #include "kernel_types.h"
+#include "render_polyhedra.h"
 #include "simd.h"
+
+/* The edge function of a cell's edge, for all rays of a tile.
+ *
+ * In the plane of the ray with parameters u, v (its slopes, or its origin where the camera is orthographic) a vertex
+ * placed at X, Y, Z in tile space is at x = X - u D, y = Y - v D, where D is its depth from the eye, or 1 where the
+ * camera is orthographic. The edge function is then affine in u and v, for the products u v cancel:
+ *
+ *     e = xa yb - xb ya = (Xa Yb - Xb Ya) + u (Db Ya - Da Yb) + v (Da Xb - Db Xa)
+ *
+ * Its coefficients are computed once a cell and tile, from the edge's two vertices in the order of coordinates, so that
+ * all cells of the edge have the same bits; a packet then needs two multiply-adds. On rays where that leaves the sign
+ * in doubt, which depends on the edge and the ray alone, e is computed from the projected vertices instead, by
+ * vf_diff_of_products(), to its exact sign.
+ *
+ * The bound of doubt. Let r = 2^-24, W the most of |u| and |v| over the tile, reach the eye's distance from the origin
+ * of depth (0 where orthographic), M = |Z| + reach >= |D| (1 where orthographic), N = 2 max(|X|, |Y|) + 5 W M; so
+ * |x|, |y| <= N / 2, |c| <= Na Nb / 2 and |cu| W, |cv| W <= Na Nb / 5.
+ * - The affine form errs by r of each coefficient, of u and of v, and, if nothing is fused, of two products and two
+ *   sums: by at most r (3 |c| + 5 |cu| W + 4 |cv| W) <= 3.3 r Na Nb.
+ * - The projection, (X - origin) - slope Z, errs by r of the origin, of the first difference, twice of slope Z (the
+ *   slope and the product), and of x: by at most r (2 |X| + 3 W M) <= r N. What has the exact sign is therefore the
+ * edge function of vertices that are off by r N: by at most 4 r Na Nb / 2. The sum is 5.3 r Na Nb; 6 leaves room for
+ * products of errors and for the bound's own roundings.
+ *
+ * Weights. Signs are exact, sizes are not: where a triangle is crossed, its depth and value are means of its vertices'
+ * weighed by the opposite edges' functions, of sum A (twice the triangle's area as the ray sees it). An error d of one
+ * of these moves the depth t by d |z - t| / A, z being its vertex's, and so all three by no more than D S / A, where D
+ * is the sum of their d, and S the triangle's extent in depth; and the place across the ray by as much with the extent
+ * across. By the count above d is at most r (3 |c| + 4 |cu| W + 3 |cv| W): what rounds u and v moves the ray, for all
+ * triangles alike. So where A is at least D S / KERNEL_WEIGHT_ERROR, the weights' roundings move the crossing by no
+ * more than KERNEL_WEIGHT_ERROR along the ray: 4 r with all of them at their worst, where t itself is rounded by up to
+ * r / 2. The extents across count for a quarter: there a crossing may move by 4 times as much, as that changes the
+ * value alone. On rays where A is less (the triangle is seen edge on, or the tile is wide beside it) all three edges
+ * are projected: what errs then is where the vertices are, by r N as above, for all their triangles alike, and the
+ * weights are exact to some r of each. Which it is depends on the triangle and the ray alone. (An edge in doubt has
+ * been projected in any case: on a ray that crosses the triangle its e is off by no more than r N times the edges
+ * beside it, which is what moved vertices do.) */
+
+/* c + cu u + cv v; its sign is sure where it is beyond +-bound. */
+typedef struct kernel_line {
+    float c, cu, cv, bound;
+} kernel_line;
+
+/* A vertex in tile space. */
+typedef struct kernel_spot {
+    float x, y, z;
+} kernel_spot;
+
+/* N above. */
+SIMD_INLINE float kernel_spot_size(const kernel_frame *f, const kernel_tile *tile, kernel_spot a)
+{
+    const float depth = f->job->camera.is_orthographic ? 1 : fabsf(a.z) + fabsf((float)f->depth_shift);
+    const float x = fabsf(a.x), y = fabsf(a.y);
+    return 2 * (x > y ? x : y) + 5 * tile->radius * depth;
+}
+
+/* Makes the line of the edge from a to b, a before b in the order; sizes as above. */
+SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a, kernel_spot b, float size_a,
+                                            float size_b)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const double da = flat ? 1 : (double)a.z + f->depth_shift, db = flat ? 1 : (double)b.z + f->depth_shift;
+    const double ax = (double)a.x, ay = (double)a.y, bx = (double)b.x, by = (double)b.y;
+    return (kernel_line){(float)(ax * by - bx * ay), (float)(db * ay - da * by), (float)(da * bx - db * ax),
+                         6 * 6e-8f * (size_a * size_b)};
+}
+
+/* ---- how good weights are ---- */
+
+/* Along the ray, in t: two of them in a ray's chord leave half of the 1e-6 that it may be off by (tests/test_chords.c).
+ */
+#define KERNEL_WEIGHT_ERROR 2.4e-7f
+
+/* By how much an edge's function may err, d above, and its extent, the distances across for a quarter. */
+typedef struct kernel_blur {
+    float error, extent;
+} kernel_blur;
+
+SIMD_INLINE kernel_blur kernel_line_blur(const kernel_line *l, float radius, kernel_spot a, kernel_spot b)
+{
+    const float x = fabsf(a.x - b.x), y = fabsf(a.y - b.y), z = fabsf(a.z - b.z);
+    return (kernel_blur){6e-8f * (3 * fabsf(l->c) + radius * (4 * fabsf(l->cu) + 3 * fabsf(l->cv))),
+                         z + 0.25f * (x + y)};
+}
+
+/* The least A that is good enough, of a triangle whose edges' errors and extents have these sums: along an axis the
+ * edges are together twice as long as the triangle. */
+SIMD_INLINE float kernel_least_weight(float errors, float extents)
+{
+    return errors * extents * (0.5f / KERNEL_WEIGHT_ERROR);
+}
+
+/* The larger of both. */
+SIMD_INLINE kernel_blur kernel_blur_more(kernel_blur a, kernel_blur b)
+{
+    return (kernel_blur){a.error < b.error ? b.error : a.error, a.extent < b.extent ? b.extent : a.extent};
+}
+
+/* No less than that of any triangle whose edges have no more than most each. */
+SIMD_INLINE float kernel_blur_least(kernel_blur most)
+{
+    return 1.0001f * kernel_least_weight(3 * most.error, 3 * most.extent);
+}
+
+/* ---- four edges at once: the same operations, and so the same bits ---- */
+
+typedef float kernel_four __attribute__((vector_size(16)));
+
+SIMD_INLINE kernel_four kernel_four_load(const float *p)
+{
+    kernel_four v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+
+/* Lanes of a vector, and of the three of a place. */
+#define KERNEL_PICKED(v, i, j, k, l) __builtin_shufflevector(v, v, i, j, k, l)
+#define KERNEL_PICK(at, i, j, k, l)                                                                                    \
+    (kernel_spots)                                                                                                     \
+    {                                                                                                                  \
+        KERNEL_PICKED(at[0], i, j, k, l), KERNEL_PICKED(at[1], i, j, k, l), KERNEL_PICKED(at[2], i, j, k, l)           \
+    }
+
+typedef struct kernel_spots {
+    kernel_four x, y, z;
+} kernel_spots;
+
+typedef double kernel_doubles __attribute__((vector_size(32)));
+
+SIMD_INLINE kernel_four kernel_four_abs(kernel_four v)
+{
+    typedef int32_t kernel_four_bits __attribute__((vector_size(16)));
+    return (kernel_four)((kernel_four_bits)v & 0x7fffffff);
+}
+
+/* kernel_line_between() of edges from a to b, and kernel_line_blur(). */
+SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_spots a, kernel_spots b,
+                                   kernel_four size_a, kernel_four size_b, kernel_line lines[4], kernel_four *errors,
+                                   kernel_four *extents)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const kernel_doubles ax = __builtin_convertvector(a.x, kernel_doubles),
+                         ay = __builtin_convertvector(a.y, kernel_doubles);
+    const kernel_doubles bx = __builtin_convertvector(b.x, kernel_doubles),
+                         by = __builtin_convertvector(b.y, kernel_doubles);
+    kernel_doubles da = __builtin_convertvector(a.z, kernel_doubles) + f->depth_shift;
+    kernel_doubles db = __builtin_convertvector(b.z, kernel_doubles) + f->depth_shift;
+    if (flat) da = db = (kernel_doubles){1, 1, 1, 1};
+    const kernel_four c = __builtin_convertvector(ax * by - bx * ay, kernel_four);
+    const kernel_four cu = __builtin_convertvector(db * ay - da * by, kernel_four);
+    const kernel_four cv = __builtin_convertvector(da * bx - db * ax, kernel_four);
+    const kernel_four bound = 6 * 6e-8f * (size_a * size_b);
+    for (int n = 0; n < 4; n++) lines[n] = (kernel_line){c[n], cu[n], cv[n], bound[n]};
+    const kernel_four x = kernel_four_abs(a.x - b.x), y = kernel_four_abs(a.y - b.y), z = kernel_four_abs(a.z - b.z);
+    *errors = 6e-8f * (3 * kernel_four_abs(c) + radius * (4 * kernel_four_abs(cu) + 3 * kernel_four_abs(cv)));
+    *extents = z + 0.25f * (x + y);
+}
 
 enum { KERNEL_MAX_CROSSINGS = 12, KERNEL_MAX_CELL_INTERVALS = KERNEL_MAX_CROSSINGS / 2, KERNEL_MAX_LINES = 18 };
 
@@ -227,11 +385,6 @@ SIMD_INLINE void kernel_place_in(const kernel_frame *f, const kernel_tile *tile,
     *out_z = (float)(z - tile->depth_shift);
 }
 
-SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
-{
-    kernel_place_in(p->frame, p->tile, world, out_x, out_y, out_z);
-}
-
 /* kernel_place_in() of a tet's vertices at once: the same operations, and so the same bits. */
 SIMD_INLINE void kernel_tet_place(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
@@ -270,6 +423,216 @@ SIMD_INLINE void kernel_cell_place_in(kernel_cell *c, const kernel_frame *f, con
 SIMD_INLINE kernel_spot kernel_cell_spot(const kernel_cell *c, int i)
 {
     return (kernel_spot){c->x[i], c->y[i], c->z[i]};
+}
+
+/* A quad's corners around, from the smallest vertex towards its smaller neighbour. */
+SIMD_INLINE void kernel_quad_corners(const kernel_cell *c, const signed char *loop, int corner[4])
+{
+    int first = 0;
+    for (int i = 1; i < 4; i++)
+        if (c->rank[loop[i]] < c->rank[loop[first]]) first = i;
+    const int ahead = loop[(first + 1) & 3], behind = loop[(first + 3) & 3];
+    const bool forward = c->rank[ahead] < c->rank[behind];
+    corner[0] = loop[first];
+    corner[1] = forward ? ahead : behind;
+    corner[2] = loop[(first + 2) & 3];
+    corner[3] = forward ? behind : ahead;
+}
+
+SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4])
+{
+    const double *const corners[4] = {c->world[corner[0]], c->world[corner[1]], c->world[corner[2]],
+                                      c->world[corner[3]]};
+    return quad_collapses(corners);
+}
+
+/* ---- the lines of a cell ---- */
+
+/* Over the edges of each face, in kernel_triangle_least()'s order. */
+SIMD_INLINE kernel_four kernel_tet_face_sums(const kernel_four e[2])
+{
+    return (__builtin_shufflevector(e[0], e[1], 0, 0, 1, 3) + __builtin_shufflevector(e[0], e[1], 3, 4, 5, 5)) +
+           __builtin_shufflevector(e[0], e[1], 1, 2, 2, 4);
+}
+
+SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+{
+    kernel_four at[3], size, errors[2], extents[2];
+    kernel_line lines[8];
+    float doubt = 0;
+    for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    at[0] = kernel_four_load(c->x);
+    at[1] = kernel_four_load(c->y);
+    at[2] = kernel_four_load(c->z);
+    /* Edges 0 to 3, 4 and 5. */
+    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2),
+                      KERNEL_PICKED(size, 0, 0, 0, 1), KERNEL_PICKED(size, 1, 2, 3, 2), lines, &errors[0], &extents[0]);
+    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3),
+                      KERNEL_PICKED(size, 1, 2, 2, 2), KERNEL_PICKED(size, 3, 3, 3, 3), lines + 4, &errors[1],
+                      &extents[1]);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        c->lines[n] = lines[n];
+        doubt = doubt < lines[n].bound ? lines[n].bound : doubt;
+    }
+    c->doubt = doubt;
+    const kernel_four error = kernel_tet_face_sums(errors), extent = kernel_tet_face_sums(extents);
+    const kernel_four least = error * extent * (0.5f / KERNEL_WEIGHT_ERROR);
+    memcpy(c->least, &least, sizeof least);
+}
+
+SIMD_INLINE void kernel_poly_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+{
+    const kernel_shape *shape = kernel_cell_shape(c->type);
+    signed char ends[KERNEL_MAX_LINES][2];
+    float size[GRID_MAX_CELL_VERTICES];
+    const int count = shape->edge_count + shape->face_count;
+    memset(ends, 0, sizeof ends);
+    memcpy(ends, shape->edges, (size_t)shape->edge_count * sizeof ends[0]);
+    for (int face = 0; face < shape->face_count; face++) {
+        int corner[4];
+        if (shape->faces[face].count == 3) continue;
+        kernel_quad_corners(c, shape->faces[face].vertices, corner);
+        ends[shape->edge_count + face][0] = (signed char)corner[0];
+        ends[shape->edge_count + face][1] = (signed char)corner[2];
+    }
+    for (int i = 0; i < c->count; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    kernel_blur most = {0, 0};
+    for (int n = 0; n < count; n++) {
+        const int i = ends[n][0], j = ends[n][1], a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
+        const kernel_spot from = kernel_cell_spot(c, a), to = kernel_cell_spot(c, b);
+        c->lines[n] = kernel_line_between(f, from, to, size[a], size[b]);
+        if (c->type != GRID_HEX) most = kernel_blur_more(most, kernel_line_blur(&c->lines[n], tile->radius, from, to));
+    }
+    c->least[0] = c->type == GRID_HEX ? (float)INFINITY : kernel_blur_least(most); /* hexes hardly have triangles */
+}
+
+static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+{
+    if (c->has_lines) return;
+    c->has_lines = true;
+    if (c->type == GRID_TET)
+        kernel_tet_lines(c, f, tile);
+    else
+        kernel_poly_lines(c, f, tile);
+}
+
+/* Meshes that most simulations of tets or hexes have, whose arrays are read without asking each element for its type.
+ */
+
+/* A mesh of tets alone, or of hexes, whose indices are int32 one after the other, and whose coordinates and values
+ * float32, within reach of a gather: strides in elements. */
+typedef struct kernel_packed {
+    bool is_tets;                         /* of tets; */
+    bool is_hexes;                        /* of hexes */
+    bool is_interleaved;                  /* a vertex's coordinates are side by side */
+    const int32_t *connectivity;          /* NULL: the cells' vertices are one after the other */
+    int32_t base;                         /* of the indices */
+    const float *coordinates[3], *values; /* of the vertex of index 0, which there may not be */
+    int32_t stride, value_stride;
+    float eye[3][2], scale; /* in two parts: the nearest float, and what is left */
+} kernel_packed;
+
+/* A stride in elements of float32; 0: elements are others, or some of so many out of a gather's reach. */
+static inline int32_t kernel_packed_stride(const grid_array *a, int64_t count)
+{
+    const int64_t stride = a->stride / (int64_t)sizeof(float);
+    const bool is_packed = !a->is_wide && !a->is_integer && a->stride % (int64_t)sizeof(float) == 0;
+    return is_packed && stride > 0 && stride < INT32_MAX && count <= INT32_MAX / stride ? (int32_t)stride : 0;
+}
+
+/* Numbers are of sizes at which float32 differences keep their precision. */
+static inline void kernel_packed_begin(kernel_packed *p, const kernel_frame *f, const grid *g, const grid_field *field)
+{
+    const grid_array *c = g->coordinates;
+    memset(p, 0, sizeof *p);
+    if (g->offsets.data || g->cell_types || (g->cell_type != GRID_TET && g->cell_type != GRID_HEX) ||
+        g->connectivity.is_wide || g->connectivity.stride != sizeof(int32_t) || field->is_cell_centred ||
+        field->component < 0)
+        return;
+    p->connectivity = (const int32_t *)(const void *)g->connectivity.data;
+    const int64_t base = g->connectivity.base, count = g->vertex_count + base;
+    p->base = (int32_t)base;
+    p->stride = kernel_packed_stride(&c[0], count);
+    p->value_stride = kernel_packed_stride(&field->values, count);
+    p->values = (const float *)(const void *)(field->values.data + field->component * field->component_stride -
+                                              base * field->values.stride);
+    p->scale = (float)f->job->space.scale;
+    p->is_tets = p->stride && p->value_stride && p->scale > 1e-25f && p->scale < 1e25f;
+    p->is_interleaved = true;
+    for (int a = 0; a < 3; a++) {
+        const double eye = f->job->camera.eye[a];
+        p->coordinates[a] = (const float *)(const void *)(c[a].data - base * c[a].stride);
+        p->eye[a][0] = (float)eye;
+        p->eye[a][1] = (float)(eye - (double)p->eye[a][0]);
+        p->is_tets = p->is_tets && kernel_packed_stride(&c[a], count) == p->stride && fabs(eye) < 1e15;
+        p->is_interleaved = p->is_interleaved && c[a].data == c[0].data + a * (int64_t)sizeof(float);
+    }
+    p->is_hexes = p->is_tets && g->cell_type == GRID_HEX;
+    p->is_tets = p->is_tets && g->cell_type == GRID_TET;
+}
+
+/* What is kept of a surface's cells on a part; NULL: nothing is. */
+SIMD_INLINE const kernel_active *kernel_active_of(const kernel_frame *f, int surface, int part)
+{
+    const kernel_active *active = f->active ? &f->active[surface * f->job->part_count + part] : NULL;
+    return active && active->records ? active : NULL;
+}
+
+/* A surface's cells on a part: as they are kept, or else in the mesh. */
+static inline void kernel_packed_surface(kernel_packed *p, const kernel_frame *f, int surface, int part)
+{
+    const kernel_active *active = kernel_active_of(f, surface, part);
+    kernel_packed_begin(p, f, f->job->parts[part].cells, &f->surfaces[surface].layer->field.fields[part]);
+    if (!active) return;
+    p->connectivity = NULL;
+    p->base = 0;
+    for (int a = 0; a < 3; a++) p->coordinates[a] = active->records + a;
+    p->values = active->records + 3;
+    p->stride = p->value_stride = KERNEL_ACTIVE_FLOATS;
+    p->is_interleaved = true;
+}
+
+/* A cell's i-th vertex, of so many. */
+SIMD_INLINE int32_t kernel_packed_vertex(const kernel_packed *p, uint32_t cell, int vertices, int i)
+{
+    const int64_t at = (int64_t)cell * vertices + i;
+    return p->connectivity ? p->connectivity[at] : (int32_t)at;
+}
+
+/* Nothing of cells that are kept: all of one was asked for at once (kernel_candidate_prefetch()). */
+SIMD_INLINE void kernel_packed_prefetch(const kernel_packed *p, int32_t vertex)
+{
+    if (!p->connectivity) return;
+    const int64_t at = (int64_t)vertex * p->stride;
+    __builtin_prefetch(p->values + (int64_t)vertex * p->value_stride);
+    __builtin_prefetch(p->coordinates[0] + at);
+    if (!p->is_interleaved) __builtin_prefetch(p->coordinates[1] + at);
+    __builtin_prefetch(p->coordinates[2] + at);
+}
+
+/* A tet or hex with finite values, as kernel_cell_fetch() makes it, and where its vertices are; for the
+ * caller to place. */
+SIMD_INLINE void kernel_packed_fetch(kernel_cell *c, const kernel_packed *p, uint32_t index, int vertices)
+{
+    c->index = index;
+    c->type = vertices == 8 ? GRID_HEX : GRID_TET;
+    c->count = vertices;
+    c->is_finite = c->is_placed = true;
+    c->has_lines = c->has_normal = false;
+    for (int i = 0; i < vertices; i++) {
+        const int64_t vertex = kernel_packed_vertex(p, index, vertices, i);
+        c->vertices[i] = vertex - p->base;
+        c->values[i] = (double)p->values[vertex * p->value_stride];
+        for (int a = 0; a < 3; a++) c->world[i][a] = (double)p->coordinates[a][vertex * p->stride];
+    }
+}
+
+/* A tet, as kernel_cell_move() places it. */
+SIMD_INLINE void kernel_packed_cell(kernel_cell *c, const kernel_packed *p, const kernel_frame *f,
+                                    const kernel_tile *tile, uint32_t index)
+{
+    kernel_packed_fetch(c, p, index, 4);
+    kernel_tet_place(c, f, tile);
 }
 
 #endif

@@ -1,18 +1,150 @@
-/* A cell's map and field in double, from the coordinates and values as they were handed over, a point at a time: what
- * kernel_map.h is in float32. */
+/* Cells in double, from the coordinates and values as they were handed over: where rays meet a tet's faces, for reasons
+ * that kernel_double.h has; and other cells' maps and fields, a point at a time, which kernel_map.h has in float32. */
 #ifndef RENDER_KERNEL_EXACT_H
 #define RENDER_KERNEL_EXACT_H
 
 #include <math.h>
+#include <string.h>
 
 #include "grid.h"
 #include "kernel_cell.h"
+#include "kernel_crossings.h"
 #include "kernel_double.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_shapes.h"
 #include "kernel_types.h"
+#include "kernel_wide.h"
+#include "simd.h"
+
+SIMD_INLINE kernel_affine kernel_double_edge(const kernel_double_spot *a, const kernel_double_spot *b)
+{
+    return (kernel_affine){
+        {a->x * b->y - b->x * a->y, b->depth * a->y - a->depth * b->y, a->depth * b->x - b->depth * a->x}};
+}
+
+/* The sums of a face of kernel_tet_face, from the tet's vertices and edges. No ray's |u| and |v| exceed radius. */
+SIMD_INLINE void kernel_double_sums(const kernel_double_spot *spots, const kernel_affine *edges,
+                                    const signed char *face, double radius, kernel_double_face *out)
+{
+    const kernel_double_spot *i = &spots[face[0]], *j = &spots[face[1]], *k = &spots[face[2]];
+    const kernel_affine *ij = &edges[face[3]], *jk = &edges[face[4]], *ik = &edges[face[5]];
+    for (int n = 0; n < 3; n++) {
+        out->depth.c[n] = (jk->c[n] * i->t - ik->c[n] * j->t) + ij->c[n] * k->t;
+        out->value.c[n] = (jk->c[n] * i->value - ik->c[n] * j->value) + ij->c[n] * k->value;
+        out->weight.c[n] = (jk->c[n] - ik->c[n]) + ij->c[n];
+    }
+    out->least = 0;
+    for (int n = 0; n < 3; n++)
+        out->least += KERNEL_DOUBLE_EDGE * (n ? radius : 1) * ((fabs(ij->c[n]) + fabs(jk->c[n])) + fabs(ik->c[n]));
+}
+
+/* c: a tet that is placed. */
+static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f, const kernel_tile *tile,
+                                                          const kernel_cell *c, const kernel_transfer *transfer,
+                                                          kernel_double_cell *out)
+{
+    kernel_double_spot spots[4];
+    kernel_affine edges[KERNEL_TET_EDGES];
+    for (int i = 0; i < 4; i++) {
+        spots[i] = kernel_double_place(f, tile, c->world[i]);
+        spots[i].value = kernel_double_domain(transfer, c->values[i]);
+    }
+    for (int n = 0; n < KERNEL_TET_EDGES; n++)
+        edges[n] = kernel_double_edge(&spots[kernel_tet_edge[n][0]], &spots[kernel_tet_edge[n][1]]);
+    for (int n = 0; n < 4; n++)
+        kernel_double_sums(spots, edges, kernel_tet_face[n], (double)tile->radius, &out->faces[n]);
+}
+
+/* ---- rays in it ---- */
+
+/* Where rays meet a face; is_sound: it is not seen edge on. */
+typedef struct kernel_double_end {
+    kernel_half t, v;
+    kernel_half_mask is_sound;
+} kernel_double_end;
+
+SIMD_INLINE kernel_half kernel_affine_at(const kernel_affine *a, kernel_half u, kernel_half v)
+{
+    return (a->c[0] + a->c[1] * u) + a->c[2] * v;
+}
+
+SIMD_INLINE kernel_double_end kernel_double_meet(const kernel_double_face *face, kernel_half u, kernel_half v)
+{
+    const kernel_half weight = kernel_affine_at(&face->weight, u, v), inverse = 1.0 / weight;
+    return (kernel_double_end){kernel_affine_at(&face->depth, u, v) * inverse,
+                               kernel_affine_at(&face->value, u, v) * inverse,
+                               (kernel_half_mask)(weight * weight > face->least * face->least)};
+}
+
+SIMD_INLINE void kernel_double_take(kernel_half_mask m, const kernel_double_end *from, kernel_double_end *to)
+{
+    to->t = kernel_half_select(m, from->t, to->t);
+    to->v = kernel_half_select(m, from->v, to->v);
+    to->is_sound = (from->is_sound & m) | (to->is_sound & ~m);
+}
+
+/* A packet's, half by half. */
+typedef struct kernel_double_lanes {
+    float is_sound[SIMD_WIDTH], length[SIMD_WIDTH], v_in[SIMD_WIDTH], rest_in[SIMD_WIDTH], v_out[SIMD_WIDTH],
+        rest_out[SIMD_WIDTH];
+} kernel_double_lanes;
+
+SIMD_INLINE void kernel_double_value(kernel_half value, float *v, float *rest)
+{
+    const kernel_half_floats rounded = kernel_half_narrow(value);
+    const kernel_half_floats lost = kernel_half_narrow(value - kernel_half_widen(rounded));
+    memcpy(v, &rounded, sizeof rounded);
+    memcpy(rest, &lost, sizeof lost);
+}
+
+SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel_double_rays *rays, const vm hit[4],
+                                    int half, kernel_double_lanes *out)
+{
+    kernel_double_end first = {0}, last = {0};
+    kernel_half_mask met = {0};
+    const int lane = half * KERNEL_HALF;
+    for (int n = 0; n < 4; n++) {
+        const kernel_half_mask m = kernel_half_of_mask(hit[n], half);
+        const kernel_double_end end = kernel_double_meet(&cell->faces[n], rays->u[half], rays->v[half]);
+        kernel_double_take(m & ~met, &end, &first);
+        kernel_double_take(m & met, &end, &last);
+        met |= m;
+    }
+    const kernel_half_mask swap = (kernel_half_mask)(last.t < first.t);
+    const kernel_double_end nearer = first;
+    kernel_double_take(swap, &last, &first);
+    kernel_double_take(swap, &nearer, &last);
+    const kernel_half_floats length = kernel_half_narrow(last.t - first.t);
+    const kernel_half_floats sound = __builtin_convertvector(first.is_sound & last.is_sound, kernel_half_floats);
+    memcpy(out->length + lane, &length, sizeof length);
+    memcpy(out->is_sound + lane, &sound, sizeof sound);
+    kernel_double_value(first.v, out->v_in + lane, out->rest_in + lane);
+    kernel_double_value(last.v, out->v_out + lane, out->rest_out + lane);
+}
+
+/* Of the tet's interval i as kernel_tet_interval() has it: its values become the nearest to those in double. */
+static __attribute__((noinline)) kernel_double kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
+                                                                 const kernel_double_cell *cell,
+                                                                 const kernel_double_rays *rays, kernel_interval *i)
+{
+    kernel_double_lanes lanes;
+    kernel_double out = kernel_double_of(i);
+    vm hit[4];
+    kernel_tet_faces(p, c, i->mask, hit);
+    for (int half = 0; half < 2; half++) kernel_double_half(cell, rays, hit, half, &lanes);
+    const vm sound = vm_and(i->mask, vf_lt(vf_load(lanes.is_sound), vf_set(0)));
+    out.length = vf_select(sound, vf_load(lanes.length), out.length);
+    out.rest_in = vf_select(sound, vf_load(lanes.rest_in), vf_set(0));
+    out.rest_out = vf_select(sound, vf_load(lanes.rest_out), vf_set(0));
+    i->v_in = vf_select(sound, vf_load(lanes.v_in), i->v_in);
+    i->v_out = vf_select(sound, vf_load(lanes.v_out), i->v_out);
+    return out;
+}
 
 enum { KERNEL_EXACT_STEPS = 24 };
+
+/* ---- the map and the field ---- */
 
 typedef struct kernel_exact_map {
     bool is_pyramid;

@@ -13,7 +13,6 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_line.h"
 #include "kernel_tile.h"
 #include "simd.h"
 

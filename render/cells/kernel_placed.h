@@ -10,10 +10,7 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_line.h"
-#include "kernel_packet.h"
-#include "kernel_packed.h"
-#include "kernel_tet.h"
+#include "kernel_shapes.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "simd.h"

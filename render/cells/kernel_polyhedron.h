@@ -31,9 +31,8 @@
 #include <string.h>
 
 #include "kernel_cell.h"
-#include "kernel_line.h"
+#include "kernel_crossings.h"
 #include "kernel_packet.h"
-#include "kernel_poly.h"
 #include "kernel_quad.h"
 #include "render_polyhedra.h"
 #include "simd.h"

@@ -2,7 +2,7 @@
  * (kernel_outline_placement()) leave blocks that lie beside its slanted edges; two of five packets would be asked for
  * nothing.
  *
- * An edge function is affine over the tile (kernel_line.h), so that over a block it is that of the block's middle, give
+ * An edge function is affine over the tile (kernel_cell.h), so that over a block it is that of the block's middle, give
  * or take its slopes times half of what the block's rays span. A block in which no face can have the signs that a ray
  * inside has of its three edges, holds no ray that crosses the tet. */
 #ifndef RENDER_KERNEL_TILE_BLOCKS_H
@@ -11,9 +11,7 @@
 #include <math.h>
 
 #include "kernel_cell.h"
-#include "kernel_line.h"
-#include "kernel_packet.h"
-#include "kernel_tet.h"
+#include "kernel_shapes.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
 #include "simd.h"

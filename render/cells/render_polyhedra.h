@@ -32,7 +32,7 @@ typedef struct polyhedron {
     float *f, *g;      /* values as the kernels want them; of the colour field */
     double scale;      /* of the values in f */
     double fall, rise; /* by how much values change at most along the tile's rays, down and up, a unit of depth */
-    float (*lines)[4]; /* kernel_line.h: of the edges, then from each vertex to the centre */
+    float (*lines)[4]; /* kernel_cell.h: of the edges, then from each vertex to the centre */
     float least;       /* of all its triangles: kernel_blur_least() */
     int64_t *vertices; /* vertex_count */
     int (*edges)[2];

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "kernel_cell.h"
 #include "kernel_finder.h"
-#include "kernel_packed.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"

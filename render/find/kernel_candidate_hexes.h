@@ -9,8 +9,8 @@
  * the vertices are, 8 roundings of their distance from the eye, which is within the pads of kernel_add_lanes(). What
  * is said of cells that are not folded holds but for rounding as well, and those whose size is near that are within
  * the pads anywhere. */
-#ifndef RENDER_KERNEL_CANDIDATES_HEXES_H
-#define RENDER_KERNEL_CANDIDATES_HEXES_H
+#ifndef RENDER_KERNEL_CANDIDATE_HEXES_H
+#define RENDER_KERNEL_CANDIDATE_HEXES_H
 
 #include <math.h>
 #include <string.h>
@@ -18,8 +18,6 @@
 #include "kernel_cell.h"
 #include "kernel_finder.h"
 #include "kernel_outline.h"
-#include "kernel_packed.h"
-#include "kernel_candidate_tets.h"
 #include "kernel_tile.h"
 #include "render.h"
 #include "simd.h"

@@ -2,10 +2,9 @@
  *
  * In float32 from the eye on: positions err by 8 roundings of their distance from it, and so do X, Y and depth; all of
  * it is within the pads of kernel_pixel_range(), which take this of the picture's scale too. */
-#ifndef RENDER_KERNEL_CANDIDATES_TETS_H
-#define RENDER_KERNEL_CANDIDATES_TETS_H
+#ifndef RENDER_KERNEL_CANDIDATE_TETS_H
+#define RENDER_KERNEL_CANDIDATE_TETS_H
 
-#include <math.h>
 #include <string.h>
 
 #include "grid.h"
@@ -13,17 +12,9 @@
 #include "kernel_cell_values.h"
 #include "kernel_finder.h"
 #include "kernel_interest.h"
-#include "kernel_packed.h"
-#include "kernel_tet.h"
-#include "kernel_tile.h"
-#include "kernel_types.h"
+#include "kernel_shapes.h"
 #include "render.h"
 #include "simd.h"
-
-/* Where the surface of one isovalue is in each: ends over the edges that it crosses. */
-typedef struct kernel_tet_ends {
-    vf near, far, left, right, top, bottom;
-} kernel_tet_ends;
 
 typedef struct kernel_tet_lanes {
     vf f[4], at[3][4]; /* values less the isovalue; from the eye, in the space's scale */
@@ -41,27 +32,6 @@ SIMD_INLINE void kernel_tet_lanes_turn(const kernel_finder *s, const kernel_tet_
                 (l->at[0][i] * (float)axes[a][0] + l->at[1][i] * (float)axes[a][1]) + l->at[2][i] * (float)axes[a][2];
 }
 
-/* Ends that take in the point, in the lanes that are meant. */
-SIMD_INLINE void kernel_tet_ends_add(const kernel_finder *s, kernel_tet_ends *e, const vf point[3], vm lanes)
-{
-    const vf most = vf_set(INFINITY);
-    vf inverse = vf_set(1);
-    if (!s->frame->job->camera.is_orthographic) inverse = 1.0f / point[2];
-    const vf x = (point[0] * inverse) * s->column_scale, y = (point[1] * inverse) * s->row_scale;
-    e->near = vf_min(e->near, vf_select(lanes, point[2], most));
-    e->far = vf_max(e->far, vf_select(lanes, point[2], -most));
-    e->left = vf_min(e->left, vf_select(lanes, x, most));
-    e->right = vf_max(e->right, vf_select(lanes, x, -most));
-    e->top = vf_min(e->top, vf_select(lanes, y, most));
-    e->bottom = vf_max(e->bottom, vf_select(lanes, y, -most));
-}
-
-SIMD_INLINE kernel_tet_ends kernel_tet_no_ends(void)
-{
-    const vf most = vf_set(INFINITY);
-    return (kernel_tet_ends){most, -most, most, -most, most, -most};
-}
-
 SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_lanes *l, kernel_tet_ends *e)
 {
     vf at[4][3];
@@ -74,59 +44,6 @@ SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = at[i][a] + along * (at[j][a] - at[i][a]);
         kernel_tet_ends_add(s, e, point, crossed);
-    }
-}
-
-/* kernel_extent_range() lane by lane: the first and last pixels. Returns the lanes that have any. */
-SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, int pixels, vf *first, vf *last)
-{
-    const vf pad = (0.01f + blur + 3e-5f * fabsf(zero)) + 3e-5f * vf_max(vf_abs(low), vf_abs(high));
-    *first = vf_max(-vf_floor(pad - (low + zero)), vf_set(0));
-    *last = vf_min(vf_floor((high + zero) + pad), vf_set((float)(pixels - 1)));
-    return vf_le(*first, *last);
-}
-
-/* kernel_extents_candidate() lane by lane, of so many lanes those whose bits are set. */
-static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigned lanes, const uint32_t *cells,
-                             uint32_t source)
-{
-    const render_camera *camera = &s->frame->job->camera;
-    const bool flat = camera->is_orthographic;
-    kernel_candidate_list *list = s->list;
-    vf first[2], last[2];
-    float near[SIMD_WIDTH], far[SIMD_WIDTH];
-    int32_t ends[4][SIMD_WIDTH];
-    const vf size = vf_abs(e->far) + fabsf(s->t_near), pad = KERNEL_OUTLINE_PAD * size;
-    /* The largest blur of any lane stands for all. */
-    const float blur = 2e-6f * (flat ? vf_reduce_max(vf_select(vm_from_bits(lanes), size, vf_set(0))) + 1 : 1);
-    vm candidates = kernel_pixel_range(e->left, e->right, s->column_0, blur * fabsf(s->column_scale), camera->width,
-                                       &first[0], &last[0]);
-    candidates = vm_and(candidates, kernel_pixel_range(e->top, e->bottom, s->row_0, blur * fabsf(s->row_scale),
-                                                       camera->height, &first[1], &last[1]));
-    const vm anywhere = flat ? vm_none() : vm_not(vf_lt(0.01f * size, e->near));
-    const vm behind = vf_lt((e->far + s->t_near) + pad, vf_set(s->t_near));
-    lanes &= vm_bits(vm_andnot(vm_or(candidates, anywhere), behind));
-    const int most[2] = {camera->width - 1, camera->height - 1};
-    for (int a = 0; a < 2; a++) {
-        const vi from = vi_from_vf(vf_select(anywhere, vf_set(0), first[a]));
-        const vi to = vi_from_vf(vf_select(anywhere, vf_set((float)most[a]), last[a]));
-        memcpy(ends[2 * a], &from, sizeof from);
-        memcpy(ends[2 * a + 1], &to, sizeof to);
-    }
-    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* not a number: that */
-    vf_store(far, -vf_max(-((e->far + s->t_near) + pad), vf_set(-INFINITY)));
-    if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
-    for (; lanes; lanes &= lanes - 1) {
-        const int n = __builtin_ctz(lanes);
-        list->items[list->count++] = (kernel_candidate){.cell = cells[n],
-                                                        .source = source,
-                                                        .near = near[n],
-                                                        .far = far[n],
-                                                        .x0 = (uint16_t)ends[0][n],
-                                                        .x1 = (uint16_t)ends[1][n],
-                                                        .y0 = (uint16_t)ends[2][n],
-                                                        .y1 = (uint16_t)ends[3][n]};
-        kernel_count_tiles(list, ends[0][n], ends[1][n], ends[2][n], ends[3][n]);
     }
 }
 

@@ -1,7 +1,7 @@
 /* Isosurfaces by one traversal a frame: the trees are gone down once for the whole picture, and each cell that the
  * surface crosses, or that shows in the volume, is fetched and placed once, to find the pixels that it may show in; the
  * cells are then binned by tile (render_candidates.c; sort-middle, in the terms of Molnar et al. 1994), and tiles trace
- * them from the nearest on, blocks that know of something nearer left out (kernel_tile_candidates.h, kernel_batch.h; of
+ * them from the nearest on, blocks that know of something nearer left out (render_kernels.c, kernel_batch.h; of
  * the volume kernel_tile_cells.h):
  *
  *     nodes --- ranges, picture's planes ---> cells --- outlines' boxes ---> tiles --- nearest first ---> blocks
@@ -16,14 +16,13 @@
 #define RENDER_KERNEL_CANDIDATES_H
 
 #include "grid.h"
+#include "kernel_active_cells.h"
+#include "kernel_candidate_hexes.h"
+#include "kernel_candidate_tets.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
 #include "kernel_interest.h"
-#include "kernel_active_cells.h"
-#include "kernel_packed.h"
 #include "kernel_prefetch.h"
-#include "kernel_candidate_hexes.h"
-#include "kernel_candidate_tets.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
 #include "mmbvh.h"

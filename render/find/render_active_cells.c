@@ -2,6 +2,10 @@
  * blocks leave are closed from its end: gathers reach records by index. The array has room for all cells, or for as
  * many as may be kept: memory that is not written to is none. */
 #include "render_active_cells.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "render_kernels.h"
+#include "render_subtrees.h"
 
 #include <math.h>
 #include <omp.h>
@@ -9,12 +13,8 @@
 #include <string.h>
 
 #include "grid.h"
-#include "kernel_types.h"
 #include "memory.h"
 #include "mmbvh.h"
-#include "render.h"
-#include "render_kernels.h"
-#include "render_subtrees.h"
 
 enum {
     BLOCK = 1 << 14,      /* floats: 64 KiB */
@@ -182,7 +182,7 @@ static bool is_in_view(const kernel_frame *frame, const mmbvh *tree)
     return inside >= POINTS * 3 / 4;
 }
 
-/* Tells whether records hold all that tiles ask of the layer's cells (kernel_tile_candidates.h). */
+/* Tells whether records hold all that tiles ask of the layer's cells (render_kernels.c). */
 static bool can_keep(const kernel_frame *frame, int surface, int part)
 {
     const kernel_surface *s = &frame->surfaces[surface];

@@ -1,7 +1,7 @@
 /* Crossed cells kept from one picture to the next (render.h): a frame that has fewer cells to look at, and these side
  * by side, neither goes down trees nor gathers vertices from all over the mesh. */
-#ifndef RENDER_RENDER_ACTIVE_H
-#define RENDER_RENDER_ACTIVE_H
+#ifndef RENDER_RENDER_ACTIVE_CELLS_H
+#define RENDER_RENDER_ACTIVE_CELLS_H
 
 #include "kernel_types.h"
 

@@ -3,14 +3,14 @@
  * beyond one cell a pixel most of what would be listed is hidden, or smaller than a pixel. Of a volume nothing is
  * hidden: there a million may be listed in any case. */
 #include "render_candidates.h"
-
-#include <omp.h>
-
 #include "kernel_types.h"
-#include "memory.h"
 #include "render.h"
 #include "render_kernels.h"
 #include "render_subtrees.h"
+
+#include <omp.h>
+
+#include "memory.h"
 
 enum { ITEMS = 1024, MOST_ITEMS = 64 * ITEMS, VOLUME_ITEMS = 1024 * ITEMS, BLOCKS = KERNEL_TILE / KERNEL_BLOCK };
 

@@ -1,8 +1,8 @@
 #include "render_subtrees.h"
+#include "kernel_types.h"
 
 #include <string.h>
 
-#include "kernel_types.h"
 #include "memory.h"
 #include "mmbvh.h"
 

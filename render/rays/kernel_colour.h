@@ -5,43 +5,11 @@
 #include <math.h>
 
 #include "fragment.h"
+#include "kernel_exponentials.h"
 #include "kernel_packet.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
-
-/* 2^x for x <= 0, to 2e-7 relative; 0 below -126. Taylor of 2^f for f in [-1/2, 1/2]: the first term left out is
- * (f ln 2)^7 / 7! < 1.2e-7. */
-SIMD_INLINE vf vf_exp2(vf x)
-{
-    const vf whole = vf_floor(x + 0.5f);
-    const vf f = x - whole;
-    vf p = f * 1.5403530e-4f + 1.3333558e-3f;
-    p = p * f + 9.6181291e-3f;
-    p = p * f + 5.5504109e-2f;
-    p = p * f + 2.4022651e-1f;
-    p = p * f + 6.9314718e-1f;
-    p = p * f + 1.0f;
-    const vf scale = vf_from_bits((vi_from_vf(vf_max(whole, vf_set(-127))) + 127) << 23);
-    return vf_select(vf_lt(x, vf_set(-126)), vf_set(0), p * scale);
-}
-
-/* log2(x) for normal x > 0: mantissa to [sqrt(1/2), sqrt(2)), then 2 atanh(s) / ln 2 with s = (m-1)/(m+1), |s| < 0.172:
- * the first term left out is s^10 / 11 < 3e-9 relative. */
-SIMD_INLINE vf vf_log2(vf x)
-{
-    const vi bits = vi_from_bits(x);
-    const vi shifted = bits - 0x3f3504f3; /* bits of sqrt(1/2) */
-    const vi exponent = shifted >> 23;
-    const vf m = vf_from_bits(bits - (exponent << 23));
-    const vf s = (m - 1.0f) / (m + 1.0f);
-    const vf z = s * s;
-    vf p = z * 0.32059890f + 0.41219858f;
-    p = p * z + 0.57707802f;
-    p = p * z + 0.96179669f;
-    p = p * z + 2.8853901f;
-    return vf_from_vi(exponent) + s * p;
-}
 
 /* Transmittance of a sample whose opacity per unit is a: (1 - a)^exponent, and 1 minus it without cancellation. */
 SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
@@ -186,6 +154,40 @@ SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const ker
                                                 .transmittance = a[5][lane],
                                                 .kind = kind + (uint32_t)a[6][lane]};
     }
+}
+
+/* Of bands, and with colours of their own for what is outside of the range. */
+static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
+{
+    const vf place = kernel_colour_place(t, w), one = vf_set(1), zero = vf_set(0);
+    if (t->is_banded) {
+        const vf band = vf_floor(vf_clamp(place, zero, one) * (float)t->colour_count);
+        const vi index = vi_from_vf(vf_min(band, vf_set((float)(t->colour_count - 1)))) * 3;
+        vf_gather_pair(t->colours, index, &out[0], &out[1]);
+        out[2] = vf_gather(t->colours + 2, index);
+    } else {
+        kernel_table_colour(t, w, out);
+    }
+    const vm below = vf_lt(place, vf_set(-RENDER_END)), above = vf_lt(vf_set(1 + RENDER_END), place), is = vf_eq(w, w);
+    for (int a = 0; a < 3; a++) {
+        if (t->outside) out[a] = vf_select(below, vf_set(t->outside[a]), out[a]);
+        if (t->outside) out[a] = vf_select(above, vf_set(t->outside[3 + a]), out[a]);
+        out[a] = vf_select(is, out[a], vf_set(t->outside ? t->outside[6 + a] : RENDER_NO_COLOUR));
+    }
+}
+
+SIMD_INLINE void kernel_base_colour(const kernel_surface *s, int value, vf w, vf out[3])
+{
+    if (s->layer->colour_map && (s->colour.is_banded || s->colour.outside)) {
+        kernel_marked_colour(&s->colour, w, out);
+        return;
+    }
+    if (s->layer->colour_map) {
+        kernel_table_colour(&s->colour, w, out);
+        for (int a = 0; a < 3; a++) out[a] = vf_select(vf_eq(w, w), out[a], vf_set(RENDER_NO_COLOUR));
+        return;
+    }
+    for (int a = 0; a < 3; a++) out[a] = vf_set(s->layer->colours[3 * value + a]);
 }
 
 #endif

@@ -21,16 +21,6 @@
 #include "render.h"
 #include "simd.h"
 
-typedef struct kernel_tile {
-    int x0, y0;                /* the upper left pixel */
-    double centre_x, centre_y; /* slope (perspective) or offset (orthographic) of the centre */
-    double depth_shift;        /* the frame's */
-    float shear_x, shear_y;    /* the centre's slope; 0 where orthographic */
-    /* Rays in tile space, by the tile's columns and rows. */
-    float origin_x[KERNEL_TILE], origin_y[KERNEL_TILE], slope_x[KERNEL_TILE], slope_y[KERNEL_TILE];
-    float radius; /* |u|, |v| of no ray are more */
-} kernel_tile;
-
 typedef struct kernel_packet {
     const kernel_frame *frame;
     const kernel_tile *tile;
@@ -42,7 +32,7 @@ typedef struct kernel_packet {
     /* tile space */
     vf origin_x, origin_y, slope_x, slope_y;
     /* Are these rays the tile's own? Then what tells one from another is (u, v), their slopes, or where the camera is
-     * orthographic their origins (kernel_line.h). */
+     * orthographic their origins (kernel_cell.h). */
     bool is_pencil;
     vf u, v;
     vf t_near; /* the eye's plane, or clip_in where that is farther */
@@ -67,49 +57,6 @@ typedef struct kernel_packet {
 
 /* Packets cover rectangles: 4 × 4, 4 × 2 or 2 × 2 pixels. */
 enum { KERNEL_PACKET_COLUMNS = SIMD_WIDTH == 4 ? 2 : 4, KERNEL_PACKET_ROWS = SIMD_WIDTH / KERNEL_PACKET_COLUMNS };
-
-static inline double kernel_column(const kernel_frame *f, double x)
-{
-    return f->slope_x0 + x * f->slope_dx;
-}
-static inline double kernel_row(const kernel_frame *f, double y)
-{
-    return f->slope_y0 + y * f->slope_dy;
-}
-
-static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, int x0, int y0)
-{
-    tile->x0 = x0;
-    tile->y0 = y0;
-    tile->depth_shift = f->depth_shift;
-    tile->centre_x = kernel_column(f, x0 + 0.5 * (KERNEL_TILE - 1));
-    tile->centre_y = kernel_row(f, y0 + 0.5 * (KERNEL_TILE - 1));
-    const bool flat = f->job->camera.is_orthographic;
-    tile->shear_x = flat ? 0 : (float)tile->centre_x;
-    tile->shear_y = flat ? 0 : (float)tile->centre_y;
-    const double widest = fmax(fabs(f->slope_dx), fabs(f->slope_dy)) * (flat ? f->job->space.scale : 1);
-    tile->radius = (float)(0.5 * KERNEL_TILE * widest);
-}
-
-/* Returns the factor that turns a slope into the origin at Z = 0. */
-static inline double kernel_reach(const kernel_frame *f)
-{
-    return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
-}
-
-static inline void kernel_tile_rays(kernel_tile *tile, const kernel_frame *f)
-{
-    const bool flat = f->job->camera.is_orthographic;
-    const double reach = kernel_reach(f);
-    for (int i = 0; i < KERNEL_TILE; i++) {
-        const double dx = kernel_column(f, tile->x0 + i) - tile->centre_x;
-        const double dy = kernel_row(f, tile->y0 + i) - tile->centre_y;
-        tile->origin_x[i] = (float)(dx * reach);
-        tile->origin_y[i] = (float)(dy * reach);
-        tile->slope_x[i] = flat ? 0 : (float)dx;
-        tile->slope_y[i] = flat ? 0 : (float)dy;
-    }
-}
 
 /* Base point at t = 0 and direction per t of the ray with column and row parameters (px, py), in tree space. */
 static inline void kernel_tree_ray(const kernel_frame *f, double px, double py, double base[3], double direction[3])

@@ -19,11 +19,44 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernel_packet.h"
 #include "kernel_types.h"
 #include "mmbvh.h"
 #include "render.h"
 #include "simd.h"
+
+static inline void kernel_tile_setup(kernel_tile *tile, const kernel_frame *f, int x0, int y0)
+{
+    tile->x0 = x0;
+    tile->y0 = y0;
+    tile->depth_shift = f->depth_shift;
+    tile->centre_x = kernel_column(f, x0 + 0.5 * (KERNEL_TILE - 1));
+    tile->centre_y = kernel_row(f, y0 + 0.5 * (KERNEL_TILE - 1));
+    const bool flat = f->job->camera.is_orthographic;
+    tile->shear_x = flat ? 0 : (float)tile->centre_x;
+    tile->shear_y = flat ? 0 : (float)tile->centre_y;
+    const double widest = fmax(fabs(f->slope_dx), fabs(f->slope_dy)) * (flat ? f->job->space.scale : 1);
+    tile->radius = (float)(0.5 * KERNEL_TILE * widest);
+}
+
+/* Returns the factor that turns a slope into the origin at Z = 0. */
+static inline double kernel_reach(const kernel_frame *f)
+{
+    return f->job->camera.is_orthographic ? f->job->space.scale : f->depth_shift;
+}
+
+static inline void kernel_tile_rays(kernel_tile *tile, const kernel_frame *f)
+{
+    const bool flat = f->job->camera.is_orthographic;
+    const double reach = kernel_reach(f);
+    for (int i = 0; i < KERNEL_TILE; i++) {
+        const double dx = kernel_column(f, tile->x0 + i) - tile->centre_x;
+        const double dy = kernel_row(f, tile->y0 + i) - tile->centre_y;
+        tile->origin_x[i] = (float)(dx * reach);
+        tile->origin_y[i] = (float)(dy * reach);
+        tile->slope_x[i] = flat ? 0 : (float)dx;
+        tile->slope_y[i] = flat ? 0 : (float)dy;
+    }
+}
 
 enum {
     KERNEL_BLOCKS_ACROSS = KERNEL_TILE / KERNEL_BLOCK,

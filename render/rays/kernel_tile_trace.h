@@ -3,11 +3,15 @@
 #define RENDER_KERNEL_TILE_TRACE_H
 
 #include <math.h>
+#include <string.h>
 
 #include "kernel_hits.h"
+#include "kernel_interest.h"
 #include "kernel_packet.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
+#include "mmbvh.h"
+#include "render.h"
 #include "simd.h"
 
 typedef struct kernel_tile_trace {
@@ -101,6 +105,111 @@ SIMD_INLINE void kernel_tile_begin(kernel_tile_trace *t, const kernel_frame *f, 
     kernel_tile_borders(&borders, f, &t->tile);
     kernel_tree_planes(&t->tree_planes, f, &borders);
     kernel_tile_planes(&t->tile_planes, f, &t->tile);
+}
+
+/* A tile goes down a tree once for all its blocks, with a mask of those that a node may meet before what they already
+ * know to be nearer. */
+
+typedef struct kernel_tile_entry {
+    int64_t node;
+    float near;
+    unsigned blocks;
+} kernel_tile_entry;
+
+typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
+
+/* Where the node may be met, of blocks: none where it does not show. interest NULL: everything shows. */
+SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                              const kernel_interest *interest, int64_t node, unsigned blocks)
+{
+    kernel_placement placement = {0};
+    if (interest && !kernel_node_shows(interest, ranges, node)) return placement;
+    placement = kernel_box_placement(&t->tree_planes, tree, node);
+    placement.blocks &= placement.far < t->t_near ? 0 : blocks;
+    if (placement.blocks) {
+        /* Prefetches what an inner node or a leaf needs next. */
+        const int64_t ref = mmbvh_node_ref(tree, node);
+        if (mmbvh_node_count(tree, node))
+            __builtin_prefetch(tree->cells + ref);
+        else if (interest)
+            __builtin_prefetch(ranges->low + ref * ranges->stride);
+    }
+    return placement;
+}
+
+SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
+                                      const kernel_interest *interest, unsigned blocks, int part,
+                                      kernel_tile_visit *visit)
+{
+    kernel_tile_entry stack[MMBVH_MAX_DEPTH + 1];
+    int top = 0;
+    if (!tree->node_count) return;
+    const kernel_placement root = kernel_tile_look(t, tree, ranges, interest, 0, blocks);
+    if (root.blocks) stack[top++] = (kernel_tile_entry){0, root.near, root.blocks};
+    while (top) {
+        const kernel_tile_entry e = stack[--top];
+        blocks = e.blocks & kernel_blocks_beyond(t, e.near);
+        if (!blocks) continue;
+        const int count = mmbvh_node_count(tree, e.node);
+        const int64_t ref = mmbvh_node_ref(tree, e.node);
+        if (count) {
+            visit(t, part, tree->cells + ref, count, blocks);
+            continue;
+        }
+        const kernel_placement left = kernel_tile_look(t, tree, ranges, interest, ref, blocks);
+        const kernel_placement right = kernel_tile_look(t, tree, ranges, interest, ref + 1, blocks);
+        const kernel_tile_entry entries[2] = {{ref, left.near, left.blocks}, {ref + 1, right.near, right.blocks}};
+        const int far = left.along < right.along;
+        if (entries[far].blocks) stack[top++] = entries[far];
+        if (entries[!far].blocks) stack[top++] = entries[!far];
+    }
+}
+
+/* ---- lanes that are pixels of several cells ---- */
+
+SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
+{
+    typedef uint8_t kernel_byte_lanes __attribute__((vector_size(SIMD_WIDTH)));
+    kernel_byte_lanes lanes;
+    memcpy(&lanes, bytes, sizeof lanes);
+    return __builtin_convertvector(lanes, vi);
+}
+
+/* A tile's entry by column or row. */
+SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
+{
+    return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
+}
+
+/* Where a pixel of the tile is in its packets. */
+SIMD_INLINE vi kernel_batch_at(vi column, vi row)
+{
+    const vi block = (row & ~3) + (column >> 2);
+    const vi within = SIMD_WIDTH == 4 ? ((row & 2) << 2) + ((column & 2) << 1) + ((row & 1) << 1) + (column & 1)
+                                      : ((row & 3) << 2) + (column & 3);
+    return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
+}
+
+SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
+{
+    const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
+    return vf_gather((const float *)(const void *)&t->packets[0].t_far,
+                     at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
+}
+
+static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
+{
+    t->layer = layer;
+    t->surface = &t->frame->surfaces[layer];
+}
+
+/* Are rays of the layer under way accepted by kernel_ray_accept()? */
+SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
+{
+    const render_surface_layer *l = t->surface->layer;
+    /* Rays that are clipped begin each at a depth of its own, which packets know. */
+    if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
+    return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
 }
 
 #endif

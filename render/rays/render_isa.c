@@ -1,4 +1,6 @@
 #include "render_isa.h"
+#include "kernel_types.h"
+#include "render_kernels.h"
 
 #include <pthread.h>
 #include <stdio.h>
@@ -6,9 +8,6 @@
 #include <string.h>
 
 #include "cpu.h"
-#include "kernel_types.h"
-#include "render.h"
-#include "render_kernels.h"
 
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 static cpu_isa chosen;

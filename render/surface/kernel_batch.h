@@ -6,7 +6,7 @@
  *
  * Where cells are small a block's packet would be asked for rays most of which lie beside the cell. Pixels of several
  * cells' boxes are put side by side instead, and a lane takes its cell's numbers out of the batch's vectors by a
- * permutation. Every operation is that of a cell alone (kernel_tet.h, kernel_line.h, kernel_surface.h) in the same
+ * permutation. Every operation is that of a cell alone (kernel_crossings.h, kernel_surface.h) in the same
  * order, so that a hit has the same bits however it came to be found. */
 #ifndef RENDER_KERNEL_BATCH_H
 #define RENDER_KERNEL_BATCH_H
@@ -14,20 +14,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "kernel_accept.h"
 #include "kernel_cell.h"
-#include "kernel_field.h"
-#include "kernel_hits.h"
-#include "kernel_line.h"
-#include "kernel_packet.h"
+#include "kernel_crossings.h"
+#include "kernel_map.h"
 #include "kernel_placed.h"
-#include "kernel_packed.h"
+#include "kernel_shapes.h"
 #include "kernel_surface.h"
-#include "kernel_tet.h"
-#include "kernel_tile_surface.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
-#include "render.h"
 #include "simd.h"
 
 enum {
@@ -134,36 +130,6 @@ typedef struct kernel_batch_rays {
     int32_t at[SIMD_WIDTH]; /* packet of the tile * SIMD_WIDTH + lane in it */
 } kernel_batch_rays;
 
-SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
-{
-    typedef uint8_t kernel_byte_lanes __attribute__((vector_size(SIMD_WIDTH)));
-    kernel_byte_lanes lanes;
-    memcpy(&lanes, bytes, sizeof lanes);
-    return __builtin_convertvector(lanes, vi);
-}
-
-/* A tile's entry by column or row. */
-SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
-{
-    return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
-}
-
-/* Where a pixel of the tile is in its packets. */
-SIMD_INLINE vi kernel_batch_at(vi column, vi row)
-{
-    const vi block = (row & ~3) + (column >> 2);
-    const vi within = SIMD_WIDTH == 4 ? ((row & 2) << 2) + ((column & 2) << 1) + ((row & 1) << 1) + (column & 1)
-                                      : ((row & 3) << 2) + (column & 3);
-    return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
-}
-
-SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
-{
-    const int stride = (int)(sizeof(kernel_packet) / sizeof(float));
-    return vf_gather((const float *)(const void *)&t->packets[0].t_far,
-                     at / SIMD_WIDTH * stride + (at & (SIMD_WIDTH - 1)));
-}
-
 SIMD_INLINE void kernel_batch_project(const kernel_batch *b, const kernel_tile *tile, const kernel_batch_rays *r,
                                       vf x[4], vf y[4])
 {
@@ -263,53 +229,6 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
     return vm_and(change, vm_and(vf_le(vf_set(t_near), *out), vf_le(*out, r->far)));
 }
 
-/* What one ray hits. */
-typedef struct kernel_ray_hit {
-    int part, value;
-    uint32_t cell;
-    float depth;
-    float normal[3]; /* as in kernel_hits */
-    float colour[3]; /* not lit */
-} kernel_ray_hit;
-
-/* Of one ray that hits in the place of the nearest. */
-static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, const kernel_surface *s, int ray,
-                                                            const kernel_ray_hit *hit)
-{
-    const vm tied = vm_from_bits(1u << ray);
-    const vf depth = vf_set(hit->depth);
-    const vf colour[3] = {vf_set(hit->colour[0]), vf_set(hit->colour[1]), vf_set(hit->colour[2])};
-    const kernel_hit_cells cells = {vi_set(hit->part), vi_set((int32_t)hit->cell)};
-    vf normal[3] = {vf_set(hit->normal[0]), vf_set(hit->normal[1]), vf_set(hit->normal[2])};
-    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, depth, &cells, normal);
-    kernel_emit_tied(p, s, hit->value, tied, depth, normal, colour);
-}
-
-/* kernel_accept() of one ray, for two of a packet may be of one pixel. Returns its block, where something is nearer. */
-SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_ray_hit *hit)
-{
-    const kernel_surface *s = t->surface;
-    const int ray = at % SIMD_WIDTH;
-    kernel_packet *p = &t->packets[at / SIMD_WIDTH];
-    kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
-    const float far = p->t_far[ray];
-    if (!(hit->depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
-    if (hit->depth == far && far < INFINITY) {
-        kernel_ray_tied(p, s, ray, hit);
-        return 0;
-    }
-    p->t_far[ray] = hit->depth;
-    vm_set_lane(&hits->found, ray);
-    for (int a = 0; a < 3; a++) {
-        hits->normal[a][ray] = hit->normal[a];
-        hits->colour[a][ray] = hit->colour[a];
-    }
-    hits->cells.part[ray] = hit->part;
-    hits->cells.index[ray] = (int32_t)hit->cell;
-    hits->kind[ray] = (float)((int)s->first_kind + hit->value);
-    return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
-}
-
 /* Returns the blocks in which something is nearer. */
 static unsigned kernel_batch_accept(kernel_tile_trace *t, kernel_batch *b, const kernel_batch_rays *r,
                                     const uint8_t *lanes, unsigned hit, vf depth)
@@ -402,21 +321,6 @@ static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, ker
     }
     kernel_batch_trace(t, b);
     b->count = 0;
-}
-
-static inline void kernel_tile_set_layer(kernel_tile_trace *t, int layer)
-{
-    t->layer = layer;
-    t->surface = &t->frame->surfaces[layer];
-}
-
-/* Are rays of the layer under way accepted by kernel_ray_accept()? */
-SIMD_INLINE bool kernel_tile_layer_batches(const kernel_tile_trace *t)
-{
-    const render_surface_layer *l = t->surface->layer;
-    /* Rays that are clipped begin each at a depth of its own, which packets know. */
-    if (t->frame->common_clips || t->surface->own_clips || t->frame->job->paint == RENDER_VALUES) return false;
-    return t->layer < t->frame->opaque_count && !(l->edge_width > 0) && l->normal != RENDER_DIFFERENCES;
 }
 
 /* What is added from now on is of the part and the layer under way: what waits, of others, is traced. */

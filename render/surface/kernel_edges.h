@@ -39,7 +39,7 @@ SIMD_INLINE vf kernel_nearest_of_loop(const kernel_packet *p, const grid *g, con
         double world[3];
         float x, y, z;
         grid_vertex(g, loop[1 + i % loop[0]], world);
-        kernel_place(p, world, &x, &y, &z);
+        kernel_place_in(p->frame, p->tile, world, &x, &y, &z);
         kernel_edge_place(p, x, y, z, next);
         if (i > 0) nearest = vf_min(nearest, kernel_edge_distance(last, next, length));
         last[0] = next[0];

@@ -6,12 +6,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "kernel_batch.h"
 #include "kernel_map.h"
-#include "kernel_packet.h"
 #include "kernel_placed_hexes.h"
-#include "kernel_poly.h"
 #include "kernel_quad.h"
+#include "kernel_shapes.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "simd.h"

@@ -4,20 +4,18 @@
 #define RENDER_KERNEL_PACKET_SURFACE_H
 
 #include "grid.h"
+#include "kernel_accept.h"
+#include "kernel_bounds.h"
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
 #include "kernel_cell_values.h"
 #include "kernel_colour.h"
 #include "kernel_hits.h"
-#include "kernel_normals.h"
 #include "kernel_packet.h"
-#include "kernel_poly.h"
-#include "kernel_polyhedron_surface.h"
 #include "kernel_spmd.h"
 #include "kernel_surface.h"
 #include "kernel_traverse.h"
 #include "kernel_types.h"
-#include "kernel_vertex_normals.h"
 #include "render.h"
 #include "simd.h"
 

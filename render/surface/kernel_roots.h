@@ -31,9 +31,7 @@
 #ifndef RENDER_KERNEL_ROOTS_H
 #define RENDER_KERNEL_ROOTS_H
 
-#include "kernel_bounds.h"
 #include "kernel_cell.h"
-#include "kernel_field.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_wide.h"

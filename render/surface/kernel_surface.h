@@ -12,216 +12,40 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_accept.h"
 #include "kernel_bounds.h"
 #include "kernel_cell.h"
-#include "kernel_colour.h"
-#include "kernel_edges.h"
-#include "kernel_field.h"
-#include "kernel_hits.h"
+#include "kernel_cell_values.h"
+#include "kernel_crossings.h"
 #include "kernel_map.h"
-#include "kernel_neubauer.h"
-#include "kernel_normals.h"
 #include "kernel_packet.h"
-#include "kernel_poly.h"
+#include "kernel_polyhedron.h"
 #include "kernel_roots.h"
-#include "kernel_tet.h"
+#include "kernel_tile.h"
+#include "kernel_tile_trace.h"
 #include "kernel_types.h"
-#include "kernel_vertex_normals.h"
 #include "render.h"
+#include "render_polyhedra.h"
 #include "simd.h"
 
-typedef struct kernel_surface_state {
-    const kernel_surface *surface;
-    int layer;
-    kernel_hits *hits;
-    bool is_opaque;
-} kernel_surface_state;
+/* Neubauer's method (thesis, algorithm 4.2). */
 
-/* Of bands, and with colours of their own for what is outside of the range. */
-static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
+/* Neubauer's method: steps of regula falsi on the field along the ray. The guess for an inverse map is on the line
+ * between the places found so far, and so better in every step. */
+SIMD_INLINE void kernel_neubauer(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, int steps,
+                                 kernel_point *out)
 {
-    const vf place = kernel_colour_place(t, w), one = vf_set(1), zero = vf_set(0);
-    if (t->is_banded) {
-        const vf band = vf_floor(vf_clamp(place, zero, one) * (float)t->colour_count);
-        const vi index = vi_from_vf(vf_min(band, vf_set((float)(t->colour_count - 1)))) * 3;
-        vf_gather_pair(t->colours, index, &out[0], &out[1]);
-        out[2] = vf_gather(t->colours + 2, index);
-    } else {
-        kernel_table_colour(t, w, out);
+    kernel_point low, high;
+    kernel_point_ends(i, &low, &high);
+    *out = low;
+    for (int n = 0; n <= steps; n++) {
+        out->t = kernel_secant(low.t, low.value, high.t, high.value);
+        kernel_place_between(&low, &high, out->t, out->r);
+        out->value = kernel_solve(p, map, i, rays, out->t, out->r);
+        const vm same = vm_not(vm_xor(vf_lt(out->value, vf_set(0)), vf_lt(low.value, vf_set(0))));
+        kernel_place_move(same, out, &low);
+        kernel_place_move(vm_not(same), out, &high);
     }
-    const vm below = vf_lt(place, vf_set(-RENDER_END)), above = vf_lt(vf_set(1 + RENDER_END), place), is = vf_eq(w, w);
-    for (int a = 0; a < 3; a++) {
-        if (t->outside) out[a] = vf_select(below, vf_set(t->outside[a]), out[a]);
-        if (t->outside) out[a] = vf_select(above, vf_set(t->outside[3 + a]), out[a]);
-        out[a] = vf_select(is, out[a], vf_set(t->outside ? t->outside[6 + a] : RENDER_NO_COLOUR));
-    }
-}
-
-SIMD_INLINE void kernel_base_colour(const kernel_surface *s, int value, vf w, vf out[3])
-{
-    if (s->layer->colour_map && (s->colour.is_banded || s->colour.outside)) {
-        kernel_marked_colour(&s->colour, w, out);
-        return;
-    }
-    if (s->layer->colour_map) {
-        kernel_table_colour(&s->colour, w, out);
-        for (int a = 0; a < 3; a++) out[a] = vf_select(vf_eq(w, w), out[a], vf_set(RENDER_NO_COLOUR));
-        return;
-    }
-    for (int a = 0; a < 3; a++) out[a] = vf_set(s->layer->colours[3 * value + a]);
-}
-
-/* Gradients in tile space to camera axes: undo the shear. */
-SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
-{
-    g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
-}
-
-/* RENDER_NORMALS, as kernel_shade() finds it; and of RENDER_VALUES the isovalue's number. */
-static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
-                                                                 vf colour[3])
-{
-    const render_camera *c = &p->frame->job->camera;
-    vm flat;
-    vf unit[3], inverse = kernel_inverse_length(normal, &flat), facing = vf_set(0);
-    if (p->frame->job->paint == RENDER_VALUES) {
-        colour[1] = kind - (float)FRAGMENT_SURFACE;
-        colour[2] = vf_set(0);
-        return;
-    }
-    for (int a = 0; a < 3; a++) {
-        unit[a] = vf_select(flat, p->view[a], normal[a] * inverse);
-        facing += unit[a] * p->view[a];
-    }
-    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
-    for (int a = 0; a < 3; a++)
-        colour[a] =
-            turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
-}
-
-/* Hits as the job paints them; kind: that of the fragments. */
-SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind, vf colour[3])
-{
-    kernel_packet_view(p);
-    if (__builtin_expect(p->frame->job->paint == RENDER_LIGHT, 1))
-        kernel_shade(p, &s->layer->material, normal, colour);
-    else
-        kernel_paint_numbers(p, normal, kind, colour);
-}
-
-/* A hit in the place of the nearest, as folded cells may have them: compositing decides, by bits that do not know which
- * cell came first. */
-static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
-                                                             vm tied, vf t, const vf normal[3], const vf colour[3])
-{
-    kernel_fragments lit = {t, t, {colour[0], colour[1], colour[2]}, vf_set(0), vf_set(0)};
-    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), lit.colour);
-    kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
-}
-
-/* Where rays hit: the depth, a vector along the normal (or what kernel_vertex_normals() makes one of), and the value
- * that the surface is coloured by. */
-typedef struct kernel_hit_places {
-    vf t, normal[3], w;
-} kernel_hit_places;
-
-/* What colours the surface, or its isovalue. w: the first's place along the colour map's range. */
-SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
-{
-    if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
-    return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
-}
-
-/* Takes hits: the nearest are kept; those of a transparent surface are written at once. */
-SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
-                               kernel_hit_places *at)
-{
-    const kernel_surface *s = state->surface;
-    kernel_hits *hits = state->hits;
-    const vf t = at->t;
-    vf *normal = at->normal, colour[3];
-    const bool by_differences = s->layer->normal == RENDER_DIFFERENCES, by_vertices = s->layer->normal == RENDER_VERTEX;
-    const kernel_hit_cells cells = {vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
-    /* Polyhedra (no cell given) have their own gradient always, or come with what their vertices make. */
-    const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
-    kernel_base_colour(s, value, at->w, colour);
-    if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
-        colour[0] = kernel_surface_value(s, value, at->w);
-    else if (s->layer->edge_width > 0 && c)
-        kernel_draw_edges(p, s->layer, c, t, colour);
-    if (state->is_opaque) {
-        const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
-        if (__builtin_expect(vm_any(tied), 0)) {
-            vf own[3] = {normal[0], normal[1], normal[2]};
-            if (by_differences) kernel_differences(p, s, value, tied, t, reach, own);
-            if (by_vertices) kernel_vertex_normals(p, s, tied, t, &cells, own);
-            kernel_emit_tied(p, s, value, tied, t, own, colour);
-            hit = vm_andnot(hit, tied);
-        }
-        p->t_far = vf_select(hit, t, p->t_far);
-        p->is_nearer = true;
-        hits->found = vm_or(hits->found, hit);
-        for (int a = 0; a < 3; a++) {
-            hits->normal[a] = vf_select(hit, normal[a], hits->normal[a]);
-            hits->colour[a] = vf_select(hit, colour[a], hits->colour[a]);
-        }
-        if (by_differences) hits->reach = vf_select(hit, reach, hits->reach);
-        if (by_vertices) {
-            hits->cells.part = vi_select(hit, cells.part, hits->cells.part);
-            hits->cells.index = vi_select(hit, cells.index, hits->cells.index);
-        }
-        hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
-        return;
-    }
-    if (by_differences) kernel_differences(p, s, value, hit, t, reach, normal);
-    if (by_vertices) kernel_vertex_normals(p, s, hit, t, &cells, normal);
-    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), colour);
-    const float opacity = s->layer->opacity;
-    const kernel_fragments f = {
-        t, t, {colour[0] * opacity, colour[1] * opacity, colour[2] * opacity}, vf_set(1 - opacity), vf_set(0)};
-    kernel_emit(p, hit, s->first_kind + (uint32_t)value, &f);
-    kernel_hits_cut(hits, hit, t);
-}
-
-/* Rays on which the sign changes between the interval's faces. */
-SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
-{
-    return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
-}
-
-/* Rays whose interval is in front of the eye and of what is known. */
-SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
-{
-    return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
-}
-
-/* The hits that clips leave. */
-static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
-{
-    kernel_lanes l;
-    unsigned kept = 0;
-    kernel_packet_lanes(p, &l);
-    vf_store(l.value, t);
-    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
-        const int i = __builtin_ctz(left);
-        kernel_clip_ray ray;
-        kernel_tree_ray(p->frame, l.px[i], l.py[i], ray.base, ray.direction);
-        kept |= (unsigned)kernel_clip_keeps(p->frame->job, clips, &ray, (double)l.value[i]) << i;
-    }
-    return vm_from_bits(kept);
-}
-
-/* Hits in front of the eye that the surface's clips leave. */
-SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
-{
-    const vm in_front = vm_and(hit, vf_le(p->t_near, t));
-    if (__builtin_expect(s->own_clips == 0, 1)) return in_front;
-    return kernel_clip_hits(p, s->own_clips, in_front, t);
-}
-
-SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
-{
-    return kernel_kept(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
 }
 
 /* The gradient of a tet's field, by Cramer's rule in double; its length and sign do not matter. */
@@ -269,34 +93,6 @@ SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *stat
         at.w = i.w_in + along * (i.w_out - i.w_in);
     }
     kernel_accept(p, state, c, value, hit, &at);
-}
-
-/* What is set up once for a cell and isovalue, for all packets of a tile: beside each place of the cache. */
-typedef struct kernel_poly {
-    bool is_set_up;
-    int value;
-    kernel_map map;
-    kernel_bounds bounds; /* robust roots alone */
-} kernel_poly;
-
-/* The tile's rays. */
-SIMD_INLINE kernel_beam kernel_tile_beam(const kernel_frame *f, const kernel_tile *tile)
-{
-    const bool flat = f->job->camera.is_orthographic;
-    const float shift = fabsf((float)f->depth_shift), radius = tile->radius;
-    return (kernel_beam){.spread = flat ? 0 : radius, .offset = flat ? radius : radius * shift};
-}
-
-SIMD_INLINE void kernel_poly_setup(const kernel_frame *f, const kernel_tile *tile, kernel_poly *poly,
-                                   const render_surface_layer *layer, const kernel_cell *c, int value)
-{
-    if (poly->is_set_up) return;
-    poly->is_set_up = true;
-    poly->value = value;
-    kernel_map_setup(&poly->map, c);
-    if (layer->colour_map) kernel_map_colour(&poly->map, c);
-    const kernel_beam beam = kernel_tile_beam(f, tile);
-    if (layer->root == RENDER_ROBUST) kernel_bounds_setup(&poly->bounds, &poly->map, c->type, &beam);
 }
 
 SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_cell *c)
@@ -371,6 +167,414 @@ static __attribute__((noinline)) void kernel_cell_surface(kernel_packet *p, kern
         kernel_tet_surface(p, state, c, value, rays);
     else
         kernel_poly_surface(p, state, c, poly, value, rays);
+}
+
+/* Isosurfaces in polyhedra: the places on the profile where the sign changes. They are exact: a linear piece has one
+ * root at most. Neubauer's method takes the first where the faces' values differ in sign; the robust finder takes all
+ * of them, on rays too that are on one side of the isovalue at both faces.
+ *
+ * Most such rays stay on that side, and need not be followed. A bound says which do, from the faces' values alone:
+ *
+ *      v |                               along the tile's rays the field of no tet falls faster than fall, nor rises
+ *        | in                . out       faster than rise, so between the faces' triangles it is above both lines. They
+ *        |   '.           .'             meet below the isovalue where
+ *        |      '.     .'  rise
+ *        |   fall  '.'                       rise v_in + fall v_out < fall rise (t_out - t_in),
+ *        +-----------------------> t
+ *                                        and alike below it. A field that nowhere turns has fall or rise 0.
+ *
+ * What is beyond the range of the vertices' values is not looked for: where tets overlap their sum may go there, but no
+ * isovalue that the vertices do not straddle has a surface in the cell, as the tree and the plan have it. */
+
+SIMD_INLINE bool kernel_polyhedron_straddles(const polyhedron *c, double value)
+{
+    bool below = false, above = false;
+    for (int i = 0; i < c->vertex_count; i++) {
+        below = below || c->values[i] < value;
+        above = above || c->values[i] >= value;
+    }
+    return below && above;
+}
+
+SIMD_INLINE void kernel_polyhedron_relative(polyhedron *c, double value)
+{
+    double largest = 0;
+    for (int i = 0; i < c->vertex_count; i++) {
+        const double size = fabs(c->values[i] - value);
+        largest = size > largest ? size : largest;
+    }
+    c->scale = kernel_mirrored_power(largest);
+    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = (float)((c->values[i] - value) * c->scale);
+}
+
+static void kernel_polyhedron_colours(polyhedron *c, const kernel_surface *s, int part)
+{
+    const grid_field *field = &s->layer->colour_field.fields[part];
+    double sum = 0;
+    for (int i = 0; i < c->vertex_count; i++) {
+        const double v = grid_field_value(field, field->is_cell_centred ? c->index : c->vertices[i]);
+        const double place = (v - s->colour.low) * s->colour.inverse_width;
+        c->g[i] = (float)place;
+        sum += place / c->vertex_count;
+    }
+    c->g[c->vertex_count] = (float)sum;
+}
+
+/* The gradient of a field that changes by df along d, by Cramer's rule. */
+SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], double g[3])
+{
+    double n[3][3];
+    for (int i = 0; i < 3; i++) {
+        const double *u = d[(i + 1) % 3], *v = d[(i + 2) % 3];
+        for (int a = 0; a < 3; a++) n[i][a] = u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3];
+    }
+    const double volume = d[0][0] * n[0][0] + d[0][1] * n[0][1] + d[0][2] * n[0][2];
+    for (int a = 0; a < 3; a++) g[a] = (df[0] * n[0][a] + df[1] * n[1][a] + df[2] * n[2][a]) / volume;
+}
+
+/* The gradient of the field in a tet, in camera axes, in double. */
+static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
+{
+    const int *vertex = c->facets[facet].vertex, centre = c->vertex_count;
+    const double scale = p->frame->job->space.scale;
+    double d[3][3], df[3], g[3];
+    for (int i = 0; i < 3; i++) {
+        df[i] = (double)c->f[vertex[i]] - (double)c->f[centre];
+        for (int a = 0; a < 3; a++) d[i][a] = (c->world[vertex[i]][a] - c->world[centre][a]) * scale;
+    }
+    kernel_gradient(d, df, g);
+    for (int a = 0; a < 3; a++) {
+        const double *axis = p->frame->scaled_axes[a];
+        const double along = (axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) / scale;
+        out[a] = along > 1e18 ? 1e18 : along >= -1e18 ? along : -1e18;
+    }
+}
+
+/* Where tets overlap: the signed sum of their gradients. Returns the rays that have one. */
+static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit,
+                                        vf t, vf out[3])
+{
+    vf cover = vf_set(0);
+    for (int n = 0; n < r->segment_count; n++) {
+        const kernel_tet_span *s = &r->segments[n];
+        const vm in = vm_and(hit, kernel_tet_span_holds(s, t, false));
+        if (!vm_any(in)) continue;
+        double g[3];
+        kernel_polyhedron_gradient(p, c, s->facet, g);
+        cover = vf_select(in, cover + s->sign, cover);
+        for (int a = 0; a < 3; a++) out[a] = vf_select(in, out[a] + s->sign * (float)g[a], out[a]);
+    }
+    return vm_and(hit, vf_eq(cover, vf_set(1)));
+}
+
+/* The gradient at the hits: of the positive tet that holds them, or is nearest to that. */
+static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit, vf t,
+                                     vf out[3])
+{
+    for (int a = 0; a < 3; a++) out[a] = vf_set(0);
+    if (!c->is_star) hit = vm_andnot(hit, kernel_polyhedron_sum_normals(p, c, r, hit, t, out));
+    vf nearest = vf_set(INFINITY);
+    for (int n = 0; n < r->segment_count; n++) {
+        const kernel_tet_span *s = &r->segments[n];
+        const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
+        const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
+        if (!vm_any(nearer) || s->sign < 0) continue;
+        double g[3];
+        kernel_polyhedron_gradient(p, c, s->facet, g);
+        nearest = vf_select(nearer, away, nearest);
+        for (int a = 0; a < 3; a++) out[a] = vf_select(nearer, vf_set((float)g[a]), out[a]);
+    }
+}
+
+/* ---- gradients at vertices ---- */
+
+/* The mean of the vertices' gradients, in camera axes, as the centre has the mean of their values. */
+static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhedron *c,
+                                            const render_vertex_gradients *gradients, double out[3])
+{
+    out[0] = out[1] = out[2] = 0;
+    for (int i = 0; i < c->vertex_count; i++) {
+        double g[3];
+        kernel_vertex_gradient(f, gradients, c->vertices[i], g);
+        for (int a = 0; a < 3; a++) out[a] += g[a] / c->vertex_count;
+    }
+}
+
+/* The tet that holds the hit, or is nearest to it, of those that do not lie outside; -1: none. */
+static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
+{
+    vf nearest = vf_set(INFINITY);
+    vi facet = vi_set(-1);
+    for (int n = 0; n < r->segment_count; n++) {
+        const kernel_tet_span *s = &r->segments[n];
+        const vf away = vf_max(vf_max(s->t0 - t, t - s->t1), vf_set(0));
+        const vm nearer = vm_and(vm_and(hit, s->mask), vf_lt(away, nearest));
+        if (s->sign < 0) continue;
+        nearest = vf_select(nearer, away, nearest);
+        facet = vi_select(nearer, vi_set(s->facet), facet);
+    }
+    memcpy(out, &facet, sizeof facet);
+}
+
+/* Normals of RENDER_VERTEX. */
+static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
+                                                               const render_surface_layer *layer,
+                                                               const kernel_passage *r, vm hit, vf t, vf out[3])
+{
+    const render_vertex_gradients *gradients = &layer->gradients[c->part];
+    const int centre = c->vertex_count;
+    int32_t facets[SIMD_WIDTH];
+    double of_centre[3];
+    kernel_polyhedron_facets(r, hit, t, facets);
+    kernel_polyhedron_mean_gradient(p->frame, c, gradients, of_centre);
+    for (int a = 0; a < 3; a++) out[a] = vf_set((float)of_centre[a]);
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int ray = __builtin_ctz(left);
+        if (facets[ray] < 0) continue;
+        double corner[4][3], g[4][3], point[3], share[4];
+        for (int i = 0; i < 4; i++) {
+            const int v = i < 3 ? c->facets[facets[ray]].vertex[i] : centre;
+            corner[i][0] = (double)c->x[v];
+            corner[i][1] = (double)c->y[v];
+            corner[i][2] = (double)c->z[v];
+            if (i < 3) kernel_vertex_gradient(p->frame, gradients, c->vertices[v], g[i]);
+        }
+        memcpy(g[3], of_centre, sizeof g[3]);
+        kernel_ray_point(p, ray, t[ray], point);
+        kernel_barycentric((const double(*)[3])corner, point, share);
+        for (int a = 0; a < 3; a++)
+            out[a][ray] =
+                (float)((share[0] * g[0][a] + share[1] * g[1][a]) + (share[2] * g[2][a] + share[3] * g[3][a]));
+    }
+}
+
+/* ---- which rays to follow ---- */
+
+/* The steepest that the tet's field falls and rises along rays of the tile, a unit of depth. */
+static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
+                              double *rise)
+{
+    const int centre = c->vertex_count;
+    double d[3][3], df[3], g[3];
+    for (int i = 0; i < 3; i++) {
+        const int v = facet->vertex[i];
+        d[i][0] = (double)c->x[v] - (double)c->x[centre];
+        d[i][1] = (double)c->y[v] - (double)c->y[centre];
+        d[i][2] = (double)c->z[v] - (double)c->z[centre];
+        df[i] = c->values[v] - c->values[centre];
+    }
+    kernel_gradient((const double(*)[3])d, df, g);
+    const double aside = spread * (fabs(g[0]) + fabs(g[1]));
+    *fall = aside - g[2];
+    *rise = aside + g[2];
+}
+
+/* Of all tets. Those without a volume have any slope. */
+static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
+{
+    const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
+    c->has_slopes = true;
+    c->fall = c->rise = 0;
+    for (int i = 0; i < c->facet_count; i++) {
+        double fall = (double)INFINITY, rise = (double)INFINITY;
+        if (c->facets[i].sign != 0) kernel_tet_slopes(c, &c->facets[i], spread, &fall, &rise);
+        if (!(fall <= c->fall)) c->fall = fall <= 1e300 ? fall : (double)INFINITY;
+        if (!(rise <= c->rise)) c->rise = rise <= 1e300 ? rise : (double)INFINITY;
+    }
+}
+
+/* In the values' scale, and such that products of two are numbers. */
+SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
+{
+    const double scaled = slope * c->scale;
+    return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
+}
+
+/* Rays with one sign at both faces that may have another between. Where tets overlap, or a quad's patch and its
+ * triangles are not met by the same rays, the bound does not hold. */
+SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_passage *r,
+                                       const kernel_stay *stay)
+{
+    const kernel_interval *i = &stay->interval;
+    const vm longer = vm_and(i->mask, vf_lt(i->t_in, i->t_out));
+    if (!c->is_star || !p->is_pencil) return longer;
+    if (!c->has_slopes) kernel_polyhedron_slopes(c, p);
+    const vf zero = vf_set(0), fall = kernel_slope_of(c, c->fall), rise = kernel_slope_of(c, c->rise);
+    const vf in = stay->in.v, out = stay->out.v;
+    const vm below = vf_lt(i->v_in, zero);
+    const vm differs = vm_or(vm_xor(vf_lt(in, zero), below), vm_xor(vf_lt(out, zero), below));
+    const vf away = vf_select(below, fall, rise) * vf_abs(in) + vf_select(below, rise, fall) * vf_abs(out);
+    const vm turns = vf_lt(away, fall * rise * (stay->out.t - stay->in.t));
+    return vm_and(longer, vm_or(turns, vm_or(differs, r->uneven)));
+}
+
+/* ---- along the profile ---- */
+
+/* A ray that follows its profile from crossing to crossing. Where tets overlap at a face, the field behind it may be on
+ * the other side of the isovalue than the face's own value, which decides: it jumps there, and the jump is a crossing.
+ */
+typedef struct kernel_walk {
+    vm open;                    /* rays whose profile goes on */
+    vm below;                   /* who is below the isovalue at the end of the piece */
+    vm jump_in, jump_out;       /* rays of which the face's value is on the other side than the profile's end */
+    kernel_profile_piece piece; /* each ray's own */
+    vf t, w;                    /* of the crossing that was found, and the colour field there */
+} kernel_walk;
+
+static void kernel_walk_begin(const kernel_stay *stay, vm rays, kernel_walk *walk)
+{
+    const kernel_interval *i = &stay->interval;
+    const vf zero = vf_set(0);
+    const vm below = vf_lt(i->v_in, zero);
+    walk->open = rays;
+    walk->below = vf_lt(stay->u_in, zero);
+    walk->jump_in = vm_and(rays, vm_xor(walk->below, below));
+    walk->jump_out = vm_and(rays, vm_xor(vf_lt(stay->u_out, zero), vf_lt(i->v_out, zero)));
+    walk->piece = kernel_profile_begin(stay, stay->u_in);
+}
+
+SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, kernel_profile_piece *to)
+{
+    to->t0 = vf_select(rays, from->t0, to->t0);
+    to->t1 = vf_select(rays, from->t1, to->t1);
+    to->v0 = vf_select(rays, from->v0, to->v0);
+    to->v1 = vf_select(rays, from->v1, to->v1);
+    to->w0 = vf_select(rays, from->w0, to->w0);
+    to->w1 = vf_select(rays, from->w1, to->w1);
+}
+
+/* To the next piece; returns rays of left whose profile goes on behind it. The jump at the last face is a piece too. */
+SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, vm left, kernel_walk *walk)
+{
+    kernel_profile_piece next = walk->piece;
+    const vm inside = kernel_profile_open(stay, &next, left);
+    kernel_profile_next(r, stay, vf_select(inside, stay->u_out, stay->interval.v_out), &next);
+    kernel_piece_take(left, &next, &walk->piece);
+    return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
+}
+
+/* A little more than t, by one or two roundings. */
+SIMD_INLINE vf kernel_just_behind(vf t)
+{
+    return t + (vf_abs(t) * 2.4e-7f + 1e-30f);
+}
+
+/* The next crossing of every open ray; returns who has one. */
+static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, kernel_walk *walk)
+{
+    const vm jump = walk->jump_in;
+    vm found = jump, left = vm_andnot(walk->open, jump);
+    walk->jump_in = vm_none();
+    while (vm_any(left)) {
+        const vm on = kernel_walk_on(r, stay, left, walk);
+        const vm cross = vm_and(left, vm_xor(vf_lt(walk->piece.v1, vf_set(0)), walk->below));
+        walk->below = vm_xor(walk->below, cross);
+        walk->open = vm_andnot(walk->open, vm_andnot(left, on));
+        found = vm_or(found, cross);
+        left = vm_andnot(on, cross);
+    }
+    const kernel_profile_piece *piece = &walk->piece;
+    const vf length = piece->t1 - piece->t0;
+    const vf t = kernel_secant(piece->t0, piece->v0, piece->t1, piece->v1);
+    const vf along = vf_select(vf_lt(vf_set(0), length), (t - piece->t0) / length, vf_set(0));
+    walk->t = vf_select(vf_lt(piece->t0, piece->t1), t, vf_select(jump, kernel_just_behind(piece->t0), piece->t0));
+    walk->w = piece->w0 + along * (piece->w1 - piece->w0);
+    return found;
+}
+
+static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
+                                     vm rays, kernel_passage *r, vm hit, const kernel_walk *walk)
+{
+    kernel_hit_places at = {.t = walk->t, .w = walk->w};
+    if (!vm_any(hit)) return;
+    kernel_passage_segments(c, rays, r);
+    if (state->surface->layer->normal == RENDER_VERTEX)
+        kernel_polyhedron_smooth(p, c, state->surface->layer, r, hit, walk->t, at.normal);
+    else
+        kernel_polyhedron_normal(p, c, r, hit, walk->t, at.normal);
+    kernel_accept(p, state, NULL, value, hit, &at);
+}
+
+/* The crossings of a stay. An opaque surface's first before the eye is the ray's last. */
+static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
+                                    vm rays, vm wanted, kernel_passage *r, kernel_stay *stay)
+{
+    const render_surface_layer *layer = state->surface->layer;
+    kernel_walk walk;
+    kernel_passage_profile(p, c, rays, layer->colour_map != NULL, r, stay);
+    kernel_walk_begin(stay, wanted, &walk);
+    do {
+        const vm found = kernel_walk_next(r, stay, &walk);
+        const vm kept = kernel_kept(p, state->surface, found, walk.t);
+        kernel_polyhedron_accept(p, state, c, value, rays, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
+        if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
+    } while (layer->root == RENDER_ROBUST && vm_any(walk.open));
+}
+
+static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *state, polyhedron *c, int value, vm rays)
+{
+    const render_surface_layer *layer = state->surface->layer;
+    kernel_passage r;
+    kernel_stay stay;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, layer->colour_map != NULL, &r)) return;
+    while (kernel_passage_next(&r, &stay)) {
+        const vm near = kernel_is_near(p, &stay.interval);
+        vm wanted = kernel_changes_sign(&stay.interval);
+        if (!vm_any(near)) continue;
+        if (layer->root == RENDER_ROBUST) wanted = vm_or(wanted, kernel_polyhedron_turns(p, c, &r, &stay));
+        wanted = vm_and(wanted, near);
+        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, c, value, rays, wanted, &r, &stay);
+    }
+}
+
+static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *state, int part, uint32_t index, vm rays)
+{
+    const render_surface_layer *layer = state->surface->layer;
+    polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells,
+                                               &layer->field.fields[part], part, state->layer, index);
+    if (!c) p->thread->out_of_memory = true;
+    if (!c || !c->is_finite) return;
+    for (int value = 0; value < layer->value_count; value++) {
+        if (!kernel_polyhedron_straddles(c, layer->values[value])) continue;
+        const bool is_fresh = !c->is_placed;
+        if (is_fresh) {
+            kernel_polyhedron_place(c, p);
+            if (layer->colour_map) kernel_polyhedron_colours(c, state->surface, part);
+        }
+        if (is_fresh || layer->value_count > 1) kernel_polyhedron_relative(c, layer->values[value]);
+        kernel_polyhedron_surface(p, state, c, value, rays);
+    }
+}
+
+/* ---- the blocks of a tile that a cell may show in ---- */
+
+/* cell: NULL for a polyhedron, all of whose surfaces are meant. */
+SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
+                                   int value)
+{
+    bool is_nearer = false;
+    kernel_block_begin(t, block);
+    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+        const int i = block * KERNEL_BLOCK_PACKETS + n;
+        kernel_packet *p = &t->packets[i];
+        kernel_surface_state state = {.surface = t->surface,
+                                      .layer = t->layer,
+                                      .hits = &t->hits[i],
+                                      .is_opaque = t->layer < t->frame->opaque_count};
+        p->is_nearer = false;
+        if (cell)
+            kernel_cell_surface(p, &state, cell, t->poly, value, p->active);
+        else
+            kernel_polyhedron_surfaces(p, &state, part, index, p->active);
+        is_nearer = is_nearer || p->is_nearer;
+    }
+    if (is_nearer) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
+}
+
+SIMD_INLINE void kernel_blocks_meet(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
+                                    const kernel_cell *cell, int value)
+{
+    for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, index, cell, value);
 }
 
 #endif

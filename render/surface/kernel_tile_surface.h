@@ -9,45 +9,12 @@
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
 #include "kernel_outline.h"
-#include "kernel_packet.h"
-#include "kernel_poly.h"
-#include "kernel_polyhedron_surface.h"
 #include "kernel_prefetch.h"
 #include "kernel_surface.h"
 #include "kernel_tile.h"
 #include "kernel_tile_trace.h"
-#include "kernel_tile_traverse.h"
 #include "render.h"
 #include "simd.h"
-
-/* cell: NULL for a polyhedron, all of whose surfaces are meant. */
-SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
-                                   int value)
-{
-    bool is_nearer = false;
-    kernel_block_begin(t, block);
-    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-        const int i = block * KERNEL_BLOCK_PACKETS + n;
-        kernel_packet *p = &t->packets[i];
-        kernel_surface_state state = {.surface = t->surface,
-                                      .layer = t->layer,
-                                      .hits = &t->hits[i],
-                                      .is_opaque = t->layer < t->frame->opaque_count};
-        p->is_nearer = false;
-        if (cell)
-            kernel_cell_surface(p, &state, cell, t->poly, value, p->active);
-        else
-            kernel_polyhedron_surfaces(p, &state, part, index, p->active);
-        is_nearer = is_nearer || p->is_nearer;
-    }
-    if (is_nearer) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
-}
-
-SIMD_INLINE void kernel_blocks_meet(kernel_tile_trace *t, unsigned blocks, int part, uint32_t index,
-                                    const kernel_cell *cell, int value)
-{
-    for (; blocks; blocks &= blocks - 1) kernel_block_meet(t, __builtin_ctz(blocks), part, index, cell, value);
-}
 
 /* Of a moved cell with its values, before blocks meet it. */
 SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)

@@ -2,16 +2,455 @@
 #ifndef RENDER_KERNEL_CELL_SEGMENTS_H
 #define RENDER_KERNEL_CELL_SEGMENTS_H
 
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_span.h"
-#include "kernel_field.h"
+#include "kernel_cell_values.h"
+#include "kernel_crossings.h"
 #include "kernel_double.h"
-#include "kernel_bisection.h"
+#include "kernel_exact.h"
 #include "kernel_integral.h"
+#include "kernel_interest.h"
+#include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_polyhedron.h"
+#include "kernel_samples.h"
 #include "kernel_segment_list.h"
-#include "kernel_tet.h"
+#include "kernel_types.h"
+#include "render_polyhedra.h"
 #include "simd.h"
+
+/* A stretch of a ray in a cell, cut where the transfer function asks for it: for rays on which no number of equal
+ * subintervals is enough. A step of the opacity has no slope that would bound what a field that is somewhat off does to
+ * the light, and where a curved field barely reaches the step, the length that is beyond it goes as the root of how
+ * far: at 800 optical depths a field that is off by 1e-6 of the function's domain changes such a pixel by a tenth. So
+ * all of this is in double, from the coordinates and values as they were handed over and from the ray's place in the
+ * picture, a ray at a time, and the same for all instruction sets.
+ *
+ * Parts. The field is known at a subinterval's ends, quarters and middle; it is off the chord by no more than d, half
+ * as much again as it is there (the three see 7/8 of a cubic's). A cubic is off its chord by s (1 - s) (u + q (s -
+ * 1/2)), s from 0 to 1, and its slope off the chord's by u + q / 2 at most, at an end. If it is off by no more than e
+ * at the middle and the quarters, then |u| <= 4 e, |u| + |q| / 4 <= 16/3 e, and that slope is 32/3 e at most. Where the
+ * chord rises by 12 e or more the field is monotone, with something to spare for maps that bend, and so are all
+ * subintervals of it. Its values are then those between its ends, otherwise these widened by d. What the subinterval
+ * is:
+ *   - of one side of each step, and its chord is close enough: a segment;
+ *   - monotone, with a step strictly between its ends: cut where the field is that step's value, to rounding;
+ *   - anything else: halved, the nearer half first, to the same questions.
+ * So a field that barely reaches a step is halved about its extreme alone, until what is about it is of one side, or so
+ * short that it does not show.
+ *
+ * The error of a subinterval of length L, T being the light that comes to it from the stretch's begin
+ * (docs/error_budget.md has the rest). Over the subinterval's values let extinction be from s0 to s1 and change by no
+ * more than s' per value, the colour by c', and let R be the colours' contrast. A field that is off by d on average
+ * changes extinction by ds <= s' d, and no more than s1 - s0; light in the subinterval falls at least as exp(-s0 t), so
+ * that R ds  is seen for no more than min(L, 1 / s0),    s1 dc  for min(s1 L, 1) / s1: error <= R ds min(L, 1 / s0) +
+ * dc min(s1 L, 1), times T. It may be 7/8 of the share that equal subintervals have, a = allowance: T error <= 7/8 a (L
+ * / reach + T D / (1 + D)),    D = s0 L, The rest is for subintervals that no bisection makes good, about an extreme
+ * that touches a step: where T error of one, by s1 - s0 alone, is no more than a 32nd of a (stretch / reach) it is left
+ * as it is. A cubic has two extremes, and four such subintervals are in an eighth. */
+
+/* KERNEL_BISECTION_DEPTH: 2^-40 of a stretch is nothing to any medium. The count of subintervals is a guard that no
+ * function in use comes to: what is left of the stretch is then one subinterval each time. */
+enum { KERNEL_BISECTION_DEPTH = 40, KERNEL_BISECTION_ROOM = 128, KERNEL_BISECTION_SEGMENTS = 8192 };
+
+/* ---- the field on a ray ---- */
+
+/* A place of the ray: the field there, and the cell's own coordinates. */
+typedef struct kernel_knot {
+    double t, v, r[3];
+} kernel_knot;
+
+/* A stretch under way, of one ray. */
+typedef struct kernel_bisection {
+    const kernel_segment_state *state;
+    const kernel_span *span;
+    const kernel_exact_map *map; /* NULL: linear, as the interval has it */
+    double u, v, slope, shift;   /* at depth t the ray is at (u, v) (slope t + shift) */
+    kernel_knot in, out;         /* of the interval, as the faces have it */
+    double per_t, length, light; /* unit distances per t, of the stretch; what light gets to the subinterval */
+    int64_t *map_failures;
+    int count;
+} kernel_bisection;
+
+static inline double kernel_between(double from, double to, double share)
+{
+    return from + (to - from) * share;
+}
+
+/* The field at depth t from a guess of r, as kernel_solve() has it. */
+static kernel_knot kernel_knot_at(const kernel_bisection *h, double t, const double guess[3])
+{
+    const double whole = h->out.t - h->in.t, share = whole > 0 ? (t - h->in.t) / whole : 0;
+    kernel_knot out = {.t = t, .v = kernel_between(h->in.v, h->out.v, share)};
+    if (!h->map) return out;
+    const double reach = h->slope * t + h->shift, target[3] = {h->u * reach, h->v * reach, t};
+    double slopes[3];
+    memcpy(out.r, guess, sizeof out.r);
+    if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
+        out.r[0] = out.r[1] = 0.4;
+        out.r[2] = 0.5;
+        if (!kernel_exact_newton(h->map, target, out.r) || !kernel_exact_is_near(out.r)) {
+            for (int a = 0; a < 3; a++) out.r[a] = kernel_between(h->in.r[a], h->out.r[a], share);
+            ++*h->map_failures;
+            return out;
+        }
+    }
+    out.v = kernel_exact_value(h->map->field, out.r, kernel_exact_product(h->map->is_pyramid, out.r, slopes));
+    return out;
+}
+
+static kernel_knot kernel_knot_between(const kernel_bisection *h, const kernel_knot *a, const kernel_knot *b,
+                                       double share)
+{
+    double guess[3];
+    for (int n = 0; n < 3; n++) guess[n] = kernel_between(a->r[n], b->r[n], share);
+    return kernel_knot_at(h, kernel_between(a->t, b->t, share), guess);
+}
+
+/* Where the field is x, between two knots on either side of it. By regula falsi that halves the value of an end that
+ * stays. */
+static kernel_knot kernel_knot_where(const kernel_bisection *h, const kernel_knot *a, const kernel_knot *b, double x)
+{
+    kernel_knot low = *a, high = *b, at = *a;
+    double low_v = low.v - x, high_v = high.v - x;
+    const double enough = 1e-15 * fmax(1, fabs(x));
+    for (int n = 0; n < 60; n++) {
+        const double share = n % 3 == 2 ? 0.5 : low_v / (low_v - high_v);
+        at = kernel_knot_between(h, &low, &high, share);
+        const double v = at.v - x;
+        if (fabs(v) <= enough || high.t - low.t <= 1e-16 * fabs(at.t)) break;
+        if ((v < 0) == (low_v < 0)) {
+            low = at;
+            low_v = v;
+            high_v *= 0.5;
+        } else {
+            high = at;
+            high_v = v;
+            low_v *= 0.5;
+        }
+    }
+    at.v = x;
+    return at;
+}
+
+/* ---- what a subinterval may do to the light ---- */
+
+/* Of the transfer function over some values. */
+typedef struct kernel_medium_range {
+    double least, most, slope, colour_slope; /* least, most: of the extinction */
+} kernel_medium_range;
+
+/* -ln(1 - a), from below and from above: the logarithm's series, and ln(1 + x) <= x (6 + x) / (6 + 4 x). */
+static inline double kernel_extinction_least(double a)
+{
+    return a + 0.5 * a * a;
+}
+
+static inline double kernel_extinction_most(double a)
+{
+    if (!(a < 1)) return (double)KERNEL_OPAQUE;
+    const double x = a / (1 - a);
+    return fmin(x * (6 + x) / (6 + 4 * x), (double)KERNEL_OPAQUE);
+}
+
+static inline double kernel_piece_low(const kernel_piece *p)
+{
+    return (double)p->entry[KERNEL_PIECE_LOW] + (double)p->entry[KERNEL_PIECE_LOW_REST];
+}
+
+static inline double kernel_piece_high(const kernel_piece *p)
+{
+    return (double)p->entry[KERNEL_PIECE_HIGH] + (double)p->entry[KERNEL_PIECE_HIGH_REST];
+}
+
+static inline void kernel_medium_range_widen(kernel_medium_range *s, const kernel_piece *p, double low, double high)
+{
+    const double from = kernel_piece_low(p), slope = (double)p->entry[KERNEL_PIECE_SLOPE];
+    const double x0 = fmax(low, from), x1 = fmin(high, kernel_piece_high(p));
+    const double a0 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x0 - from) * slope, 1), 0);
+    const double a1 = fmax(fmin((double)p->entry[KERNEL_PIECE_OPACITY] + (x1 - from) * slope, 1), 0);
+    const double most = fmax(a0, a1);
+    s->least = fmin(s->least, kernel_extinction_least(fmin(a0, a1)));
+    s->most = fmax(s->most, kernel_extinction_most(most));
+    if (slope != 0) s->slope = fmax(s->slope, most < 1 ? fmin(fabs(slope) / (1 - most), 1e30) : 1e30);
+    for (int c = 0; c < 3; c++)
+        s->colour_slope = fmax(s->colour_slope, fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]));
+}
+
+/* Of the values between low and high; by the bins' bounds where these are many. */
+static kernel_medium_range kernel_medium_range_of(const kernel_pieces *t, double low, double high)
+{
+    const double last = KERNEL_BOUND_BINS - 1, begin = (double)t->bin_low, per_bin = (double)t->bound_inverse;
+    const double pieces_last = KERNEL_PIECE_BINS - 1;
+    kernel_medium_range out = {1e30, 0, 0, 0};
+    if ((high - low) * per_bin > 2) {
+        const int from = (int)fmin(fmax((low - begin) * per_bin, 0), last);
+        const int to = (int)fmin(fmax((high - begin) * per_bin, 0), last);
+        for (int i = from; i <= to; i++) {
+            out.least = fmin(out.least, (double)t->bounds[i].extinction_low);
+            out.most = fmax(out.most, (double)t->bounds[i].extinction_high);
+            out.slope = fmax(out.slope, (double)t->bounds[i].extinction_slope);
+            out.colour_slope = fmax(out.colour_slope, (double)t->bounds[i].colour_slope);
+        }
+        return out;
+    }
+    int at = (int)t->bin_first[(int)fmin(fmax((low - begin) * (double)t->bin_inverse, 0), pieces_last)];
+    while (at > 0 && low < kernel_piece_low(&t->pieces[at])) at--;
+    while (at + 1 < t->count && kernel_piece_high(&t->pieces[at]) <= low) at++;
+    do {
+        kernel_medium_range_widen(&out, &t->pieces[at], low, high);
+        at++;
+    } while (at < t->count && kernel_piece_low(&t->pieces[at]) < high);
+    return out;
+}
+
+/* A subinterval: its ends, middle, by how much its field may be off the chord, and its values. */
+typedef struct kernel_subinterval {
+    kernel_knot end, middle;
+    int depth;
+    bool is_monotone;
+} kernel_subinterval;
+
+typedef struct kernel_subinterval_values {
+    double off, low, high;
+} kernel_subinterval_values;
+
+/* By the field at its quarters. */
+static kernel_subinterval_values kernel_subinterval_look(const kernel_bisection *h, const kernel_knot *from,
+                                                         kernel_subinterval *sub, const kernel_knot *first,
+                                                         const kernel_knot *third)
+{
+    const double a = from->v, b = sub->end.v, rise = b - a;
+    kernel_subinterval_values out = {0, fmin(a, b), fmax(a, b)};
+    if (!h->map) return out;
+    out.off = fmax(fmax(fabs(a + 0.25 * rise - first->v), fabs(a + 0.75 * rise - third->v)),
+                   fabs(a + 0.5 * rise - sub->middle.v));
+    sub->is_monotone = sub->is_monotone || fabs(rise) >= 12 * out.off;
+    if (!sub->is_monotone) {
+        out.low -= 1.5 * out.off;
+        out.high += 1.5 * out.off;
+    }
+    return out;
+}
+
+/* What the subinterval does wrong as a segment, as light; all: whatever its field is off by. */
+static double kernel_subinterval_error(const kernel_bisection *h, const kernel_subinterval_values *sub,
+                                       const kernel_medium_range *s, double length, double *all)
+{
+    const double contrast = (double)h->state->pieces->contrast;
+    const double seen = fmin(length, 1 / fmax(s->least, 1e-30)), lit = fmin(s->most * length, 1);
+    const double change = s->most - s->least, tint = fmin(s->colour_slope * (sub->high - sub->low), contrast);
+    *all = fmin(contrast * change * seen + tint * lit, contrast * lit);
+    return fmin(contrast * (s->slope * sub->off) * seen + fmin(s->colour_slope * sub->off, contrast) * lit, *all);
+}
+
+/* ---- steps ---- */
+
+/* The nearest step strictly between two values; NULL: none. */
+static const kernel_step *kernel_step_between(const kernel_bisection *h, double low, double high)
+{
+    const kernel_step *steps = h->state->pieces->steps + h->span->first_step;
+    for (int i = 0; i < h->span->step_count; i++)
+        if (low < steps[i].at && steps[i].at < high) return &steps[i];
+    return NULL;
+}
+
+/* Pieces end at steps that are rounded to float: of the values there that are beside the step on the same side as
+ * inside, the least and the most. */
+typedef struct kernel_side_values {
+    float low, high;
+} kernel_side_values;
+
+static kernel_side_values kernel_step_side(const kernel_bisection *h, double inside)
+{
+    const kernel_step *steps = h->state->pieces->steps;
+    kernel_side_values out = {-3e38f, 3e38f};
+    int n = 0;
+    for (; n < h->state->pieces->step_count && steps[n].at <= inside; n++) out.low = steps[n].cut;
+    /* A level segment at a step is beyond it; one that is not must not come to be there by rounding. */
+    if (n < h->state->pieces->step_count) out.high = nextafterf(steps[n].cut, out.low);
+    return out;
+}
+
+/* A value x in float, on its side, and what that loses. */
+static void kernel_step_round(const kernel_side_values *side, double x, float *v, double *rest)
+{
+    const double active = fmax(fmin(x, (double)side->high), (double)side->low);
+    *v = (float)active;
+    *rest = side->low < *v && *v < side->high ? active - (double)*v : 0;
+}
+
+/* The function over the subinterval's values, of which inside is one; step: what is between them. */
+static kernel_medium_range kernel_subinterval_range(const kernel_bisection *h, const kernel_subinterval_values *values,
+                                                    double inside, const kernel_step *step)
+{
+    const kernel_side_values side = kernel_step_side(h, inside);
+    if (step)
+        return kernel_medium_range_of(h->state->pieces, fmin(values->low, (double)nextafterf(step->cut, -3e38f)),
+                                      fmax(values->high, (double)nextafterf(step->cut, 3e38f)));
+    const double low = fmin(fmax(values->low, (double)side.low), (double)side.high);
+    const double high = fmin(fmax(values->high, (double)side.low), (double)side.high);
+    return kernel_medium_range_of(h->state->pieces, low, high);
+}
+
+/* ---- segments ---- */
+
+/* From the subinterval's begin to its end, in so many equal subintervals as mixing asks for. */
+static void kernel_subinterval_emit(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
+                                    const kernel_knot *to, const double values[2], double subdivisions)
+{
+    float begin = (float)from->t;
+    for (int n = 1; n <= (int)subdivisions; n++) {
+        const double before = (n - 1) / subdivisions, after = n / subdivisions;
+        const float end = n < (int)subdivisions ? (float)kernel_between(from->t, to->t, after) : (float)to->t;
+        const double in = kernel_between(values[0], values[1], before);
+        const double out = kernel_between(values[0], values[1], after);
+        const kernel_run run = {.length = vf_set((float)((to->t - from->t) / subdivisions * h->per_t)),
+                                .v_in = vf_set((float)in),
+                                .v_out = vf_set((float)out),
+                                .rest_in = vf_set((float)(in - (double)(float)in)),
+                                .rest_out = vf_set((float)(out - (double)(float)out))};
+        if (begin < end) kernel_emit_segment(p, h->state, lane, vf_set(begin), vf_set(end), &run);
+        begin = end;
+    }
+}
+
+/* The subinterval as segments on its chord: raised to the field's mean, as equal subintervals are, it might come to
+ * values that have not been looked at. */
+static void kernel_subinterval_put(kernel_packet *p, const kernel_bisection *h, vm lane, const kernel_knot *from,
+                                   const kernel_subinterval *sub, const kernel_subinterval_values *values,
+                                   const kernel_medium_range *s)
+{
+    kernel_segments *list = h->state->list;
+    const double inside = sub->middle.v;
+    const bool is_cut = kernel_step_between(h, values->low, values->high) != NULL;
+    const double x[2] = {from->v, sub->end.v};
+    double rest[2] = {0, 0};
+    float v[2] = {(float)x[0], (float)x[1]};
+    const kernel_side_values side = kernel_step_side(h, inside);
+    for (int i = 0; i < 2 && !is_cut; i++) kernel_step_round(&side, x[i], &v[i], &rest[i]);
+    if (h->state->mixing > 0) {
+        const double contrast = (double)h->state->pieces->contrast, change = values->high - values->low;
+        const double length = (sub->end.t - from->t) * h->per_t;
+        const double moved = 0.25 * length *
+                             (contrast * fmin(change * s->slope, s->most - s->least) +
+                              s->most * fmin(change * s->colour_slope, contrast));
+        const double subdivisions =
+            sqrt(fmin(moved / (double)h->state->mixing, KERNEL_MAX_SUBDIVISIONS * KERNEL_MAX_SUBDIVISIONS));
+        const double sums[2] = {(double)v[0] + rest[0], (double)v[1] + rest[1]};
+        kernel_subinterval_emit(p, h, lane, from, &sub->end, sums, fmax(ceil(subdivisions), 1));
+        return;
+    }
+    const kernel_interval i = {.t_in = vf_set((float)from->t),
+                               .t_out = vf_set((float)sub->end.t),
+                               .v_in = vf_set(v[0]),
+                               .v_out = vf_set(v[1])};
+    const kernel_double precise = {vf_set((float)(sub->end.t - from->t)), vf_set((float)rest[0]),
+                                   vf_set((float)rest[1])};
+    if (!list->is_double) lane = vm_and(lane, vf_lt(i.t_in, i.t_out));
+    kernel_segments_add(h->state->pieces, list, lane, &i, list->is_double ? &precise : NULL);
+}
+
+/* ---- a stretch ---- */
+
+static bool kernel_subinterval_is_good(const kernel_bisection *h, const kernel_subinterval_values *values,
+                                       const kernel_medium_range *s, double length, bool is_cut, bool is_monotone)
+{
+    const double reach = (double)h->state->reach, depth = s->least * length;
+    const double a = (double)(h->state->allowance > 0 ? h->state->allowance : h->state->mixing);
+    double all;
+    const double error = kernel_subinterval_error(h, values, s, length, &all);
+    if (!is_cut && h->light * error <= 0.875 * a * (length / reach + h->light * depth / (1 + depth))) return true;
+    return (is_cut || !is_monotone) && h->light * all <= a * h->length / (32 * reach);
+}
+
+/* All subintervals of a stretch whose ends and middle are known. */
+static void kernel_stretch_halve(kernel_packet *p, kernel_bisection *h, int lane, kernel_knot from,
+                                 kernel_subinterval whole)
+{
+    const kernel_segments *list = h->state->list;
+    const vm only = vm_from_bits(1u << lane);
+    kernel_subinterval stack[KERNEL_BISECTION_ROOM];
+    int count = 1;
+    stack[0] = whole;
+    while (count > 0 && (float)from.t < list->t_end[lane]) {
+        kernel_subinterval sub = stack[--count];
+        const kernel_knot first = kernel_knot_between(h, &from, &sub.middle, 0.5);
+        const kernel_knot third = kernel_knot_between(h, &sub.middle, &sub.end, 0.5);
+        const kernel_subinterval_values values = kernel_subinterval_look(h, &from, &sub, &first, &third);
+        const kernel_step *step = kernel_step_between(h, values.low, values.high);
+        const kernel_medium_range s = kernel_subinterval_range(h, &values, sub.middle.v, step);
+        const double length = (sub.end.t - from.t) * h->per_t;
+        const bool is_last = sub.depth >= KERNEL_BISECTION_DEPTH || h->count >= KERNEL_BISECTION_SEGMENTS ||
+                             count + 2 > KERNEL_BISECTION_ROOM;
+        if (is_last || kernel_subinterval_is_good(h, &values, &s, length, step != NULL, sub.is_monotone)) {
+            if (list->t_begin[lane] <= (float)from.t) kernel_subinterval_put(p, h, only, &from, &sub, &values, &s);
+            const double depth = s.least * length;
+            h->light /= 1 + depth * (1 + 0.5 * depth);
+            h->count++;
+            from = sub.end;
+            continue;
+        }
+        kernel_subinterval near = {sub.middle, first, sub.depth + 1, sub.is_monotone};
+        kernel_subinterval far = {sub.end, third, sub.depth + 1, sub.is_monotone};
+        if (step && sub.is_monotone) {
+            near.end = kernel_knot_where(h, &from, &sub.end, step->at);
+            near.middle = kernel_knot_between(h, &from, &near.end, 0.5);
+            far.middle = kernel_knot_between(h, &near.end, &far.end, 0.5);
+        }
+        stack[count++] = far;
+        stack[count++] = near;
+    }
+}
+
+/* The stretches from t0 to t1 of the rays, as segments; those that begin in the window are kept. */
+static __attribute__((noinline, cold)) void kernel_span_bisect(kernel_packet *p, const kernel_segment_state *state,
+                                                               const kernel_span *span, vm rays, vf t0, vf t1)
+{
+    const kernel_interval *i = span->interval;
+    const kernel_frame *f = p->frame;
+    const bool is_flat = f->job->camera.is_orthographic;
+    kernel_exact_map map;
+    kernel_lanes at;
+    kernel_packet_lanes(p, &at);
+    const kernel_transfer *transfer = &f->volumes[state->volume];
+    if (span->map) kernel_exact_setup(&map, p, span->cell, transfer);
+    for (unsigned bits = vm_bits(rays); bits; bits &= bits - 1) {
+        const int n = __builtin_ctz(bits);
+        kernel_bisection h = {.state = state,
+                              .span = span,
+                              .map = span->map ? &map : NULL,
+                              .u = at.px[n] - p->tile->centre_x,
+                              .v = at.py[n] - p->tile->centre_y,
+                              .slope = is_flat ? 0 : 1,
+                              .shift = is_flat ? f->job->space.scale : p->tile->depth_shift,
+                              .in = {.t = (double)i->t_in[n], .v = (double)i->v_in[n]},
+                              .out = {.t = (double)i->t_out[n], .v = (double)i->v_out[n]},
+                              .per_t = (double)state->list->per_t[n],
+                              .length = (double)((t1[n] - t0[n]) * state->list->per_t[n]),
+                              .light = 1,
+                              .map_failures = &p->thread->map_failures};
+        for (int a = 0; a < 3 && span->map; a++) {
+            h.in.r[a] = (double)i->r_in[a][n];
+            h.out.r[a] = (double)i->r_out[a][n];
+        }
+        if (!span->map && span->cell) h.in.v = h.out.v = kernel_double_domain(transfer, span->cell->values[0]);
+        const double whole = h.out.t - h.in.t;
+        if (!(whole > 0)) continue;
+        const double a = ((double)t0[n] - h.in.t) / whole, b = ((double)t1[n] - h.in.t) / whole;
+        const kernel_knot from = kernel_knot_between(&h, &h.in, &h.out, a);
+        kernel_subinterval sub = {.end = kernel_knot_between(&h, &h.in, &h.out, b)};
+        kernel_knot begin = from;
+        begin.t = (double)t0[n];
+        sub.end.t = (double)t1[n];
+        sub.middle = kernel_knot_between(&h, &from, &sub.end, 0.5);
+        sub.is_monotone = !span->map;
+        kernel_stretch_halve(p, &h, n, begin, sub);
+    }
+}
 
 /* ---- a cell's segments ---- */
 
@@ -169,6 +608,113 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
         mine = vm_and(mine, vf_lt(vf_set(0), precise.length));
     }
     kernel_segments_add(state->pieces, list, mine, &i, list->is_double ? &precise : NULL);
+}
+
+/* Volumes in polyhedra: samples on the profile. */
+
+SIMD_INLINE bool kernel_polyhedron_shows(const polyhedron *c, const kernel_transfer *t)
+{
+    double low = c->values[0], high = low;
+    for (int i = 1; i < c->vertex_count; i++) {
+        low = c->values[i] < low ? c->values[i] : low;
+        high = c->values[i] > high ? c->values[i] : high;
+    }
+    return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
+}
+
+SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
+{
+    for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
+}
+
+/* The samples of the window, from begin on to end, that the stay owns and that are in the piece. One that another cell
+ * owns too stays the other's, as in kernel_fill(). */
+static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state, const kernel_stay *stay,
+                                   const kernel_profile_piece *piece, int begin, int end)
+{
+    kernel_samples *s = state->samples;
+    const vf length = piece->t1 - piece->t0;
+    const vf slope = vf_select(vf_lt(vf_set(0), length), (piece->v1 - piece->v0) / length, vf_set(0));
+    for (int n = begin; n < end; n++) {
+        const vf t = kernel_sample_t(p, s->first + n);
+        vm own = vm_and(stay->interval.mask, vm_andnot(vf_lt(t, piece->t1), vf_lt(t, piece->t0)));
+        if (!vm_any(own)) continue;
+        const vf value = piece->v0 + slope * (t - piece->t0), active = s->value[state->volume][n];
+        const vm apart = vm_and(own, vf_eq(active, active));
+        if (__builtin_expect(vm_any(apart), 0)) {
+            kernel_emit_sample(p, state, &stay->interval, apart, t, value);
+            own = vm_andnot(own, apart);
+        }
+        s->value[state->volume][n] = vf_select(own, value, active);
+        if (p->frame->needs_contact) {
+            s->t_in[n] = vf_select(own, stay->interval.t_in, s->t_in[n]);
+            s->t_out[n] = vf_select(own, stay->interval.t_out, s->t_out[n]);
+        }
+    }
+}
+
+static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state, const polyhedron *c, vm rays,
+                                   kernel_passage *r, kernel_stay *stay)
+{
+    const kernel_interval *i = &stay->interval;
+    int begin, end;
+    kernel_sample_span(p, state->samples, i, &begin, &end);
+    if (begin >= end) return;
+    if (!c->is_constant) kernel_passage_profile(p, c, rays, false, r, stay);
+    kernel_profile_piece piece = kernel_profile_begin(stay, stay->u_in);
+    while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
+        kernel_profile_next(r, stay, stay->u_out, &piece);
+        kernel_polyhedron_fill(p, state, stay, &piece, begin, end);
+    }
+}
+
+/* The cell in the layer's domain, placed; NULL where it does not show. */
+static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int part, uint32_t index)
+{
+    const kernel_transfer *transfer = &p->frame->volumes[volume];
+    const grid_field *field = &p->frame->job->volumes[volume].field.fields[part];
+    polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part,
+                                               p->frame->surface_count + volume, index);
+    if (!c) p->thread->out_of_memory = true;
+    if (!c || !c->is_finite || !kernel_polyhedron_shows(c, transfer)) return NULL;
+    if (!c->is_placed) {
+        kernel_polyhedron_place(c, p);
+        kernel_polyhedron_domain(c, transfer);
+    }
+    return c;
+}
+
+static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *state, int part, uint32_t index, vm rays)
+{
+    const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
+    kernel_passage r;
+    kernel_stay stay;
+    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
+    while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, c, rays, &r, &stay);
+}
+
+/* Segments are the profile's pieces, on which the field is linear: exact. */
+static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *state, int part, uint32_t index, vm rays)
+{
+    const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
+    kernel_passage r;
+    kernel_stay stay;
+    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
+    kernel_span span = {.map = NULL};
+    if (state->mixing > 0) kernel_span_bound(state, c->f, c->vertex_count, &span);
+    while (kernel_passage_next(&r, &stay)) {
+        if (!c->is_constant) kernel_passage_profile(p, c, rays, false, &r, &stay);
+        kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
+        vm open = kernel_profile_open(&stay, &piece, stay.interval.mask);
+        while (vm_any(open)) {
+            kernel_profile_next(&r, &stay, stay.u_out, &piece);
+            const kernel_interval i = {
+                .mask = open, .t_in = piece.t0, .t_out = piece.t1, .v_in = piece.v0, .v_out = piece.v1};
+            span.interval = &i;
+            kernel_span_run(p, state, &span);
+            open = kernel_profile_open(&stay, &piece, open);
+        }
+    }
 }
 
 #endif

@@ -32,10 +32,10 @@
 #ifndef RENDER_KERNEL_INTEGRAL_H
 #define RENDER_KERNEL_INTEGRAL_H
 
-#include "kernel_pieces.h"
+#include "kernel_types.h"
 
 #if !defined(KERNEL_REAL_IS_DOUBLE)
-#include "kernel_colour.h"
+#include "kernel_exponentials.h"
 
 enum { KERNEL_NODES = 3 };
 

@@ -32,7 +32,7 @@
 #define RENDER_KERNEL_PREINTEGRAL_H
 
 #include "kernel_integral.h"
-#include "kernel_pieces.h"
+#include "kernel_types.h"
 #include "simd.h"
 
 /* The most subintervals of a segment. */

@@ -11,7 +11,7 @@
 #include "fragment.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
-#include "kernel_field.h"
+#include "kernel_hits.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_types.h"
@@ -24,7 +24,7 @@
 /* Two faces that are one in truth, but not the same to the bit, may be so far apart along a ray, in t: of a hanging
  * node the coarse cell's face and the small ones on it, and faces whose crossings come in the wrong order beside a
  * vertex. Near 1, where t of the scene is, each face's crossing is off by a rounding of its vertices' depths and one of
- * t, 6e-8 each, and by its weights' or Newton's, 2.4e-7 (kernel_line.h) to 1e-6 times the cell's size (kernel_quad.h):
+ * t, 6e-8 each, and by its weights' or Newton's, 2.4e-7 (kernel_cell.h) to 1e-6 times the cell's size (kernel_quad.h):
  * twice that is 3e-6 for a cell as large as the scene. Across the ray vertices are off by 6e-8 of their distance from
  * the tile's centre, a cell's size: of cells of 0.1 that is no more than this where a face's cosine to the ray is above
  * 1.5e-3. */
@@ -137,6 +137,97 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
         if (needs_contact) {
             s->t_in[n] = vf_select(own, i->t_in, s->t_in[n]);
             s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);
+        }
+    }
+}
+
+/* A fragment under way on each ray. */
+typedef struct kernel_blend {
+    vm open;
+    vf t_first, t_last, contact_in, contact_out;
+    vf colour[3], transmittance;
+    vf depth, lost[3]; /* of segments: -ln(transmittance), and what colour has lost to rounding */
+    vf light;          /* what reaches this rank's next sample through all its samples so far */
+} kernel_blend;
+
+/* End the fragments of the rays in mask. */
+SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
+{
+    const vm closing = vm_and(b->open, mask);
+    if (!vm_any(closing)) return;
+    const kernel_fragments ended = {
+        b->t_first, b->t_last, {b->colour[0], b->colour[1], b->colour[2]}, b->transmittance, vf_set(0)};
+    kernel_emit(p, vm_and(closing, vf_lt(b->transmittance, vf_set(1))), FRAGMENT_VOLUME, &ended);
+    b->open = vm_andnot(b->open, closing);
+}
+
+/* Rays whose fragment must end before the sample at t: a surface is in between, or may be, on another rank. */
+SIMD_INLINE vm kernel_blend_breaks(const kernel_packet *p, const kernel_blend *b, const kernel_samples *s, int n,
+                                   const kernel_hits *hits, vf t)
+{
+    vm broken = hits->crowded;
+    for (int i = 0; i < hits->cut_count; i++)
+        broken = vm_or(broken, vm_and(vf_lt(b->t_last, hits->cut[i]), vf_le(hits->cut[i], t)));
+    if (p->frame->needs_contact) {
+        const vm touch = vm_or(vf_eq(s->t_in[n], b->contact_out), vf_eq(s->t_in[n], b->contact_in));
+        broken = vm_or(broken, vm_not(touch));
+    }
+    return broken;
+}
+
+/* Colour (premultiplied) and transmittance of the samples of all volumes at one place. */
+SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_samples *s, int n, vf colour[3], vf *clear)
+{
+    const kernel_frame *f = p->frame;
+    vf sum[3] = {vf_set(0), vf_set(0), vf_set(0)}, weight = vf_set(0), through = vf_set(1), all = vf_set(0);
+    for (int v = 0; v < f->volume_count; v++) {
+        const vf value = s->value[v][n];
+        const vm has = vf_eq(value, value);
+        vf absorbed, c[3];
+        const vf opacity = vf_select(has, kernel_opacity(&f->volumes[v], value), vf_set(0));
+        if (!vm_any(vf_lt(vf_set(0), opacity))) continue;
+        const vf left = kernel_transmittance(opacity, f->volumes[v].exponent, &absorbed);
+        kernel_table_colour(&f->volumes[v], value, c);
+        for (int a = 0; a < 3; a++) sum[a] += absorbed * c[a];
+        weight += absorbed;
+        all += through * absorbed;
+        through *= left;
+    }
+    /* Several media at one place share what all of them absorb in proportion to what each would. */
+    const vf share = f->volume_count == 1 ? vf_set(1) : vf_select(vf_lt(vf_set(0), weight), all / weight, vf_set(0));
+    for (int a = 0; a < 3; a++) colour[a] = sum[a] * share;
+    *clear = through;
+}
+
+SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const kernel_samples *s,
+                                     const kernel_hits *hits)
+{
+    const bool is_alone = p->frame->job->is_alone;
+    for (int n = 0; n < s->count; n++) {
+        const vf t = kernel_sample_t(p, s->first + n);
+        vm has = vm_none();
+        for (int v = 0; v < p->frame->volume_count; v++) has = vm_or(has, vf_eq(s->value[v][n], s->value[v][n]));
+        has = vm_and(has, vm_and(vf_lt(t, p->t_far), vf_lt(vf_set(KERNEL_DARK), b->light)));
+        has = vm_and(has, vf_le(p->clip_in, t));
+        if (!is_alone) kernel_blend_close(p, b, vm_not(has));
+        if (!vm_any(has)) continue;
+        kernel_blend_close(p, b, vm_and(has, kernel_blend_breaks(p, b, s, n, hits, t)));
+        const vm fresh = vm_andnot(has, b->open);
+        vf colour[3], clear;
+        kernel_sample_colour(p, s, n, colour, &clear);
+        b->t_first = vf_select(fresh, t, b->t_first);
+        b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
+        for (int a = 0; a < 3; a++) {
+            b->colour[a] = vf_select(fresh, vf_set(0), b->colour[a]);
+            b->colour[a] = vf_select(has, b->colour[a] + b->transmittance * colour[a], b->colour[a]);
+        }
+        b->transmittance = vf_select(has, b->transmittance * clear, b->transmittance);
+        b->light = vf_select(has, b->light * clear, b->light);
+        b->t_last = vf_select(has, t, b->t_last);
+        b->open = vm_or(b->open, has);
+        if (p->frame->needs_contact) {
+            b->contact_in = vf_select(has, s->t_in[n], b->contact_in);
+            b->contact_out = vf_select(has, s->t_out[n], b->contact_out);
         }
     }
 }

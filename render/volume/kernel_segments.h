@@ -25,66 +25,13 @@
 #include <math.h>
 #include <string.h>
 
-#include "grid.h"
-#include "kernel_cell.h"
-#include "kernel_cell_cache.h"
-#include "kernel_cell_segments.h"
-#include "kernel_cell_values.h"
-#include "kernel_span.h"
-#include "kernel_double.h"
 #include "kernel_integral.h"
-#include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_pieces.h"
-#include "kernel_poly.h"
-#include "kernel_polyhedron_volume.h"
 #include "kernel_preintegral.h"
 #include "kernel_samples.h"
 #include "kernel_segment_list.h"
-#include "kernel_traverse.h"
 #include "kernel_types.h"
-#include "kernel_volume.h"
 #include "simd.h"
-
-static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
-                                vm rays)
-{
-    kernel_segment_state *state = opaque_state;
-    const kernel_transfer *transfer = &p->frame->volumes[state->volume];
-    const grid_field *field = &p->frame->job->volumes[state->volume].field.fields[part];
-    const grid *g = p->frame->job->parts[part].cells;
-    for (int n = 0; n < count; n++) {
-        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count + state->volume, part, field, cells[n]);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_polyhedron_segments(p, state, part, cells[n], rays);
-            continue;
-        }
-        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
-        if (!c->is_placed) {
-            kernel_cell_place(c, p, g);
-            kernel_cell_domain(c, transfer);
-        }
-        if (c->type == GRID_TET) {
-            kernel_double_cell precise;
-            if (state->list->is_double) kernel_double_begin(p->frame, p->tile, c, transfer, &precise);
-            kernel_tet_segments(p, state, c, &precise, rays);
-            continue;
-        }
-        kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-        kernel_span span = {.cell = c};
-        kernel_map map;
-        const int intervals = kernel_poly_intervals(p, c, rays, false, list);
-        if (intervals && !c->is_constant) {
-            kernel_map_setup(&map, c);
-            span.map = &map;
-        }
-        if (intervals && (span.map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
-        for (int k = 0; k < intervals; k++) {
-            span.interval = &list[k];
-            kernel_span_run(p, state, &span);
-        }
-    }
-}
 
 /* ---- the ray ---- */
 
@@ -167,23 +114,6 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
     if (vm_any(heaped)) kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
 }
 
-/* All segments of all volumes, each as a fragment of its own. */
-SIMD_INLINE void kernel_trace_apart(kernel_packet *p)
-{
-    const kernel_frame *f = p->frame;
-    kernel_segments list;
-    list.t_begin = p->t_near;
-    list.t_end = vf_set(INFINITY);
-    list.cuts.row_count = 0;
-    kernel_segments_set_double(p, &list, false);
-    for (int v = 0; v < f->volume_count; v++) {
-        kernel_segment_state state = {&list, &f->pieces[v], v, f->allowance, f->mixing, f->reach[v]};
-        list.per_t = f->volumes[v].exponent / p->sample_step;
-        const kernel_descent descent = {&f->volumes[v].interest, p->t_near, &p->t_far, kernel_segment_leaf, &state};
-        kernel_trace_parts(p, &f->job->volumes[v].field, &descent);
-    }
-}
-
 /* A window from list->t_begin on. */
 SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 {
@@ -197,39 +127,6 @@ SIMD_INLINE kernel_blend kernel_blend_begin(void)
 {
     const vf zero = vf_set(0), one = vf_set(1);
     return (kernel_blend){vm_none(), zero, zero, zero, zero, {zero, zero, zero}, one, zero, {zero, zero, zero}, one};
-}
-
-/* One window from list->t_begin on; t_end is lowered to where it ended. */
-SIMD_INLINE void kernel_trace_window(kernel_packet *p, kernel_segment_state *state)
-{
-    kernel_segments *list = state->list;
-    kernel_segments_begin(list, p->t_far);
-    const kernel_descent descent = {&p->frame->volumes[0].interest, list->t_begin, &list->t_end, kernel_segment_leaf,
-                                    state};
-    kernel_trace_parts(p, &p->frame->job->volumes[0].field, &descent);
-}
-
-/* first_fragment: where the packet's own fragments, of surfaces so far, begin in the thread's list. */
-SIMD_INLINE void kernel_trace_segments(kernel_packet *p, int64_t first_fragment)
-{
-    const kernel_frame *f = p->frame;
-    kernel_segments list;
-    kernel_segment_state state = {&list, &f->pieces[0], 0, f->allowance, 0, f->reach[0]};
-    kernel_blend b = kernel_blend_begin();
-    list.per_t = f->volumes[0].exponent / p->sample_step;
-    kernel_segments_set_double(p, &list, f->is_double);
-    list.t_begin = p->t_near;
-    kernel_cuts_find(p, first_fragment, &list.cuts);
-    const vm active = p->active;
-    while (vm_any(p->active)) {
-        kernel_trace_window(p, &state);
-        kernel_blend_segments(p, &b, state.pieces, &list);
-        const vm unfinished = vm_and(vf_lt(list.t_end, p->t_far), vf_lt(vf_set(KERNEL_DARK), b.light));
-        p->active = vm_and(p->active, unfinished);
-        list.t_begin = list.t_end;
-    }
-    p->active = active;
-    kernel_segments_close(p, &b, p->active);
 }
 
 #endif

@@ -18,14 +18,12 @@
 #include "kernel_interest.h"
 #include "kernel_map.h"
 #include "kernel_outline.h"
+#include "kernel_packet.h"
 #include "kernel_placed.h"
-#include "kernel_packed.h"
-#include "kernel_poly.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
 #include "kernel_tile_blocks.h"
 #include "kernel_tile_trace.h"
-#include "kernel_tile_traverse.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "render.h"
@@ -317,6 +315,40 @@ SIMD_INLINE void kernel_tile_meet_candidate(kernel_tile_trace *t, bool is_pencil
         if (met) kernel_tile_meet_item(t, cells, item, is_pencil, met, take);
     }
     kernel_tile_take_pending(t, cells, take);
+}
+
+/* ---- windows ---- */
+
+/* The blocks that any tree's box may meet, and the depths between which. */
+SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
+{
+    const render_job *job = t->frame->job;
+    kernel_placement all = {.near = INFINITY, .far = -INFINITY};
+    for (int i = 0; i < job->part_count; i++) {
+        if (!job->parts[i].tree->node_count) continue;
+        const kernel_placement placement = kernel_box_placement(&t->tree_planes, job->parts[i].tree, 0);
+        all.blocks |= placement.blocks & t->wanted;
+        all.near = fminf(all.near, placement.near);
+        all.far = fmaxf(all.far, placement.far);
+    }
+    return all;
+}
+
+/* Set up the blocks; returns how many packets they have, which are listed. */
+SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
+{
+    int count = 0;
+    for (; blocks; blocks &= blocks - 1) {
+        const int block = __builtin_ctz(blocks);
+        kernel_block_begin(t, block);
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            const int i = block * KERNEL_BLOCK_PACKETS + n;
+            if (t->frame->volume_turns) kernel_packet_clip_volumes(&t->packets[i], t->turn);
+            packets[count++] = i;
+        }
+    }
+    if (count) kernel_block_rays_setup(&t->thread->tile_cells->block_rays, t->frame, &t->tile);
+    return count;
 }
 
 #endif

@@ -7,28 +7,25 @@
  *     block 2  |--s--s--s--s--s--s--|  dark: takes no part in the next window
  *              ^ t_near of window 1 ^ t_near of window 2
  *
- * The traversal is that of surfaces (kernel_tile_traverse.h), with the window's begin in the place of the eye and each
+ * The traversal is that of surfaces (kernel_tile_trace.h), with the window's begin in the place of the eye and each
  * block's end of the window in that of its nearest hits. What is in a window does not show in the picture: samples are
  * numbered along the ray, and owned by cells. */
 #ifndef RENDER_KERNEL_TILE_VOLUME_H
 #define RENDER_KERNEL_TILE_VOLUME_H
 
-#include <limits.h>
 #include <math.h>
 
+#include <limits.h>
 #include "grid.h"
 #include "kernel_cell.h"
+#include "kernel_cell_segments.h"
+#include "kernel_crossings.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_poly.h"
-#include "kernel_polyhedron_volume.h"
 #include "kernel_samples.h"
-#include "kernel_tet.h"
 #include "kernel_tile.h"
-#include "kernel_tile_blocks.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
-#include "kernel_volume.h"
 #include "render.h"
 #include "simd.h"
 
@@ -91,40 +88,6 @@ static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uin
 {
     (void)unused;
     kernel_tile_volume_trees(t, t->thread->tile_volume->volume, parts, count, blocks, kernel_tile_volume_leaf);
-}
-
-/* ---- windows ---- */
-
-/* The blocks that any tree's box may meet, and the depths between which. */
-SIMD_INLINE kernel_placement kernel_tile_reach(const kernel_tile_trace *t)
-{
-    const render_job *job = t->frame->job;
-    kernel_placement all = {.near = INFINITY, .far = -INFINITY};
-    for (int i = 0; i < job->part_count; i++) {
-        if (!job->parts[i].tree->node_count) continue;
-        const kernel_placement placement = kernel_box_placement(&t->tree_planes, job->parts[i].tree, 0);
-        all.blocks |= placement.blocks & t->wanted;
-        all.near = fminf(all.near, placement.near);
-        all.far = fmaxf(all.far, placement.far);
-    }
-    return all;
-}
-
-/* Set up the blocks; returns how many packets they have, which are listed. */
-SIMD_INLINE int kernel_tile_volume_begin(kernel_tile_trace *t, unsigned blocks, int packets[KERNEL_TILE_PACKETS])
-{
-    int count = 0;
-    for (; blocks; blocks &= blocks - 1) {
-        const int block = __builtin_ctz(blocks);
-        kernel_block_begin(t, block);
-        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-            const int i = block * KERNEL_BLOCK_PACKETS + n;
-            if (t->frame->volume_turns) kernel_packet_clip_volumes(&t->packets[i], t->turn);
-            packets[count++] = i;
-        }
-    }
-    if (count) kernel_block_rays_setup(&t->thread->tile_cells->block_rays, t->frame, &t->tile);
-    return count;
 }
 
 /* Set up the packet; what of sample numbers its rays have between the depths is added to first .. last. */

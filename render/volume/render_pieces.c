@@ -2,6 +2,9 @@
  * lie on a line with others have been left out. Opacity and colour are then linear between cuts, exactly as documented.
  */
 #include "render_pieces.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "render_scale.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,10 +12,7 @@
 
 #include "error.h"
 #include "insitu/status.h"
-#include "kernel_pieces.h"
 #include "memory.h"
-#include "render.h"
-#include "render_scale.h"
 
 /* Far outside of every domain, and finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;

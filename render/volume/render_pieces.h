@@ -4,7 +4,7 @@
 
 #include "error.h"
 #include "insitu/status.h"
-#include "kernel_pieces.h"
+#include "kernel_types.h"
 #include "render.h"
 
 /* Colours may be off the table's by tolerance where that saves pieces; 0: by rounding. Freed by render_pieces_free().

@@ -5,7 +5,7 @@
 
 #include "error.h"
 #include "insitu/status.h"
-#include "kernel_pieces.h"
+#include "kernel_types.h"
 #include "memory.h"
 #include "render.h"
 #include "render_pieces.h"

@@ -1,0 +1,555 @@
+/* Where a packet's rays meet a cell's faces: the edge functions on the rays, from the cell's lines (kernel_cell.h);
+ * then tets, then cells that have quads. */
+#ifndef RENDER_KERNEL_CROSSINGS_H
+#define RENDER_KERNEL_CROSSINGS_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_packet.h"
+#include "kernel_quad.h"
+#include "kernel_shapes.h"
+#include "simd.h"
+
+SIMD_INLINE kernel_line kernel_line_of(const kernel_packet *p, kernel_spot a, kernel_spot b)
+{
+    return kernel_line_between(p->frame, a, b, kernel_spot_size(p->frame, p->tile, a),
+                               kernel_spot_size(p->frame, p->tile, b));
+}
+
+SIMD_INLINE vf kernel_project_x(const kernel_packet *p, kernel_spot a)
+{
+    return (vf_set(a.x) - p->origin_x) - p->slope_x * a.z;
+}
+
+SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_spot a)
+{
+    return (vf_set(a.y) - p->origin_y) - p->slope_y * a.z;
+}
+
+/* Below this the products' errors may be too small for float32. */
+#define KERNEL_EDGE_LEAST 1e-30f
+
+/* e of rays on which it is all but zero: its sign is taken in double, where products of float32 are exact; its size, as
+ * little beside that of any other edge, need not be known, but that not all weights may be zero. Where e is zero the
+ * tie is decided as kernel_cell.h has it, and the sign of the zero says how. */
+static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, vf by, vf e)
+{
+    for (int lane = 0; lane < SIMD_WIDTH; lane++) {
+        const double x0 = (double)ax[lane], y0 = (double)ay[lane], x1 = (double)bx[lane], y1 = (double)by[lane];
+        const double exact = x0 * y1 - x1 * y0;
+        if (!(fabsf(e[lane]) <= KERNEL_EDGE_LEAST)) continue;
+        if (exact == 0)
+            e[lane] = y1 < y0 || (y0 == y1 && x0 < x1) ? 0.0f : -0.0f;
+        else
+            e[lane] = exact > 0 ? KERNEL_EDGE_LEAST : -KERNEL_EDGE_LEAST;
+    }
+    return e;
+}
+
+/* Returns the edge function, with the exact sign for the projected points. */
+SIMD_INLINE vf kernel_edge_between(vf ax, vf ay, vf bx, vf by)
+{
+    const vf e = vf_diff_of_products(ax, by, bx, ay);
+    const vm tie = vf_le(vf_abs(e), vf_set(KERNEL_EDGE_LEAST));
+    return __builtin_expect(vm_any(tie), 0) ? kernel_edge_tied(ax, ay, bx, by, e) : e;
+}
+
+SIMD_INLINE vf kernel_edge_projected(const kernel_packet *p, kernel_spot a, kernel_spot b)
+{
+    return kernel_edge_between(kernel_project_x(p, a), kernel_project_y(p, a), kernel_project_x(p, b),
+                               kernel_project_y(p, b));
+}
+
+static __attribute__((noinline, cold)) vf kernel_edge_doubted(const kernel_packet *p, kernel_spot a, kernel_spot b,
+                                                              vm doubt, vf e)
+{
+    return vf_select(doubt, kernel_edge_projected(p, a, b), e);
+}
+
+SIMD_INLINE vf kernel_line_at(const kernel_packet *p, const kernel_line *l)
+{
+    return vf_muladd(vf_set(l->cv), p->v, vf_muladd(vf_set(l->cu), p->u, vf_set(l->c)));
+}
+
+/* The edge function of the edge from a to b, a before b in the order, whose line is l: of the side where it is positive
+ * the sign bit is clear, ties decided. */
+SIMD_INLINE vf kernel_edge(const kernel_packet *p, const kernel_line *l, kernel_spot a, kernel_spot b)
+{
+    if (!p->is_pencil) return kernel_edge_projected(p, a, b);
+    const vf e = kernel_line_at(p, l);
+    const vm doubt = vm_not(vf_lt(vf_set(l->bound), vf_abs(e)));
+    return __builtin_expect(vm_any(doubt), 0) ? kernel_edge_doubted(p, a, b, doubt, e) : e;
+}
+
+/* The triangle i, j, k (in the order) with its three edges: who crosses it. */
+SIMD_INLINE vm kernel_inside(vm rays, vf ij, vf jk, vf ik)
+{
+    const vi a = vi_from_bits(ij), b = vi_from_bits(jk), c = vi_from_bits(ik);
+    return vm_and(rays, vm_sign(~(a ^ b) & (a ^ c)));
+}
+
+/* Sums the depths or values of a crossed triangle's vertices, weighted by their opposite edges and not yet divided by
+ * the sum of the weights. A sum has the sign that all its terms have. */
+SIMD_INLINE vf kernel_weigh_value(vf ij, vf jk, vf ik, float i, float j, float k)
+{
+    return vf_muladd(ij, vf_set(k), vf_muladd(-ik, vf_set(j), jk * i));
+}
+
+SIMD_INLINE vf kernel_weight(vf ij, vf jk, vf ik)
+{
+    return (jk - ik) + ij;
+}
+
+SIMD_INLINE kernel_blur kernel_edge_blur(const kernel_packet *p, kernel_spot a, kernel_spot b)
+{
+    const kernel_line l = kernel_line_of(p, a, b);
+    return kernel_line_blur(&l, p->tile->radius, a, b);
+}
+
+/* kernel_least_weight() of the triangle i, j, k in the order. */
+static __attribute__((noinline, cold)) float kernel_triangle_least(const kernel_packet *p, kernel_spot i, kernel_spot j,
+                                                                   kernel_spot k)
+{
+    const kernel_blur ij = kernel_edge_blur(p, i, j), jk = kernel_edge_blur(p, j, k), ik = kernel_edge_blur(p, i, k);
+    return kernel_least_weight((ij.error + jk.error) + ik.error, (ij.extent + jk.extent) + ik.extent);
+}
+
+/* Returns the rays whose weights of a triangle that they cross are not good enough. */
+SIMD_INLINE vm kernel_weak(vm hit, vf weight, float least)
+{
+    return vm_and(hit, vf_lt(vf_abs(weight), vf_set(least)));
+}
+
+/* The triangle's edge functions, projected on these rays. */
+static __attribute__((noinline, cold)) void kernel_triangle_mend(const kernel_packet *p, const kernel_spot ijk[3],
+                                                                 vm weak, vf *ij, vf *jk, vf *ik)
+{
+    const vf ax = kernel_project_x(p, ijk[0]), ay = kernel_project_y(p, ijk[0]);
+    const vf bx = kernel_project_x(p, ijk[1]), by = kernel_project_y(p, ijk[1]);
+    const vf cx = kernel_project_x(p, ijk[2]), cy = kernel_project_y(p, ijk[2]);
+    *ij = vf_select(weak, kernel_edge_between(ax, ay, bx, by), *ij);
+    *jk = vf_select(weak, kernel_edge_between(bx, by, cx, cy), *jk);
+    *ik = vf_select(weak, kernel_edge_between(ax, ay, cx, cy), *ik);
+}
+
+SIMD_INLINE void kernel_place(const kernel_packet *p, const double *world, float *out_x, float *out_y, float *out_z)
+{
+    kernel_place_in(p->frame, p->tile, world, out_x, out_y, out_z);
+}
+
+/* Tets: four triangles, of which a ray crosses two or none (kernel_cell.h). */
+
+SIMD_INLINE void kernel_tet_project(const kernel_packet *p, const kernel_cell *c, vf x[4], vf y[4])
+{
+    for (int i = 0; i < 4; i++) {
+        x[i] = kernel_project_x(p, kernel_cell_spot(c, i));
+        y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
+    }
+}
+
+/* What kernel_edge() gives of each, from vertices that are projected once. */
+static __attribute__((noinline)) void kernel_tet_edges_exactly(const kernel_packet *p, const kernel_cell *c,
+                                                               vf e[KERNEL_TET_EDGES])
+{
+    vf x[4], y[4];
+    kernel_tet_project(p, c, x, y);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int a = kernel_tet_edge[n][0], b = kernel_tet_edge[n][1];
+        const vf line = kernel_line_at(p, &c->lines[n]);
+        const vm doubt = vm_not(vf_lt(vf_set(c->lines[n].bound), vf_abs(line)));
+        e[n] = vm_any(doubt) ? vf_select(doubt, kernel_edge_between(x[a], y[a], x[b], y[b]), line) : line;
+    }
+}
+
+SIMD_INLINE void kernel_tet_edges_projected(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
+{
+    vf x[4], y[4];
+    kernel_tet_project(p, c, x, y);
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int a = kernel_tet_edge[n][0], b = kernel_tet_edge[n][1];
+        e[n] = kernel_edge_between(x[a], y[a], x[b], y[b]);
+    }
+}
+
+/* All edge functions at once; one by one only where one of them is in doubt. */
+SIMD_INLINE void kernel_tet_edges(const kernel_packet *p, const kernel_cell *c, vf e[KERNEL_TET_EDGES])
+{
+    if (!p->is_pencil) {
+        kernel_tet_edges_projected(p, c, e);
+        return;
+    }
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) e[n] = kernel_line_at(p, &c->lines[n]);
+    const vf low = vf_min(vf_min(vf_abs(e[0]), vf_abs(e[1])), vf_abs(e[2]));
+    const vf least = vf_min(vf_min(low, vf_min(vf_abs(e[3]), vf_abs(e[4]))), vf_abs(e[5]));
+    if (__builtin_expect(vm_any(vm_not(vf_lt(vf_set(c->doubt), least))), 0)) kernel_tet_edges_exactly(p, c, e);
+}
+
+/* A crossed triangle's sums (kernel_cell.h). */
+typedef struct kernel_sums {
+    vf depth, value, colour, weight;
+} kernel_sums;
+
+/* face: a row of kernel_tet_face. */
+SIMD_INLINE kernel_sums kernel_tet_sums(const kernel_cell *c, const signed char *face, vf ij, vf jk, vf ik,
+                                        bool has_colour)
+{
+    const int i = face[0], j = face[1], k = face[2];
+    return (kernel_sums){kernel_weigh_value(ij, jk, ik, c->z[i], c->z[j], c->z[k]),
+                         kernel_weigh_value(ij, jk, ik, c->f[i], c->f[j], c->f[k]),
+                         has_colour ? kernel_weigh_value(ij, jk, ik, c->g[i], c->g[j], c->g[k]) : vf_set(0),
+                         kernel_weight(ij, jk, ik)};
+}
+
+SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const kernel_sums *b)
+{
+    return (kernel_sums){vf_select(m, a->depth, b->depth), vf_select(m, a->value, b->value),
+                         vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
+}
+
+/* Where a ray goes in and out, in whichever order. */
+typedef struct kernel_ends {
+    kernel_sums a, b;
+} kernel_ends;
+
+/* Takes the first and the last of the faces that each ray crosses. */
+SIMD_INLINE kernel_ends kernel_tet_choose(const vm hit[4], const kernel_sums sums[4])
+{
+    const kernel_sums a = kernel_sums_select(hit[1], &sums[1], &sums[2]);
+    const kernel_sums b = kernel_sums_select(hit[2], &sums[2], &sums[1]);
+    return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
+}
+
+/* With the edges of faces projected on rays where their weights are not good enough. */
+static __attribute__((noinline, cold)) kernel_ends
+kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour)
+{
+    kernel_sums sums[4];
+    vm hit[4];
+    for (int n = 0; n < 4; n++) {
+        const signed char *f = kernel_tet_face[n];
+        vf ij = e[f[3]], jk = e[f[4]], ik = e[f[5]];
+        hit[n] = kernel_inside(rays, ij, jk, ik);
+        const vm weak = kernel_weak(hit[n], kernel_weight(ij, jk, ik), c->least[n]);
+        if (vm_any(weak)) {
+            const kernel_spot ijk[3] = {kernel_cell_spot(c, f[0]), kernel_cell_spot(c, f[1]),
+                                        kernel_cell_spot(c, f[2])};
+            kernel_triangle_mend(p, ijk, weak, &ij, &jk, &ik);
+        }
+        sums[n] = kernel_tet_sums(c, f, ij, jk, ik, has_colour);
+    }
+    return kernel_tet_choose(hit, sums);
+}
+
+/* Which rays cross which of the faces, in kernel_tet_face's order. */
+SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, vm rays, vm hit[4])
+{
+    vf e[KERNEL_TET_EDGES];
+    kernel_tet_edges(p, c, e);
+    for (int n = 0; n < 4; n++) {
+        const signed char *f = kernel_tet_face[n];
+        hit[n] = kernel_inside(rays, e[f[3]], e[f[4]], e[f[5]]);
+    }
+}
+
+/* Without branches: all four faces' sums, of which each ray takes its first and its last crossed face's. */
+SIMD_INLINE void kernel_tet_interval(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
+                                     kernel_interval *out)
+{
+    vf e[KERNEL_TET_EDGES];
+    kernel_tet_edges(p, c, e);
+    const vm hit[4] = {kernel_inside(rays, e[0], e[3], e[1]), kernel_inside(rays, e[0], e[4], e[2]),
+                       kernel_inside(rays, e[1], e[5], e[2]), kernel_inside(rays, e[3], e[5], e[4])};
+    out->mask = vm_or(vm_or(hit[0], hit[1]), vm_or(hit[2], hit[3]));
+    out->t_in = out->t_out = out->v_in = out->v_out = out->w_in = out->w_out = vf_set(0);
+    if (!vm_any(out->mask)) return;
+    const kernel_sums sums[4] = {kernel_tet_sums(c, kernel_tet_face[0], e[0], e[3], e[1], has_colour),
+                                 kernel_tet_sums(c, kernel_tet_face[1], e[0], e[4], e[2], has_colour),
+                                 kernel_tet_sums(c, kernel_tet_face[2], e[1], e[5], e[2], has_colour),
+                                 kernel_tet_sums(c, kernel_tet_face[3], e[3], e[5], e[4], has_colour)};
+    kernel_ends ends = kernel_tet_choose(hit, sums);
+    if (p->is_pencil) {
+        const float *least = c->least;
+        const vm weak =
+            vm_or(vm_or(kernel_weak(hit[0], sums[0].weight, least[0]), kernel_weak(hit[1], sums[1].weight, least[1])),
+                  vm_or(kernel_weak(hit[2], sums[2].weight, least[2]), kernel_weak(hit[3], sums[3].weight, least[3])));
+        if (__builtin_expect(vm_any(weak), 0)) ends = kernel_tet_mend(p, c, rays, e, has_colour);
+    }
+    const vf scale_a = 1.0f / ends.a.weight, scale_b = 1.0f / ends.b.weight;
+    const vf t_a = ends.a.depth * scale_a, t_b = ends.b.depth * scale_b;
+    const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
+    const vm swap = vf_lt(t_b, t_a);
+    out->t_in = vf_select(swap, t_b, t_a);
+    out->t_out = vf_select(swap, t_a, t_b);
+    out->v_in = vf_select(swap, v_b, v_a);
+    out->v_out = vf_select(swap, v_a, v_b);
+    if (!has_colour) return;
+    const vf w_a = ends.a.colour * scale_a, w_b = ends.b.colour * scale_b;
+    out->w_in = vf_select(swap, w_b, w_a);
+    out->w_out = vf_select(swap, w_a, w_b);
+}
+
+/* Hexes, wedges and pyramids: cells with quads, which a ray may go into more than once (kernel_cell.h). */
+
+/* Edge functions by vertex pair: those of the shape and of the quads' diagonals. */
+typedef struct kernel_edges {
+    vf e[GRID_MAX_CELL_VERTICES][GRID_MAX_CELL_VERTICES]; /* [a][b] with a before b in the order */
+} kernel_edges;
+
+/* Number n of the cell's lines. */
+SIMD_INLINE void kernel_poly_edge(const kernel_packet *p, const kernel_cell *c, int n, int i, int j, kernel_edges *out)
+{
+    const int a = c->rank[i] < c->rank[j] ? i : j, b = a == i ? j : i;
+    out->e[a][b] = kernel_edge(p, &c->lines[n], kernel_cell_spot(c, a), kernel_cell_spot(c, b));
+}
+
+SIMD_INLINE void kernel_cell_place(kernel_cell *c, const kernel_packet *p, const grid *g)
+{
+    kernel_cell_place_in(c, p->frame, p->tile, g);
+    if (p->is_pencil) kernel_cell_lines(c, p->frame, p->tile);
+}
+
+/* Edge functions of a crossed triangle i, j, k in the order, the weights, and one over their sum. Tets weigh in the
+ * same way: a face's depth and value have the same bits from both its cells. */
+typedef struct kernel_weights {
+    int i, j, k;
+    vf ij, jk, ik, inverse;
+} kernel_weights;
+
+SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, vf ik)
+{
+    return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
+}
+
+/* Those of a triangle of these spots, made good enough on rays that cross it; least is no less than its own. */
+SIMD_INLINE void kernel_weights_mend(const kernel_packet *p, float least, vm hit, kernel_spot i, kernel_spot j,
+                                     kernel_spot k, kernel_weights *w)
+{
+    if (!p->is_pencil) return;
+    const vf weight = kernel_weight(w->ij, w->jk, w->ik);
+    if (__builtin_expect(!vm_any(kernel_weak(hit, weight, least)), 1)) return;
+    const vm weak = kernel_weak(hit, weight, kernel_triangle_least(p, i, j, k));
+    vf ij = w->ij, jk = w->jk, ik = w->ik;
+    if (!vm_any(weak)) return;
+    kernel_triangle_mend(p, (const kernel_spot[3]){i, j, k}, weak, &ij, &jk, &ik);
+    *w = kernel_weights_of(w->i, w->j, w->k, ij, jk, ik);
+}
+
+SIMD_INLINE vf kernel_weigh(const kernel_weights *w, float fi, float fj, float fk)
+{
+    return kernel_weigh_value(w->ij, w->jk, w->ik, fi, fj, fk) * w->inverse;
+}
+
+SIMD_INLINE vf kernel_weigh_depth(const kernel_weights *w, const float *z)
+{
+    return kernel_weigh(w, z[w->i], z[w->j], z[w->k]);
+}
+
+/* A search for the crossings of a cell's faces: whose rays, and what all of the faces share. */
+typedef struct kernel_face_search {
+    const kernel_packet *packet;
+    const kernel_cell *cell;
+    const kernel_shape *shape;
+    const kernel_projected *projected;
+    const kernel_edges *edges;
+    vm rays;
+    bool has_colour;
+} kernel_face_search;
+
+SIMD_INLINE void kernel_triangle_values(const kernel_face_search *s, const kernel_weights *w, kernel_crossing *out)
+{
+    const kernel_cell *c = s->cell;
+    const kernel_shape *shape = s->shape;
+    out->v = kernel_weigh(w, c->f[w->i], c->f[w->j], c->f[w->k]);
+    out->w = s->has_colour ? kernel_weigh(w, c->g[w->i], c->g[w->j], c->g[w->k]) : vf_set(0);
+    for (int a = 0; a < 3; a++)
+        out->r[a] = kernel_weigh(w, shape->corners[w->i][a], shape->corners[w->j][a], shape->corners[w->k][a]);
+}
+
+/* The edge function from one corner to another. */
+SIMD_INLINE vf kernel_corner_edge(const kernel_cell *c, const kernel_edges *edges, int from, int to)
+{
+    return c->rank[from] < c->rank[to] ? edges->e[from][to] : -edges->e[to][from];
+}
+
+SIMD_INLINE void kernel_quad_take(const kernel_projected *q, const float *z, const int corner[4], kernel_quad *out)
+{
+    for (int i = 0; i < 4; i++) {
+        out->x[i] = q->x[corner[i]];
+        out->y[i] = q->y[corner[i]];
+        out->z[i] = vf_set(z[corner[i]]);
+    }
+}
+
+/* The crossing of a quad's patch. The isoparametric map has the same patch there, so that the field inside the cells on
+ * both sides goes on to the same value. */
+SIMD_INLINE void kernel_quad_values(const kernel_face_search *s, const int corner[4], const kernel_quad_place *at,
+                                    kernel_crossing *out)
+{
+    const kernel_cell *c = s->cell;
+    const kernel_shape *shape = s->shape;
+    vf f[4], g[4];
+    for (int i = 0; i < 4; i++) f[i] = vf_set(c->f[corner[i]]), g[i] = vf_set(s->has_colour ? c->g[corner[i]] : 0);
+    out->mask = at->mask;
+    out->t = at->t;
+    out->v = kernel_bilinear(f, at->s, at->r);
+    out->w = s->has_colour ? kernel_bilinear(g, at->s, at->r) : vf_set(0);
+    for (int a = 0; a < 3; a++) {
+        const float base = shape->corners[corner[0]][a];
+        out->r[a] =
+            (base + at->s * (shape->corners[corner[1]][a] - base)) + at->r * (shape->corners[corner[3]][a] - base);
+    }
+}
+
+/* Three of the cell's vertices in the order. */
+SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3], int out[3])
+{
+    int i = corners[0], j = corners[1], k = corners[2], swap;
+    if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
+    if (c->rank[k] < c->rank[j]) swap = j, j = k, k = swap;
+    if (c->rank[j] < c->rank[i]) swap = i, i = j, j = swap;
+    out[0] = i;
+    out[1] = j;
+    out[2] = k;
+}
+
+/* Who crosses the triangle. */
+SIMD_INLINE vm kernel_triangle(const kernel_edges *edges, vm rays, const int ijk[3])
+{
+    return kernel_inside(rays, edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]], edges->e[ijk[0]][ijk[2]]);
+}
+
+/* Finds the crossing of three of the cell's vertices; false where no ray has any. */
+SIMD_INLINE bool kernel_triangle_crossing(const kernel_face_search *s, const int corners[3], kernel_crossing *out)
+{
+    const kernel_cell *c = s->cell;
+    const kernel_edges *edges = s->edges;
+    int ijk[3];
+    kernel_triangle_order(c, corners, ijk);
+    const vm hit = kernel_triangle(edges, s->rays, ijk);
+    if (!vm_any(hit)) return false;
+    kernel_weights w = kernel_weights_of(ijk[0], ijk[1], ijk[2], edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]],
+                                         edges->e[ijk[0]][ijk[2]]);
+    kernel_weights_mend(s->packet, c->least[0], hit, kernel_cell_spot(c, w.i), kernel_cell_spot(c, w.j),
+                        kernel_cell_spot(c, w.k), &w);
+    out->mask = hit;
+    out->t = kernel_weigh_depth(&w, c->z);
+    kernel_triangle_values(s, &w, out);
+    return true;
+}
+
+/* As below, for a quad that has collapsed to a triangle. */
+static __attribute__((noinline, cold)) int kernel_collapsed_crossings(const kernel_face_search *s, const int corner[4],
+                                                                      kernel_crossing *out)
+{
+    int n = 0;
+    for (int half = 0; half < 2; half++) {
+        const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
+        n += kernel_triangle_crossing(s, corners, &out[n]);
+    }
+    return n;
+}
+
+/* Finds the crossings of a quad and returns how many there are, 0 to 2; each ray's are in one of them or in both. */
+SIMD_INLINE int kernel_quad_crossings(const kernel_face_search *s, const int corner[4], kernel_crossing *out)
+{
+    const kernel_cell *c = s->cell;
+    const kernel_edges *edges = s->edges;
+    const vm rays = s->rays;
+    kernel_quad quad;
+    kernel_quad_place places[2];
+    vm once = vm_none();
+    for (int half = 0; half < 2; half++) {
+        const int corners[3] = {corner[0], corner[half + 1], corner[half + 2]};
+        int ijk[3];
+        kernel_triangle_order(c, corners, ijk);
+        once = vm_xor(once, kernel_triangle(edges, rays, ijk));
+    }
+    quad.e01 = edges->e[corner[0]][corner[1]];
+    quad.e03 = edges->e[corner[0]][corner[3]];
+    quad.e12 = kernel_corner_edge(c, edges, corner[1], corner[2]);
+    quad.e32 = kernel_corner_edge(c, edges, corner[3], corner[2]);
+    const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
+    if (!vm_any(vm_or(once, twice))) return 0;
+    if (kernel_quad_collapses(c, corner)) return kernel_collapsed_crossings(s, corner, out);
+    kernel_quad_take(s->projected, c->z, corner, &quad);
+    const int n = kernel_quad_places(&quad, once, twice, places);
+    for (int i = 0; i < n; i++) kernel_quad_values(s, corner, &places[i], &out[i]);
+    return n;
+}
+
+/* All crossings of a cell with quads; returns how many triangles are crossed by some ray. */
+SIMD_INLINE int kernel_poly_crossings(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
+                                      kernel_crossing out[KERNEL_MAX_CROSSINGS])
+{
+    const kernel_shape *shape = kernel_cell_shape(c->type);
+    kernel_projected q;
+    kernel_edges edges;
+    const kernel_face_search s = {p, c, shape, &q, &edges, rays, has_colour};
+    for (int i = 0; i < c->count; i++) {
+        q.x[i] = kernel_project_x(p, kernel_cell_spot(c, i));
+        q.y[i] = kernel_project_y(p, kernel_cell_spot(c, i));
+    }
+    for (int n = 0; n < shape->edge_count; n++)
+        kernel_poly_edge(p, c, n, shape->edges[n][0], shape->edges[n][1], &edges);
+    int n = 0;
+    for (int face = 0; face < shape->face_count; face++) {
+        const signed char *loop = shape->faces[face].vertices;
+        if (shape->faces[face].count == 3) {
+            const int corners[3] = {loop[0], loop[1], loop[2]};
+            n += kernel_triangle_crossing(&s, corners, &out[n]);
+            continue;
+        }
+        int corner[4];
+        kernel_quad_corners(c, loop, corner);
+        kernel_poly_edge(p, c, shape->edge_count + face, corner[0], corner[2], &edges);
+        n += kernel_quad_crossings(&s, corner, &out[n]);
+    }
+    return n;
+}
+
+/* Take the nearest crossing of each ray out of the list: false where no ray has one left. */
+SIMD_INLINE bool kernel_take_nearest(kernel_crossing *list, int count, kernel_crossing *out)
+{
+    vi taken = vi_set(-1);
+    out->mask = vm_none();
+    out->t = vf_set(INFINITY);
+    out->v = out->w = out->r[0] = out->r[1] = out->r[2] = vf_set(0);
+    for (int n = 0; n < count; n++) {
+        const vm nearer = vm_and(list[n].mask, vf_lt(list[n].t, out->t));
+        out->mask = vm_or(out->mask, nearer);
+        out->t = vf_select(nearer, list[n].t, out->t);
+        out->v = vf_select(nearer, list[n].v, out->v);
+        out->w = vf_select(nearer, list[n].w, out->w);
+        for (int a = 0; a < 3; a++) out->r[a] = vf_select(nearer, list[n].r[a], out->r[a]);
+        taken = (vi)vf_select(nearer, (vf)vi_set(n), (vf)taken);
+    }
+    for (int n = 0; n < count; n++) list[n].mask = vm_andnot(list[n].mask, vf_eq(vf_from_vi(taken), vf_set((float)n)));
+    return vm_any(out->mask);
+}
+
+SIMD_INLINE int kernel_poly_intervals(const kernel_packet *p, const kernel_cell *c, vm rays, bool has_colour,
+                                      kernel_interval out[KERNEL_MAX_CELL_INTERVALS])
+{
+    kernel_crossing list[KERNEL_MAX_CROSSINGS], in, next;
+    const int crossings = kernel_poly_crossings(p, c, rays, has_colour, list);
+    int n = 0;
+    while (n < KERNEL_MAX_CELL_INTERVALS && kernel_take_nearest(list, crossings, &in) &&
+           kernel_take_nearest(list, crossings, &next)) {
+        out[n].mask = vm_and(in.mask, next.mask);
+        out[n].t_in = in.t;
+        out[n].t_out = next.t;
+        out[n].v_in = in.v;
+        out[n].v_out = next.v;
+        out[n].w_in = in.w;
+        out[n].w_out = next.w;
+        memcpy(out[n].r_in, in.r, sizeof in.r);
+        memcpy(out[n].r_out, next.r, sizeof next.r);
+        n++;
+    }
+    return n;
+}
+
+#endif

@@ -1,0 +1,506 @@
+/* What becomes of a ray's hits on an isosurface: clips, normals, colours, and which is kept (thesis, sections 4.3.4 and
+ * 4.3.5). */
+#ifndef RENDER_KERNEL_ACCEPT_H
+#define RENDER_KERNEL_ACCEPT_H
+
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_cache.h"
+#include "kernel_clip.h"
+#include "kernel_colour.h"
+#include "kernel_crossings.h"
+#include "kernel_edges.h"
+#include "kernel_hits.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_tile_trace.h"
+#include "kernel_traverse.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
+
+/* Normals by central differences (thesis, section 4.3.4): the field half an offset before and behind the hit along each
+ * axis. Which cell holds a point is asked of the tree, as a ray of no length: with inverse directions of 1 the box test
+ * of kernel_packet.h tells whether the point is in the box. In a leaf, the line through the point along the tile's
+ * depth axis meets the cells as any ray does, by the same exact decisions, and the point belongs to the one whose
+ * interval [t_in, t_out) holds its depth: to one cell of a mesh or none.
+ *
+ * The samples are the field less the isovalue, so that the hit's own value is 0. */
+
+/* The field at one point of each ray. */
+typedef struct kernel_probe {
+    const kernel_surface *surface;
+    int layer; /* for the cache */
+    double isovalue;
+    vf z; /* of the points */
+    vm found;
+    vf sample;
+} kernel_probe;
+
+/* f: the values less the isovalue, of one scale in all cells. */
+SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
+{
+    for (int i = 0; i < c->count; i++) {
+        const double v = (c->values[i] - probe->isovalue) * probe->surface->value_scale;
+        c->f[i] = (float)(v < -1e18 ? -1e18 : v > 1e18 ? 1e18 : v);
+    }
+}
+
+SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    const bool is_tet = c->type == GRID_TET;
+    int count = 1;
+    if (is_tet)
+        kernel_tet_interval(p, c, rays, false, &list[0]);
+    else
+        count = kernel_poly_intervals(p, c, rays, false, list);
+    for (int n = 0; n < count; n++) {
+        const kernel_interval *i = &list[n];
+        const vm own = vm_andnot(vm_and(i->mask, vf_lt(probe->z, i->t_out)), vf_lt(probe->z, i->t_in));
+        if (!vm_any(own)) continue;
+        const vf along = (probe->z - i->t_in) / (i->t_out - i->t_in);
+        vf value = i->v_in + along * (i->v_out - i->v_in);
+        if (!is_tet) {
+            kernel_map map;
+            kernel_map_setup(&map, c);
+            value = kernel_value_at(p, &map, i, own, probe->z);
+        }
+        probe->sample = vf_select(own, value, probe->sample);
+        probe->found = vm_or(probe->found, own);
+    }
+}
+
+static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays)
+{
+    kernel_probe *probe = state;
+    const render_field *field = &probe->surface->layer->field;
+    for (int n = 0; n < count; n++) {
+        const vm open = vm_andnot(rays, probe->found);
+        if (!vm_any(open)) return;
+        kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
+        if (!c->is_finite || c->type == GRID_POLYHEDRON) continue;
+        const bool is_fresh = !c->is_placed;
+        if (is_fresh) kernel_cell_place(c, p, p->frame->job->parts[part].cells);
+        if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
+        kernel_probe_cell(p, probe, c, open);
+    }
+}
+
+/* Sample at the rays' points t moved by offset along a world axis (scaled units). Returns the rays whose point is in a
+ * cell. */
+SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
+{
+    const render_camera *c = &p->frame->job->camera;
+    const float right = (float)c->right[axis], up = (float)c->up[axis], forward = (float)c->forward[axis];
+    const vf zero = vf_set(0);
+    kernel_packet points = *p;
+    points.active = rays;
+    points.is_pencil = false;
+    points.origin_x = (p->origin_x + p->slope_x * t) + offset * (right - p->tile->shear_x * forward);
+    points.origin_y = (p->origin_y + p->slope_y * t) + offset * (up - p->tile->shear_y * forward);
+    points.slope_x = points.slope_y = zero;
+    for (int a = 0; a < 3; a++) {
+        points.inverse[a] = vf_set(1);
+        points.shift[a] = (t + p->shift[a]) / p->inverse[a];
+    }
+    points.shift[axis] += offset;
+    probe->z = t + offset * forward;
+    probe->found = vm_none();
+    probe->sample = zero;
+    const kernel_descent descent = {NULL, zero, &zero, kernel_probe_leaf, probe};
+    kernel_trace_parts(&points, &probe->surface->layer->field, &descent);
+    return probe->found;
+}
+
+/* Replace the cells' gradients in normal (camera axes) on the rays of hit by differences over reach before and behind:
+ * one-sided where one sample is in no cell; not where both of an axis are, nor where there is no reach. s: one of
+ * the frame's. */
+SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
+                                    vf normal[3])
+{
+    const kernel_frame *f = p->frame;
+    kernel_probe probe = {.surface = s,
+                          .layer = f->surface_count + f->volume_count + (int)(s - f->surfaces),
+                          .isovalue = s->layer->values[value]};
+    vf g[3];
+    hit = vm_and(hit, vf_lt(vf_set(0), reach));
+    vm whole = hit;
+    for (int a = 0; a < 3; a++) {
+        const vm before = kernel_probe_at(p, &probe, hit, t, a, -reach);
+        const vf low = vf_select(before, probe.sample, vf_set(0));
+        const vm behind = kernel_probe_at(p, &probe, hit, t, a, reach);
+        const vf high = vf_select(behind, probe.sample, vf_set(0));
+        g[a] = (high - low) * vf_select(vm_and(before, behind), vf_set(1), vf_set(2));
+        whole = vm_and(whole, vm_or(before, behind));
+    }
+    const double *axes[3] = {f->job->camera.right, f->job->camera.up, f->job->camera.forward};
+    for (int k = 0; k < 3; k++) {
+        const vf sum = (g[0] * (float)axes[k][0] + g[1] * (float)axes[k][1]) + g[2] * (float)axes[k][2];
+        normal[k] = vf_select(whole, sum, normal[k]);
+    }
+}
+
+/* Half the offset of differences in scaled units: by the cell's size, the cube root of its box's volume, or of its
+ * longest side where that is flat. */
+SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
+                                          const kernel_cell *c)
+{
+    double volume = 1, longest = 0;
+    for (int a = 0; a < 3; a++) {
+        double low = c->world[0][a], high = low;
+        for (int i = 1; i < c->count; i++) {
+            low = c->world[i][a] < low ? c->world[i][a] : low;
+            high = c->world[i][a] > high ? c->world[i][a] : high;
+        }
+        volume *= high - low;
+        longest = high - low > longest ? high - low : longest;
+    }
+    const double size = volume > 0 ? cbrt(volume) : longest;
+    return (float)(0.5 * layer->difference * size * p->frame->job->space.scale);
+}
+
+/* Normals out of gradients at the vertices: the three components are interpolated in the hit's cell just as values are,
+ * so that they go on from cell to cell without a jump, and so does the light on the surface.
+ *
+ * Only what is seen gets one: a hit keeps its cell, and in the place of its normal where it lies in that, until no
+ * nearer one can come. Then rays are taken one by one; those of a packet that hit the same cell share its
+ * coefficients. */
+
+/* A cell's gradients, in camera axes. */
+typedef struct kernel_smooth_cell {
+    int part;
+    int32_t index;
+    kernel_cell cell;
+    double gradient[3][GRID_MAX_CELL_VERTICES];
+    double polynomial[3][8]; /* of all but tets */
+} kernel_smooth_cell;
+
+/* The gradient at a vertex, in camera axes; 0 where it has none. */
+SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vertex_gradients *gradients, int64_t vertex,
+                                        double out[3])
+{
+    const double *axes[3] = {f->job->camera.right, f->job->camera.up, f->job->camera.forward};
+    const int32_t entry = gradients->entries ? gradients->entries[vertex] : -1;
+    for (int k = 0; k < 3; k++) {
+        const float *g = gradients->gradients[entry < 0 ? 0 : entry];
+        out[k] = entry < 0 ? 0 : ((double)g[0] * axes[k][0] + (double)g[1] * axes[k][1]) + (double)g[2] * axes[k][2];
+    }
+}
+
+static void kernel_smooth_setup(const kernel_packet *p, const render_surface_layer *layer, int part, int32_t index,
+                                kernel_smooth_cell *out)
+{
+    const grid *g = p->frame->job->parts[part].cells;
+    kernel_cell *c = &out->cell;
+    out->part = part;
+    out->index = index;
+    kernel_cell_fetch(c, g, &layer->field.fields[part], (uint32_t)index);
+    kernel_cell_place_in(c, p->frame, p->tile, g);
+    for (int i = 0; i < c->count; i++) {
+        double gradient[3];
+        kernel_vertex_gradient(p->frame, &layer->gradients[part], c->vertices[i], gradient);
+        for (int k = 0; k < 3; k++) out->gradient[k][i] = gradient[k];
+    }
+    for (int k = 0; k < 3 && c->type != GRID_TET; k++)
+        kernel_polynomial_fit(out->polynomial[k], c->type, out->gradient[k]);
+}
+
+/* A point's barycentric coordinates in a tet of four corners; 1/4 each where the tet has no volume. */
+SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double point[3], double out[4])
+{
+    double d[4][3], sum = 0;
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < 3; a++) d[i][a] = corner[i][a] - point[a];
+    for (int i = 0; i < 4; i++) {
+        const double *u = d[(i + 1) & 3], *v = d[(i + 2) & 3], *w = d[(i + 3) & 3];
+        const double volume = (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2])) +
+                              u[2] * (v[0] * w[1] - v[1] * w[0]);
+        out[i] = i & 1 ? -volume : volume; /* three steps around four corners are an odd permutation */
+        sum += out[i];
+    }
+    for (int i = 0; i < 4; i++) {
+        const double share = out[i] / sum;
+        out[i] = share >= -1 && share <= 2 ? share : 0.25;
+    }
+}
+
+/* kernel_value_of() in double. */
+SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, const double r[3])
+{
+    double m = r[0] * r[1];
+    if (is_pyramid) {
+        const double share = r[0] / (r[2] > 1e-6 ? r[2] : 1e-6);
+        m = (share < -1 ? -1 : share > 2 ? 2 : share) * r[1];
+    }
+    const double v = ((c[0] + r[0] * c[1]) + (r[1] * c[2] + r[2] * c[3])) + m * c[4];
+    return is_pyramid ? v : v + r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
+}
+
+/* place: the cell's own coordinates, or of a tet the point in tile space. */
+SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double place[3], float out[3])
+{
+    const kernel_cell *c = &s->cell;
+    if (c->type != GRID_TET) {
+        for (int k = 0; k < 3; k++)
+            out[k] = (float)kernel_polynomial_at(s->polynomial[k], c->type == GRID_PYRAMID, place);
+        return;
+    }
+    double corner[4][3], share[4];
+    for (int i = 0; i < 4; i++) {
+        corner[i][0] = (double)c->x[i];
+        corner[i][1] = (double)c->y[i];
+        corner[i][2] = (double)c->z[i];
+    }
+    kernel_barycentric(corner, place, share);
+    for (int k = 0; k < 3; k++) {
+        const double *g = s->gradient[k];
+        out[k] = (float)((share[0] * g[0] + share[1] * g[1]) + (share[2] * g[2] + share[3] * g[3]));
+    }
+}
+
+/* Where a ray is at t, in tile space. */
+SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, double out[3])
+{
+    out[0] = (double)p->origin_x[ray] + (double)p->slope_x[ray] * (double)t;
+    out[1] = (double)p->origin_y[ray] + (double)p->slope_y[ray] * (double)t;
+    out[2] = (double)t;
+}
+
+/* Turn what hits have in the place of their normals into normals, in camera axes. Hits of no cell have theirs. */
+static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet *p, const kernel_surface *s, vm rays,
+                                                            vf t, const kernel_hit_cells *cells, vf normal[3])
+{
+    kernel_smooth_cell known;
+    known.part = -1;
+    for (unsigned left = vm_bits(rays); left; left &= left - 1) {
+        const int ray = __builtin_ctz(left);
+        const int part = cells->part[ray];
+        const int32_t index = cells->index[ray];
+        double place[3];
+        float out[3];
+        if (part < 0) continue;
+        if (known.part != part || known.index != index) kernel_smooth_setup(p, s->layer, part, index, &known);
+        if (known.cell.type == GRID_TET)
+            kernel_ray_point(p, ray, t[ray], place);
+        else
+            for (int a = 0; a < 3; a++) place[a] = (double)normal[a][ray];
+        kernel_smooth_at(&known, place, out);
+        for (int a = 0; a < 3; a++) normal[a][ray] = out[a];
+    }
+}
+
+/* ---- hits of a packet ---- */
+
+typedef struct kernel_surface_state {
+    const kernel_surface *surface;
+    int layer;
+    kernel_hits *hits;
+    bool is_opaque;
+} kernel_surface_state;
+
+/* Gradients in tile space to camera axes: undo the shear. */
+SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
+{
+    g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
+}
+
+/* RENDER_NORMALS, as kernel_shade() finds it; and of RENDER_VALUES the isovalue's number. */
+static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
+                                                                 vf colour[3])
+{
+    const render_camera *c = &p->frame->job->camera;
+    vm flat;
+    vf unit[3], inverse = kernel_inverse_length(normal, &flat), facing = vf_set(0);
+    if (p->frame->job->paint == RENDER_VALUES) {
+        colour[1] = kind - (float)FRAGMENT_SURFACE;
+        colour[2] = vf_set(0);
+        return;
+    }
+    for (int a = 0; a < 3; a++) {
+        unit[a] = vf_select(flat, p->view[a], normal[a] * inverse);
+        facing += unit[a] * p->view[a];
+    }
+    const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
+    for (int a = 0; a < 3; a++)
+        colour[a] =
+            turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
+}
+
+/* Hits as the job paints them; kind: that of the fragments. */
+SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind, vf colour[3])
+{
+    kernel_packet_view(p);
+    if (__builtin_expect(p->frame->job->paint == RENDER_LIGHT, 1))
+        kernel_shade(p, &s->layer->material, normal, colour);
+    else
+        kernel_paint_numbers(p, normal, kind, colour);
+}
+
+/* A hit in the place of the nearest, as folded cells may have them: compositing decides, by bits that do not know which
+ * cell came first. */
+static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
+                                                             vm tied, vf t, const vf normal[3], const vf colour[3])
+{
+    kernel_fragments lit = {t, t, {colour[0], colour[1], colour[2]}, vf_set(0), vf_set(0)};
+    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), lit.colour);
+    kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
+}
+
+/* Where rays hit: the depth, a vector along the normal (or what kernel_vertex_normals() makes one of), and the value
+ * that the surface is coloured by. */
+typedef struct kernel_hit_places {
+    vf t, normal[3], w;
+} kernel_hit_places;
+
+/* What colours the surface, or its isovalue. w: the first's place along the colour map's range. */
+SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
+{
+    if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
+    return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
+}
+
+/* Takes hits: the nearest are kept; those of a transparent surface are written at once. */
+SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
+                               kernel_hit_places *at)
+{
+    const kernel_surface *s = state->surface;
+    kernel_hits *hits = state->hits;
+    const vf t = at->t;
+    vf *normal = at->normal, colour[3];
+    const bool by_differences = s->layer->normal == RENDER_DIFFERENCES, by_vertices = s->layer->normal == RENDER_VERTEX;
+    const kernel_hit_cells cells = {vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
+    /* Polyhedra (no cell given) have their own gradient always, or come with what their vertices make. */
+    const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
+    kernel_base_colour(s, value, at->w, colour);
+    if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
+        colour[0] = kernel_surface_value(s, value, at->w);
+    else if (s->layer->edge_width > 0 && c)
+        kernel_draw_edges(p, s->layer, c, t, colour);
+    if (state->is_opaque) {
+        const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
+        if (__builtin_expect(vm_any(tied), 0)) {
+            vf own[3] = {normal[0], normal[1], normal[2]};
+            if (by_differences) kernel_differences(p, s, value, tied, t, reach, own);
+            if (by_vertices) kernel_vertex_normals(p, s, tied, t, &cells, own);
+            kernel_emit_tied(p, s, value, tied, t, own, colour);
+            hit = vm_andnot(hit, tied);
+        }
+        p->t_far = vf_select(hit, t, p->t_far);
+        p->is_nearer = true;
+        hits->found = vm_or(hits->found, hit);
+        for (int a = 0; a < 3; a++) {
+            hits->normal[a] = vf_select(hit, normal[a], hits->normal[a]);
+            hits->colour[a] = vf_select(hit, colour[a], hits->colour[a]);
+        }
+        if (by_differences) hits->reach = vf_select(hit, reach, hits->reach);
+        if (by_vertices) {
+            hits->cells.part = vi_select(hit, cells.part, hits->cells.part);
+            hits->cells.index = vi_select(hit, cells.index, hits->cells.index);
+        }
+        hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
+        return;
+    }
+    if (by_differences) kernel_differences(p, s, value, hit, t, reach, normal);
+    if (by_vertices) kernel_vertex_normals(p, s, hit, t, &cells, normal);
+    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), colour);
+    const float opacity = s->layer->opacity;
+    const kernel_fragments f = {
+        t, t, {colour[0] * opacity, colour[1] * opacity, colour[2] * opacity}, vf_set(1 - opacity), vf_set(0)};
+    kernel_emit(p, hit, s->first_kind + (uint32_t)value, &f);
+    kernel_hits_cut(hits, hit, t);
+}
+
+/* Rays on which the sign changes between the interval's faces. */
+SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
+{
+    return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
+}
+
+/* Rays whose interval is in front of the eye and of what is known. */
+SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
+{
+    return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
+}
+
+/* The hits that clips leave. */
+static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
+{
+    kernel_lanes l;
+    unsigned kept = 0;
+    kernel_packet_lanes(p, &l);
+    vf_store(l.value, t);
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int i = __builtin_ctz(left);
+        kernel_clip_ray ray;
+        kernel_tree_ray(p->frame, l.px[i], l.py[i], ray.base, ray.direction);
+        kept |= (unsigned)kernel_clip_keeps(p->frame->job, clips, &ray, (double)l.value[i]) << i;
+    }
+    return vm_from_bits(kept);
+}
+
+/* Hits in front of the eye that the surface's clips leave. */
+SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
+{
+    const vm in_front = vm_and(hit, vf_le(p->t_near, t));
+    if (__builtin_expect(s->own_clips == 0, 1)) return in_front;
+    return kernel_clip_hits(p, s->own_clips, in_front, t);
+}
+
+SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
+{
+    return kernel_kept(p, s, vm_and(hit, vf_le(t, p->t_far)), t);
+}
+
+/* ---- hits of rays that are lanes of several cells ---- */
+
+/* What one ray hits. */
+typedef struct kernel_ray_hit {
+    int part, value;
+    uint32_t cell;
+    float depth;
+    float normal[3]; /* as in kernel_hits */
+    float colour[3]; /* not lit */
+} kernel_ray_hit;
+
+/* Of one ray that hits in the place of the nearest. */
+static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, const kernel_surface *s, int ray,
+                                                            const kernel_ray_hit *hit)
+{
+    const vm tied = vm_from_bits(1u << ray);
+    const vf depth = vf_set(hit->depth);
+    const vf colour[3] = {vf_set(hit->colour[0]), vf_set(hit->colour[1]), vf_set(hit->colour[2])};
+    const kernel_hit_cells cells = {vi_set(hit->part), vi_set((int32_t)hit->cell)};
+    vf normal[3] = {vf_set(hit->normal[0]), vf_set(hit->normal[1]), vf_set(hit->normal[2])};
+    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, depth, &cells, normal);
+    kernel_emit_tied(p, s, hit->value, tied, depth, normal, colour);
+}
+
+/* kernel_accept() of one ray, for two of a packet may be of one pixel. Returns its block, where something is nearer. */
+SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_ray_hit *hit)
+{
+    const kernel_surface *s = t->surface;
+    const int ray = at % SIMD_WIDTH;
+    kernel_packet *p = &t->packets[at / SIMD_WIDTH];
+    kernel_hits *hits = &t->hits[at / SIMD_WIDTH];
+    const float far = p->t_far[ray];
+    if (!(hit->depth <= far) || !(vm_bits(p->active) >> ray & 1)) return 0;
+    if (hit->depth == far && far < INFINITY) {
+        kernel_ray_tied(p, s, ray, hit);
+        return 0;
+    }
+    p->t_far[ray] = hit->depth;
+    vm_set_lane(&hits->found, ray);
+    for (int a = 0; a < 3; a++) {
+        hits->normal[a][ray] = hit->normal[a];
+        hits->colour[a][ray] = hit->colour[a];
+    }
+    hits->cells.part[ray] = hit->part;
+    hits->cells.index[ray] = (int32_t)hit->cell;
+    hits->kind[ray] = (float)((int)s->first_kind + hit->value);
+    return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
+}
+
+#endif
