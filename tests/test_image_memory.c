@@ -21,7 +21,7 @@
 #include "failing_heap.h"
 #include "session_image.h"
 
-enum { WIDTH = 40, HEIGHT = 30, MOST_BYTES = 1 << 16, SECONDS = 60 };
+enum { WIDTH = 40, HEIGHT = 30, MOST_BYTES = 1 << 17, SECONDS = 60 };
 
 static const char *folder = "test_image_memory_files";
 static int stride = 41; /* between the allocations that are tried */
@@ -33,10 +33,16 @@ typedef struct picture_case {
     bool has_depth, is_decorated;
 } picture_case;
 
+enum { MOST_SAMPLES = 3 };
+static insitu_deep_sample samples[MOST_SAMPLES * WIDTH * HEIGHT];
+static int64_t first_sample[WIDTH * HEIGHT];
+static uint32_t sample_counts[WIDTH * HEIGHT];
+
 static const picture_case cases[] = {{"a.png", INSITU_PNG8, false, false},
                                      {"b.png", INSITU_PNG16, false, false},
                                      {"c.exr", INSITU_EXR, true, false},
-                                     {"d.png", INSITU_PNG8, false, true}};
+                                     {"d.png", INSITU_PNG8, false, true},
+                                     {"e.exr", INSITU_DEEP_EXR, false, false}};
 
 typedef struct file_bytes {
     size_t count;
@@ -63,8 +69,13 @@ static insitu_status write_picture(const picture_case *c, base_error *error)
                                                    .bar_count = 1,
                                                    .bars = &bar,
                                                    .has_axes = true};
-    const insitu_image image = {WIDTH, HEIGHT, rgba, c->has_depth ? depth : NULL,
-                                c->is_decorated ? &decorations : NULL, 0, NULL};
+    const insitu_deep deep = {samples, first_sample, sample_counts};
+    const insitu_image image = {.width = WIDTH,
+                                .height = HEIGHT,
+                                .rgba = rgba,
+                                .depth = c->has_depth ? depth : NULL,
+                                .decorations = c->is_decorated ? &decorations : NULL,
+                                .deep = &deep};
     char path[1024];
     path_of(c, path);
     *error = (base_error){0};
@@ -258,12 +269,24 @@ static void tight_memory_is_the_same_picture_or_an_error(void **context)
     }
 }
 
+static void make_samples(void)
+{
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        first_sample[i] = MOST_SAMPLES * i;
+        sample_counts[i] = (uint32_t)(i % (MOST_SAMPLES + 1));
+        for (int n = 0; n < MOST_SAMPLES; n++)
+            samples[MOST_SAMPLES * i + n] = (insitu_deep_sample){
+                {rgba[4 * i] / 4, rgba[4 * i + 1] / 4, rgba[4 * i + 2] / 4, 0.25f}, (float)n, (float)n + 0.5f};
+    }
+}
+
 int main(int argument_count, char **arguments)
 {
     if (argument_count > 1) folder = arguments[1];
     if (argument_count > 2) stride = atoi(arguments[2]);
     for (int i = 0; i < 4 * WIDTH * HEIGHT; i++) rgba[i] = (float)(i * 7919 % 1000) / 1000;
     for (int i = 0; i < WIDTH * HEIGHT; i++) depth[i] = (float)(i * 31 % 100);
+    make_samples();
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) remove_picture(&cases[i]);
     mkdir(folder, 0777);
     /* Loads the image library, which then refuses the picture. */

@@ -1,5 +1,8 @@
 /* The image adaptor, called as libinsitu calls it: by the loader. What was written is read back by OpenImageIO and held
  * against the pixels, through the sRGB curve in double where the format has it. */
+#include <OpenImageIO/deepdata.h>
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imagebufalgo.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cmath>
@@ -40,7 +43,7 @@ struct picture {
     std::vector<float> rgba, depth;
     insitu_image view(bool with_depth) const
     {
-        return {width, height, rgba.data(), with_depth ? depth.data() : nullptr, nullptr, 0, nullptr};
+        return {width, height, rgba.data(), with_depth ? depth.data() : nullptr, nullptr, 0, nullptr, nullptr};
     }
 };
 
@@ -224,6 +227,108 @@ void exr_is_bitwise(void **)
     }
 }
 
+/* Any number of samples a pixel, none in the first. */
+struct deep_picture {
+    int width, height;
+    std::vector<insitu_deep_sample> samples;
+    std::vector<std::int64_t> first;
+    std::vector<std::uint32_t> counts;
+};
+
+deep_picture make_deep_picture(int width, int height)
+{
+    deep_picture p{width, height, {}, {}, {}};
+    for (std::size_t i = 0; i < static_cast<std::size_t>(width) * static_cast<std::size_t>(height); i++) {
+        const auto count = static_cast<std::uint32_t>(i % 5 == 0 ? 0 : hash(static_cast<std::uint32_t>(i)) % 12);
+        p.first.push_back(static_cast<std::int64_t>(p.samples.size()));
+        p.counts.push_back(count);
+        for (std::size_t n = 0; n < count; n++) {
+            insitu_deep_sample sample = {};
+            sample.rgba[3] = number(7 * i + n);
+            for (std::size_t c = 0; c < 3; c++) sample.rgba[c] = sample.rgba[3] * number(11 * i + 3 * n + c);
+            sample.z = static_cast<float>(n) + 1;
+            sample.z_back = n % 2 ? sample.z : sample.z + 0.75F;
+            p.samples.push_back(sample);
+        }
+        p.samples.push_back({}); /* samples of pixels need not follow each other */
+    }
+    return p;
+}
+
+insitu_status write_deep(const deep_picture &p, const fs::path &path, base_error &error)
+{
+    const insitu_deep deep = {p.samples.data(), p.first.data(), p.counts.data()};
+    insitu_image image = {};
+    image.width = p.width;
+    image.height = p.height;
+    image.deep = &deep;
+    return write(image, INSITU_DEEP_EXR, path, error);
+}
+
+void check_deep_pixel(const deep_picture &p, const OIIO::DeepData &data, std::size_t i)
+{
+    assert_int_equal(data.samples(static_cast<std::int64_t>(i)), p.counts[i]);
+    for (std::uint32_t n = 0; n < p.counts[i]; n++) {
+        const insitu_deep_sample &sample = p.samples[static_cast<std::size_t>(p.first[i]) + n];
+        const float expected[6] = {sample.rgba[0], sample.rgba[1], sample.rgba[2],
+                                   sample.rgba[3], sample.z,       sample.z_back};
+        for (int c = 0; c < 6; c++) {
+            static const char *const names[6] = {"R", "G", "B", "A", "Z", "ZBack"};
+            int channel = 0;
+            while (channel < 6 && data.channelname(channel) != names[c]) channel++;
+            assert_true(channel < 6);
+            assert_true(data.deep_value(static_cast<std::int64_t>(i), channel, static_cast<int>(n)) == expected[c]);
+        }
+    }
+}
+
+void deep_exr_is_bitwise(void **)
+{
+    for (const auto &size : sizes) {
+        const deep_picture p = make_deep_picture(size[0], size[1]);
+        const fs::path path = folder / "deep" / "samples.exr";
+        base_error error;
+        if (write_deep(p, path, error) != INSITU_OK) fail_msg("%s", error.message);
+        const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path.string());
+        if (!input) fail_msg("%s", OIIO::geterror().c_str());
+        const OIIO::ImageSpec &spec = input->spec();
+        assert_true(spec.deep && spec.width == p.width && spec.height == p.height && spec.nchannels == 6);
+        assert_true(spec.format == OIIO::TypeDesc::FLOAT);
+        OIIO::DeepData data;
+        assert_true(input->read_native_deep_image(0, 0, data));
+        for (std::size_t i = 0; i < p.counts.size(); i++) check_deep_pixel(p, data, i);
+    }
+}
+
+/* Front to back, in double: each sample's colour by what the ones before it let through. */
+void check_flat_pixel(const deep_picture &p, std::size_t i, const float *flat)
+{
+    double expected[4] = {0, 0, 0, 0};
+    for (std::uint32_t n = 0; n < p.counts[i]; n++) {
+        const insitu_deep_sample &sample = p.samples[static_cast<std::size_t>(p.first[i]) + n];
+        const double through = 1 - expected[3];
+        for (std::size_t c = 0; c < 4; c++) expected[c] += through * static_cast<double>(sample.rgba[c]);
+    }
+    /* Three roundings of numbers up to 1 a sample, and one of what is left. */
+    const double bound = 4 * std::ldexp(1.0, -24) * p.counts[i];
+    for (std::size_t c = 0; c < 4; c++) assert_true(std::fabs(static_cast<double>(flat[c]) - expected[c]) <= bound);
+}
+
+/* By what oiiotool --flatten does. */
+void deep_exr_is_flattened_by_openimageio(void **)
+{
+    const deep_picture p = make_deep_picture(64, 33);
+    base_error error;
+    if (write_deep(p, folder / "flatten.exr", error) != INSITU_OK) fail_msg("%s", error.message);
+    const OIIO::ImageBuf flat = OIIO::ImageBufAlgo::flatten(OIIO::ImageBuf((folder / "flatten.exr").string()));
+    if (flat.has_error()) fail_msg("%s", flat.geterror().c_str());
+    for (std::size_t i = 0; i < p.counts.size(); i++) {
+        float pixel[6];
+        flat.getpixel(static_cast<int>(i % 64), static_cast<int>(i / 64), pixel);
+        check_flat_pixel(p, i, pixel);
+    }
+}
+
 std::size_t count_files(const fs::path &in)
 {
     std::size_t count = 0;
@@ -377,9 +482,13 @@ void nonsense_is_refused(void **)
     base_error error;
     assert_int_equal(write(no_pixels, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
     assert_int_equal(write(no_width, INSITU_PNG8, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
-    assert_int_equal(write(p.view(false), static_cast<insitu_image_format>(3), folder / "n.png", error),
-                     INSITU_ERROR_ARGUMENT);
+    insitu_image_format unknown = INSITU_PNG8;
+    const int number_of_none = 7;
+    static_assert(sizeof unknown == sizeof number_of_none, "an enum is an int");
+    std::memcpy(&unknown, &number_of_none, sizeof unknown); /* as a caller in C may */
+    assert_int_equal(write(p.view(false), unknown, folder / "n.png", error), INSITU_ERROR_ARGUMENT);
     assert_int_equal(write(p.view(false), INSITU_PNG8, "", error), INSITU_ERROR_ARGUMENT);
+    assert_int_equal(write(p.view(false), INSITU_DEEP_EXR, folder / "n.exr", error), INSITU_ERROR_ARGUMENT);
     assert_false(fs::exists(folder / "n.png"));
 }
 
@@ -396,6 +505,8 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(png_of_numbers_that_are_not_is_black),
         cmocka_unit_test(exr_is_bitwise),
         cmocka_unit_test(exr_has_channels_of_other_numbers),
+        cmocka_unit_test(deep_exr_is_bitwise),
+        cmocka_unit_test(deep_exr_is_flattened_by_openimageio),
         cmocka_unit_test(writing_leaves_the_picture_alone),
         cmocka_unit_test(unwritable_places_are_told),
         cmocka_unit_test(full_disk_is_told_and_leaves_the_old_picture),

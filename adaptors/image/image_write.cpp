@@ -4,7 +4,6 @@
  * and what goes wrong is said in a message. */
 #include "insitu/image_output.h"
 
-#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -15,12 +14,13 @@
 #include <cstring>
 #include <exception>
 #include <limits>
-#include <memory>
 #include <new>
 #include <string>
 #include <vector>
 
 #include "decorate.h"
+#include "deep_exr.h"
+#include "encoded_file.h"
 #include "memory_reserve.h"
 #include "picture_file.h"
 
@@ -178,55 +178,12 @@ OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
     return spec;
 }
 
-/* Reads a number of so many bytes, the least significant first. */
-std::uint64_t number_at(const std::vector<unsigned char> &file, std::size_t at, int bytes)
-{
-    std::uint64_t number = 0;
-    for (int i = bytes; i-- > 0;) number = number << 8 | file[at + static_cast<std::size_t>(i)];
-    return number;
-}
-
-/* OpenEXR may lose rows that its compressor has no memory for, and say nothing. In the table of blocks of rows, behind
- * the attributes (name, type, size and value each), such a block's place stays 0. */
-bool has_all_rows(const std::vector<unsigned char> &file, int height)
-{
-    enum { VERSION_END = 8, SIZE_BYTES = 4, PLACE_BYTES = 8, ZIP_ROWS = 16 };
-    std::size_t at = VERSION_END;
-    while (at < file.size() && file[at]) {
-        for (int text = 0; text < 2; text++) {
-            while (at < file.size() && file[at]) at++;
-            at++;
-        }
-        if (at + SIZE_BYTES > file.size()) return false;
-        at += SIZE_BYTES + static_cast<std::size_t>(number_at(file, at, SIZE_BYTES));
-    }
-    at++;
-    for (int row = 0; row < height; row += ZIP_ROWS, at += PLACE_BYTES)
-        if (at + PLACE_BYTES > file.size() || !number_at(file, at, PLACE_BYTES)) return false;
-    return true;
-}
-
-/* Throws. That a C library lacked memory is told by its words alone. */
-[[noreturn]] void fail_with(std::string what)
-{
-    for (const char *words : {"memory", "bad_alloc"})
-        if (what.find(words) != std::string::npos) throw std::bad_alloc();
-    std::replace(what.begin(), what.end(), '\n', ' ');
-    throw io_error(what);
-}
-
 /* The file as OpenImageIO makes it, in memory: its PNG writer does not notice a full disk. */
 void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixels, std::vector<unsigned char> &bytes)
 {
-    OIIO::attribute("threads", 1);
-    OIIO::attribute("exr_threads", -1); /* none but the caller's */
-    OIIO::Filesystem::IOVecOutput memory(bytes);
-    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(name, &memory);
-    if (!output) fail_with(OIIO::geterror());
-    output->threads(1);
-    if (!output->open(name, spec)) fail_with(output->geterror());
-    if (!output->write_image(spec.format, pixels)) fail_with(output->geterror());
-    if (!output->close() || output->has_error()) fail_with(output->geterror());
+    encoded_file file(name, spec, bytes);
+    if (!file.output().write_image(spec.format, pixels)) file.fail();
+    file.finish();
 }
 
 /* Large blocks are allocated first, so that the reserve is left to OpenImageIO and the libraries below it: for the
@@ -241,7 +198,7 @@ void write_pixels(const insitu_image &image, const layout &l, const void *pixels
     bytes.reserve(raw + raw / 8 + ADDED); /* noise does not compress, and formats add to it */
     const memory_reserve reserve(TABLES + ROWS * row);
     encode_file(l.file_name, l.describe(image, l), pixels, bytes);
-    if (l.describe == describe_exr && !has_all_rows(bytes, image.height)) throw std::bad_alloc();
+    if (l.describe == describe_exr) check_exr_rows(bytes.data(), bytes.size(), image.height, EXR_ZIP_ROWS);
     write_picture_file(path, bytes.data(), bytes.size());
 }
 
@@ -266,6 +223,7 @@ void write_undecorated(const insitu_image &image, insitu_image_format format, co
     case INSITU_PNG8: write_png<std::uint8_t>(image, OIIO::TypeDesc::UINT8, path); break;
     case INSITU_PNG16: write_png<std::uint16_t>(image, OIIO::TypeDesc::UINT16, path); break;
     case INSITU_EXR: write_exr(image, path); break;
+    case INSITU_DEEP_EXR: write_deep_exr(image.width, image.height, *image.deep, path); break;
     }
 }
 
@@ -276,7 +234,7 @@ std::string write(const insitu_image &image, insitu_image_format format, const s
     std::string warning;
     insitu_image finished = image;
     std::vector<float> rgba;
-    if (image.decorations) {
+    if (image.decorations && format != INSITU_DEEP_EXR) {
         rgba.assign(image.rgba, image.rgba + 4 * pixel_count(image));
         const memory_reserve reserve(FONT_TABLES);
         OIIO::attribute("threads", 1);
@@ -298,8 +256,9 @@ insitu_status fail(insitu_status status, const char *path, const char *what, cha
 extern "C" insitu_status insitu_image_write(const insitu_image *image, insitu_image_format format, const char *path,
                                             char *message, size_t size)
 {
-    const bool is_known = format == INSITU_PNG8 || format == INSITU_PNG16 || format == INSITU_EXR;
-    if (!image || !path || !*path || !image->rgba || image->width < 1 || image->height < 1 || !is_known) {
+    const bool is_flat = format == INSITU_PNG8 || format == INSITU_PNG16 || format == INSITU_EXR;
+    const bool has_pixels = image && (is_flat ? image->rgba != nullptr : format == INSITU_DEEP_EXR && image->deep);
+    if (!path || !*path || !has_pixels || image->width < 1 || image->height < 1) {
         return fail(INSITU_ERROR_ARGUMENT, path, "no image, no path, no pixels or an unknown format", message, size);
     }
     try {

@@ -6,6 +6,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "insitu/status.h"
 
@@ -16,7 +17,8 @@ extern "C" {
 typedef enum insitu_image_format {
     INSITU_PNG8 = 0,  /* sRGB, 8 bits a channel, straight alpha; no alpha channel where all is opaque */
     INSITU_PNG16 = 1, /* the same with 16 bits */
-    INSITU_EXR = 2    /* linear premultiplied float RGBA, the channel Z where depth is given, and channels */
+    INSITU_EXR = 2,   /* linear premultiplied float RGBA, the channel Z where depth is given, and channels */
+    INSITU_DEEP_EXR = 3 /* deep: any number of samples a pixel, each float R, G, B, A, Z and ZBack */
 } insitu_image_format;
 
 /* Where in the picture a decoration stands. Those of one place stack, and none lies over another. */
@@ -101,6 +103,19 @@ typedef struct insitu_channel {
     int stride;          /* floats from pixel to pixel, row-major, top row first */
 } insitu_channel;
 
+/* A stretch of a pixel's ray, or a surface, where z_back is z. */
+typedef struct insitu_deep_sample {
+    float rgba[4];   /* linear, premultiplied */
+    float z, z_back; /* depths as insitu_image has them */
+} insitu_deep_sample;
+
+/* What lies behind each other in the pixels of an image, rising with depth and not overlapping. Without background. */
+typedef struct insitu_deep {
+    const insitu_deep_sample *samples;
+    const int64_t *first;   /* row-major, height × width: of a pixel's samples, where they begin */
+    const uint32_t *counts; /* row-major, height × width: and how many they are */
+} insitu_deep;
+
 typedef struct insitu_image {
     int width, height;
     const float *rgba;  /* row-major, height × width × 4, top row first, linear, premultiplied */
@@ -110,6 +125,7 @@ typedef struct insitu_image {
     const insitu_decorations *decorations; /* NULL: none, and rgba has its background */
     int channel_count;
     const insitu_channel *channels; /* borrowed; passed over where the format has none */
+    const insitu_deep *deep;        /* NULL, or what a deep format holds, in place of all else but the size */
 } insitu_image;
 
 /* Write to a temporary file beside path and rename, so that path is never half a picture; missing folders are made. The
