@@ -17,27 +17,30 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-static insitu_status merge_alone(const comp_layout *layout, fragment_list *items, const float background[4], image *out,
-                                 unsigned char *overlaps, comp_statistics *statistics, base_error *error)
+static insitu_status merge_alone(const comp_layout *layout, fragment_list *items, const float background[4],
+                                 const comp_merged *merged, comp_statistics *statistics, base_error *error)
 {
     const double start = MPI_Wtime();
     if (!comp_bucket_fits(layout, items->items, items->count))
         return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
-    comp_pixels_clear(layout, out, background);
-    const insitu_status status = comp_pixels_merge(layout, 0, items, background, out, NULL, overlaps, error);
+    comp_pixels_clear(layout, merged->out, background);
+    const insitu_status status = comp_pixels_merge(layout, 0, items, background, merged, error);
     statistics->merge_ms = milliseconds_since(start);
     return status;
 }
 
-static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, int rank, fragment_list *owned,
-                                      const float background[4], image *out, unsigned char *overlaps,
+static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, fragment_list *owned,
+                                      const float background[4], image *out, comp_merged *merged,
                                       comp_statistics *statistics, base_error *error)
 {
     const double start = MPI_Wtime();
     comp_pixel_list finished = {NULL, 0};
-    image *const here = rank == 0 ? out : NULL;
-    if (here) comp_pixels_clear(layout, here, background);
-    insitu_status status = comp_pixels_merge(layout, rank, owned, background, here, &finished, overlaps, error);
+    int rank = 0;
+    MPI_Comm_rank(comm, &rank);
+    merged->out = rank == 0 ? out : NULL;
+    merged->finished = &finished;
+    if (merged->out) comp_pixels_clear(layout, out, background);
+    insitu_status status = comp_pixels_merge(layout, rank, owned, background, merged, error);
     base_free(owned->items);
     status = comp_agree(comm, status, error);
     statistics->merge_ms = milliseconds_since(start);
@@ -61,21 +64,47 @@ static insitu_status layout_of(MPI_Comm comm, const image *out, int threads, com
     return INSITU_OK;
 }
 
-static insitu_status composite(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
-                               const float background[4], image *out, unsigned char *overlaps,
-                               comp_statistics *statistics, base_error *error)
+static insitu_status composite_flat(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
+                                    const float background[4], image *out, comp_merged *merged,
+                                    comp_statistics *statistics, base_error *error)
 {
-    int rank = 0;
-    MPI_Comm_rank(comm, &rank);
     statistics->sent_fragments = items->count;
-    if (layout->ranks == 1) return merge_alone(layout, items, background, out, overlaps, statistics, error);
+    merged->out = out;
+    if (layout->ranks == 1) return merge_alone(layout, items, background, merged, statistics, error);
     const double start = MPI_Wtime();
     fragment_list owned = {NULL, 0, 0};
     const insitu_status status =
         comp_exchange_direct(comm, layout, items, comp_message_fragments, &owned, &statistics->sent_bytes, error);
     statistics->exchange_ms = milliseconds_since(start);
     if (status != INSITU_OK) return status;
-    return merge_and_gather(comm, layout, rank, &owned, background, out, overlaps, statistics, error);
+    return merge_and_gather(comm, layout, &owned, background, out, merged, statistics, error);
+}
+
+/* A list a thread. */
+static insitu_status composite_deep(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
+                                    const float background[4], image *out, comp_merged *merged,
+                                    comp_statistics *statistics, base_error *error)
+{
+    merged->deep = base_calloc((size_t)layout->threads, sizeof *merged->deep);
+    insitu_status status = INSITU_OK;
+    if (!merged->deep) status = base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image");
+    status = comp_agree(comm, status, error);
+    if (!status) status = composite_flat(comm, layout, items, background, out, merged, statistics, error);
+    if (!status)
+        status = comp_deep_gather(comm, merged->deep, layout->threads, out->deep, &statistics->sent_bytes, error);
+    else if (merged->deep)
+        comp_deep_free(merged->deep, layout->threads);
+    base_free(merged->deep);
+    return status;
+}
+
+static insitu_status composite(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
+                               const float background[4], image *out, unsigned char *overlaps,
+                               comp_statistics *statistics, base_error *error)
+{
+    comp_merged merged = {.overlaps = overlaps};
+    return (out->deep ? composite_deep : composite_flat)(comm, layout, items, background, out, &merged, statistics,
+                                                         error);
 }
 
 insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,

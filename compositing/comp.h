@@ -43,10 +43,10 @@ typedef struct comp_statistics {
 } comp_statistics;
 
 /* Collective over comm, on which only compositing talks. out->rgba must be allocated on rank 0, out->depth may be
- * (width and height set on all ranks), and are filled there; elsewhere they are not touched. items is reordered. An
- * error on one rank (memory) is an error on all. threads: of this rank, 0: as many as OpenMP would take. statistics may
- * be NULL.
- */
+ * (width and height set on all ranks), and are filled there; elsewhere they are not touched. out->deep may be given, on
+ * all ranks: rank 0's, whose first and counts are allocated, gets the samples of the pixels that have fragments
+ * (comp_deep.h), with t for their depths. items is reordered. An error on one rank (memory) is an error on all. threads:
+ * of this rank, 0: as many as OpenMP would take. statistics may be NULL. */
 insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
                              comp_statistics *statistics, base_error *error);
 

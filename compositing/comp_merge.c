@@ -16,6 +16,8 @@
  *     |  a   |  a and b |   b   |
  *
  * Whoever makes them sees to it that they are short enough for that (render/kernel_segments.h). */
+#include "comp_merge.h"
+
 #include "comp.h"
 
 #include <math.h>
@@ -246,24 +248,54 @@ static bool is_overlapped(const fragment *sorted, int64_t count)
     return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
+/* Who takes the stretches that are blended. take NULL: nobody. */
+typedef struct stretch_sink {
+    comp_stretch_taker *take;
+    void *state;
+} stretch_sink;
+
+static void hand_over(const stretch_sink *sink, const blend *b, const fragment *of, float from, float to)
+{
+    fragment stretch = *of;
+    stretch.t_in = from;
+    stretch.t_out = to;
+    for (int c = 0; c < 3; c++) stretch.colour[c] = (float)b->colour[c];
+    stretch.transmittance = (float)b->transmittance;
+    sink->take(sink->state, &stretch);
+}
+
+/* As blend_mixed(), and for the sink what is mixed. */
+static void blend_cut(blend *b, const fragment *items, int64_t count, float from, float to, const stretch_sink *sink)
+{
+    blend own = {{0, 0, 0}, 1};
+    if (sink->take) {
+        blend_mixed(&own, items, count, from, to);
+        hand_over(sink, &own, items, from, to);
+    }
+    blend_mixed(b, items, count, from, to);
+}
+
 /* The fragments from the first on to where none goes on; returns how many they are. Stretches under way are kept at the
  * front, so that a cut costs no more than what is mixed in it: a thousand short ones behind each other beside a long
  * one are a thousand cuts of two. The fragments are in order again in the end. */
-static int64_t blend_run(blend *b, fragment *sorted, int64_t count)
+static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const stretch_sink *sink)
 {
     float at = sorted[0].t_in;
     int64_t open = 0, end = 0;
     for (;;) {
-        for (; end < count && sorted[end].t_in <= at; end++)
-            if (has_length(&sorted[end]))
+        for (; end < count && sorted[end].t_in <= at; end++) {
+            if (has_length(&sorted[end])) {
                 exchange(sorted, open++, end);
-            else
+            } else {
                 blend_over(b, &sorted[end]);
+                if (sink->take) sink->take(sink->state, &sorted[end]);
+            }
+        }
         open = keep_open(sorted, open, at);
         if (open == 0 || b->transmittance == 0) break;
         float to = next_end(sorted, open);
         if (end < count && sorted[end].t_in < to) to = sorted[end].t_in;
-        blend_mixed(b, sorted, open, at, to);
+        blend_cut(b, sorted, open, at, to, sink);
         at = to;
     }
     sort(sorted, end);
@@ -282,13 +314,14 @@ static void blend_single(const fragment *f, const float background[4], float out
 static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
                                                    float out_rgba[4], float *out_depth)
 {
+    static const stretch_sink nobody = {NULL, NULL};
     sort(items, count);
     float colour[3] = {0, 0, 0};
     float transmittance = 1;
     for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
         if (is_overlapped(items + i, count - i)) {
             blend run = {{0, 0, 0}, 1};
-            n = blend_run(&run, items + i, count - i);
+            n = blend_run(&run, items + i, count - i, &nobody);
             for (int c = 0; c < 3; c++) colour[c] += transmittance * (float)run.colour[c];
             transmittance *= (float)run.transmittance;
             continue;
@@ -309,4 +342,22 @@ void comp_merge_pixel(fragment *items, int64_t count, const float background[4],
         blend_single(items, background, out_rgba, out_depth);
     else
         blend_sorted(items, count, background, out_rgba, out_depth);
+}
+
+void comp_merge_cut(fragment *sorted, int64_t count, comp_stretch_taker *take, void *state)
+{
+    const stretch_sink sink = {take, state};
+    float transmittance = 1;
+    for (int64_t i = 0, n; i < count && transmittance != 0; i += n) {
+        if (is_overlapped(sorted + i, count - i)) {
+            blend run = {{0, 0, 0}, 1};
+            n = blend_run(&run, sorted + i, count - i, &sink);
+            transmittance *= (float)run.transmittance;
+            continue;
+        }
+        n = samples_at(sorted + i, count - i);
+        const fragment f = n == 1 ? sorted[i] : mix_samples(sorted + i, n);
+        take(state, &f);
+        transmittance *= f.transmittance;
+    }
 }

@@ -11,6 +11,7 @@
 #include "comp_pixels.h"
 
 #include <math.h>
+#include <omp.h>
 #include <string.h>
 
 #include "comp.h"
@@ -32,6 +33,7 @@ typedef struct merging {
     image *out;
     comp_pixel *finished;
     unsigned char *overlaps;
+    comp_deep_list *deep;
 } merging;
 
 /* One thread's. */
@@ -139,6 +141,7 @@ static void blend_slice(merging *m, int64_t slice, scratch *own)
         comp_pixel pixel = {.pixel = items->pixel};
         comp_merge_pixel(items, count, m->background, pixel.rgba, &pixel.depth);
         if (m->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(m->overlaps, pixel.pixel);
+        if (m->deep) comp_deep_add(&m->deep[omp_get_thread_num()], items, count);
         if (m->out)
             comp_pixels_store(m->out, &pixel);
         else
@@ -196,13 +199,16 @@ static bool merge(merging *m)
 }
 
 insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
-                                const float background[4], image *out, comp_pixel_list *finished,
-                                unsigned char *overlaps, base_error *error)
+                                const float background[4], const comp_merged *merged, base_error *error)
 {
-    if (!out) *finished = (comp_pixel_list){NULL, 0};
+    if (!merged->out) *merged->finished = (comp_pixel_list){NULL, 0};
     if (fragments->count == 0) return INSITU_OK;
     const int64_t owned = comp_layout_owned(layout, rank);
-    merging m = {.layout = layout, .background = background, .out = out, .overlaps = overlaps};
+    merging m = {.layout = layout,
+                 .background = background,
+                 .out = merged->out,
+                 .overlaps = merged->overlaps,
+                 .deep = merged->deep};
     m.items = fragments->items;
     m.count = fragments->count;
     m.slice_shift = least_slice_shift;
@@ -210,8 +216,8 @@ insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_li
     m.slices = ((owned - 1) >> m.slice_shift) + 1;
     m.blocks = (m.count - 1) / block_fragments + 1;
     const bool well = merge(&m);
-    if (well && !out)
-        *finished = (comp_pixel_list){m.finished, close_up(&m)};
+    if (well && !m.out)
+        *merged->finished = (comp_pixel_list){m.finished, close_up(&m)};
     else
         base_free(m.finished);
     base_free(m.pixel_counts);

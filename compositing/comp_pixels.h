@@ -2,6 +2,7 @@
 #ifndef COMP_COMP_PIXELS_H
 #define COMP_COMP_PIXELS_H
 
+#include "comp_deep.h"
 #include "comp_schedule.h"
 #include "error.h"
 #include "fragment.h"
@@ -30,11 +31,18 @@ void comp_pixels_clear(const comp_layout *layout, image *out, const float backgr
 
 void comp_pixels_store(image *out, const comp_pixel *from);
 
-/* Merge the pixels that have fragments; all of fragments belong to pixels that rank owns, and are reordered. Where out
- * is given they are written there, else they become *finished, rising by owned index. Those whose fragments overlap are
- * added to overlaps (pixel_set.h; may be NULL). Local. On an error *finished is empty, and out may hold some pixels. */
+/* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned index.
+ */
+typedef struct comp_merged {
+    image *out;
+    comp_pixel_list *finished;
+    unsigned char *overlaps; /* pixel_set.h: those whose fragments overlap are added. NULL: not wanted */
+    comp_deep_list *deep;    /* as many as the layout has threads: what they hold is added. NULL: not wanted */
+} comp_merged;
+
+/* Merge the pixels that have fragments; all of fragments belong to pixels that rank owns, and are reordered. Local. On
+ * an error *finished is empty, and out and deep may hold some pixels. */
 insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
-                                const float background[4], image *out, comp_pixel_list *finished,
-                                unsigned char *overlaps, base_error *error);
+                                const float background[4], const comp_merged *merged, base_error *error);
 
 #endif

@@ -22,6 +22,9 @@ insitu_add_mpi_test(session_surfaces test_session_surfaces 1 2 3 4 7 TIMEOUT 120
 insitu_session_program(test_session_channels)
 insitu_add_mpi_test(session_channels test_session_channels 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_deep)
+insitu_add_mpi_test(session_deep test_session_deep 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_smooth)
 insitu_add_mpi_test(session_smooth test_session_smooth 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -91,7 +91,7 @@ static void serial_merge(fragment *all, int64_t count, image *out)
 static image make_image(int width, int height)
 {
     const size_t pixels = (size_t)width * (size_t)height;
-    image made = {width, height, base_alloc(16 * pixels), base_alloc(4 * pixels)};
+    image made = {width, height, base_alloc(16 * pixels), base_alloc(4 * pixels), NULL};
     assert_true(made.rgba && made.depth);
     memset(made.rgba, 0xa5, 16 * pixels);
     memset(made.depth, 0xa5, 4 * pixels);
@@ -266,7 +266,8 @@ static void long_messages_are_cut(void **context)
     image *const here = own_rank == 0 ? &s.out : NULL;
     comp_pixel_list finished = {NULL, 0};
     if (here) comp_pixels_clear(&layout, here, background);
-    status = comp_pixels_merge(&layout, own_rank, &owned, background, here, &finished, NULL, NULL);
+    status = comp_pixels_merge(&layout, own_rank, &owned, background,
+                               &(comp_merged){.out = here, .finished = &finished}, NULL);
     assert_everywhere(status == INSITU_OK, "merge succeeds");
     status = comp_gather(comm, &finished, 5, &s.out, &bytes, NULL);
     assert_everywhere(status == INSITU_OK, "gather in messages of 5 succeeds");
@@ -321,7 +322,7 @@ static void pixel_beyond_the_image_is_an_error_on_all(void **context)
 static void image_without_pixels_is_refused(void **context)
 {
     (void)context;
-    image none = {0, 4, NULL, NULL}, huge = {65536, 65536, NULL, NULL};
+    image none = {0, 4, NULL, NULL, NULL}, huge = {65536, 65536, NULL, NULL, NULL};
     fragment_list items = {NULL, 0, 0};
     assert_everywhere(comp_composite(comm, &items, background, 0, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
     assert_everywhere(comp_composite(comm, &items, background, 0, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");

@@ -41,7 +41,7 @@ insitu_decorations plain()
 std::vector<float> draw(const std::vector<float> &rgba, const insitu_decorations &d)
 {
     std::string warning;
-    const insitu_image image{width, height, rgba.data(), nullptr, &d, 0, nullptr};
+    const insitu_image image{width, height, rgba.data(), nullptr, &d, 0, nullptr, nullptr};
     std::vector<float> out = rgba;
     decorate(image, out, warning);
     assert_string_equal(warning.c_str(), "");
@@ -180,7 +180,7 @@ void words_are_written_at_their_anchor(void **)
 /* Any blocks for which there is room are apart, and within the picture. */
 void blocks_do_not_overlap(void **)
 {
-    const insitu_image image{1000, 800, nullptr, nullptr, nullptr, 0, nullptr};
+    const insitu_image image{1000, 800, nullptr, nullptr, nullptr, 0, nullptr, nullptr};
     std::srand(3);
     for (int round = 0; round < 2000; round++) {
         std::vector<area> taken;

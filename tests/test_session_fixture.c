@@ -168,12 +168,19 @@ void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spo
     step_is_good(session, 2);
 }
 
+void free_caught(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+    free(picture->data);
+    free(picture->samples);
+    free(picture->first);
+    *picture = (caught_picture){0};
+}
+
 void forget_pictures(void)
 {
-    for (int i = 0; i < caught_count; i++) {
-        free(caught[i].rgba);
-        free(caught[i].depth);
-    }
+    for (int i = 0; i < caught_count; i++) free_caught(&caught[i]);
     caught_count = 0;
 }
 
@@ -181,31 +188,54 @@ bool session_writes_behind;
 
 void session_load_image_library(void) {}
 
+/* False: no memory. */
+static bool catch_deep(const insitu_deep *deep, size_t pixels, caught_picture *out)
+{
+    int64_t count = 0;
+    for (size_t p = 0; p < pixels; p++) count += deep->counts[p];
+    out->samples = malloc((size_t)(count + 1) * sizeof *out->samples);
+    out->first = malloc((pixels + 1) * sizeof *out->first);
+    if (!out->samples || !out->first) return false;
+    out->first[0] = 0;
+    for (size_t p = 0; p < pixels; p++) {
+        out->first[p + 1] = out->first[p] + deep->counts[p];
+        if (deep->counts[p])
+            memcpy(out->samples + out->first[p], deep->samples + deep->first[p],
+                   deep->counts[p] * sizeof *out->samples);
+    }
+    return true;
+}
+
+static bool catch_pixels(const insitu_image *image, size_t pixels, caught_picture *out)
+{
+    out->rgba = malloc(pixels * 4 * sizeof(float));
+    if (image->depth) out->depth = malloc(pixels * sizeof(float));
+    out->channel_count = image->channel_count;
+    if (image->channel_count) out->data = malloc(pixels * (size_t)image->channel_count * sizeof(float));
+    if (!out->rgba || (image->depth && !out->depth) || (image->channel_count && !out->data)) return false;
+    memcpy(out->rgba, image->rgba, pixels * 4 * sizeof(float));
+    if (image->depth) memcpy(out->depth, image->depth, pixels * sizeof(float));
+    for (int c = 0; c < image->channel_count; c++)
+        for (size_t p = 0; p < pixels; p++)
+            out->data[pixels * (size_t)c + p] = image->channels[c].values[p * (size_t)image->channels[c].stride];
+    return !image->deep || catch_deep(image->deep, pixels, out);
+}
+
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error)
 {
-    (void)format;
     if (before_writing) before_writing();
     if (unwritable && strstr(path, unwritable)) return base_fail(error, INSITU_ERROR_IO, "%s: cannot be written", path);
     if (caught_count == MAX_CAUGHT) return base_fail(error, INSITU_ERROR_INTERNAL, "too many pictures for the test");
+    if ((format == INSITU_DEEP_EXR) != (image->deep != NULL))
+        return base_fail(error, INSITU_ERROR_INTERNAL, "%s: the format and what is given differ", path);
     const size_t pixels = (size_t)image->width * (size_t)image->height;
     caught_picture picture = {.width = image->width, .height = image->height, .held = base_memory_held()};
     snprintf(picture.path, sizeof picture.path, "%s", path);
-    picture.rgba = malloc(pixels * 4 * sizeof(float));
-    if (image->depth) picture.depth = malloc(pixels * sizeof(float));
-    picture.channel_count = image->channel_count;
-    if (image->channel_count) picture.data = malloc(pixels * (size_t)image->channel_count * sizeof(float));
-    if (!picture.rgba || (image->depth && !picture.depth) || (image->channel_count && !picture.data)) {
-        free(picture.rgba);
-        free(picture.depth);
-        free(picture.data);
+    if (!catch_pixels(image, pixels, &picture)) {
+        free_caught(&picture);
         return base_fail(error, INSITU_ERROR_MEMORY, "%s: no memory to catch it", path);
     }
-    memcpy(picture.rgba, image->rgba, pixels * 4 * sizeof(float));
-    if (image->depth) memcpy(picture.depth, image->depth, pixels * sizeof(float));
-    for (int c = 0; c < image->channel_count; c++)
-        for (size_t p = 0; p < pixels; p++)
-            picture.data[pixels * (size_t)c + p] = image->channels[c].values[p * (size_t)image->channels[c].stride];
     caught[caught_count++] = picture;
     return INSITU_OK;
 }

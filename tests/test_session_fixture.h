@@ -12,6 +12,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "insitu/image_output.h"
 #include "insitu/insitu.h"
 #include "test_meshes.h"
 
@@ -79,6 +80,8 @@ typedef struct caught_picture {
     float *rgba, *depth; /* depth NULL where none was given */
     int channel_count;
     float *data; /* the channels one after the other; NULL where there are none */
+    insitu_deep_sample *samples; /* of a deep picture, pixel by pixel; else NULL */
+    int64_t *first;              /* pixels + 1: of samples */
     char path[256];
     int64_t held; /* bytes that the library held when it was written */
 } caught_picture;
@@ -87,6 +90,7 @@ enum { MAX_CAUGHT = 64 };
 extern caught_picture caught[MAX_CAUGHT];
 extern int caught_count;
 void forget_pictures(void);
+void free_caught(caught_picture *picture);
 
 /* Paths with this in them cannot be written. NULL: all can. */
 extern const char *unwritable;

@@ -11,6 +11,7 @@
 #include "session_agree.h"
 #include "session_channels.h"
 #include "session_decorations.h"
+#include "session_deep.h"
 #include "session_files.h"
 #include "session_frame.h"
 #include "session_layers.h"
@@ -29,6 +30,7 @@ typedef struct canvas {
     double *edge_sums;
     double *sum; /* NULL: there is one frame */
     session_channels channels;
+    deep_image deep;
     session_decorations *decorations; /* NULL: there are none, and the frame has its background */
 } canvas;
 
@@ -40,6 +42,7 @@ static void canvas_free(canvas *c, session_writer *writer)
     base_free(c->edges);
     base_free(c->edge_sums);
     session_free_channels(&c->channels);
+    session_free_deep(&c->deep);
     session_free_decorations(c->decorations);
 }
 
@@ -78,7 +81,7 @@ static insitu_status canvas_create(const session_drawing *d, const scene_image *
     if (!out->frame.rgba || (is_summed && !out->sum))
         return session_no_memory(error, (int64_t)(bytes + (is_summed ? pixels * 4 * sizeof *out->sum : 0)),
                                  "a picture");
-    return INSITU_OK;
+    return session_wants_deep(image) ? session_begin_deep(&out->deep, image, error) : INSITU_OK;
 }
 
 static void canvas_add(canvas *c, int threads)
@@ -137,6 +140,7 @@ static void canvas_finish(canvas *c, int frames, const render_space *space, int 
     if (c->sum) average_frames(c, frames, threads);
     average_edges(c, frames, threads);
     if (c->frame.depth) scale_depths(c, space, threads);
+    session_finish_deep(&c->deep, space, threads);
 }
 
 /* ---- frames -------------------------------------------------------------------------------------------------- */
@@ -194,12 +198,15 @@ typedef struct frames_basis {
     session_frame_target target;
     canvas *canvas;
     int64_t overlaps; /* pixels, at most of any frame */
+    deep_image *deep; /* of the next frame; NULL: not wanted, or drawn */
 } frames_basis;
 
 static insitu_status draw_frame(frames_basis *b, const render_job *job, image *out, base_error *error)
 {
     session_frame frame;
+    out->deep = b->deep;
     const insitu_status status = session_draw_frame(&b->target, job, out, &frame, error);
+    out->deep = b->deep = NULL;
     report_frame(&b->drawing->report->numbers, &frame);
     if (!status && frame.overlaps > b->overlaps) b->overlaps = frame.overlaps;
     return status;
@@ -260,7 +267,8 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
 {
     static const float no_background[4] = {0, 0, 0, 0}; /* edges may go between it and the picture */
     const float *background = image->decorations.is_given ? no_background : image->background;
-    frames_basis basis = {d, {d->team->comm, d->team->compositing_comm, background, overlap_fragments}, canvas, 0};
+    frames_basis basis = {d, {d->team->comm, d->team->compositing_comm, background, overlap_fragments}, canvas, 0,
+                          session_wants_deep(image) ? &canvas->deep : NULL};
     render_job job = make_job(d, image, view, layers);
     const insitu_status status = draw_all(&basis, image, &job, error);
     if (status) return status;
@@ -297,9 +305,11 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     files->frame = c->frame;
     files->memory = c->memory;
     files->channels = c->channels;
+    files->deep = c->deep;
     files->decorations = c->decorations;
     c->memory = (session_picture){0};
     c->channels = (session_channels){0};
+    c->deep = (deep_image){0};
     c->decorations = NULL;
     session_writer_give(d->writer, files, d->report, error);
 }

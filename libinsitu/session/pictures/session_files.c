@@ -3,17 +3,20 @@
 #include <time.h>
 
 #include "memory.h"
+#include "session_deep.h"
 #include "session_image.h"
 
 int64_t session_files_bytes(const session_files *files)
 {
     const int64_t frame = (int64_t)files->frame.width * files->frame.height * 4 * (int64_t)sizeof(float);
-    return (int64_t)files->memory.bytes + (files->channels.normals ? 2 * frame : 0);
+    return (int64_t)files->memory.bytes + (files->channels.normals ? 2 * frame : 0) +
+           session_deep_bytes(&files->deep, files->frame.width, files->frame.height);
 }
 
-static insitu_image_format format_of(scene_format format)
+static insitu_image_format format_of(const scene_output *output)
 {
-    switch (format) {
+    if (output->is_deep) return INSITU_DEEP_EXR;
+    switch (output->format) {
     case SCENE_PNG8: return INSITU_PNG8;
     case SCENE_PNG16: return INSITU_PNG16;
     case SCENE_EXR: return INSITU_EXR;
@@ -29,17 +32,19 @@ static void write_output(session_files *files, const scene_output *output)
         base_fail(&files->error, INSITU_ERROR_MEMORY, "no memory for the name of a picture");
         return;
     }
+    const insitu_deep deep = {files->deep.samples, files->deep.first, files->deep.counts};
     const insitu_image picture = {.width = files->frame.width,
                                   .height = files->frame.height,
                                   .rgba = files->frame.rgba,
                                   .depth = output->format == SCENE_EXR ? files->frame.depth : NULL,
                                   .channel_count = output->has_data ? SESSION_CHANNELS : 0,
                                   .channels = files->channels.items,
+                                  .deep = output->is_deep ? &deep : NULL,
                                   .decorations = !decorations              ? NULL
                                                  : output->has_decorations ? &decorations->all
                                                                            : &decorations->background};
     base_error reason = {0};
-    if (session_write_image(&picture, format_of(output->format), path, &reason) != INSITU_OK)
+    if (session_write_image(&picture, format_of(output), path, &reason) != INSITU_OK)
         base_fail(&files->error, reason.status, "image \"%s\": %.900s", files->image.name, reason.message);
     else if (output->database >= 0)
         session_note_picture(files->cinema, files->scene, &files->image, output, &files->moment, &files->error);
@@ -69,6 +74,7 @@ void session_files_free(session_files *files)
     if (!files) return;
     session_drop_picture(&files->memory);
     session_free_channels(&files->channels);
+    session_free_deep(&files->deep);
     session_free_decorations(files->decorations);
     base_free(files);
 }

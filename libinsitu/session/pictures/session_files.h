@@ -24,6 +24,7 @@ typedef struct session_files {
     image frame;
     session_picture memory; /* of the frame */
     session_channels channels;
+    deep_image deep; /* without counts: there is none */
     session_decorations *decorations; /* NULL: none, and the frame has its background */
     base_error error;                 /* the first reason why a file could not be written */
     base_error warning;               /* of status INSITU_OK: what was left out of the last file */

@@ -45,7 +45,7 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
-    if (ranks == 1 && job->part_count > 0) return draw_alone(t, job, out, frame, overlaps, error);
+    if (ranks == 1 && job->part_count > 0 && !out->deep) return draw_alone(t, job, out, frame, overlaps, error);
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
@@ -113,6 +113,14 @@ static void copy_pixels(const unsigned char *pixels, const image *from, image *t
     }
 }
 
+/* Of rank 0's deep picture: the pixels' samples come anew. */
+static void forget_samples(const unsigned char *pixels, const image *out)
+{
+    const int64_t count = (int64_t)out->width * out->height;
+    for (int64_t p = 0; p < count; p++)
+        if (pixel_set_has(pixels, p)) out->deep->counts[p] = 0;
+}
+
 /* A second picture beside the first, on rank 0, of so many pixels at once. */
 typedef struct second_picture {
     image picture;
@@ -125,7 +133,7 @@ static insitu_status second_create(const session_frame_target *t, const comp_ove
     const int64_t pixels = (int64_t)first->width * first->height;
     image *second = &out->picture;
     int rank = 0;
-    *out = (second_picture){.picture = {.width = first->width, .height = first->height}};
+    *out = (second_picture){.picture = {.width = first->width, .height = first->height, .deep = first->deep}};
     out->turn = base_alloc(pixel_set_bytes(pixels));
     MPI_Comm_rank(t->comm, &rank);
     if (rank == 0) {
@@ -157,6 +165,7 @@ static insitu_status redraw(const session_frame_target *t, const render_job *job
     for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
         comp_overlaps found = {0};
         at = take_pixels(out, overlaps->pixels, at, most, second->turn);
+        if (out->deep && out->deep->counts) forget_samples(second->turn, out);
         const insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
         base_free(found.pixels);

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "memory.h"
+#include "session_deep.h"
 #include "session_files.h"
 #include "session_image.h"
 
@@ -172,6 +173,7 @@ static void finish_first(session_writer *w)
     w->waiting_bytes -= session_files_bytes(files);
     keep_memory(w, &files->memory);
     session_free_channels(&files->channels);
+    session_free_deep(&files->deep);
     append(&w->done, &w->last_done, files);
     pthread_cond_broadcast(&w->has_changed);
 }

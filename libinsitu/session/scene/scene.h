@@ -263,6 +263,7 @@ typedef struct scene_output {
     scene_format format;  /* by the ending; bits: 16 makes SCENE_PNG16. EXR holds float colour and depth */
     bool has_decorations; /* of the image, if that has any */
     bool has_data;        /* of EXR: the nearest surface's normal, value and numbers too */
+    bool is_deep;         /* an EXR of all that lies behind each other in a pixel */
     int database;         /* index of the scene's, in which the picture is a line; -1: none */
     int folder_bytes;     /* of path that are the database's folder and its slash; 0 without a database */
 } scene_output;

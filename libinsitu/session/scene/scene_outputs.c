@@ -171,6 +171,18 @@ static insitu_status convert_format(const scene_document *d, const char *path, c
                                    : scene_bad(d, path, "bits", "%d is not allowed, expected 8 or 16", bits);
 }
 
+static insitu_status convert_deep(const scene_document *d, const char *path, const scene_file_output *in,
+                                  scene_output *out)
+{
+    out->is_deep = in->deep && *in->deep;
+    if (!out->is_deep) return INSITU_OK;
+    if (out->format != SCENE_EXR) return scene_bad(d, path, "deep", "given for a PNG, expected for an EXR only");
+    if (out->has_data) return scene_bad(d, path, "deep", "given with data: true, expected a file for each");
+    if (in->decorations && *in->decorations)
+        return scene_bad(d, path, "deep", "given with decorations: true, which a deep picture has none of");
+    return INSITU_OK;
+}
+
 static insitu_status convert_output(const scene_document *d, const char *path, const scene_file_output *in,
                                     const scene_image *image, scene_output *out)
 {
@@ -181,6 +193,8 @@ static insitu_status convert_output(const scene_document *d, const char *path, c
     out->has_data = in->data && *in->data;
     if (out->has_data && out->format != SCENE_EXR)
         return scene_bad(d, path, "data", "given for a PNG, expected for an EXR only");
+    status = convert_deep(d, path, in, out);
+    if (status) return status;
     out->has_decorations = in->decorations ? *in->decorations : out->format != SCENE_EXR;
     if (in->cinema) return scene_convert_cinema(d, path, in, image, out);
     out->path = base_strdup(in->path);

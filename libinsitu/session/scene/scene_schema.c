@@ -163,6 +163,13 @@ DEFINE_MAPPING(decorations, "decorations", DECORATIONS_KEYS);
               "the field that colours it, or its isovalue; layer is the number of its layer in the list, from 0, and " \
               "surface that of its isovalue or plane in the layer. 0, NaN and -1 where there is no surface. Two "      \
               "frames of surfaces more are drawn.",                                                                    \
+      .by_default = "`false`")                                                                                         \
+    X(CYAML_FIELD_BOOL_PTR("deep", OPTIONAL, scene_file_output, deep),                                                 \
+      .help = "A deep EXR: of every pixel all that lies behind each other, as R, G, B (linear, times A), A, Z and "    \
+              "ZBack, from what is nearest on. A surface is a sample with Z and ZBack the same, of volumes each is a " \
+              "stretch; none overlaps another, and nothing stands for the background. `oiiotool --flatten` makes the " \
+              "picture of it. Through the pixel's centre, whatever `antialias` and `frames` are; with neither "        \
+              "`decorations` nor `data`. 24 bytes a sample and 12 a pixel are held on rank 0 until it is written.",    \
       .by_default = "`false`")
 DEFINE_MAPPING(output, "outputs", OUTPUT_KEYS);
 

@@ -194,7 +194,7 @@ typedef struct scene_file_sweep {
 typedef struct scene_file_output {
     char *path, *cinema;
     int *bits;
-    bool *decorations, *data;
+    bool *decorations, *data, *deep;
 } scene_file_output;
 
 typedef struct scene_file_condition {

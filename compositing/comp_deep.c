@@ -1,0 +1,214 @@
+/* Samples are cut by the rule of merging (comp_merge_cut()), so that flat and deep pictures cannot differ in it. Of each
+ * owner rank 0 takes first which pixels have how many samples, and then the samples, into the place where they stay. */
+#include "comp_deep.h"
+
+#include <string.h>
+
+#include "comp_agree.h"
+#include "comp_merge.h"
+#include "memory.h"
+
+enum { tag_deep_pixels = 17, tag_deep_samples = 18, message_samples = 1 << 20 };
+
+/* ---- on the owner --------------------------------------------------------------------------------------------- */
+
+/* Room for one more of these; false: no memory. */
+static bool make_room(void **items, int64_t count, int64_t *capacity, size_t size)
+{
+    if (count < *capacity) return true;
+    const int64_t more = *capacity ? 2 * *capacity : 1024;
+    void *grown = base_realloc(*items, (size_t)more * size);
+    if (!grown) return false;
+    *items = grown;
+    *capacity = more;
+    return true;
+}
+
+/* A stretch that shows nothing is none. */
+static void take_stretch(void *of_list, const fragment *f)
+{
+    comp_deep_list *list = of_list;
+    const insitu_deep_sample sample = {
+        {f->colour[0], f->colour[1], f->colour[2], 1 - f->transmittance}, f->t_in, f->t_out < f->t_in ? f->t_in : f->t_out};
+    if (sample.rgba[3] == 0 && sample.rgba[0] == 0 && sample.rgba[1] == 0 && sample.rgba[2] == 0) return;
+    void *items = list->samples;
+    if (!make_room(&items, list->sample_count, &list->sample_capacity, sizeof sample)) {
+        list->lacks_memory = true;
+        return;
+    }
+    list->samples = items;
+    list->samples[list->sample_count++] = sample;
+}
+
+void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count)
+{
+    const int64_t first = list->sample_count;
+    void *items = list->pixels;
+    if (!make_room(&items, list->pixel_count, &list->pixel_capacity, sizeof *list->pixels)) {
+        list->lacks_memory = true;
+        return;
+    }
+    list->pixels = items;
+    comp_merge_cut(sorted, count, take_stretch, list);
+    list->pixels[list->pixel_count++] = (comp_deep_pixel){sorted->pixel, (uint32_t)(list->sample_count - first)};
+}
+
+void comp_deep_free(comp_deep_list *lists, int count)
+{
+    for (int i = 0; i < count; i++) {
+        base_free(lists[i].pixels);
+        base_free(lists[i].samples);
+        lists[i] = (comp_deep_list){0};
+    }
+}
+
+/* ---- to rank 0 ------------------------------------------------------------------------------------------------ */
+
+static int send_items(MPI_Comm comm, int tag, const void *items, int64_t count, size_t size)
+{
+    const char *bytes = items;
+    int code = MPI_SUCCESS;
+    for (int64_t i = 0; i < count && code == MPI_SUCCESS; i += message_samples) {
+        const int64_t left = count - i, n = left < message_samples ? left : message_samples;
+        code = MPI_Send(bytes + (size_t)i * size, (int)((size_t)n * size), MPI_BYTE, 0, tag, comm);
+    }
+    return code;
+}
+
+static int send_lists(MPI_Comm comm, const comp_deep_list *lists, int count)
+{
+    int code = MPI_SUCCESS;
+    for (int i = 0; i < count && code == MPI_SUCCESS; i++)
+        code = send_items(comm, tag_deep_pixels, lists[i].pixels, lists[i].pixel_count, sizeof *lists[i].pixels);
+    for (int i = 0; i < count && code == MPI_SUCCESS; i++)
+        code = send_items(comm, tag_deep_samples, lists[i].samples, lists[i].sample_count, sizeof *lists[i].samples);
+    return code;
+}
+
+/* Messages of any length until there are count items. */
+static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t count, size_t size)
+{
+    char *bytes = items;
+    int code = MPI_SUCCESS;
+    for (int64_t i = 0; i < count && code == MPI_SUCCESS;) {
+        const int64_t left = count - i, n = left < message_samples ? left : message_samples;
+        MPI_Status status;
+        int received = 0;
+        code = MPI_Recv(bytes + (size_t)i * size, (int)((size_t)n * size), MPI_BYTE, rank, tag, comm, &status);
+        if (code == MPI_SUCCESS) code = MPI_Get_count(&status, MPI_BYTE, &received);
+        i += received / (int)size;
+    }
+    return code;
+}
+
+/* Says where the samples of these pixels will be. */
+static void place_pixels(deep_image *out, const comp_deep_pixel *pixels, int64_t count, int64_t at)
+{
+    for (int64_t i = 0; i < count; i++) {
+        out->first[pixels[i].pixel] = at;
+        out->counts[pixels[i].pixel] = pixels[i].count;
+        at += pixels[i].count;
+    }
+}
+
+static void take_own(deep_image *out, const comp_deep_list *lists, int count)
+{
+    for (int i = 0; i < count; i++) {
+        place_pixels(out, lists[i].pixels, lists[i].pixel_count, out->count);
+        if (lists[i].sample_count)
+            memcpy(out->samples + out->count, lists[i].samples,
+                   (size_t)lists[i].sample_count * sizeof *lists[i].samples);
+        out->count += lists[i].sample_count;
+    }
+}
+
+/* How much all ranks have: on rank 0, pixels and samples by rank. */
+typedef struct deep_inbox {
+    int ranks;
+    int64_t (*counts)[2];
+    comp_deep_pixel *pixels; /* room for the most that another rank has */
+} deep_inbox;
+
+static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
+{
+    int code = MPI_SUCCESS;
+    for (int rank = 1; rank < in->ranks && code == MPI_SUCCESS; rank++) {
+        const int64_t pixels = in->counts[rank][0], samples = in->counts[rank][1];
+        code = receive_items(comm, rank, tag_deep_pixels, in->pixels, pixels, sizeof *in->pixels);
+        if (code != MPI_SUCCESS) break;
+        place_pixels(out, in->pixels, pixels, out->count);
+        code = receive_items(comm, rank, tag_deep_samples, out->samples + out->count, samples, sizeof *out->samples);
+        out->count += samples;
+    }
+    return code;
+}
+
+/* Rank 0: room for all that comes. */
+static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *error)
+{
+    int64_t pixels = 0, samples = out->count;
+    for (int rank = 0; rank < in->ranks; rank++) {
+        samples += in->counts[rank][1];
+        if (rank > 0 && in->counts[rank][0] > pixels) pixels = in->counts[rank][0];
+    }
+    in->pixels = base_alloc((size_t)pixels * sizeof *in->pixels);
+    if (samples > out->capacity) {
+        const int64_t capacity = out->count ? samples + samples / 2 : samples; /* turns (session_frame.c) grow it */
+        insitu_deep_sample *grown = base_realloc(out->samples, (size_t)capacity * sizeof *grown);
+        if (grown) {
+            out->samples = grown;
+            out->capacity = capacity;
+        }
+    }
+    if (in->pixels && samples <= out->capacity) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image of %lld samples (%lld bytes)",
+                     (long long)samples, (long long)(samples * (int64_t)sizeof *out->samples));
+}
+
+static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int count, deep_inbox *in,
+                               base_error *error)
+{
+    int64_t own[2] = {0, 0};
+    bool lacks_memory = false;
+    for (int i = 0; i < count; i++) {
+        own[0] += lists[i].pixel_count;
+        own[1] += lists[i].sample_count;
+        lacks_memory = lacks_memory || lists[i].lacks_memory;
+    }
+    if (lacks_memory || !in->counts)
+        base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image's %lld samples",
+                  (long long)own[1]);
+    const insitu_status status = comp_agree(comm, lacks_memory || !in->counts ? INSITU_ERROR_MEMORY : INSITU_OK, error);
+    if (status) return status;
+    return comp_mpi_status(MPI_Gather(own, 2, MPI_INT64_T, in->counts, 2, MPI_INT64_T, 0, comm), error);
+}
+
+static insitu_status gather(MPI_Comm comm, int rank, const comp_deep_list *lists, int list_count, deep_inbox *in,
+                            deep_image *out, base_error *error)
+{
+    insitu_status status = count_all(comm, lists, list_count, in, error);
+    if (!status && rank == 0) status = open_inbox(in, out, error);
+    status = comp_agree(comm, status, error);
+    if (status) return status;
+    if (rank == 0) take_own(out, lists, list_count);
+    const int code = rank == 0 ? receive_all(comm, in, out) : send_lists(comm, lists, list_count);
+    return comp_agree(comm, comp_mpi_status(code, error), error);
+}
+
+insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_count, deep_image *out,
+                               int64_t *sent_bytes, base_error *error)
+{
+    int rank = 0;
+    deep_inbox in = {0};
+    MPI_Comm_rank(comm, &rank);
+    MPI_Comm_size(comm, &in.ranks);
+    in.counts = base_alloc((size_t)(rank == 0 ? in.ranks : 1) * sizeof *in.counts);
+    const insitu_status status = gather(comm, rank, lists, list_count, &in, out, error);
+    for (int i = 0; i < list_count && rank != 0 && !status; i++)
+        *sent_bytes += lists[i].pixel_count * (int64_t)sizeof *lists[i].pixels +
+                       lists[i].sample_count * (int64_t)sizeof *lists[i].samples;
+    base_free(in.pixels);
+    base_free(in.counts);
+    comp_deep_free(lists, list_count);
+    return status;
+}

@@ -1,0 +1,37 @@
+/* Deep images: what lies behind each other in every pixel, kept beside the flat picture.
+ *
+ * The owner of a pixel makes samples of its fragments, sorted and cut until none overlaps another, and rank 0 takes them
+ * all. Blended front to back they are the picture without its background. */
+#ifndef COMP_COMP_DEEP_H
+#define COMP_COMP_DEEP_H
+
+#include <mpi.h>
+
+#include "error.h"
+#include "fragment.h"
+#include "image.h"
+
+typedef struct comp_deep_pixel {
+    uint32_t pixel, count; /* of samples */
+} comp_deep_pixel;
+
+/* A thread's samples on one owner, pixel after pixel. All zero: empty. */
+typedef struct comp_deep_list {
+    comp_deep_pixel *pixels;
+    insitu_deep_sample *samples;
+    int64_t pixel_count, pixel_capacity, sample_count, sample_capacity;
+    bool lacks_memory; /* something was left out */
+} comp_deep_list;
+
+/* One pixel's fragments, as comp_merge_pixel() left them. z and z_back are t. Local. */
+void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count);
+
+/* NULL items are fine. */
+void comp_deep_free(comp_deep_list *lists, int count);
+
+/* Every rank's lists to rank 0's out, where they take the place of what these pixels had. The lists are freed.
+ * Collective; returns the same on all ranks. *sent_bytes grows by what went to rank 0. */
+insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_count, deep_image *out,
+                               int64_t *sent_bytes, base_error *error);
+
+#endif

@@ -1,0 +1,185 @@
+/* Deep pictures: of every pixel what lies behind each other, in order and without overlaps, which blended in double are
+ * the flat picture; of surfaces, the samples of one rank to the bit, on any partition. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_session_fixture.h"
+
+enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
+
+/* Colours of 0 and 1 are the same in sRGB and in linear light. */
+#define SCENE(layers, more)                                                                                            \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 1, 0, 0.5]\n" more "    layers:\n" layers           \
+    "    outputs: [{path: flat.exr}, {path: deep.exr, deep: true}]\n"
+#define CLEAR "      - isosurface: {field: f, values: [-0.4, -0.2, 0.1], opacity: 0.4}\n"
+#define SOLID "      - isosurface: {field: f, values: [0.3]}\n"
+#define SLICE "      - slice: {field: f, opacity: 0.7, planes: [{normal: [1, 0.2, 0.1]}]}\n"
+#define VOLUME "      - volume: {field: f, opacity: [[0, 0.1], [0.5, 0.2], [0.5, 0.9], [1, 0.4]]}\n"
+#define SAMPLES "    sampling: {method: samples}\n"
+
+typedef struct deep_case {
+    const char *name, *scene;
+    bool is_of_surfaces;
+} deep_case;
+
+static const deep_case cases[] = {
+    {"surfaces", SCENE(CLEAR SOLID SLICE, ""), true},
+    {"surfaces, antialias", SCENE(CLEAR SOLID SLICE, "    antialias: 4\n"), true},
+    {"volume", SCENE(VOLUME, ""), false},
+    {"volume, clear surfaces", SCENE(VOLUME CLEAR, ""), false},
+    {"volume, all", SCENE(VOLUME CLEAR SOLID SLICE, "    sampling: {max_error: 0.001}\n"), false},
+    {"samples", SCENE(VOLUME CLEAR SOLID, SAMPLES), false},
+    {"segments", SCENE(VOLUME CLEAR, "    sampling: {method: segments}\n"), false},
+    {"two volumes", SCENE(VOLUME VOLUME CLEAR, SAMPLES), false},
+    {"two volumes, max_error", SCENE(VOLUME VOLUME SOLID, "    sampling: {max_error: 0.01}\n"), false},
+    {"nothing", SCENE("      - isosurface: {field: f, values: [1000]}\n", ""), true},
+};
+enum { CASES = sizeof cases / sizeof *cases, ANTIALIASED = 1 };
+
+/* ---- one picture ---------------------------------------------------------------------------------------------- */
+
+/* A float's rounding takes 2^-24 of at most 1. Compositing makes of a sample a product, a sum and a product more, and
+ * the deep picture's A is a difference: four a sample. Of mixed stretches the flat picture multiplies what a run of them
+ * lets through as one number, which is two more. The background is a product and a sum. */
+static double bound_of(int64_t samples)
+{
+    return ldexp((double)(6 * samples + 2), -24);
+}
+
+static bool is_in_order(const insitu_deep_sample *samples, int64_t count)
+{
+    for (int64_t i = 0; i < count; i++) {
+        if (!(samples[i].z <= samples[i].z_back)) return false;
+        if (i > 0 && !(samples[i - 1].z_back <= samples[i].z)) return false;
+        if (!(samples[i].rgba[3] >= 0 && samples[i].rgba[3] <= 1)) return false;
+    }
+    return true;
+}
+
+/* How far the flat pixel is from what the samples make over the background. */
+static double distance(const insitu_deep_sample *samples, int64_t count, const double behind[4], const float *flat)
+{
+    double rgba[4] = {0, 0, 0, 0}, worst = 0;
+    for (int64_t i = 0; i < count; i++) {
+        const double through = 1 - rgba[3];
+        for (int c = 0; c < 4; c++) rgba[c] += through * (double)samples[i].rgba[c];
+    }
+    for (int c = 0; c < 4; c++)
+        worst = test_worse(worst, fabs(rgba[c] + (1 - rgba[3]) * behind[c] - (double)flat[c]));
+    return worst;
+}
+
+static const double linear_background[4] = {0, 0.5, 0, 0.5};
+
+static bool is_the_flat_picture(const caught_picture *deep, const caught_picture *flat, const char *name)
+{
+    int64_t shown = 0;
+    for (int p = 0; p < PIXELS; p++) {
+        const insitu_deep_sample *samples = deep->samples + deep->first[p];
+        const int64_t count = deep->first[p + 1] - deep->first[p];
+        const double off = distance(samples, count, linear_background, flat->rgba + 4 * p);
+        shown += count;
+        if (is_in_order(samples, count) && off <= bound_of(count)) continue;
+        fprintf(stderr, "%s, %d ranks, pixel %d of %d samples: off by %g\n", name, rank_count, p, (int)count, off);
+        return false;
+    }
+    return shown > 0 || strcmp(name, "nothing") == 0;
+}
+
+/* The nearest surface's depth is the first sample's, for there is no volume. */
+static bool has_depths(const caught_picture *deep, const caught_picture *flat)
+{
+    for (int p = 0; p < PIXELS; p++) {
+        const bool is_empty = deep->first[p] == deep->first[p + 1];
+        if (is_empty ? isfinite(flat->depth[p]) : deep->samples[deep->first[p]].z != flat->depth[p]) return false;
+    }
+    return true;
+}
+
+static bool are_the_same(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->first, b->first, (PIXELS + 1) * sizeof *a->first) == 0 &&
+           memcmp(a->samples, b->samples, (size_t)a->first[PIXELS] * sizeof *a->samples) == 0;
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------- */
+
+typedef struct two_pictures {
+    caught_picture flat, deep;
+} two_pictures;
+
+static two_pictures draw(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    two_pictures out = {0};
+    insitu_session *session = open_session(comm, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    if (own_rank == 0) {
+        assert_int_equal(caught_count, 2);
+        out = (two_pictures){caught[0], caught[1]};
+        caught_count = 0;
+    }
+    insitu_destroy(&session);
+    return out;
+}
+
+static void free_pictures(two_pictures *pictures)
+{
+    free_caught(&pictures->flat);
+    free_caught(&pictures->deep);
+}
+
+static bool judge_case(const deep_case *c, const session_input *whole, const session_input *part)
+{
+    const char *scene = write_scene(c->scene);
+    two_pictures ours = draw(MPI_COMM_WORLD, scene, part), alone = {0};
+    if (own_rank != 0) return true;
+    alone = draw(MPI_COMM_SELF, scene, whole);
+    const bool is_averaged = c == &cases[ANTIALIASED];
+    bool is_well = is_averaged || is_the_flat_picture(&ours.deep, &ours.flat, c->name);
+    is_well = is_well && (is_averaged || is_the_flat_picture(&alone.deep, &alone.flat, c->name));
+    if (is_well && c->is_of_surfaces)
+        is_well = has_depths(&ours.deep, &ours.flat) && are_the_same(&ours.deep, &alone.deep);
+    free_pictures(&ours);
+    free_pictures(&alone);
+    return is_well;
+}
+
+static void judge(test_mesh_kind kind, test_partition_kind dealt)
+{
+    session_input whole = {0}, part = {0};
+    input_create(&whole, kind, SIDE, dealt, 0, 1);
+    input_create(&part, kind, SIDE, dealt, own_rank, rank_count);
+    for (int i = 0; i < CASES; i++) {
+        const bool is_well = judge_case(&cases[i], &whole, &part);
+        if (!is_well) fprintf(stderr, "%s: %s\n", test_mesh_kind_name(kind), cases[i].name);
+        everywhere(is_well);
+    }
+    input_free(&part);
+    input_free(&whole);
+}
+
+static void deep_pictures_are_the_flat_ones(void **state)
+{
+    (void)state;
+    judge(TEST_TETS, TEST_BLOCK);
+    judge(TEST_HEXES, TEST_CHECKERBOARD);
+    judge(TEST_POLYHEDRA, TEST_RANDOM);
+    judge(TEST_MIXED, TEST_RANDOM);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(deep_pictures_are_the_flat_ones)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
