@@ -25,6 +25,13 @@ insitu_add_mpi_test(session_channels test_session_channels 1 2 3 7 TIMEOUT 120 A
 insitu_session_program(test_session_deep)
 insitu_add_mpi_test(session_deep test_session_deep 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+add_executable(test_deep_file test_deep_file.cpp)
+add_dependencies(test_deep_file insitu_image)
+target_include_directories(test_deep_file SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
+target_link_libraries(test_deep_file PRIVATE
+  insitu_flags insitu ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY} PkgConfig::CMOCKA)
+insitu_add_mpi_test(deep_file test_deep_file 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_smooth)
 insitu_add_mpi_test(session_smooth test_session_smooth 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

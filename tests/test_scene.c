@@ -100,6 +100,7 @@ static const char every_key[] =
     "        bits: 16\n"
     "      - path: out/wave_{cycle}.EXR\n"
     "        data: true\n"
+    "      - {path: \"out/{name}.exr\", deep: true}\n"
     "  - name: second\n"
     "    every_time: 0.25\n"
     "    once: true\n"
@@ -216,12 +217,13 @@ static void scene_image_keys_are_read(void **state)
     assert_true(image->max_seconds == 10 && s.images[1].max_seconds == 3600);
     assert_true(image->method == SCENE_SEGMENTS && image->max_error == 0);
     assert_true(s.images[2].method == SCENE_SEGMENTS && s.images[2].max_error == 1e-3 && s.images[2].volume_count == 2);
-    assert_int_equal(image->output_count, 2);
+    assert_int_equal(image->output_count, 3);
     assert_string_equal(image->outputs[0].path, "out/{name}_{cycle:06}.png");
     assert_int_equal(image->outputs[0].format, SCENE_PNG16);
     assert_string_equal(image->outputs[1].path, "out/wave_{cycle}.EXR");
     assert_int_equal(image->outputs[1].format, SCENE_EXR);
     assert_true(image->outputs[1].has_data && !image->outputs[0].has_data);
+    assert_true(image->outputs[2].is_deep && !image->outputs[1].is_deep && !image->outputs[2].has_decorations);
     assert_int_equal(image->isosurfaces[1].number, 2);
     assert_int_equal(image->slices[0].number, 3);
     assert_int_equal(image->surfaces[2].number, 6);
@@ -829,6 +831,10 @@ static const struct bad_file {
     {14, "      - path: a.png\n        bits: 12", 15, {"outputs[0].bits: 12", "8 or 16"}},
     {14, "      - path: a.exr\n        bits: 16", 15, {"outputs[0].bits", "for a PNG only"}},
     {14, "      - path: a.png\n        data: true", 15, {"outputs[0].data: given for a PNG", "an EXR only"}},
+    {14, "      - path: a.png\n        deep: true", 15, {"outputs[0].deep: given for a PNG", "an EXR only"}},
+    {14, "      - path: a.exr\n        deep: 1", 15, {"outputs[0].deep: \"1\"", "true or false"}},
+    {14, "      - {path: a.exr, deep: true, data: true}", 14, {"outputs[0].deep: given with data"}},
+    {14, "      - {path: a.exr, deep: true, decorations: true}", 14, {"outputs[0].deep: given with decorations"}},
     {14, "      - path: a.exr\n        data: 1", 15, {"outputs[0].data: \"1\"", "true or false"}},
     {14, "      - path: a.png\n      - path: a.png", 15, {"outputs[1].path: \"a.png\" is another output's file too"}},
     {14, "      - path: b.exr", 17, {"images[1].outputs[0].path: \"b.exr\" is another"}},

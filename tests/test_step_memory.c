@@ -19,7 +19,7 @@ static int64_t allocation;
 
 #define IMAGE(name, size, layers, sampling)                                                                            \
     "  - name: " name "\n    size: " size "\n    layers:\n" layers sampling "    outputs: [{path: " name               \
-    ".exr, data: true}]\n"
+    ".exr, data: true}, {path: " name "_deep.exr, deep: true}]\n"
 #define SURFACES                                                                                                       \
     "      - isosurface: {field: f, values: [0.1, -0.4]}\n"                                                            \
     "      - isosurface: {field: c, values: [0], colour_by: {field: f}, opacity: 0.5}\n"
@@ -113,12 +113,20 @@ typedef struct picture_set {
     caught_picture pictures[MAX_CAUGHT];
 } picture_set;
 
+/* Of deep pictures; others have none. */
+static bool have_same_samples(const caught_picture *a, const caught_picture *b, size_t pixels)
+{
+    if (!a->first || !b->first) return a->first == b->first;
+    return !memcmp(a->first, b->first, (pixels + 1) * sizeof *a->first) &&
+           !memcmp(a->samples, b->samples, (size_t)a->first[pixels] * sizeof *a->samples);
+}
+
 static bool is_same_picture(const caught_picture *a, const caught_picture *b)
 {
     const size_t pixels = (size_t)a->width * (size_t)a->height;
     return a->width == b->width && a->height == b->height && !memcmp(a->rgba, b->rgba, pixels * 4 * sizeof(float)) &&
            (a->depth && b->depth ? !memcmp(a->depth, b->depth, pixels * sizeof(float)) : a->depth == b->depth) &&
-           !strcmp(a->path, b->path);
+           !strcmp(a->path, b->path) && have_same_samples(a, b, pixels);
 }
 
 /* Rank 0's pictures, which are forgotten. */
@@ -132,10 +140,7 @@ static picture_set take_pictures(void)
 
 static void free_pictures(picture_set *set)
 {
-    for (int i = 0; i < set->count; i++) {
-        free(set->pictures[i].rgba);
-        free(set->pictures[i].depth);
-    }
+    for (int i = 0; i < set->count; i++) free_caught(&set->pictures[i]);
 }
 
 /* Every picture that was caught is one of the set; rank 0 has them. */

@@ -1,0 +1,149 @@
+/* The deep file that a run writes, flattened by OpenImageIO as oiiotool --flatten does, is the flat file that it writes
+ * beside it: transparent isosurfaces and a volume, on any number of ranks, written in the background. */
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imagebufalgo.h>
+#include <insitu/insitu.h>
+
+#include <cmath>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+extern "C" {
+#include <cmocka.h>
+}
+
+namespace
+{
+
+std::string folder; /* of this number of ranks */
+int own_rank, rank_count;
+
+/* A slab of hexes a rank, along x. */
+enum { NX = 3, NY = 10, NZ = 10 };
+
+struct slab {
+    std::vector<double> places, values;
+    std::vector<std::int32_t> hexes;
+};
+
+std::int32_t vertex(int i, int j, int k)
+{
+    return i + (NX + 1) * (j + (NY + 1) * k);
+}
+
+slab make_slab()
+{
+    slab s;
+    const double width = 10.0 / (NX * rank_count);
+    for (int k = 0; k <= NZ; k++)
+        for (int j = 0; j <= NY; j++)
+            for (int i = 0; i <= NX; i++) {
+                const double x = width * (i + own_rank * NX);
+                s.places.insert(s.places.end(), {x, static_cast<double>(j), static_cast<double>(k)});
+                s.values.push_back(std::cos(std::hypot(x - 5, j - 5.0, k - 5.0)));
+            }
+    for (int c = 0; c < NX * NY * NZ; c++)
+        for (int n = 0; n < 8; n++)
+            s.hexes.push_back(vertex(c % NX + (n % 4 == 1 || n % 4 == 2), c / NX % NY + n % 4 / 2, c / NX / NY + n / 4));
+    return s;
+}
+
+void hand_over(insitu_session *session, const slab &s)
+{
+    insitu_mesh mesh;
+    insitu_field field;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = static_cast<std::int64_t>(s.values.size());
+    insitu_mesh_interleaved(&mesh, s.places.data(), INSITU_FLOAT64);
+    mesh.cell_count = NX * NY * NZ;
+    mesh.cell_type = INSITU_HEX;
+    mesh.connectivity_count = static_cast<std::int64_t>(s.hexes.size());
+    mesh.connectivity = {s.hexes.data(), INSITU_INT32, 0};
+    insitu_field_defaults(&field);
+    field.name = "f";
+    field.count = mesh.vertex_count;
+    field.values = {s.values.data(), INSITU_FLOAT64, 0};
+    assert_int_equal(insitu_set_mesh(session, "slab", &mesh), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, "slab", &field), INSITU_OK);
+}
+
+/* Files of a name each: OpenImageIO remembers what it has read. */
+void draw(const std::string &name, const std::string &layers)
+{
+    const std::string scene = folder + "/scene.yaml";
+    if (own_rank == 0)
+        std::ofstream(scene) << "images:\n  - name: a\n    size: [97, 61]\n    background: [0, 0, 0, 0]\n    layers:\n"
+                             << layers << "    outputs: [{path: " << folder << "/" << name << ".exr}, {path: "
+                             << folder << "/" << name << "_deep.exr, deep: true}]\n";
+    const slab s = make_slab();
+    insitu_session *session = nullptr;
+    assert_int_equal(insitu_create(MPI_COMM_WORLD, scene.c_str(), &session), INSITU_OK);
+    hand_over(session, s);
+    assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
+    assert_int_equal(insitu_destroy(&session), INSITU_OK);
+}
+
+/* Roundings of 2^-24 of at most 1: of a sample compositing makes three, A is one, and OpenImageIO makes three. */
+void compare(const std::string &name)
+{
+    if (own_rank != 0) return;
+    const OIIO::ImageBuf deep(folder + "/" + name + "_deep.exr"), picture(folder + "/" + name + ".exr");
+    const OIIO::ImageBuf flattened = OIIO::ImageBufAlgo::flatten(deep);
+    if (flattened.has_error()) fail_msg("%s", flattened.geterror().c_str());
+    double worst = 0;
+    int most = 0;
+    for (int y = 0; y < 61; y++)
+        for (int x = 0; x < 97; x++) {
+            float flat[5], own[6];
+            picture.getpixel(x, y, flat, 5);
+            flattened.getpixel(x, y, own, 6);
+            const int samples = deep.deep_samples(x, y, 0);
+            most = samples > most ? samples : most;
+            for (std::size_t c = 0; c < 4; c++) {
+                const double off = std::fabs(static_cast<double>(flat[c]) - static_cast<double>(own[c]));
+                worst = off > worst ? off : worst;
+                assert_true(off <= std::ldexp(7.0, -24) * samples);
+            }
+        }
+    std::printf("%s: %d samples in a pixel at most, off by %.2g\n", name.c_str(), most, worst);
+    assert_true(most > 1);
+}
+
+void flattened_surfaces_are_the_picture(void **)
+{
+    draw("surfaces", "      - isosurface: {field: f, values: [-0.5, 0, 0.5], opacity: 0.3}\n");
+    compare("surfaces");
+}
+
+void flattened_volume_is_the_picture(void **)
+{
+    draw("volume",
+         "      - volume: {field: f}\n      - isosurface: {field: f, values: [-0.5, 0.5], opacity: 0.3}\n");
+    compare("volume");
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    MPI_Init(&argc, &argv);
+    MPI_Comm_rank(MPI_COMM_WORLD, &own_rank);
+    MPI_Comm_size(MPI_COMM_WORLD, &rank_count);
+    folder = std::string(argc > 1 ? argv[1] : ".") + "/deep_np" + std::to_string(rank_count);
+    if (own_rank == 0) std::filesystem::create_directories(folder);
+    MPI_Barrier(MPI_COMM_WORLD);
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(flattened_surfaces_are_the_picture),
+        cmocka_unit_test(flattened_volume_is_the_picture),
+    };
+    const int failures = cmocka_run_group_tests(tests, nullptr, nullptr);
+    MPI_Finalize();
+    return failures;
+}
