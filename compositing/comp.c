@@ -17,21 +17,20 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-static insitu_status merge_alone(const comp_layout *layout, fragment_list *items, const float background[4],
-                                 const comp_merged *merged, comp_statistics *statistics, base_error *error)
+static insitu_status merge_alone(const comp_layout *layout, fragment_list *items, const comp_merged *merged,
+                                 comp_statistics *statistics, base_error *error)
 {
     const double start = MPI_Wtime();
     if (!comp_bucket_fits(layout, items->items, items->count))
         return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
-    comp_pixels_clear(layout, merged->out, background);
-    const insitu_status status = comp_pixels_merge(layout, 0, items, background, merged, error);
+    comp_pixels_clear(layout, merged->out, merged->background);
+    const insitu_status status = comp_pixels_merge(layout, 0, items, merged, error);
     statistics->merge_ms = milliseconds_since(start);
     return status;
 }
 
 static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, fragment_list *owned,
-                                      const float background[4], image *out, comp_merged *merged,
-                                      comp_statistics *statistics, base_error *error)
+                                      image *out, comp_merged *merged, comp_statistics *statistics, base_error *error)
 {
     const double start = MPI_Wtime();
     comp_pixel_list finished = {NULL, 0};
@@ -39,8 +38,8 @@ static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, 
     MPI_Comm_rank(comm, &rank);
     merged->out = rank == 0 ? out : NULL;
     merged->finished = &finished;
-    if (merged->out) comp_pixels_clear(layout, out, background);
-    insitu_status status = comp_pixels_merge(layout, rank, owned, background, merged, error);
+    if (merged->out) comp_pixels_clear(layout, out, merged->background);
+    insitu_status status = comp_pixels_merge(layout, rank, owned, merged, error);
     base_free(owned->items);
     status = comp_agree(comm, status, error);
     statistics->merge_ms = milliseconds_since(start);
@@ -65,31 +64,29 @@ static insitu_status layout_of(MPI_Comm comm, const image *out, int threads, com
 }
 
 static insitu_status composite_flat(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
-                                    const float background[4], image *out, comp_merged *merged,
-                                    comp_statistics *statistics, base_error *error)
+                                    image *out, comp_merged *merged, comp_statistics *statistics, base_error *error)
 {
     statistics->sent_fragments = items->count;
     merged->out = out;
-    if (layout->ranks == 1) return merge_alone(layout, items, background, merged, statistics, error);
+    if (layout->ranks == 1) return merge_alone(layout, items, merged, statistics, error);
     const double start = MPI_Wtime();
     fragment_list owned = {NULL, 0, 0};
     const insitu_status status =
         comp_exchange_direct(comm, layout, items, comp_message_fragments, &owned, &statistics->sent_bytes, error);
     statistics->exchange_ms = milliseconds_since(start);
     if (status != INSITU_OK) return status;
-    return merge_and_gather(comm, layout, &owned, background, out, merged, statistics, error);
+    return merge_and_gather(comm, layout, &owned, out, merged, statistics, error);
 }
 
 /* A list a thread. */
 static insitu_status composite_deep(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
-                                    const float background[4], image *out, comp_merged *merged,
-                                    comp_statistics *statistics, base_error *error)
+                                    image *out, comp_merged *merged, comp_statistics *statistics, base_error *error)
 {
     merged->deep = base_calloc((size_t)layout->threads, sizeof *merged->deep);
     insitu_status status = INSITU_OK;
     if (!merged->deep) status = base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image");
     status = comp_agree(comm, status, error);
-    if (!status) status = composite_flat(comm, layout, items, background, out, merged, statistics, error);
+    if (!status) status = composite_flat(comm, layout, items, out, merged, statistics, error);
     if (!status)
         status = comp_deep_gather(comm, merged->deep, layout->threads, out->deep, &statistics->sent_bytes, error);
     else if (merged->deep)
@@ -98,13 +95,10 @@ static insitu_status composite_deep(MPI_Comm comm, const comp_layout *layout, fr
     return status;
 }
 
-static insitu_status composite(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
-                               const float background[4], image *out, unsigned char *overlaps,
-                               comp_statistics *statistics, base_error *error)
+static insitu_status composite(MPI_Comm comm, const comp_layout *layout, fragment_list *items, image *out,
+                               comp_merged *merged, comp_statistics *statistics, base_error *error)
 {
-    comp_merged merged = {.overlaps = overlaps};
-    return (out->deep ? composite_deep : composite_flat)(comm, layout, items, background, out, &merged, statistics,
-                                                         error);
+    return (out->deep ? composite_deep : composite_flat)(comm, layout, items, out, merged, statistics, error);
 }
 
 insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
@@ -115,7 +109,8 @@ insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float ba
     if (!statistics) statistics = &unwanted;
     *statistics = (comp_statistics){0};
     const insitu_status status = layout_of(comm, out, threads, &layout, error);
-    return status ? status : composite(comm, &layout, items, background, out, NULL, statistics, error);
+    comp_merged merged = {.background = background};
+    return status ? status : composite(comm, &layout, items, out, &merged, statistics, error);
 }
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
@@ -150,7 +145,8 @@ insitu_status comp_composite_overlaps(MPI_Comm comm, fragment_list *items, const
     insitu_status status = layout_of(comm, out, threads, &layout, error);
     if (status) return status;
     unsigned char *const found = base_calloc(pixel_set_bytes(layout.pixel_count), 1);
-    status = composite(comm, &layout, items, background, out, found, statistics, error);
+    comp_merged merged = {.background = background, .overlaps = found};
+    status = composite(comm, &layout, items, out, &merged, statistics, error);
     if (!status) status = share_overlaps(comm, &layout, found, overlaps, error);
     if (!overlaps->pixels) base_free(found);
     return status;

@@ -199,13 +199,13 @@ static bool merge(merging *m)
 }
 
 insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
-                                const float background[4], const comp_merged *merged, base_error *error)
+                                const comp_merged *merged, base_error *error)
 {
     if (!merged->out) *merged->finished = (comp_pixel_list){NULL, 0};
     if (fragments->count == 0) return INSITU_OK;
     const int64_t owned = comp_layout_owned(layout, rank);
     merging m = {.layout = layout,
-                 .background = background,
+                 .background = merged->background,
                  .out = merged->out,
                  .overlaps = merged->overlaps,
                  .deep = merged->deep};

@@ -34,6 +34,7 @@ void comp_pixels_store(image *out, const comp_pixel *from);
 /* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned index.
  */
 typedef struct comp_merged {
+    const float *background; /* 4 */
     image *out;
     comp_pixel_list *finished;
     unsigned char *overlaps; /* pixel_set.h: those whose fragments overlap are added. NULL: not wanted */
@@ -43,6 +44,6 @@ typedef struct comp_merged {
 /* Merge the pixels that have fragments; all of fragments belong to pixels that rank owns, and are reordered. Local. On
  * an error *finished is empty, and out and deep may hold some pixels. */
 insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
-                                const float background[4], const comp_merged *merged, base_error *error);
+                                const comp_merged *merged, base_error *error);
 
 #endif

@@ -266,8 +266,8 @@ static void long_messages_are_cut(void **context)
     image *const here = own_rank == 0 ? &s.out : NULL;
     comp_pixel_list finished = {NULL, 0};
     if (here) comp_pixels_clear(&layout, here, background);
-    status = comp_pixels_merge(&layout, own_rank, &owned, background,
-                               &(comp_merged){.out = here, .finished = &finished}, NULL);
+    status = comp_pixels_merge(&layout, own_rank, &owned,
+                               &(comp_merged){.background = background, .out = here, .finished = &finished}, NULL);
     assert_everywhere(status == INSITU_OK, "merge succeeds");
     status = comp_gather(comm, &finished, 5, &s.out, &bytes, NULL);
     assert_everywhere(status == INSITU_OK, "gather in messages of 5 succeeds");

@@ -58,7 +58,7 @@ static int64_t draw(render_fixture *f, MPI_Comm comm, bool is_alone, image *out)
 {
     session_frame frame;
     base_error error = {0};
-    *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float))};
+    *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL};
     f->job.is_alone = is_alone;
     const session_frame_target target = {comm, comm, fixture_background, MANY};
     if (session_draw_frame(&target, &f->job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);

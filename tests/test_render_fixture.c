@@ -232,7 +232,10 @@ void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *
     }
     index_pixels(out, pixels);
     out->picture =
-        (image){width, height, malloc((size_t)pixels * 4 * sizeof(float)), malloc((size_t)pixels * sizeof(float))};
+        (image){.width = width,
+                .height = height,
+                .rgba = malloc((size_t)pixels * 4 * sizeof(float)),
+                .depth = malloc((size_t)pixels * sizeof(float))};
     for (int64_t p = 0; p < pixels; p++)
         comp_merge_pixel(out->list.items + out->first[p], out->first[p + 1] - out->first[p], fixture_background,
                          out->picture.rgba + 4 * p, out->picture.depth + p);
