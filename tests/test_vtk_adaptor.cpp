@@ -622,8 +622,12 @@ void structured_grids_are_hexahedra(void **)
         assert_true(mesh.cell_count == 24 && mesh.vertex_count == 60 && mesh.cell_type == INSITU_HEX);
         assert_true(std::fabs(whole_volume(mesh) - 1 * 3 * 8) < 24 * rounding);
         assert_ptr_equal(f.mesh().fields.at("f").values.data, values->GetPointer(0));
-        assert_true(f.report.bytes_copied > 24 * 8 * 4);
+        const int64_t cells = 24 * 8 * 4 + 25 * 4 + 24, listed = 60 * 3 * 8; // corners, offsets, types; points
+        const bool has_points = data == curvilinear.Get();
+        assert_int_equal(f.report.bytes_copied, has_points ? cells : cells + listed);
         assert_non_null(strstr(f.report.copied_why, data->GetClassName()));
+        assert_true(has_points == !strstr(f.report.copied_why, " points: those of a "));
+        if (has_points) assert_ptr_equal(mesh.coordinates[0].data, points->GetVoidPointer(0));
     }
 }
 
@@ -647,6 +651,15 @@ void polygons_are_shells(void **)
     assert_int_equal(mesh.cell_count, 3);
     for (int i = 0; i < 3; i++) assert_int_equal(integer_at(mesh.cell_types, i), types[i]);
     assert_int_equal(f.report.cells_flat, 1);
+
+    data->SetLines(nullptr); // then the list is taken as it is, all but the types of its cells
+    assert_int_equal(f.set(data), INSITU_OK);
+    assert_int_equal(f.mesh().mesh.cell_count, 3);
+    for (int i = 0; i < 3; i++) assert_int_equal(integer_at(f.mesh().mesh.cell_types, i), types[i]);
+    const vtkDataArray *listed = polygons->GetConnectivityArray();
+    assert_ptr_equal(f.mesh().mesh.connectivity.data, const_cast<vtkDataArray *>(listed)->GetVoidPointer(0));
+    assert_ptr_equal(f.mesh().mesh.coordinates[0].data, points->GetVoidPointer(0));
+    assert_int_equal(f.report.bytes_copied, 3);
 }
 
 void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
@@ -681,6 +694,17 @@ void leaves_of_composites_are_meshes_and_go_when_they_are_gone(void **)
     collection->SetPartitionedDataSet(0, partitions);
     assert_int_equal(f.set(collection), INSITU_OK);
     assert_int_equal(f.session.meshes.size(), 2);
+    partitions->SetPartition(0, nullptr); // as on a rank that has none of it: the other keeps its number
+    vtkNew<vtkPartitionedDataSet> images;
+    vtkNew<vtkImageData> image;
+    image->SetDimensions(2, 2, 2);
+    images->SetPartition(0, image);
+    collection->SetPartitionedDataSet(1, images);
+    assert_int_equal(f.set(collection), INSITU_OK);
+    assert_int_equal(f.session.meshes.size(), 2);
+    assert_int_equal(f.mesh("m/1").mesh.cell_type, INSITU_HEX);
+    assert_ptr_equal(f.mesh("m/1").mesh.coordinates[0].data, b->GetPoints()->GetVoidPointer(0));
+    assert_int_equal(f.mesh("m/2").mesh.vertex_count, 8);
     assert_int_equal(f.set(nullptr), INSITU_OK);
     assert_true(f.session.meshes.empty());
 }

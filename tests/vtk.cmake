@@ -7,6 +7,11 @@ target_link_libraries(test_vtk_adaptor PRIVATE insitu_vtk_objects PkgConfig::CMO
 add_test(NAME vtk_adaptor COMMAND test_vtk_adaptor)
 set_tests_properties(vtk_adaptor PROPERTIES TIMEOUT 30)
 
+add_executable(test_vtk_amr test_vtk_amr.cpp test_vtk_session_stub.cpp)
+target_link_libraries(test_vtk_amr PRIVATE insitu_vtk_objects PkgConfig::CMOCKA insitu_flags)
+add_test(NAME vtk_amr COMMAND test_vtk_amr)
+set_tests_properties(vtk_amr PROPERTIES TIMEOUT 30)
+
 add_executable(test_vtk_deal test_vtk_deal.cpp)
 target_link_libraries(test_vtk_deal PRIVATE insitu_render_files insitu_flags PkgConfig::CMOCKA)
 add_test(NAME vtk_deal COMMAND test_vtk_deal)

@@ -16,13 +16,17 @@
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataSet.h>
+#include <vtkOverlappingAMR.h>
 #include <vtkPointData.h>
 #include <vtkPointSet.h>
 #include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkUniformGridAMRDataIterator.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
 #include "insitu/vtk_grids.h"
+#include "vtk_amr.h"
 #include "vtk_arrays.h"
 #include "vtk_cells.h"
 
@@ -212,25 +216,54 @@ void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
     }
 }
 
-/* The bytes of the lists that insitu_vtk_make_grid() made. */
-int64_t bytes_made(vtkUnstructuredGrid *grid, vtkDataSet *data)
+/* Say what insitu_vtk_make_grid() made of data: its lists, and what is not data's own. */
+void tell_what_was_made(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::string &what, tally &count)
 {
+    if (grid->GetNumberOfCells() == 0) return;
+    const std::string of = std::string(" of a ") + data->GetClassName();
     vtkCellArray *cells = grid->GetCells();
+    auto *polygons = vtkPolyData::SafeDownCast(data);
     const int64_t id = cells->IsStorage64Bit() ? 8 : 4;
     const int64_t lists = cells->GetNumberOfConnectivityIds() + cells->GetNumberOfCells() + 1;
-    const int64_t point = vtkPointSet::SafeDownCast(data) ? 0 : 3 * grid->GetPoints()->GetData()->GetDataTypeSize();
-    return lists * id + cells->GetNumberOfCells() + point * grid->GetNumberOfPoints();
+    if (polygons && polygons->GetPolys() == cells)
+        count.copied(what, "the types" + of + "'s cells listed", grid->GetNumberOfCells());
+    else
+        count.copied(what, "the cells" + of + " listed", lists * id + grid->GetNumberOfCells());
+    if (!vtkPointSet::SafeDownCast(data)) {
+        const int64_t point = 3 * grid->GetPoints()->GetData()->GetDataTypeSize();
+        count.copied(what + " points", "those" + of + " listed", point * grid->GetNumberOfPoints());
+    }
+    if (grid->GetCellGhostArray() != data->GetCellGhostArray())
+        count.copied(what + " ghosts", "cells with hidden points, or refined, flagged", grid->GetNumberOfCells());
 }
 
-/* A data set of another class than an unstructured grid, as one. */
+/* A data set of another class than an unstructured grid, as one; with other ghost flags than its own, if given. */
 void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
-               vtkDataSet *data, outcome &out)
+               vtkDataSet *data, vtkUnsignedCharArray *flags, outcome &out)
 {
-    const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(data));
-    if (grid->GetNumberOfCells() > 0)
-        out.count.copied("mesh '" + name + "'", std::string("the cells of a ") + data->GetClassName() + " listed",
-                         bytes_made(grid, data));
+    vtkSmartPointer<vtkDataSet> flagged = data;
+    if (flags) {
+        flagged = vtkSmartPointer<vtkDataSet>::Take(data->NewInstance());
+        flagged->ShallowCopy(data);
+        flagged->GetCellData()->AddArray(flags);
+    }
+    const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::Take(insitu_vtk_make_grid(flagged));
+    tell_what_was_made(grid, data, "mesh '" + name + "'", out.count);
     set_leaf(adaptor, parts, name, grid, out);
+}
+
+/* A leaf of a composite, where the iterator stands. */
+void set_other_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
+                    vtkCompositeDataSet *composite, vtkCompositeDataIterator *it, outcome &out)
+{
+    auto *data = vtkDataSet::SafeDownCast(it->GetCurrentDataObject());
+    auto *amr = vtkOverlappingAMR::SafeDownCast(composite);
+    auto *at = vtkUniformGridAMRDataIterator::SafeDownCast(it);
+    vtkSmartPointer<vtkUnsignedCharArray> flags;
+    if (amr && at)
+        flags = refined_flags(amr, at->GetCurrentLevel(), at->GetCurrentIndex(), data, "mesh '" + name + "'",
+                              out.count);
+    set_other(adaptor, parts, name, data, flags, out);
 }
 
 /* Every leaf, the empty ones too, so that a leaf has one number on all ranks. */
@@ -246,8 +279,8 @@ void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts,
         const std::string leaf_name = name + "/" + std::to_string(number);
         if (auto *grid = vtkUnstructuredGrid::SafeDownCast(leaf))
             set_leaf(adaptor, parts, leaf_name, grid, out);
-        else if (auto *other = vtkDataSet::SafeDownCast(leaf))
-            set_other(adaptor, parts, leaf_name, other, out);
+        else if (vtkDataSet::SafeDownCast(leaf))
+            set_other_leaf(adaptor, parts, leaf_name, composite, it, out);
         else
             out.count.warn("mesh '" + leaf_name + "': a " + leaf->GetClassName() + " is not drawn");
     }
@@ -262,7 +295,7 @@ void set_data(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
     else if (auto *composite = vtkCompositeDataSet::SafeDownCast(data))
         set_leaves(adaptor, parts, name, composite, out);
     else if (auto *other = vtkDataSet::SafeDownCast(data))
-        set_other(adaptor, parts, name, other, out);
+        set_other(adaptor, parts, name, other, nullptr, out);
     else
         throw failure{INSITU_ERROR_ARGUMENT, "mesh '" + name + "': a " + data->GetClassName() +
                                                  " is not taken, expected a vtkDataSet or a composite of them"};

@@ -1,5 +1,6 @@
-/* The points of curvilinear grids and all arrays are VTK's own, by reference. A list of hexahedra and, for images and
- * rectilinear grids, of points is what the way through unstructured grids costs: 32 bytes a cell and 24 a point. */
+/* The points of curvilinear grids, the polygons of polygonal data and all arrays are VTK's own, by reference. A list of
+ * hexahedra and, for images and rectilinear grids, of points is what the way through unstructured grids costs: 37 bytes
+ * a cell, offset and type included, and 24 a point. */
 #include "insitu/vtk_grids.h"
 
 #include <array>
@@ -16,6 +17,7 @@
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
+#include <vtkPolyData.h>
 #include <vtkRectilinearGrid.h>
 #include <vtkSmartPointer.h>
 #include <vtkStructuredGrid.h>
@@ -27,51 +29,81 @@
 namespace
 {
 
-using dimensions = std::array<int, 3>; // points along i, j and k
+/* The points of a grid along its axes of more than one point: three, or two of a flat grid. */
+struct lattice {
+    int64_t line = 1, rows = 1, layers = 1;
 
-/* Gets the dimensions of a grid of three dimensions; false for any other data. */
-bool get_dimensions(vtkDataSet *data, dimensions &d)
+    int64_t points() const { return line * rows * layers; }
+    bool is_flat() const { return layers == 1; }
+    int corners() const { return is_flat() ? 4 : 8; }
+    int64_t cells() const { return (line - 1) * (rows - 1) * (is_flat() ? 1 : layers - 1); }
+};
+
+/* False for data of no such axes, or of fewer than two of more than one point. */
+bool get_lattice(vtkDataSet *data, lattice &l)
 {
+    std::array<int, 3> d{};
     if (auto *image = vtkImageData::SafeDownCast(data))
         image->GetDimensions(d.data());
     else if (auto *rectilinear = vtkRectilinearGrid::SafeDownCast(data))
         rectilinear->GetDimensions(d.data());
     else if (auto *curvilinear = vtkStructuredGrid::SafeDownCast(data))
         curvilinear->GetDimensions(d.data());
-    else
-        return false;
-    return d[0] > 1 && d[1] > 1 && d[2] > 1;
+    std::array<int64_t, 3> axes = {1, 1, 1};
+    size_t count = 0;
+    for (const int size : d) {
+        if (size < 1) return false;
+        if (size > 1) axes[count++] = size;
+    }
+    l = {axes[0], axes[1], axes[2]};
+    return count > 1;
 }
 
-template <typename Array> vtkSmartPointer<vtkCellArray> list_hexes(const dimensions &d)
+/* The cells in VTK's order, hidden ones too. */
+template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice &l)
 {
     using id = typename Array::ValueType;
-    const int64_t line = d[0], plane = line * d[1];
-    const int64_t count = (line - 1) * (d[1] - 1) * (d[2] - 1);
+    const int64_t line = l.line, plane = l.line * l.rows, count = l.cells();
     vtkNew<Array> offsets, connectivity;
     offsets->SetNumberOfValues(count + 1);
-    connectivity->SetNumberOfValues(count * 8);
-    for (int64_t i = 0; i <= count; i++) offsets->SetValue(i, static_cast<id>(i * 8));
+    connectivity->SetNumberOfValues(count * l.corners());
+    for (int64_t i = 0; i <= count; i++) offsets->SetValue(i, static_cast<id>(i * l.corners()));
     id *to = connectivity->GetPointer(0);
-    for (int64_t k = 0; k + 1 < d[2]; k++)
-        for (int64_t j = 0; j + 1 < d[1]; j++)
+    for (int64_t k = 0; k < (l.is_flat() ? 1 : l.layers - 1); k++)
+        for (int64_t j = 0; j + 1 < l.rows; j++)
             for (int64_t i = 0; i + 1 < line; i++) {
-                const int64_t low = i + j * line + k * plane, high = low + plane;
-                for (const int64_t first : {low, high})
+                const int64_t low = i + j * line + k * plane, last = l.is_flat() ? low : low + plane;
+                for (int64_t first = low; first <= last; first += plane)
                     for (const int64_t corner : {first, first + 1, first + 1 + line, first + line})
                         *to++ = static_cast<id>(corner);
             }
-    auto hexes = vtkSmartPointer<vtkCellArray>::New();
-    hexes->SetData(offsets, connectivity);
-    return hexes;
+    auto cells = vtkSmartPointer<vtkCellArray>::New();
+    cells->SetData(offsets, connectivity);
+    return cells;
 }
 
-void set_hexes(const dimensions &d, vtkUnstructuredGrid *grid)
+void set_lattice(const lattice &l, vtkUnstructuredGrid *grid)
 {
     /* The offsets go up to eight times the cells, of which there are fewer than points. */
-    const int64_t points = static_cast<int64_t>(d[0]) * d[1] * d[2];
-    const bool is_small = points < std::numeric_limits<int32_t>::max() / 8;
-    grid->SetCells(VTK_HEXAHEDRON, is_small ? list_hexes<vtkTypeInt32Array>(d) : list_hexes<vtkTypeInt64Array>(d));
+    const bool is_small = l.points() < std::numeric_limits<int32_t>::max() / 8;
+    grid->SetCells(l.is_flat() ? VTK_QUAD : VTK_HEXAHEDRON,
+                   is_small ? list_cells<vtkTypeInt32Array>(l) : list_cells<vtkTypeInt64Array>(l));
+}
+
+/* Polygons as they are listed; false where there are other cells too. */
+bool borrow_polygons(vtkPolyData *data, vtkUnstructuredGrid *grid)
+{
+    if (!data || data->GetNumberOfVerts() > 0 || data->GetNumberOfLines() > 0 || data->GetNumberOfStrips() > 0)
+        return false;
+    vtkCellArray *polygons = data->GetPolys();
+    vtkNew<vtkUnsignedCharArray> types;
+    types->SetNumberOfValues(polygons->GetNumberOfCells());
+    for (vtkIdType i = 0; i < polygons->GetNumberOfCells(); i++) {
+        const vtkIdType size = polygons->GetCellSize(i);
+        types->SetValue(i, size == 3 ? VTK_TRIANGLE : size == 4 ? VTK_QUAD : VTK_POLYGON);
+    }
+    grid->SetCells(types, polygons);
+    return true;
 }
 
 /* Cells of any other data set, one by one. */
@@ -140,11 +172,11 @@ vtkUnstructuredGrid *insitu_vtk_make_grid(vtkDataSet *data)
     grid->GetCellData()->ShallowCopy(data->GetCellData());
     grid->GetFieldData()->ShallowCopy(data->GetFieldData());
     set_points(data, grid);
-    dimensions d{};
-    if (get_dimensions(data, d)) {
-        set_hexes(d, grid);
+    lattice l;
+    if (get_lattice(data, l)) {
+        set_lattice(l, grid);
         hide_cells_of_hidden_points(grid);
-    } else {
+    } else if (!borrow_polygons(vtkPolyData::SafeDownCast(data), grid)) {
         set_cells(data, grid);
     }
     grid->Register(nullptr);

@@ -16,8 +16,10 @@
  *
  *  - Points: float or double borrowed, whether interleaved (AOS) or a component apart (SOA); others copied to double.
  *  - Cells 10, 12, 13, 14, and the shells 5, 7, 9: borrowed, with 32- or 64-bit storage.
- *  - Data sets that are no unstructured grid: their cells are listed anew in each call, and points that are given by
- *    axes (insitu/vtk_grids.h); the report has the bytes.
+ *  - Points of curvilinear grids and of polygonal data: borrowed; so are polygons where there are no lines, points and
+ *    strips beside them. The library has coordinates in arrays alone: the points of images and rectilinear grids are
+ *    listed anew in each call, and so are the cells of all grids of rows and columns (insitu/vtk_grids.h). The report
+ *    has the bytes of both.
  *  - Voxels (11) and pixels (8): drawn as hexahedra and quads; a copy of the connectivity.
  *  - Polyhedra (42): their face streams become faces shared between cells; a copy. Pentagonal and hexagonal prisms
  *    (15, 16) come as polyhedra too.
@@ -25,7 +27,10 @@
  *  - What else is left, polyhedra without their faces too: not drawn, and reported; so are lines and points.
  *  - Fields: float, double and 32- or 64-bit signed integers borrowed; other types copied.
  *  - vtkGhostType of the cells: duplicate, hidden and refined cells are not drawn, nor cells of structured grids
- *    with a hidden point. Cells of AMR that finer levels refine are to be flagged, as by vtkAMRUtilities::BlankCells().
+ *    with a hidden point.
+ *  - Overlapping AMR: cells within a box of the next level are not drawn, whether or not vtkAMRUtilities::BlankCells()
+ *    has flagged them, and whichever rank holds the finer grid. Boxes, and spacings or ratios, are to be set for all
+ *    levels on every rank, as VTK wants them; a warning says where they do not fit the grids.
  *
  * No function throws, and none changes a data set. */
 #ifndef INSITU_VTK_H
