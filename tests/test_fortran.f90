@@ -24,6 +24,7 @@ contains
 end module test_fortran_maker
 
 program test_fortran
+    use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr
     use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32, real64, error_unit
     use mpi_f08
     use insitu
@@ -36,6 +37,9 @@ program test_fortran
     integer(int64), target :: hexes_8(8, cells), offsets_8(cells + 1), wide_8(16, cells)
     integer, parameter :: face_count = 3*n*(n - 1)**2
     integer(int32), target :: faces(4, face_count), face_offsets(face_count + 1), owner(face_count), neighbour(face_count)
+    integer(int64), target :: faces_8(4, face_count), face_sizes_8(face_count)
+    integer(int32), target :: face_sizes(face_count), cell_faces(6, cells), cell_offsets(cells + 1)
+    type(c_ptr), target :: face_lists(face_count), face_lists_8(2, face_count)
     integer(int8), target :: types(cells), ghosts(cells)
     real(real64), target :: vector(2*vertices)
     integer(int32), target :: places(vertices), nodes(27, cells), own(8, cells), dofs(10, cells)
@@ -60,6 +64,12 @@ program test_fortran
     call make_faces()
     call same(picture('faces', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(pressure), with_owner=.true.), &
         'owner and neighbour')
+    call same(picture('lists', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(pressure), with_owner=.true., &
+        with_lists=1), 'a list for each face')
+    call same(picture('lists_8', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(pressure), with_owner=.true., &
+        with_lists=2), 'lists in long integers, pointers apart')
+    call same(picture('cells', insitu_points(xyz), insitu_borrow(cell_faces), insitu_borrow(pressure), with_owner=.true., &
+        with_lists=3), 'cells of faces that have lists')
     call make_dofs()
     call same(picture('rows', insitu_points(xyz), insitu_borrow(wide_8(1:8, :)), insitu_borrow(pressure)), 'first rows')
     call same(picture('nodes', insitu_points(xyz), insitu_borrow(nodes(1:8, :)), insitu_borrow(vector), with_dofs=.true.), &
@@ -143,6 +153,18 @@ contains
             end do
         end do
         face_offsets = [(1 + 4*(face - 1), face=1, face_count + 1)]
+        faces_8 = faces
+        face_sizes = 4
+        face_sizes_8 = 4
+        face_lists_8 = c_null_ptr
+        do face = 1, face_count
+            face_lists(face) = c_loc(faces(1, face))
+            face_lists_8(1, face) = c_loc(faces_8(1, face))
+        end do
+        cell_offsets = [(1 + 6*(cell - 1), cell=1, cells + 1)]
+        do cell = 1, cells
+            cell_faces(:, cell) = pack([(face, face=1, face_count)], owner == cell .or. neighbour == cell)
+        end do
         call expect(count == face_count, 'all faces are found')
     end subroutine make_faces
 
@@ -203,13 +225,31 @@ contains
             ', values: [1.3]}}, {surface: {opacity: 0.3}}], outputs: [{path: '//prefix//name//'.png}]}]'
     end function scene_of
 
+    subroutine set_lists(session, way, cells_of_faces)
+        type(insitu_session), intent(inout) :: session
+        integer, intent(in) :: way
+        type(insitu_array), intent(in) :: cells_of_faces
+        select case (way)
+        case (1)
+            call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_lists(face_lists, face_sizes), &
+                insitu_borrow(owner), insitu_borrow(neighbour), cells, status, ghosts=insitu_borrow(ghosts))
+        case (2)
+            call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_lists(face_lists_8(1, :), face_sizes_8, int64), &
+                insitu_borrow(owner), insitu_borrow(neighbour), cells, status)
+        case default
+            call session%set_mesh('m', insitu_points(xyz), cells_of_faces, status, cell_type=INSITU_POLYHEDRON, &
+                offsets=insitu_borrow(cell_offsets), face_lists=insitu_lists(face_lists, face_sizes))
+        end select
+    end subroutine set_lists
+
     ! The file's bytes, on rank 0.
-    function picture(name, points, connectivity, values, component, with_types, with_owner, with_dofs, at_corner) result(out)
+    function picture(name, points, connectivity, values, component, with_types, with_owner, with_dofs, at_corner, &
+        with_lists) result(out)
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity, values
         character(*), intent(in), optional :: component
         logical, intent(in), optional :: with_types, with_owner, with_dofs
-        integer, intent(in), optional :: at_corner
+        integer, intent(in), optional :: at_corner, with_lists
         character(:), allocatable :: out
         type(insitu_session) :: session
         type(insitu_report) :: report
@@ -223,6 +263,8 @@ contains
         if (present(with_types)) then
             call session%set_mesh('m', points, connectivity, status, cell_types=insitu_borrow(types), &
                 offsets=insitu_borrow(offsets_8), ghosts=insitu_borrow(ghosts))
+        else if (present(with_lists)) then
+            call set_lists(session, with_lists, connectivity)
         else if (present(with_owner)) then
             call session%set_mesh_of_faces('m', points, connectivity, insitu_borrow(face_offsets), insitu_borrow(owner), &
                 insitu_borrow(neighbour), cells, status, ghosts=insitu_borrow(ghosts))
@@ -331,6 +373,12 @@ contains
         call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(face_offsets), &
             insitu_borrow(owner(2:)), insitu_borrow(neighbour), cells, status)
         call refused(session, 'face_offsets are not one more than owner')
+        call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_lists(face_lists, face_sizes(2:)), &
+            insitu_borrow(owner), insitu_borrow(neighbour), cells, status)
+        call refused(session, 'lists of faces are not as many as their sizes')
+        call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_lists(face_lists(2:), face_sizes(2:)), &
+            insitu_borrow(owner), insitu_borrow(neighbour), cells, status)
+        call refused(session, 'lists of faces are not as many as owner')
         call session%set_mesh('m', insitu_points(xyz), insitu_borrow(hexes), status, cell_type=INSITU_HEX)
         call expect(status == INSITU_OK, session%error())
         call session%set_field('m', 'p', insitu_borrow(pressure(2:)), status)

@@ -39,6 +39,12 @@ module insitu
         integer(c_int64_t) :: row_stride = 0, stride = 0 ! bytes, along the first extent and along the last
     end type insitu_array
 
+    ! Faces as a list of vertices each: pointers to them, and how many each has.
+    type, public :: insitu_face_lists
+        private
+        type(insitu_array) :: lists, sizes
+    end type insitu_face_lists
+
     type, bind(C) :: c_array
         type(c_ptr) :: data
         integer(c_int) :: kind
@@ -144,7 +150,9 @@ module insitu
         procedure, private :: create_integer, create_f08, text_integer, text_f08
         generic :: create => create_integer, create_f08                   ! (comm, scene_file, status)
         generic :: create_from_text => text_integer, text_f08             ! (comm, scene_text, status)
-        procedure :: set_mesh, set_mesh_of_faces, remove_mesh, set_field, set_filled_field, step, report, error, destroy
+        procedure, private :: set_faces_by_offsets, set_faces_by_lists
+        generic :: set_mesh_of_faces => set_faces_by_offsets, set_faces_by_lists
+        procedure :: set_mesh, remove_mesh, set_field, set_filled_field, step, report, error, destroy
         procedure :: keep_pictures, pictures
     end type insitu_session
 
@@ -160,7 +168,13 @@ module insitu
         module procedure points_of_matrix_r4, points_of_matrix_r8, points_of_axes_r4, points_of_axes_r8
     end interface insitu_points
 
-    public :: insitu_borrow, insitu_points, insitu_text
+    ! Pointers to the lists of faces' vertices, by c_loc, and the lists' sizes. kind: of the indices in the lists, int32 or
+    ! int64; int32 by default.
+    interface insitu_lists
+        module procedure lists_i4, lists_i8
+    end interface insitu_lists
+
+    public :: insitu_borrow, insitu_points, insitu_lists, insitu_text
 
     interface
         integer(c_int) function c_create(comm, scene, is_text, session) bind(C, name='insitu_create_fortran')
@@ -360,6 +374,34 @@ contains
         out = [borrow_r8(x), borrow_r8(y), borrow_r8(z)]
     end function points_of_axes_r8
 
+    function pointers_of(pointers, kind) result(out)
+        type(c_ptr), intent(in), target :: pointers(:)
+        integer, intent(in), optional :: kind
+        type(insitu_array) :: out
+        out%kind = integer32
+        if (present(kind)) out%kind = merge(integer64, integer32, kind == int64)
+        if (size(pointers) == 0) return
+        out = list_of(out%kind, size(pointers), c_loc(pointers(1)), c_loc(pointers(min(2, size(pointers)))))
+    end function pointers_of
+
+    function lists_i4(pointers, sizes, kind) result(out)
+        type(c_ptr), intent(in), target :: pointers(:)
+        integer(int32), intent(in), target :: sizes(:)
+        integer, intent(in), optional :: kind
+        type(insitu_face_lists) :: out
+        out%lists = pointers_of(pointers, kind)
+        out%sizes = borrow_i4(sizes)
+    end function lists_i4
+
+    function lists_i8(pointers, sizes, kind) result(out)
+        type(c_ptr), intent(in), target :: pointers(:)
+        integer(int64), intent(in), target :: sizes(:)
+        integer, intent(in), optional :: kind
+        type(insitu_face_lists) :: out
+        out%lists = pointers_of(pointers, kind)
+        out%sizes = borrow_i8(sizes)
+    end function lists_i8
+
     ! As C is told of a list. An array without elements is given all the same.
     function as_c(a, nothing) result(out)
         type(insitu_array), intent(in) :: a
@@ -452,9 +494,10 @@ contains
 
     ! The first of the arguments that C cannot be told of; '' where there is none. row: as row_of(), 0 where there must be
     ! no gaps.
-    function find_fault(points, connectivity, row, lists) result(out)
+    function find_fault(points, connectivity, row, lists, face_lists) result(out)
         type(insitu_array), intent(in) :: points(3), connectivity, lists(:)
         integer(c_int64_t), intent(in) :: row
+        type(insitu_face_lists), intent(in), optional :: face_lists
         character(:), allocatable :: out
         out = ''
         if (points(1)%rows /= 1) then
@@ -466,20 +509,32 @@ contains
         else if (any(lists%rows > 1)) then
             out = 'cell_types, offsets, face_offsets, owner, neighbour, ghosts and vertex_ids are lists, one is a matrix'
         end if
+        if (len(out) > 0 .or. .not. present(face_lists)) return
+        if (face_lists%lists%columns /= face_lists%sizes%columns) out = 'the lists of faces are not as many as their sizes'
     end function find_fault
+
+    subroutine take_lists(mesh, face_lists, nothing)
+        type(c_mesh), intent(inout) :: mesh
+        type(insitu_face_lists), intent(in) :: face_lists
+        real(real64), intent(in), target :: nothing
+        mesh%face_count = face_lists%lists%columns
+        mesh%face_lists = as_c(face_lists%lists, nothing)
+        mesh%face_sizes = as_c(face_lists%sizes, nothing)
+    end subroutine take_lists
 
     ! This rank's part of a mesh. connectivity: a list, or (corners, cells), of cells of one type also some first rows of
     ! a matrix; in VTK's order, or in vertex_order. faces, face_offsets: the faces' vertices, and
-    ! where each begins, of polyhedra, whose connectivity is of faces. Every index and offset counts from 1, or from
-    ! index_base.
+    ! where each begins, of polyhedra, whose connectivity is of faces; or face_lists instead. Every index and offset counts
+    ! from 1, or from index_base.
     subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
-        ghosts, vertex_ids, changed, index_base, keep_polyhedra, vertex_order)
+        ghosts, vertex_ids, changed, index_base, keep_polyhedra, vertex_order, face_lists)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
         type(insitu_array), intent(in) :: points(3), connectivity
         integer, intent(out) :: status
         integer, intent(in), optional :: cell_type, changed, index_base, vertex_order
         type(insitu_array), intent(in), optional :: cell_types, offsets, faces, face_offsets, ghosts, vertex_ids
+        type(insitu_face_lists), intent(in), optional :: face_lists
         logical, intent(in), optional :: keep_polyhedra
         type(insitu_array) :: given(6)
         integer(c_int64_t) :: gap ! elements between one column's last and the next one's first
@@ -502,7 +557,7 @@ contains
         if (present(vertex_order)) mesh%vertex_order = vertex_order
         if (.not. (present(offsets) .or. present(cell_types))) mesh%connectivity_row = row_of(connectivity)
         gap = max(0_c_int64_t, mesh%connectivity_row - connectivity%rows)
-        self%own_error = find_fault(points, connectivity, mesh%connectivity_row, given(1:5))
+        self%own_error = find_fault(points, connectivity, mesh%connectivity_row, given(1:5), face_lists)
         status = INSITU_ERROR_ARGUMENT
         if (len(self%own_error) > 0) return
         mesh%vertex_count = points(1)%columns
@@ -519,6 +574,7 @@ contains
         if (present(face_offsets)) mesh%face_count = max(0_c_int64_t, face_offsets%columns - 1)
         if (present(faces)) mesh%face_connectivity = as_c(faces, nothing)
         mesh%face_connectivity_count = given(6)%rows * given(6)%columns
+        if (present(face_lists)) call take_lists(mesh, face_lists, nothing)
         corners = corners_of(mesh%cell_type)
         if (present(cell_types)) then
             mesh%cell_count = cell_types%columns
@@ -535,10 +591,10 @@ contains
             merge(mesh%cell_count * corners, mesh%connectivity_count, corners > 0), corners))
     end subroutine set_mesh
 
-    ! This rank's part of a mesh of finite volumes: faces' vertices, and where each begins; of each face the cell that owns
-    ! it, and the neighbour beyond. Faces on the boundary have 0 for a neighbour (index_base - 1), or are the last ones,
-    ! beyond the neighbours.
-    subroutine set_mesh_of_faces(self, name, points, faces, face_offsets, owner, neighbour, cell_count, status, ghosts, &
+    ! This rank's part of a mesh of finite volumes: faces' vertices, and where each begins, or a list for each face; of each
+    ! face the cell that owns it, and the neighbour beyond. Faces on the boundary have 0 for a neighbour (index_base - 1),
+    ! or are the last ones, beyond the neighbours.
+    subroutine set_faces_by_offsets(self, name, points, faces, face_offsets, owner, neighbour, cell_count, status, ghosts, &
         vertex_ids, changed, index_base, keep_polyhedra)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: name
@@ -548,33 +604,81 @@ contains
         type(insitu_array), intent(in), optional :: ghosts, vertex_ids
         integer, intent(in), optional :: changed, index_base
         logical, intent(in), optional :: keep_polyhedra
-        type(insitu_array) :: given(5)
         type(c_mesh), target :: mesh
+        real(real64), target :: nothing
+        nothing = 0
+        call c_mesh_defaults(mesh)
+        status = INSITU_ERROR_ARGUMENT
+        self%own_error = find_fault(points, faces, 0_c_int64_t, [face_offsets])
+        if (len(self%own_error) == 0 .and. face_offsets%columns /= owner%columns + 1) &
+            self%own_error = 'face_offsets are not one more than owner'
+        if (len(self%own_error) > 0) return
+        mesh%face_count = max(0_c_int64_t, face_offsets%columns - 1)
+        mesh%face_offsets = as_c(face_offsets, nothing)
+        mesh%face_connectivity_count = faces%rows * faces%columns
+        mesh%face_connectivity = as_c(faces, nothing)
+        call set_owned(self, mesh, name, points, owner, neighbour, cell_count, status, ghosts, vertex_ids, changed, &
+            index_base, keep_polyhedra)
+    end subroutine set_faces_by_offsets
+
+    subroutine set_faces_by_lists(self, name, points, face_lists, owner, neighbour, cell_count, status, ghosts, vertex_ids, &
+        changed, index_base, keep_polyhedra)
+        class(insitu_session), intent(inout) :: self
+        character(*), intent(in) :: name
+        type(insitu_array), intent(in) :: points(3), owner, neighbour
+        type(insitu_face_lists), intent(in) :: face_lists
+        integer, intent(in) :: cell_count
+        integer, intent(out) :: status
+        type(insitu_array), intent(in), optional :: ghosts, vertex_ids
+        integer, intent(in), optional :: changed, index_base
+        logical, intent(in), optional :: keep_polyhedra
+        type(c_mesh), target :: mesh
+        real(real64), target :: nothing
+        nothing = 0
+        call c_mesh_defaults(mesh)
+        status = INSITU_ERROR_ARGUMENT
+        self%own_error = find_fault(points, owner, 0_c_int64_t, [face_lists%sizes], face_lists)
+        if (len(self%own_error) == 0 .and. face_lists%lists%columns /= owner%columns) &
+            self%own_error = 'the lists of faces are not as many as owner'
+        if (len(self%own_error) > 0) return
+        call take_lists(mesh, face_lists, nothing)
+        call set_owned(self, mesh, name, points, owner, neighbour, cell_count, status, ghosts, vertex_ids, changed, &
+            index_base, keep_polyhedra)
+    end subroutine set_faces_by_lists
+
+    ! mesh has its faces.
+    subroutine set_owned(self, mesh, name, points, owner, neighbour, cell_count, status, ghosts, vertex_ids, changed, &
+        index_base, keep_polyhedra)
+        class(insitu_session), intent(inout) :: self
+        type(c_mesh), intent(inout), target :: mesh
+        character(*), intent(in) :: name
+        type(insitu_array), intent(in) :: points(3), owner, neighbour
+        integer, intent(in) :: cell_count
+        integer, intent(out) :: status
+        type(insitu_array), intent(in), optional :: ghosts, vertex_ids
+        integer, intent(in), optional :: changed, index_base
+        logical, intent(in), optional :: keep_polyhedra
+        type(insitu_array) :: given(4)
         real(real64), target :: nothing
         integer :: axis
         nothing = 0
-        call c_mesh_defaults(mesh)
         mesh%index_base = 1
         mesh%cell_type = INSITU_POLYHEDRON
         mesh%cell_count = cell_count
         if (present(changed)) mesh%changed = changed
         if (present(index_base)) mesh%index_base = index_base
         if (present(keep_polyhedra)) mesh%keep_polyhedra = merge(1_c_int, 0_c_int, keep_polyhedra)
-        given(1:3) = [face_offsets, owner, neighbour]
-        if (present(ghosts)) given(4) = ghosts
-        if (present(vertex_ids)) given(5) = vertex_ids
-        self%own_error = find_fault(points, faces, 0_c_int64_t, given)
-        if (len(self%own_error) == 0) self%own_error = find_face_length(points(1)%columns, mesh%cell_count, given)
+        given(1:2) = [owner, neighbour]
+        if (present(ghosts)) given(3) = ghosts
+        if (present(vertex_ids)) given(4) = vertex_ids
+        self%own_error = find_fault(points, owner, 0_c_int64_t, given)
+        if (len(self%own_error) == 0) self%own_error = find_face_length(points(1)%columns, mesh%cell_count, given(3:4))
         status = INSITU_ERROR_ARGUMENT
         if (len(self%own_error) > 0) return
         mesh%vertex_count = points(1)%columns
         do axis = 1, 3
             mesh%coordinates(axis) = as_c(points(axis), nothing)
         end do
-        mesh%face_count = max(0_c_int64_t, face_offsets%columns - 1)
-        mesh%face_offsets = as_c(face_offsets, nothing)
-        mesh%face_connectivity_count = faces%rows * faces%columns
-        mesh%face_connectivity = as_c(faces, nothing)
         mesh%owner = as_c(owner, nothing)
         mesh%neighbour_count = neighbour%columns
         mesh%neighbour = as_c(neighbour, nothing)
@@ -582,19 +686,17 @@ contains
         if (present(vertex_ids)) mesh%vertex_ids = as_c(vertex_ids, nothing)
         status = c_set_mesh(self%handle, as_c_text(name), c_loc(mesh))
         call note_size(self%sizes, mesh_size(trim(name), mesh%vertex_count, mesh%cell_count, 0_c_int64_t, 0))
-    end subroutine set_mesh_of_faces
+    end subroutine set_owned
 
-    ! As find_length(). given: face_offsets, owner, neighbour, ghosts, vertex_ids.
+    ! As find_length(). given: ghosts, vertex_ids.
     function find_face_length(vertices, cells, given) result(out)
         integer(c_int64_t), intent(in) :: vertices, cells
-        type(insitu_array), intent(in) :: given(5)
+        type(insitu_array), intent(in) :: given(2)
         character(:), allocatable :: out
         out = ''
-        if (given(1)%columns /= given(2)%columns + 1) then
-            out = 'face_offsets are not one more than owner'
-        else if (given(4)%columns > 0 .and. given(4)%columns /= cells) then
+        if (given(1)%columns > 0 .and. given(1)%columns /= cells) then
             out = 'ghosts are not as many as the cells'
-        else if (given(5)%columns > 0 .and. given(5)%columns /= vertices) then
+        else if (given(2)%columns > 0 .and. given(2)%columns /= vertices) then
             out = 'vertex_ids are not as many as the vertices'
         end if
     end function find_face_length
