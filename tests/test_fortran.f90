@@ -44,6 +44,8 @@ program test_fortran
     real(real64), target :: vector(2*vertices)
     integer(int32), target :: places(vertices), nodes(27, cells), own(8, cells), dofs(10, cells)
     real(real64), target :: doubled(3, 8*cells), at_corners(8*cells), unknowns(10*cells)
+    real(real64), target :: block(n, n, n), velocity(2, n, n, n)
+    real(real64), pointer :: list(:), matrix(:, :)
     character(:), allocatable :: prefix, plain
     integer :: rank, status
 
@@ -61,6 +63,12 @@ program test_fortran
     call same(picture('vector', insitu_points(xyz), insitu_borrow(reshaped()), insitu_borrow(vector_4), 'x'), 'components')
     call same(picture('mixed', insitu_points(xyz), insitu_borrow(hexes_8), insitu_borrow(pressure), with_types=.true.), &
         'types, offsets, ghosts')
+    block = reshape(pressure, [n, n, n])
+    list(1:vertices) => block
+    call same(picture('block', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(list)), 'three dimensions as a list')
+    velocity = reshape(vector_4, [2, n, n, n])
+    matrix(1:2, 1:vertices) => velocity
+    call same(picture('velocity', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(matrix), 'x'), 'and as a matrix')
     call make_faces()
     call same(picture('faces', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(pressure), with_owner=.true.), &
         'owner and neighbour')

@@ -101,6 +101,7 @@ def what_cannot_be_borrowed_is_refused():
             (dict(coordinates=xyz.tolist()), TypeError, "a list cannot be borrowed"),
             (dict(coordinates=xyz.astype(">f8")), TypeError, "native"),
             (dict(coordinates=xyz[:, :2]), ValueError, "vertices x 3"),
+            (dict(coordinates=[axis.reshape(5, 5, -1) for axis in xyz.T]), ValueError, "reshape(-1) makes a list"),
             (dict(connectivity=hexes.astype("uint64")), TypeError, "uint64"),
             (dict(connectivity=numpy.asfortranarray(hexes)), ValueError, "rows that follow one another"),
             (dict(connectivity=hexes[:, :7].copy()), ValueError, "expected 8"),
