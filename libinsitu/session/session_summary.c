@@ -27,6 +27,18 @@ static int64_t mesh_bytes(const insitu_mesh *m)
     return bytes + array_bytes(&m->ghosts, m->cell_count);
 }
 
+static int64_t patch_bytes(const insitu_field *field)
+{
+    int64_t bytes = 0;
+    for (int i = 0; i < field->patch_count; i++) {
+        const insitu_patch *patch = &field->patches[i];
+        bytes += array_bytes(&patch->values, patch->count) * field->component_count;
+        bytes += array_bytes(&patch->faces, patch->count) + array_bytes(&patch->offsets, patch->count + 1);
+        bytes += array_bytes(&patch->connectivity, patch->connectivity_count);
+    }
+    return bytes;
+}
+
 static bool is_field_in_use(const session_mesh *mesh, int field)
 {
     for (int i = 0; i < mesh->scalar_count; i++)
@@ -47,7 +59,8 @@ static void report_field(session_report *out, const session_mesh *mesh, int inde
                          (long long)copied);
     if (is_field_in_use(mesh, index))
         out->numbers.bytes_borrowed += array_bytes(&field->values, field->count) * field->component_count +
-                                       array_bytes(&field->index, session_field_places(&mesh->given, field));
+                                       array_bytes(&field->index, session_field_places(&mesh->given, field)) +
+                                       patch_bytes(field);
     else if (out->numbers.images)
         session_text_add(&out->left_out, "mesh \"%s\": field \"%s\" is in no picture", mesh->name, field->name);
 }

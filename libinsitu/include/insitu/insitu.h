@@ -164,7 +164,8 @@ typedef struct insitu_mesh {
 
 /* Whether a field has one value a vertex, one a cell, or one at each corner of each cell. Of cells, volumes and colours
  * show each value as it is, unless the scene says `interpolate: vertex`; then, and for isosurfaces, a vertex gets the
- * mean of its cells on all ranks, ghosts left out: on the boundary that of the cells within.
+ * mean of its cells on all ranks, ghosts left out: on the boundary that of the cells within, or of the boundary's own
+ * values, where the field has such (insitu_patch).
  *
  * Corners are for fields that differ from cell to cell at the vertex they share, as those of discontinuous Galerkin
  * methods: there is one for each entry of connectivity that is a vertex of a cell, in the order of the caller's
@@ -178,16 +179,45 @@ typedef struct insitu_mesh {
  * they are. */
 typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER = 2 } insitu_centring;
 
+/* Values that a field of cells has on faces of the boundary, as codes of finite volumes hold them for each patch.
+ *
+ * Where cells' values are taken to the vertices, a vertex of such a face gets the mean of the values of all its faces
+ * that have one, of all patches and on all ranks, in place of the mean of its cells: so a wall at which the flow rests
+ * is drawn at rest. Along an edge where patches meet both count, by their faces there. The same bits on any partition.
+ * A field that is linear in space is so hit exactly inside of a flat stretch of equal faces, up to rounding; no mean
+ * can be exact at the edges and corners of a domain, which lie beyond all faces' centres. Values that are not finite do
+ * not count, nor do faces of ghost cells, and all else that is drawn by cells' values as they are knows nothing of
+ * patches.
+ *
+ * The faces are those between a cell and the outside. Faces between ranks, and others that are coupled in pairs, have
+ * cells on both sides and are left out. Faces are told in one of three ways; a face that two cells of this rank share,
+ * that no cell has, or that is given twice is an error, told on all ranks by the step that needs the values. */
+typedef struct insitu_patch {
+    int64_t count;      /* faces, and tuples of values */
+    int64_t first_face; /* where neither of the next two is given: the faces of the mesh that follow one another from
+                           this one on; its first face is index_base */
+    insitu_array faces; /* int32 or int64, count: the faces' numbers in face_offsets or face_lists, from index_base */
+    /* For meshes whose cells have no faces given, as hexes, but of use with any: the faces' vertices. */
+    int64_t connectivity_count; /* elements in connectivity */
+    insitu_array connectivity;  /* int32 or int64, connectivity_count: vertex indices from index_base, around each face
+                                   in either direction */
+    insitu_array offsets; /* int32 or int64, count + 1, from index_base: where each face begins in connectivity. Not
+                             needed where all have as many vertices: connectivity_count / count. */
+    insitu_array values;  /* float32, float64, int32 or int64, count tuples of the field's component_count. stride_bytes
+                             is from tuple to tuple; 0: component_count elements */
+    int64_t component_stride_bytes; /* from one component to the next; 0: packed, interleaved */
+} insitu_patch;
+
 struct insitu_field;
 
 /* Gives the values of a field in the steps that need them: field is as it was set, to be completed by values, and what
- * belongs to them (count, component_stride_bytes, index, corner_row, changed); its name, centring and component_count
- * stay. Called within insitu_step(), by the thread that called that, at most once a step, where a picture, a
- * statistic or a condition of this step needs the field; never elsewhere. The arrays are borrowed until the step has
- * returned. All ranks call the fills of their fields in the same order, by the names of meshes and then of fields:
- * where all ranks set the field with a fill, it may communicate, on a communicator of the caller's; it must not call
- * the session. Any other status than INSITU_OK is an error of the step, told on all ranks; the other fills are called
- * all the same. */
+ * belongs to them (count, component_stride_bytes, index, corner_row, patches, changed); its name, centring and
+ * component_count stay. Called within insitu_step(), by the thread that called that, at most once a step, where a
+ * picture, a statistic or a condition of this step needs the field; never elsewhere. The arrays are borrowed until the
+ * step has returned. All ranks call the fills of their fields in the same order, by the names of meshes and then of
+ * fields: where all ranks set the field with a fill, it may communicate, on a communicator of the caller's; it must
+ * not call the session. Any other status than INSITU_OK is an error of the step, told on all ranks; the other fills
+ * are called all the same. */
 typedef insitu_status insitu_fill(void *fill_data, struct insitu_field *field);
 
 /* One rank's part of a field. Borrowed as a mesh is. Fill with insitu_field_defaults() first. */
@@ -218,6 +248,9 @@ typedef struct insitu_field {
      * give other values, unless it sets changed to INSITU_CHANGED_NOTHING. */
     insitu_fill *fill;
     void *fill_data; /* handed to fill as it is */
+    /* Optional, of cells: the field's values on the boundary. The table is copied, its arrays are borrowed. */
+    int patch_count;
+    const insitu_patch *patches;
 } insitu_field;
 
 /* What the last step did, on this rank unless said otherwise. Times are wall-clock milliseconds. */

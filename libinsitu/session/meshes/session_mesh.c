@@ -77,6 +77,7 @@ void session_drop_fields(session_mesh *mesh)
 {
     for (int i = 0; i < mesh->field_count; i++) {
         base_free((void *)(uintptr_t)mesh->fields[i].given.name);
+        base_free(mesh->fields[i].patches);
         session_drop_copy(&mesh->fields[i]);
     }
     base_free(mesh->fields);

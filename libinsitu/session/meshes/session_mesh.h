@@ -17,6 +17,7 @@ typedef struct session_field {
     bool is_wanted;     /* by statistics of this step; what images use has scalars */
     bool is_filled;     /* in this step, where given.fill makes the values; or it failed: */
     base_error fill_problem;
+    insitu_patch *patches; /* given.patches, a table of ours */
     char *copy; /* NULL until made; packed tuples, components interleaved */
     int64_t copy_bytes;
 } session_field;

@@ -40,7 +40,7 @@ grid_array session_grid_array(const insitu_array *array)
     return out;
 }
 
-static grid_array index_array(const insitu_mesh *mesh, const insitu_array *array)
+grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array)
 {
     grid_array out = session_grid_array(array);
     out.base = mesh->index_base;
@@ -51,11 +51,11 @@ static grid as_grid(const insitu_mesh *mesh)
 {
     grid g = {.vertex_count = mesh->vertex_count, .cell_count = mesh->cell_count, .cell_type = (int)mesh->cell_type};
     for (int axis = 0; axis < 3; axis++) g.coordinates[axis] = session_grid_array(&mesh->coordinates[axis]);
-    g.connectivity = index_array(mesh, &mesh->connectivity);
-    g.offsets = index_array(mesh, &mesh->offsets);
+    g.connectivity = session_index_array(mesh, &mesh->connectivity);
+    g.offsets = session_index_array(mesh, &mesh->offsets);
     g.face_count = mesh->face_count;
-    g.face_offsets = index_array(mesh, &mesh->face_offsets);
-    g.face_connectivity = index_array(mesh, &mesh->face_connectivity);
+    g.face_offsets = session_index_array(mesh, &mesh->face_offsets);
+    g.face_connectivity = session_index_array(mesh, &mesh->face_connectivity);
     if (mesh->cell_types.data) {
         const grid_array types = session_grid_array(&mesh->cell_types);
         g.cell_types = types.data;
@@ -128,12 +128,6 @@ static void free_indices(grid_array *array)
 
 /* ---- faces' vertices out of lists ----------------------------------------------------------------------------- */
 
-static const void *list_of_face(const insitu_mesh *mesh, int64_t face)
-{
-    const int64_t stride = mesh->face_lists.stride_bytes ? mesh->face_lists.stride_bytes : (int64_t)sizeof(void *);
-    return *(const void *const *)(const void *)((const char *)mesh->face_lists.data + face * stride);
-}
-
 /* How many vertices all faces have, -1 where a list is none. */
 static int64_t count_listed(const session_mesh *mesh, base_error *error)
 {
@@ -149,7 +143,7 @@ static int64_t count_listed(const session_mesh *mesh, base_error *error)
                       (long long)size);
             return -1;
         }
-        if (size > 0 && !list_of_face(given, face)) {
+        if (size > 0 && !session_face_list(given, face)) {
             base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its list is NULL, its size %lld", mesh->name,
                       at, (long long)size);
             return -1;
@@ -174,8 +168,8 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
     insitu_array list = {NULL, given->face_lists.type, 0};
     for (int64_t face = 0; face < given->face_count; face++) {
         const int64_t size = grid_array_index(&sizes, face);
-        list.data = list_of_face(given, face);
-        const grid_array vertices = index_array(given, &list);
+        list.data = session_face_list(given, face);
+        const grid_array vertices = session_index_array(given, &list);
         for (int64_t i = 0; i < size; i++) {
             const int64_t vertex = grid_array_index(&vertices, i);
             if (vertex < 0 || vertex >= given->vertex_count)
@@ -193,13 +187,13 @@ static insitu_status copy_lists(session_mesh *mesh, base_error *error)
 
 /* ---- cells' faces out of owner and neighbour ------------------------------------------------------------------ */
 
-/* The two cells of a face; cells[1] is -1 of a boundary's. */
-typedef struct face_sides {
-    const insitu_mesh *given;
-    grid_array owner, neighbour;
-} face_sides;
+session_face_sides session_sides(const insitu_mesh *given)
+{
+    return (session_face_sides){given, session_index_array(given, &given->owner),
+                                session_index_array(given, &given->neighbour)};
+}
 
-static void sides_of(const face_sides *sides, int64_t face, int64_t cells[2])
+void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2])
 {
     cells[0] = grid_array_index(&sides->owner, face);
     cells[1] = -1;
@@ -232,12 +226,12 @@ static insitu_status check_sides(const session_mesh *mesh, int64_t face, const i
 }
 
 /* offsets[c + 1] becomes how many faces cell c has. */
-static insitu_status count_faces(const session_mesh *mesh, const face_sides *sides, const grid_array *offsets,
+static insitu_status count_faces(const session_mesh *mesh, const session_face_sides *sides, const grid_array *offsets,
                                  base_error *error)
 {
     for (int64_t face = 0; face < mesh->given.face_count; face++) {
         int64_t cells[2];
-        sides_of(sides, face, cells);
+        session_cells_of_face(sides, face, cells);
         if (check_sides(mesh, face, cells, error)) return error->status;
         for (int i = 0; i < 2 && cells[i] >= 0; i++)
             session_put_index(offsets, cells[i] + 1, grid_array_index(offsets, cells[i] + 1) + 1);
@@ -247,14 +241,14 @@ static insitu_status count_faces(const session_mesh *mesh, const face_sides *sid
 
 /* The counts become where each cell begins, then, as its faces are put there, where it ends, which is where the next
  * one begins. */
-static void put_faces(const session_mesh *mesh, const face_sides *sides, const session_topology *t)
+static void put_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;
     for (int64_t c = 0; c < count; c++)
         session_put_index(&t->offsets, c + 1, grid_array_index(&t->offsets, c + 1) + grid_array_index(&t->offsets, c));
     for (int64_t face = 0; face < mesh->given.face_count; face++) {
         int64_t cells[2];
-        sides_of(sides, face, cells);
+        session_cells_of_face(sides, face, cells);
         for (int i = 0; i < 2 && cells[i] >= 0; i++) {
             const int64_t at = grid_array_index(&t->offsets, cells[i]);
             session_put_index(&t->connectivity, at, face);
@@ -269,7 +263,7 @@ static insitu_status list_faces(session_mesh *mesh, base_error *error)
 {
     const insitu_mesh *given = &mesh->given;
     session_topology *t = &mesh->topology;
-    const face_sides sides = {given, index_array(given, &given->owner), index_array(given, &given->neighbour)};
+    const session_face_sides sides = session_sides(given);
     const int64_t most = given->face_count + given->neighbour_count;
     t->has_own_cells = true;
     t->cell_type = GRID_POLYHEDRON;

@@ -8,6 +8,26 @@
 /* An array as the rooms below read it; its indices count from 0. */
 grid_array session_grid_array(const insitu_array *array);
 
+/* The same of one whose indices count from the mesh's index_base. */
+grid_array session_index_array(const insitu_mesh *mesh, const insitu_array *array);
+
+/* The vertices of a face that is given by a list of its own. */
+static inline const void *session_face_list(const insitu_mesh *mesh, int64_t face)
+{
+    const int64_t stride = mesh->face_lists.stride_bytes ? mesh->face_lists.stride_bytes : (int64_t)sizeof(void *);
+    return *(const void *const *)(const void *)((const char *)mesh->face_lists.data + face * stride);
+}
+
+/* Owners and neighbours of faces. */
+typedef struct session_face_sides {
+    const insitu_mesh *given;
+    grid_array owner, neighbour;
+} session_face_sides;
+
+session_face_sides session_sides(const insitu_mesh *given);
+/* The two cells of a face; cells[1] is -1 of a boundary's. */
+void session_cells_of_face(const session_face_sides *sides, int64_t face, int64_t cells[2]);
+
 /* The grid that reads these arrays: the session's own where they are made, else the caller's. Local. */
 void session_read_topology(session_mesh *mesh);
 

@@ -1,5 +1,6 @@
 /* Recentring: the value at a vertex is the mean over its cells (or, of values at corners, over the corners there) on
- * all ranks, and bitwise the same for any partition.
+ * all ranks, and bitwise the same for any partition. Where the field has values on faces of the boundary, a vertex of
+ * such a face gets the mean over those faces instead, be they all on other ranks than its cells.
  *
  * Sums depend on their order, so partial sums of ranks would not do: every rank's single values come together, are
  * sorted, and summed in that order. Vertices are one where their keys are (global ids where all ranks give them, else
@@ -21,6 +22,7 @@
 #include "session_agree.h"
 #include "session_exchange.h"
 #include "session_neighbours.h"
+#include "session_patches.h"
 #include "session_scalars.h"
 
 /* Values by group: those of group g are values[starts[g]] .. values[starts[g + 1] - 1]. */
@@ -28,7 +30,8 @@ typedef struct value_groups {
     int64_t count;
     int64_t *starts; /* count + 1 */
     double *values;
-    double *means; /* count */
+    double *means;            /* count */
+    unsigned char *are_faces; /* count: the values are those of faces, else those of cells or corners */
 } value_groups;
 
 typedef struct vertex_groups {
@@ -45,7 +48,8 @@ static bool groups_create(value_groups *groups, int64_t count)
     *groups = (value_groups){.count = count};
     groups->starts = base_calloc((size_t)count + 1, sizeof *groups->starts);
     groups->means = base_alloc((size_t)count * sizeof *groups->means);
-    return groups->starts && groups->means;
+    groups->are_faces = base_calloc((size_t)count, sizeof *groups->are_faces);
+    return groups->starts && groups->means && groups->are_faces;
 }
 
 /* After starts[g + 1] was filled with the count of group g: values get their room. Filling then moves starts[g] to
@@ -68,6 +72,7 @@ static void groups_free(value_groups *groups)
     base_free(groups->starts);
     base_free(groups->values);
     base_free(groups->means);
+    base_free(groups->are_faces);
     *groups = (value_groups){0};
 }
 
@@ -133,7 +138,7 @@ static void give_values(const grid *g, const grid_field *field, vertex_groups *g
         int64_t vertex;
         while (grid_walk_next(&walk, &vertex)) {
             const int64_t group = groups->of_vertex[vertex];
-            if (field->is_cell_centred && last[group] == cell) continue;
+            if (values->are_faces[group] || (field->is_cell_centred && last[group] == cell)) continue;
             if (!gives(field, cell, vertex, &value)) continue;
             last[group] = cell;
             if (is_stored)
@@ -144,14 +149,32 @@ static void give_values(const grid *g, const grid_field *field, vertex_groups *g
     }
 }
 
-static bool collect_values(const session_mesh *mesh, const grid_field *field, vertex_groups *groups)
+static void count_face_values(const session_patch_values *faces, value_groups *values)
+{
+    for (int64_t i = 0; i < faces->count; i++) {
+        values->are_faces[faces->groups[i]] = 1;
+        values->starts[faces->groups[i] + 1]++;
+    }
+}
+
+static void store_face_values(const session_patch_values *faces, value_groups *values)
+{
+    for (int64_t i = 0; i < faces->count; i++) values->values[values->starts[faces->groups[i]]++] = faces->values[i];
+}
+
+static bool collect_values(const session_mesh *mesh, const grid_field *field, const session_patch_values *faces,
+                           vertex_groups *groups)
 {
     int64_t *last = base_alloc((size_t)groups->keys.count * sizeof *last);
     if (!last) return false;
+    count_face_values(faces, &groups->values);
     give_values(&mesh->cells, field, groups, last, false);
     const bool is_open = groups_open(&groups->values);
-    if (is_open) give_values(&mesh->cells, field, groups, last, true);
-    if (is_open) groups_close(&groups->values);
+    if (is_open) {
+        store_face_values(faces, &groups->values);
+        give_values(&mesh->cells, field, groups, last, true);
+        groups_close(&groups->values);
+    }
     base_free(last);
     return is_open;
 }
@@ -164,17 +187,26 @@ static void vertex_groups_free(vertex_groups *groups)
     groups_free(&groups->values);
 }
 
-/* mesh may be NULL: no groups then. */
-static insitu_status make_groups(const session_mesh *mesh, const grid_field *field, bool by_id, int threads,
+/* mesh may be NULL: no groups then. index: of the field. */
+static insitu_status make_groups(const session_mesh *mesh, int index, const grid_field *field, bool by_id, int threads,
                                  vertex_groups *groups, base_error *error)
 {
     const int64_t count = mesh ? mesh->cells.vertex_count : 0;
+    session_patch_values faces = {0};
     groups->of_vertex = base_alloc((size_t)count * sizeof *groups->of_vertex);
     groups->vertex = base_alloc((size_t)count * sizeof *groups->vertex);
     bool is_made = groups->of_vertex && groups->vertex && session_keys_create(&groups->keys, count);
     if (is_made && mesh) group_vertices(mesh, by_id, groups);
     is_made = is_made && groups_create(&groups->values, groups->keys.count);
-    is_made = is_made && (mesh ? collect_values(mesh, field, groups) : groups_open(&groups->values));
+    if (is_made && mesh) {
+        const session_vertex_numbers numbers = {&groups->keys, groups->of_vertex, by_id};
+        session_find_patch_values(mesh, index, field->component, &numbers, &faces, error);
+        is_made = error->status || collect_values(mesh, field, &faces, groups);
+        session_patch_values_free(&faces);
+        if (error->status) return error->status;
+    } else {
+        is_made = is_made && groups_open(&groups->values);
+    }
     if (!is_made) return session_no_memory(error, count * 80, "values recentred to vertices");
     groups_average(&groups->values, threads);
     return INSITU_OK;
@@ -182,7 +214,9 @@ static insitu_status make_groups(const session_mesh *mesh, const grid_field *fie
 
 /* ---- what ranks share ---------------------------------------------------------------------------------------- */
 
-enum { RECORD_HEAD = 4 }; /* words before the values: the key and the count */
+/* Words before the values: the key, then the count, beside which FACE_VALUES tells that they are those of faces. */
+enum { RECORD_HEAD = 4 };
+#define FACE_VALUES (UINT64_C(1) << 63)
 
 typedef struct shared_groups {
     int64_t count;
@@ -204,7 +238,7 @@ static void write_record(const vertex_groups *groups, int64_t group, uint64_t *r
 {
     const int64_t count = value_count(&groups->values, group);
     memcpy(record, groups->keys.keys[group].words, sizeof groups->keys.keys[group].words);
-    record[RECORD_HEAD - 1] = (uint64_t)count;
+    record[RECORD_HEAD - 1] = (uint64_t)count | (groups->values.are_faces[group] ? FACE_VALUES : 0);
     memcpy(record + RECORD_HEAD, groups->values.values + groups->values.starts[group], (size_t)count * sizeof(double));
 }
 
@@ -258,9 +292,20 @@ static bool find_shared(const session_mesh *mesh, const vertex_groups *groups, c
 
 /* ---- the homes' part: merge by key --------------------------------------------------------------------------- */
 
+static int64_t record_count(const uint64_t *record)
+{
+    return (int64_t)(record[RECORD_HEAD - 1] & ~FACE_VALUES);
+}
+
 static const uint64_t *next_record(const uint64_t *record)
 {
-    return record + RECORD_HEAD + record[RECORD_HEAD - 1];
+    return record + RECORD_HEAD + record_count(record);
+}
+
+/* Does the record have values that its group takes? Those of cells give way to those of faces, on whichever rank. */
+static bool has_values(const uint64_t *record, const value_groups *values, int64_t group)
+{
+    return !values->are_faces[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
 
 /* Means of the records' keys, one a record, into reply->words and reply->counts. */
@@ -283,12 +328,16 @@ static bool merge_records(const session_mail *in, int ranks, int threads, sessio
     }
     if (!groups_create(&values, keys.count)) goto done;
     int64_t i = 0;
-    for (const uint64_t *r = in->words; r < end; r = next_record(r))
-        values.starts[groups[i++] + 1] += (int64_t)r[RECORD_HEAD - 1];
+    for (const uint64_t *r = in->words; r < end; r = next_record(r), i++)
+        if (r[RECORD_HEAD - 1] & FACE_VALUES) values.are_faces[groups[i]] = 1;
+    i = 0;
+    for (const uint64_t *r = in->words; r < end; r = next_record(r), i++)
+        if (has_values(r, &values, groups[i])) values.starts[groups[i] + 1] += record_count(r);
     if (!groups_open(&values)) goto done;
     i = 0;
     for (const uint64_t *r = in->words; r < end; r = next_record(r), i++) {
-        const int64_t count = (int64_t)r[RECORD_HEAD - 1];
+        const int64_t count = record_count(r);
+        if (!has_values(r, &values, groups[i])) continue;
         memcpy(values.values + values.starts[groups[i]], r + RECORD_HEAD, (size_t)count * sizeof(double));
         values.starts[groups[i]] += count;
     }
@@ -385,9 +434,9 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
         if (!scalar->vertex_values)
             session_no_memory(error, mesh->cells.vertex_count * (int64_t)sizeof(double), "recentred values");
         field = session_scalar_field(mesh, &(session_scalar){.field = scalar->field, .component = scalar->component});
-        if (scalar->vertex_values) make_groups(mesh, &field, by_id, team->threads, &groups, error);
+        if (scalar->vertex_values) make_groups(mesh, scalar->field, &field, by_id, team->threads, &groups, error);
     } else {
-        make_groups(NULL, NULL, by_id, team->threads, &groups, error);
+        make_groups(NULL, -1, NULL, by_id, team->threads, &groups, error);
     }
     insitu_status status = session_agree(team->comm, error);
     if (!status && team->ranks > 1) status = merge_shared(team, mesh, by_id ? 1e-6 * half_diagonal : 0, &groups, error);

@@ -1,6 +1,8 @@
 /* As session_mesh_input.c, of fields. */
 #include "session_field_input.h"
 
+#include <string.h>
+
 #include "memory.h"
 #include "session_agree.h"
 #include "session_mesh_input.h"
@@ -87,9 +89,68 @@ static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *
     return INSITU_OK;
 }
 
+/* How the faces are told, and their values. */
+static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, base_error *error)
+{
+    const bool has_vertices = patch->connectivity.data != NULL;
+    const session_array_rule values = {"values", patch->count, SESSION_ALLOW_FLOATS | SESSION_ALLOW_INTEGERS, false};
+    const session_array_rule faces = {"faces", patch->count, SESSION_ALLOW_INTEGERS, true};
+    const session_array_rule vertices = {"connectivity indices", patch->connectivity_count, SESSION_ALLOW_INTEGERS,
+                                         false};
+    const session_array_rule offsets = {"offsets", patch->count, SESSION_ALLOW_INTEGERS, true};
+    if (patch->count < 0 || patch->connectivity_count < 0)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "has %lld faces of %lld connectivity indices",
+                         (long long)patch->count, (long long)patch->connectivity_count);
+    insitu_status status = session_check_array(&patch->values, &values, INSITU_ERROR_FIELD, error);
+    if (!status) status = session_check_array(&patch->faces, &faces, INSITU_ERROR_FIELD, error);
+    if (!status) status = session_check_array(&patch->connectivity, &vertices, INSITU_ERROR_FIELD, error);
+    if (!status) status = session_check_array(&patch->offsets, &offsets, INSITU_ERROR_FIELD, error);
+    if (status || !patch->count) return status;
+    const int64_t size = session_type_size(patch->values.type);
+    if (patch->component_stride_bytes % size != 0)
+        return base_fail(error, INSITU_ERROR_FIELD, "has a component stride of %lld bytes, no multiple of its %lld",
+                         (long long)patch->component_stride_bytes, (long long)size);
+    if (has_vertices && patch->faces.data)
+        return base_fail(error, INSITU_ERROR_FIELD, "faces and connectivity are given: faces are told by one of them");
+    if (patch->offsets.data && !has_vertices)
+        return base_fail(error, INSITU_ERROR_FIELD, "offsets are given, and connectivity is not");
+    if (has_vertices && !patch->offsets.data && patch->connectivity_count % patch->count != 0)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "has %lld connectivity indices, no multiple of its %lld faces, and no offsets",
+                         (long long)patch->connectivity_count, (long long)patch->count);
+    if (!has_vertices && !mesh->given.face_count)
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "tells faces by their numbers, and the mesh has none: their vertices are to be given");
+    const long long base = mesh->given.index_base, last = mesh->given.face_count - 1 + base;
+    if (!has_vertices && !patch->faces.data &&
+        (patch->first_face < base || patch->first_face > last || patch->count - 1 > last - patch->first_face))
+        return base_fail(error, INSITU_ERROR_FIELD,
+                         "has %lld faces from %lld on, outside %lld..%lld (index_base is %lld)",
+                         (long long)patch->count, (long long)patch->first_face, base, last, base);
+    return INSITU_OK;
+}
+
+static insitu_status check_patches(const session_mesh *mesh, const insitu_field *field, base_error *error)
+{
+    if (field->patch_count < 0 || (field->patch_count && !field->patches))
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "patch_count is %d%s", field->patch_count,
+                         field->patches ? "" : ", and patches are not given");
+    if (field->patch_count && field->centring != INSITU_CELL)
+        return base_fail(error, INSITU_ERROR_ARGUMENT, "has patches, and its centring %d is not cells (%d)",
+                         (int)field->centring, (int)INSITU_CELL);
+    for (int i = 0; i < field->patch_count; i++) {
+        base_error what = {0};
+        if (check_patch(mesh, &field->patches[i], &what))
+            return base_fail(error, what.status, "patch %d: %s", i, what.message);
+    }
+    return INSITU_OK;
+}
+
 /* Before it was called. */
 static insitu_status check_fill(const insitu_field *field, base_error *error)
 {
+    if (field->patch_count)
+        return base_fail(error, INSITU_ERROR_FIELD, "patches and fill are given: patches are given by fill");
     if (!field->values.data && !field->index.data) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_FIELD, "values and fill are given: values are given by one of them");
 }
@@ -105,6 +166,7 @@ static insitu_status check_field(const session_mesh *mesh, const insitu_field *f
     insitu_status status = check_corners(&mesh->given, field, error);
     if (!status && field->fill) return check_fill(field, error);
     if (!status) status = check_field_arrays(mesh, field, error);
+    if (!status) status = check_patches(mesh, field, error);
     if (status) return status;
     const int64_t size = session_type_size(field->values.type);
     if (field->values.data && field->component_stride_bytes % size != 0)
@@ -123,14 +185,46 @@ static void spoil_scalars(session_mesh *mesh, int field)
     }
 }
 
+static bool is_same_patch(const insitu_patch *a, const insitu_patch *b)
+{
+    return a->count == b->count && a->first_face == b->first_face && session_is_same_array(&a->faces, &b->faces) &&
+           a->connectivity_count == b->connectivity_count &&
+           session_is_same_array(&a->connectivity, &b->connectivity) &&
+           session_is_same_array(&a->offsets, &b->offsets) && session_is_same_array(&a->values, &b->values) &&
+           a->component_stride_bytes == b->component_stride_bytes;
+}
+
+static bool are_same_patches(const insitu_field *a, const insitu_field *b)
+{
+    bool is_same = a->patch_count == b->patch_count;
+    for (int i = 0; is_same && i < a->patch_count; i++) is_same = is_same_patch(&a->patches[i], &b->patches[i]);
+    return is_same;
+}
+
 /* Are the values read from where they were? */
 static bool is_same_place(const insitu_field *a, const insitu_field *b)
 {
     return session_is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
-           session_is_same_array(&a->index, &b->index) && a->count == b->count && a->corner_row == b->corner_row;
+           session_is_same_array(&a->index, &b->index) && a->count == b->count && a->corner_row == b->corner_row &&
+           are_same_patches(a, b);
 }
 
-/* The arrays, and what of their copy is to be made again. */
+/* The table of patches becomes the field's, which may hold the given one. False where memory runs out. */
+static bool copy_patches(session_field *field, const insitu_field *given, base_error *error)
+{
+    const size_t bytes = (size_t)given->patch_count * sizeof *given->patches;
+    insitu_patch *patches = bytes ? base_alloc(bytes) : NULL;
+    if (bytes && !patches) {
+        session_no_memory(error, (int64_t)bytes, "a field's table of patches");
+        return false;
+    }
+    if (bytes) memcpy(patches, given->patches, bytes);
+    base_free(field->patches);
+    field->patches = patches;
+    return true;
+}
+
+/* The arrays, and what of their copy is to be made again. Patches have been copied. */
 static void read_values(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
                         bool is_stale)
 {
@@ -143,18 +237,20 @@ static void read_values(const session_mesh *mesh, session_field *field, const in
     const char *name = field->given.name;
     field->given = *given;
     field->given.name = name;
+    field->given.patches = field->patches;
     field->values = session_grid_array(&given->values);
     const int64_t size = given->values.data ? session_type_size(given->values.type) : 1;
     if (given->values.stride_bytes == 0) field->values.stride = size * given->component_count;
     field->component_stride = given->component_stride_bytes ? given->component_stride_bytes : size;
 }
 
-static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given)
+/* Patches have been copied; is_same: all is read from where it was. */
+static void take_field(session_meshes *meshes, session_mesh *mesh, int index, const insitu_field *given, bool is_same)
 {
     session_field *field = &mesh->fields[index];
     const bool is_other = (!field->values.data && !field->given.fill) || field->given.centring != given->centring ||
                           field->given.component_count != given->component_count || field->problem.status;
-    const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same_place(&field->given, given);
+    const bool is_stale = is_other || given->changed & INSITU_CHANGED_VALUES || !is_same;
     if (is_other) {
         /* The scalars' components may have changed their meaning. */
         session_drop_scalars(mesh);
@@ -175,11 +271,14 @@ static insitu_status set_field(session_meshes *meshes, session_mesh *mesh, const
         meshes->are_names_changed = true;
     }
     base_error what = {0};
-    if (check_field(mesh, given, &what) == INSITU_OK) {
-        take_field(meshes, mesh, index, given);
-        return INSITU_OK;
-    }
     session_field *field = &mesh->fields[index];
+    if (check_field(mesh, given, &what) == INSITU_OK) {
+        const bool is_same = is_same_place(&field->given, given);
+        if (copy_patches(field, given, &what)) {
+            take_field(meshes, mesh, index, given, is_same);
+            return INSITU_OK;
+        }
+    }
     field->problem = (base_error){0};
     session_place_error(&field->problem, mesh->name, given->name, &what);
     *error = field->problem;
@@ -220,7 +319,7 @@ insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_fi
     session_field *field = &mesh->fields[index];
     const insitu_field promised = field->given;
     base_error what = {0};
-    if (check_filled(mesh, &promised, filled, &what))
+    if (check_filled(mesh, &promised, filled, &what) || !copy_patches(field, filled, &what))
         return session_place_error(error, mesh->name, promised.name, &what);
     read_values(mesh, field, filled, false, (filled->changed & INSITU_CHANGED_VALUES) != 0);
     field->given.fill = promised.fill;

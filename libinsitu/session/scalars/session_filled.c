@@ -66,5 +66,6 @@ void session_forget_filled(const session_meshes *meshes)
             field->fill_problem = (base_error){0};
             field->given.values.data = field->given.index.data = NULL;
             field->values.data = NULL;
+            field->given.patch_count = 0;
         }
 }

@@ -3,26 +3,37 @@
 #include <string.h>
 
 #include "session_agree.h"
+#include "session_topology.h"
 #include "session_torn.h"
 
-session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
+static session_key key_of_id(const session_mesh *mesh, int64_t vertex)
 {
-    session_key key = {{0}};
-    if (by_id) {
-        const insitu_array *ids = &mesh->given.vertex_ids;
-        const int64_t size = session_type_size(ids->type);
-        const grid_array a = {ids->data, ids->stride_bytes ? ids->stride_bytes : size, size == 8, true, 0};
-        key.words[0] =
-            (uint64_t)grid_array_index(&a, mesh->torn.is_made ? session_torn_origin(&mesh->torn, vertex) : vertex);
-        return key;
-    }
-    double position[3];
-    grid_vertex(&mesh->cells, vertex, position);
+    const grid_array ids = session_grid_array(&mesh->given.vertex_ids);
+    return (session_key){{(uint64_t)grid_array_index(&ids, vertex), 0, 0}};
+}
+
+static session_key key_of_position(const grid_array coordinates[3], int64_t vertex)
+{
+    session_key key;
     for (int axis = 0; axis < 3; axis++) {
-        const double unsigned_zero = position[axis] + 0.0;
+        const double unsigned_zero = grid_array_number(&coordinates[axis], vertex) + 0.0;
         memcpy(&key.words[axis], &unsigned_zero, sizeof unsigned_zero);
     }
     return key;
+}
+
+session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
+{
+    if (by_id) return key_of_id(mesh, mesh->torn.is_made ? session_torn_origin(&mesh->torn, vertex) : vertex);
+    return key_of_position(mesh->cells.coordinates, vertex);
+}
+
+session_key session_given_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id)
+{
+    if (by_id) return key_of_id(mesh, vertex);
+    grid_array coordinates[3];
+    for (int axis = 0; axis < 3; axis++) coordinates[axis] = session_grid_array(&mesh->given.coordinates[axis]);
+    return key_of_position(coordinates, vertex);
 }
 
 static bool do_boxes_meet(const session_box *a, const session_box *b)

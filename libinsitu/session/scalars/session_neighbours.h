@@ -8,6 +8,8 @@
 
 /* A vertex's global id, or the bits of its coordinates, -0 as +0. */
 session_key session_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id);
+/* The same of a vertex by the caller's number, which a torn mesh has at several corners. */
+session_key session_given_vertex_key(const session_mesh *mesh, int64_t vertex, bool by_id);
 
 typedef struct session_box {
     double lower[3], upper[3];

@@ -1,0 +1,381 @@
+/* A face is on the boundary if one cell has it. Meshes with owners say so themselves. Of others all cells' faces are
+ * looked through: a face's key is made of the groups of its vertices in no order, their first three power sums hashed,
+ * and each face that is given wants a cell of its own that has it. So a face between two cells is found out, and a
+ * baffle, whose two sides are one face to such a mesh, may be given once for each side.
+ *
+ *     patches -> faces: groups of vertices, value -> is a drawn cell behind it? -> (group, value) of each vertex */
+#include "session_patches.h"
+
+#include <stdio.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_cell_faces.h"
+#include "session_neighbours.h"
+#include "session_topology.h"
+
+typedef struct patch_faces {
+    const session_mesh *mesh;
+    const session_field *field;
+    const session_vertex_numbers *numbers;
+    int64_t count;   /* of all patches */
+    int64_t *starts; /* count + 1: where the groups of each face begin */
+    int64_t *groups; /* -1: of a vertex of no drawn cell */
+    unsigned char *is_drawn;
+} patch_faces;
+
+/* The vertices around a face. */
+typedef struct patch_face {
+    grid_array list;
+    int64_t first, size;
+    int64_t number; /* of the mesh's faces, from 0; -1: it is told by its vertices */
+} patch_face;
+
+static insitu_status no_memory(int64_t entries, base_error *error)
+{
+    return session_no_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
+}
+
+/* "mesh ...: field ...: patch 2: face 17" (or "its face 3", from 0), and what is wrong with it. */
+static insitu_status tell(const patch_faces *p, int patch, int64_t face, const char *what, base_error *error)
+{
+    const insitu_patch *given = &p->field->given.patches[patch];
+    const grid_array faces = session_grid_array(&given->faces);
+    const long long number = given->connectivity.data ? face
+                             : given->faces.data      ? grid_array_index(&faces, face)
+                                                      : given->first_face + face;
+    return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": patch %d: %sface %lld %s", p->mesh->name,
+                     p->field->given.name, patch, given->connectivity.data ? "its " : "", number, what);
+}
+
+static insitu_status tell_range(const patch_faces *p, int patch, int64_t face, const char *what, int64_t count,
+                                base_error *error)
+{
+    char words[128];
+    const long long base = p->mesh->given.index_base;
+    snprintf(words, sizeof words, "%s %lld..%lld (index_base is %lld)", what, base, (long long)count - 1 + base, base);
+    return tell(p, patch, face, words, error);
+}
+
+/* ---- faces ----------------------------------------------------------------------------------------------------- */
+
+/* Where the patch has the face's vertices itself. */
+static void own_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
+{
+    out->list = session_index_array(mesh, &patch->connectivity);
+    out->number = -1;
+    if (!patch->offsets.data) {
+        out->size = patch->connectivity_count / patch->count;
+        out->first = i * out->size;
+        return;
+    }
+    const grid_array offsets = session_index_array(mesh, &patch->offsets);
+    out->first = grid_array_index(&offsets, i);
+    out->size = grid_array_index(&offsets, i + 1) - out->first;
+}
+
+/* Where the mesh has them. */
+static void mesh_vertices(const insitu_mesh *mesh, int64_t number, patch_face *out)
+{
+    out->number = number;
+    if (mesh->face_lists.data) {
+        const grid_array sizes = session_grid_array(&mesh->face_sizes);
+        const insitu_array list = {session_face_list(mesh, number), mesh->face_lists.type, 0};
+        out->list = session_index_array(mesh, &list);
+        out->first = 0;
+        out->size = grid_array_index(&sizes, number);
+        return;
+    }
+    const grid_array offsets = session_index_array(mesh, &mesh->face_offsets);
+    out->list = session_index_array(mesh, &mesh->face_connectivity);
+    out->first = grid_array_index(&offsets, number);
+    out->size = grid_array_index(&offsets, number + 1) - out->first;
+}
+
+static insitu_status find_face(const patch_faces *p, int patch, int64_t i, patch_face *out, base_error *error)
+{
+    const insitu_mesh *mesh = &p->mesh->given;
+    const insitu_patch *given = &p->field->given.patches[patch];
+    int64_t most = given->connectivity_count;
+    if (given->connectivity.data) {
+        own_vertices(mesh, given, i, out);
+    } else {
+        const grid_array faces = session_index_array(mesh, &given->faces);
+        const int64_t number =
+            given->faces.data ? grid_array_index(&faces, i) : given->first_face - mesh->index_base + i;
+        if (number < 0 || number >= mesh->face_count)
+            return tell_range(p, patch, i, "is outside", mesh->face_count, error);
+        mesh_vertices(mesh, number, out);
+        most = mesh->face_lists.data ? out->size : mesh->face_connectivity_count;
+    }
+    if (out->size < 3) return tell(p, patch, i, "has fewer than three vertices", error);
+    if (out->first < 0 || out->first > most || out->size > most - out->first)
+        return tell(p, patch, i, "has vertices beyond the connectivity", error);
+    return INSITU_OK;
+}
+
+static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const patch_face *face, int64_t *groups,
+                               base_error *error)
+{
+    const int64_t count = p->mesh->given.vertex_count;
+    for (int64_t k = 0; k < face->size; k++) {
+        const int64_t vertex = grid_array_index(&face->list, face->first + k);
+        if (vertex < 0 || vertex >= count) return tell_range(p, patch, i, "has a vertex index outside", count, error);
+        const session_key key = session_given_vertex_key(p->mesh, vertex, p->numbers->by_id);
+        groups[k] = session_keys_find(p->numbers->keys, &key);
+    }
+    return INSITU_OK;
+}
+
+/* All faces of all patches, once to learn how much room they take, and once to take it. */
+static insitu_status list_faces(patch_faces *p, base_error *error)
+{
+    const insitu_field *field = &p->field->given;
+    int64_t entries = 0, f = 0;
+    for (int patch = 0; patch < field->patch_count; patch++)
+        for (int64_t i = 0; i < field->patches[patch].count; i++) {
+            patch_face face;
+            if (find_face(p, patch, i, &face, error)) return error->status;
+            p->starts[f++] = entries;
+            entries += face.size;
+        }
+    p->starts[f] = entries;
+    p->groups = base_alloc((size_t)entries * sizeof *p->groups);
+    if (!p->groups) return no_memory(entries, error);
+    f = 0;
+    for (int patch = 0; patch < field->patch_count; patch++)
+        for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
+            patch_face face;
+            if (find_face(p, patch, i, &face, error) || read_face(p, patch, i, &face, p->groups + p->starts[f], error))
+                return error->status;
+        }
+    return INSITU_OK;
+}
+
+/* ---- the cells behind them, by owner and neighbour ----------------------------------------------------------------
+ */
+
+static insitu_status ask_owner(patch_faces *p, int patch, int64_t i, int64_t f, unsigned char *is_taken,
+                               base_error *error)
+{
+    const session_face_sides sides = session_sides(&p->mesh->given);
+    patch_face face;
+    int64_t cells[2];
+    if (find_face(p, patch, i, &face, error)) return error->status;
+    session_cells_of_face(&sides, face.number, cells);
+    if (cells[1] >= 0) return tell(p, patch, i, "is between two cells, not on the boundary", error);
+    unsigned char *taken = &is_taken[face.number / 8], bit = (unsigned char)(1u << face.number % 8);
+    if (*taken & bit) return tell(p, patch, i, "is given twice", error);
+    *taken |= bit;
+    p->is_drawn[f] = !grid_is_ghost(&p->mesh->cells, cells[0]);
+    return INSITU_OK;
+}
+
+static bool are_by_number(const insitu_field *field)
+{
+    bool all = true;
+    for (int i = 0; i < field->patch_count; i++)
+        all = all && !(field->patches[i].count && field->patches[i].connectivity.data);
+    return all;
+}
+
+static insitu_status ask_owners(patch_faces *p, base_error *error)
+{
+    const insitu_field *field = &p->field->given;
+    const int64_t bytes = p->mesh->given.face_count / 8 + 1;
+    unsigned char *is_taken = base_calloc((size_t)bytes, 1);
+    int64_t f = 0;
+    if (!is_taken) return no_memory(bytes / 8, error);
+    for (int patch = 0; patch < field->patch_count; patch++)
+        for (int64_t i = 0; i < field->patches[patch].count && !error->status; i++)
+            ask_owner(p, patch, i, f++, is_taken, error);
+    base_free(is_taken);
+    return error->status;
+}
+
+/* ---- the cells behind them, by a search of all cells ------------------------------------------------------------- */
+
+typedef struct cell_search {
+    session_key_table keys;  /* of faces all of whose vertices have groups */
+    int64_t *of_face;        /* its key, or -1 */
+    int64_t *given, *cells;  /* of each key: how often it is given, and how many cells have it */
+    unsigned char *is_drawn; /* by one of them */
+    unsigned char *is_met;   /* groups that such faces have */
+} cell_search;
+
+static void search_free(cell_search *s)
+{
+    session_keys_free(&s->keys);
+    base_free(s->of_face);
+    base_free(s->given);
+    base_free(s->cells);
+    base_free(s->is_drawn);
+    base_free(s->is_met);
+}
+
+static bool search_create(cell_search *s, const patch_faces *p)
+{
+    const size_t count = (size_t)p->count;
+    s->of_face = base_alloc(count * sizeof *s->of_face);
+    s->given = base_calloc(count, sizeof *s->given);
+    s->cells = base_calloc(count, sizeof *s->cells);
+    s->is_drawn = base_calloc(count, 1);
+    s->is_met = base_calloc((size_t)p->numbers->keys->count, 1);
+    return s->of_face && s->given && s->cells && s->is_drawn && s->is_met && session_keys_create(&s->keys, p->count);
+}
+
+static void add_vertex(session_key *key, int64_t group)
+{
+    const uint64_t h = session_key_hash(&(session_key){{(uint64_t)group + 1, 0, 0}});
+    key->words[0] += h;
+    key->words[1] += h * h;
+    key->words[2] += h * h * h;
+}
+
+static void enter_faces(cell_search *s, const patch_faces *p)
+{
+    for (int64_t f = 0; f < p->count; f++) {
+        session_key key = {{0}};
+        bool is_whole = true;
+        for (int64_t k = p->starts[f]; k < p->starts[f + 1]; k++) {
+            is_whole = is_whole && p->groups[k] >= 0;
+            add_vertex(&key, p->groups[k]);
+        }
+        s->of_face[f] = is_whole ? session_keys_add(&s->keys, &key) : -1;
+        for (int64_t k = p->starts[f]; k < p->starts[f + 1] && is_whole; k++) s->is_met[p->groups[k]] = 1;
+        if (is_whole) s->given[s->of_face[f]]++;
+    }
+}
+
+/* The key of a cell's face; false where one of its vertices is on no face that is given. */
+static bool key_of(const cell_search *s, const patch_faces *p, const session_face_loop *loop, session_key *key)
+{
+    *key = (session_key){{0}};
+    for (int64_t i = 0; i < loop->size; i++) {
+        const int64_t group = p->numbers->of_vertex[session_face_vertex(loop, i)];
+        if (group < 0 || !s->is_met[group]) return false;
+        add_vertex(key, group);
+    }
+    return true;
+}
+
+static void count_cells(cell_search *s, const patch_faces *p)
+{
+    const grid *g = &p->mesh->cells;
+    for (int64_t cell = 0; cell < g->cell_count; cell++) {
+        if (grid_is_shell_type(grid_cell_type(g, cell))) continue;
+        const session_cell_faces faces = session_faces_of_cell(g, cell);
+        for (int64_t i = 0; i < faces.count; i++) {
+            const session_face_loop loop = session_face_of(&faces, i);
+            session_key key;
+            const int64_t found = key_of(s, p, &loop, &key) ? session_keys_find(&s->keys, &key) : -1;
+            if (found < 0) continue;
+            s->cells[found]++;
+            if (!grid_is_ghost(g, cell)) s->is_drawn[found] = 1;
+        }
+    }
+}
+
+static insitu_status judge_faces(const cell_search *s, patch_faces *p, base_error *error)
+{
+    const insitu_field *field = &p->field->given;
+    int64_t f = 0;
+    for (int patch = 0; patch < field->patch_count; patch++)
+        for (int64_t i = 0; i < field->patches[patch].count; i++, f++) {
+            const int64_t key = s->of_face[f];
+            if (key < 0) continue; /* of a ghost cell */
+            if (s->cells[key] > s->given[key])
+                return tell(p, patch, i, "is between two cells, not on the boundary", error);
+            if (s->cells[key] == 0) return tell(p, patch, i, "is no face of a cell", error);
+            if (s->cells[key] < s->given[key]) return tell(p, patch, i, "is given twice", error);
+            p->is_drawn[f] = s->is_drawn[key];
+        }
+    return INSITU_OK;
+}
+
+static insitu_status ask_cells(patch_faces *p, base_error *error)
+{
+    cell_search search = {0};
+    insitu_status status = INSITU_OK;
+    if (search_create(&search, p)) {
+        enter_faces(&search, p);
+        count_cells(&search, p);
+        status = judge_faces(&search, p, error);
+    } else {
+        status = no_memory(p->count * 6, error);
+    }
+    search_free(&search);
+    return status;
+}
+
+/* ---- values -------------------------------------------------------------------------------------------------------
+ */
+
+static grid_field values_of(const patch_faces *p, int patch, int component)
+{
+    const insitu_field *field = &p->field->given;
+    const insitu_patch *given = &field->patches[patch];
+    const int64_t size = session_type_size(given->values.type);
+    grid_field out = {.values = session_grid_array(&given->values),
+                      .component_stride = given->component_stride_bytes ? given->component_stride_bytes : size,
+                      .component_count = field->component_count,
+                      .component = component};
+    if (!given->values.stride_bytes) out.values.stride = size * field->component_count;
+    return out;
+}
+
+static bool is_first(const int64_t *groups, int64_t i)
+{
+    for (int64_t k = 0; k < i; k++)
+        if (groups[k] == groups[i]) return false;
+    return groups[i] >= 0;
+}
+
+static insitu_status give_values(const patch_faces *p, int component, session_patch_values *out, base_error *error)
+{
+    const int64_t most = p->starts[p->count];
+    int64_t f = 0;
+    out->groups = base_alloc((size_t)most * sizeof *out->groups);
+    out->values = base_alloc((size_t)most * sizeof *out->values);
+    if (!out->groups || !out->values) return no_memory(most * 2, error);
+    for (int patch = 0; patch < p->field->given.patch_count; patch++) {
+        const grid_field values = values_of(p, patch, component);
+        for (int64_t i = 0; i < p->field->given.patches[patch].count; i++, f++) {
+            const double value = grid_field_value(&values, i);
+            const int64_t *groups = p->groups + p->starts[f], size = p->starts[f + 1] - p->starts[f];
+            for (int64_t k = 0; k < size && p->is_drawn[f] && isfinite(value); k++) {
+                if (!is_first(groups, k)) continue;
+                out->groups[out->count] = groups[k];
+                out->values[out->count++] = value;
+            }
+        }
+    }
+    return INSITU_OK;
+}
+
+void session_patch_values_free(session_patch_values *values)
+{
+    base_free(values->groups);
+    base_free(values->values);
+    *values = (session_patch_values){0};
+}
+
+insitu_status session_find_patch_values(const session_mesh *mesh, int field, int component,
+                                        const session_vertex_numbers *numbers, session_patch_values *out,
+                                        base_error *error)
+{
+    patch_faces p = {.mesh = mesh, .field = &mesh->fields[field], .numbers = numbers};
+    const insitu_field *given = &p.field->given;
+    for (int i = 0; i < given->patch_count; i++) p.count += given->patches[i].count;
+    if (p.count == 0) return INSITU_OK;
+    p.starts = base_alloc((size_t)(p.count + 1) * sizeof *p.starts);
+    p.is_drawn = base_calloc((size_t)p.count, 1);
+    insitu_status status = p.starts && p.is_drawn ? list_faces(&p, error) : no_memory(p.count * 2, error);
+    const bool has_sides = mesh->given.owner.data && are_by_number(given);
+    if (!status) status = has_sides ? ask_owners(&p, error) : ask_cells(&p, error);
+    if (!status) status = give_values(&p, component, out, error);
+    base_free(p.starts);
+    base_free(p.groups);
+    base_free(p.is_drawn);
+    return status;
+}
