@@ -46,6 +46,10 @@ program test_fortran
     real(real64), target :: doubled(3, 8*cells), at_corners(8*cells), unknowns(10*cells)
     real(real64), target :: block(n, n, n), velocity(2, n, n, n)
     real(real64), pointer :: list(:), matrix(:, :)
+    integer(int32), allocatable, target :: wall(:), wall_faces(:, :)
+    real(real64), allocatable, target :: wall_values(:)
+    real(real32), allocatable, target :: wall_4(:)
+    real(real64), target :: cell_values(cells)
     character(:), allocatable :: prefix, plain
     integer :: rank, status
 
@@ -88,6 +92,7 @@ program test_fortran
         'values at corners')
     call same(picture('corner_index', insitu_points(xyz), insitu_borrow(hexes), insitu_borrow(unknowns), at_corner=2), &
         'values at corners by an index')
+    call patches_have_values()
     call procedures_make_values()
     call errors_are_told()
     call MPI_Finalize()
@@ -312,6 +317,49 @@ contains
         close (unit)
     end function picture
 
+    ! Values on the wall y = 0: the same picture whether its faces are told by their numbers or by their vertices.
+    subroutine patches_have_values()
+        character(:), allocatable :: without
+        type(insitu_patch) :: none(0)
+        integer :: face, i
+        wall = pack([(face, face=1, face_count)], [(all(xyz(2, faces(:, face)) < 0.5_real64), face=1, face_count)])
+        wall_faces = faces(:, wall)
+        wall_values = [(2 + 0.1_real64*i, i=1, size(wall))]
+        wall_4 = real(wall_values, real32)
+        wall_values = wall_4
+        cell_values = 1
+        without = wall_picture(none)
+        plain = wall_picture([insitu_patch(insitu_borrow(wall_values), faces=insitu_borrow(wall))])
+        call expect(rank /= 0 .or. without /= plain, 'the wall is seen')
+        call same(wall_picture([insitu_patch(insitu_borrow(wall_4), connectivity=insitu_borrow(wall_faces))]), 'vertices')
+        call same(wall_picture([(insitu_patch(insitu_borrow(wall_values(i:i)), first_face=wall(i)), i=1, size(wall))]), &
+            'ranges')
+    end subroutine patches_have_values
+
+    function wall_picture(patches) result(out)
+        type(insitu_patch), intent(in) :: patches(:)
+        character(:), allocatable :: out
+        type(insitu_session) :: session
+        integer :: unit, size
+        call session%create_from_text(MPI_COMM_WORLD, scene_of('wall', 'magnitude'), status)
+        call session%set_mesh_of_faces('m', insitu_points(xyz), insitu_borrow(faces), insitu_borrow(face_offsets), &
+            insitu_borrow(owner), insitu_borrow(neighbour), cells, status)
+        call expect(status == INSITU_OK, session%error())
+        call session%set_field('m', 'p', insitu_borrow(cell_values), status, centring=INSITU_CELL, patches=patches)
+        call expect(status == INSITU_OK, session%error())
+        call session%step(0, 0.0_real64, status)
+        call expect(status == INSITU_OK, session%error())
+        call session%destroy(status)
+        out = ''
+        if (rank /= 0) return
+        open (newunit=unit, file=prefix//'wall.png', access='stream', form='unformatted', status='old')
+        inquire (unit, size=size)
+        deallocate (out)
+        allocate (character(size) :: out)
+        read (unit) out
+        close (unit)
+    end function wall_picture
+
     subroutine procedures_make_values()
         type(insitu_session) :: session
         type(insitu_picture), allocatable :: given(:), made(:)
@@ -398,6 +446,16 @@ contains
         call session%set_field('m', 'p', insitu_borrow(unknowns), status, centring=INSITU_CORNER, &
             index=insitu_borrow(dofs(1:8, 2:)))
         call refused(session, 'index has not as many entries')
+        call session%set_field('m', 'p', insitu_borrow(cell_values), status, centring=INSITU_CELL, &
+            patches=[insitu_patch(insitu_borrow(wall_values), faces=insitu_borrow(wall(2:)))])
+        call refused(session, 'not as many values as faces')
+        call session%set_field('m', 'p', insitu_borrow(cell_values), status, centring=INSITU_CELL, &
+            patches=[insitu_patch(insitu_borrow(wall_values), connectivity=insitu_borrow(wall_faces), &
+            offsets=insitu_borrow(wall))])
+        call refused(session, 'offsets of a patch')
+        call session%set_field('m', 'p', insitu_borrow(cell_values), status, centring=INSITU_CELL, &
+            patches=[insitu_patch(insitu_borrow(wall_values), first_face=3)])
+        call refused(session, 'patch 0: tells faces by their numbers')
         places(5) = 0
         call session%set_field('m', 'p', insitu_borrow(vector), status, index=insitu_borrow(places))
         call session%step(0, 0.0_real64, status)

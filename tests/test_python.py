@@ -194,6 +194,52 @@ def finite_volumes_are_their_hexes():
             everywhere(s.report["cells_recognised"] == 0, "polyhedra are left")
 
 
+def boundaries_have_values_of_their_own():
+    """Values on the wall y = 0, its faces told in each way and by layouts that are no copies: one picture, another than
+    without. The isosurface lies in the cells at the wall."""
+    xyz, hexes, _ = lattice()
+    faces, owner, neighbour = faces_of(hexes)
+    is_wall = (neighbour < 0) & (xyz[faces][:, :, 1] == 0).all(axis=1)
+    order = numpy.argsort(is_wall, kind="stable")
+    faces, owner, neighbour, first = faces[order], owner[order], neighbour[order], len(faces) - is_wall.sum()
+    values = numpy.repeat(numpy.linspace(2, 3, is_wall.sum()), 2)
+    numbers = numpy.arange(first, len(faces))
+    ways = {
+        "without": [],
+        "range": [insitu.Patch(values[::2], first_face=first)],
+        "numbers": [insitu.Patch(values[::2].copy()[:5], faces=numbers[:5]),
+                    insitu.Patch(values[10::2], faces=numbers[5:].astype("i4"))],
+        "rows": [insitu.Patch(values[::2], connectivity=faces[first:])],
+        "list": (insitu.Patch(values[::2], connectivity=faces[first:].reshape(-1),
+                              offsets=4 * numpy.arange(is_wall.sum() + 1)),),
+    }
+    pictures = {}
+    for name, patches in ways.items():
+        with insitu.Session(comm, scene_text=SCENE.format(name="walls", folder=folder)) as s:
+            s.set_mesh("m", coordinates=xyz, faces=faces, face_offsets=4 * numpy.arange(len(faces) + 1), owner=owner,
+                       neighbour=neighbour, cell_count=64)
+            s.set_field("m", "f", numpy.ones(64), centring=insitu.CELL, patches=patches)
+            gc.collect()
+            s.step(0, 0.0)
+            comm.Barrier()
+            with open(f"{folder}/walls.png", "rb") as file:
+                pictures[name] = file.read()
+            comm.Barrier()
+            wrong = dict(centring=insitu.CELL)
+            raises(ValueError, "patches[0].faces: has 3 elements, expected 4", s.set_field, "m", "f", numpy.ones(64),
+                   patches=[insitu.Patch(values[:4], faces=numbers[:3])], **wrong)
+            raises(ValueError, "patches[0].offsets: has 3 elements, expected 5", s.set_field, "m", "f", numpy.ones(64),
+                   patches=[insitu.Patch(values[:4], connectivity=faces, offsets=numbers[:3])], **wrong)
+            raises(ValueError, "patches[0]: has 3 components, its field has 1", s.set_field, "m", "f", numpy.ones(64),
+                   patches=[insitu.Patch(xyz, faces=numbers)], **wrong)
+            raises(TypeError, "made by a callable", s.set_field, "m", "f", lambda: values, patches=ways["range"], **wrong)
+            raises(insitu.Error, "patch 0: has 16 faces from 239 on", s.set_field, "m", "f", numpy.ones(64),
+                   patches=[insitu.Patch(values[::2], first_face=len(faces) - 1)], **wrong)
+            s.set_field("m", "f", numpy.ones(64), centring=insitu.CELL)
+    everywhere(pictures.pop("without") != pictures["range"], "the wall is seen")
+    everywhere(len(set(pictures.values())) == 1, "the same picture in all ways")
+
+
 def finite_elements_are_their_hexes():
     xyz, hexes, f = lattice()
     plain = picture("corners", lambda: xyz.copy(), lambda: hexes.copy(), lambda: f.copy())
@@ -327,7 +373,7 @@ def borrowed_arrays_live_as_long_as_they_are_read_and_no_longer():
 def structures_are_those_of_the_header():
     with open(sys.argv[2]) as file:
         header = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
-    for name, ours in [("array", insitu._Array), ("mesh", insitu._Mesh), ("field", insitu._Field), ("report", insitu._Report),
+    for name, ours in [("array", insitu._Array), ("mesh", insitu._Mesh), ("field", insitu._Field), ("patch", insitu._Patch), ("report", insitu._Report),
                        ("picture", insitu._Picture)]:
         body = re.search(r"typedef struct insitu_%s \{(.*?)\}" % name, header, flags=re.S)[1]
         theirs = [re.search(r"(\w+)(\[\d+\])?$", line.strip())[1] for line in body.split(";") if line.strip()]
@@ -341,6 +387,7 @@ layouts_draw_the_same_picture()
 what_cannot_be_borrowed_is_refused()
 pictures_are_arrays()
 finite_volumes_are_their_hexes()
+boundaries_have_values_of_their_own()
 finite_elements_are_their_hexes()
 corners_of_hexes_are_torn()
 callables_are_asked_in_steps_that_need_them()

@@ -45,6 +45,14 @@ module insitu
         type(insitu_array) :: lists, sizes
     end type insitu_face_lists
 
+    ! Values of a field of cells on faces of the boundary: insitu_patch(insitu_borrow(values), first_face=n). The faces are
+    ! told in one of three ways: a range, their numbers, or their vertices: a list, with offsets, or (vertices, faces).
+    type, public :: insitu_patch
+        type(insitu_array) :: values
+        integer :: first_face = 0
+        type(insitu_array) :: faces = insitu_array(), connectivity = insitu_array(), offsets = insitu_array()
+    end type insitu_patch
+
     type, bind(C) :: c_array
         type(c_ptr) :: data
         integer(c_int) :: kind
@@ -72,6 +80,14 @@ module insitu
         integer(c_int64_t) :: connectivity_row
     end type c_mesh
 
+    type, bind(C) :: c_patch
+        integer(c_int64_t) :: count, first_face
+        type(c_array) :: faces
+        integer(c_int64_t) :: connectivity_count
+        type(c_array) :: connectivity, offsets, values
+        integer(c_int64_t) :: component_stride
+    end type c_patch
+
     type, bind(C) :: c_field
         type(c_ptr) :: name
         integer(c_int) :: centring
@@ -84,6 +100,8 @@ module insitu
         integer(c_int64_t) :: corner_row
         type(c_funptr) :: fill
         type(c_ptr) :: fill_data
+        integer(c_int) :: patch_count
+        type(c_ptr) :: patches
     end type c_field
 
     ! What the last step did, on this rank: as insitu_report in insitu.h.
@@ -779,14 +797,17 @@ contains
 
     ! This rank's part of a field: a list, or (components, tuples). index: which tuple each vertex, cell or corner has, from
     ! 1, or from the mesh's index_base; of corners a list, or (corners, cells), also some first rows of a matrix. corner_row:
-    ! of corners, tuples (or entries of a list index) from the first of a cell to that of the next.
-    subroutine set_field(self, mesh, name, values, status, centring, changed, index, corner_row)
+    ! of corners, tuples (or entries of a list index) from the first of a cell to that of the next. patches: of cells, the
+    ! values on the boundary.
+    subroutine set_field(self, mesh, name, values, status, centring, changed, index, corner_row, patches)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
         type(insitu_array), intent(in) :: values
         integer, intent(out) :: status
         integer, intent(in), optional :: centring, changed, corner_row
         type(insitu_array), intent(in), optional :: index
+        type(insitu_patch), intent(in), optional :: patches(:)
+        type(c_patch), allocatable, target :: table(:)
         integer(c_int64_t) :: entries
         character(kind=c_char), target :: c_name(len_trim(name) + 1)
         type(c_field) :: field
@@ -819,8 +840,65 @@ contains
             status = INSITU_ERROR_ARGUMENT
             if (len(self%own_error) > 0) return
         end if
+        if (present(patches)) then
+            self%own_error = find_patch_fault(patches, values%rows)
+            status = INSITU_ERROR_ARGUMENT
+            if (len(self%own_error) > 0) return
+            allocate (table(size(patches)))
+            call put_patches(patches, table, nothing)
+            field%patch_count = size(patches)
+            if (size(patches) > 0) field%patches = c_loc(table)
+        end if
         status = c_set_field(self%handle, as_c_text(mesh), field)
     end subroutine set_field
+
+    ! Lengths that C is not told, and would read beyond.
+    function find_patch_fault(patches, components) result(out)
+        type(insitu_patch), intent(in) :: patches(:)
+        integer(c_int64_t), intent(in) :: components
+        character(:), allocatable :: out
+        integer :: i
+        out = ''
+        do i = 1, size(patches)
+            if (patches(i)%values%rows /= components .and. patches(i)%values%columns > 0) then
+                out = 'a patch has other components than its field'
+            else if (is_given(patches(i)%faces) .and. patches(i)%faces%columns /= patches(i)%values%columns) then
+                out = 'a patch has not as many values as faces'
+            else if (is_given(patches(i)%offsets) .and. patches(i)%offsets%columns /= patches(i)%values%columns + 1) then
+                out = 'offsets of a patch are not one more than its values'
+            else if (patches(i)%faces%rows > 1 .or. patches(i)%offsets%rows > 1) then
+                out = 'faces and offsets of patches are lists, one is a matrix'
+            else if (.not. is_list(patches(i)%connectivity)) then
+                out = 'connectivity of a patch has gaps between its columns, which must follow one another'
+            end if
+        end do
+    end function find_patch_fault
+
+    logical function is_given(a)
+        type(insitu_array), intent(in) :: a
+        is_given = a%columns > 0
+    end function is_given
+
+    subroutine put_patches(patches, table, nothing)
+        type(insitu_patch), intent(in) :: patches(:)
+        type(c_patch), intent(out) :: table(:)
+        real(real64), intent(in), target :: nothing
+        integer :: i
+        do i = 1, size(patches)
+            table(i)%count = patches(i)%values%columns
+            table(i)%first_face = patches(i)%first_face
+            table(i)%values = as_c(patches(i)%values, nothing)
+            table(i)%values%stride = patches(i)%values%stride
+            table(i)%component_stride = patches(i)%values%row_stride
+            table(i)%connectivity_count = patches(i)%connectivity%rows * patches(i)%connectivity%columns
+            table(i)%faces = c_array(c_null_ptr, integer32, 0)
+            table(i)%connectivity = table(i)%faces
+            table(i)%offsets = table(i)%faces
+            if (is_given(patches(i)%faces)) table(i)%faces = as_c(patches(i)%faces, nothing)
+            if (is_given(patches(i)%connectivity)) table(i)%connectivity = as_c(patches(i)%connectivity, nothing)
+            if (is_given(patches(i)%offsets)) table(i)%offsets = as_c(patches(i)%offsets, nothing)
+        end do
+    end subroutine put_patches
 
     ! What C calls: the caller's procedure, whose array it is told of.
     function run_fill(data, field) bind(C) result(status)

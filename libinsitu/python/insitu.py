@@ -69,6 +69,19 @@ class _Mesh(ctypes.Structure):
     ]
 
 
+class _Patch(ctypes.Structure):
+    _fields_ = [
+        ("count", ctypes.c_int64),
+        ("first_face", ctypes.c_int64),
+        ("faces", _Array),
+        ("connectivity_count", ctypes.c_int64),
+        ("connectivity", _Array),
+        ("offsets", _Array),
+        ("values", _Array),
+        ("component_stride_bytes", ctypes.c_int64),
+    ]
+
+
 class _Field(ctypes.Structure):
     pass
 
@@ -86,6 +99,8 @@ _Field._fields_ = [
     ("corner_row", ctypes.c_int64),
     ("fill", _Fill),
     ("fill_data", ctypes.c_void_p),
+    ("patch_count", ctypes.c_int),
+    ("patches", ctypes.POINTER(_Patch)),
 ]
 
 
@@ -134,6 +149,10 @@ class _Picture(ctypes.Structure):
         ("depth", ctypes.POINTER(ctypes.c_float)),
     ]
 
+
+# Values of a field of cells on faces of the boundary, as many tuples as faces, which are told in one of three ways:
+# first_face, of a range; faces, their numbers; or connectivity, their vertices: a list, with offsets, or faces x vertices.
+Patch = collections.namedtuple("Patch", "values first_face faces connectivity offsets", defaults=(0, None, None, None))
 
 # image: its name in the scene; rgba: height x width x 4, linear and premultiplied; depth: height x width, inf: nothing.
 Picture = collections.namedtuple("Picture", "image rgba depth")
@@ -273,6 +292,34 @@ def _put_values(field, given):
     return array
 
 
+def _patch(what, given, components):
+    """A patch of the C interface, and what it borrows."""
+    out, field = _Patch(first_face=given.first_face), _Field()
+    held = [_put_values(field, given.values)]
+    if field.component_count != components:
+        raise ValueError(f"{what}: has {field.component_count} components, its field has {components}")
+    out.count, out.values, out.component_stride_bytes = field.count, field.values, field.component_stride_bytes
+    for name, expected in ("faces", out.count), ("offsets", out.count + 1):
+        if getattr(given, name) is not None:
+            array, size, borrowed = _list(f"{what}.{name}", getattr(given, name))
+            if size != expected:
+                raise ValueError(f"{what}.{name}: has {size} elements, expected {expected}")
+            setattr(out, name, array)
+            held.append(borrowed)
+    if given.connectivity is not None:
+        out.connectivity, out.connectivity_count, array = _rows(f"{what}.connectivity", given.connectivity)
+        held.append(array)
+    return out, held
+
+
+def _patches(field, given):
+    """The table of a field's patches, and what it borrows."""
+    made = [_patch(f"patches[{i}]", one, field.component_count) for i, one in enumerate(given)]
+    table = (_Patch * max(len(made), 1))(*[patch for patch, _ in made])
+    field.patch_count, field.patches = len(made), table
+    return [table, *(held for _, held in made)]
+
+
 def _fill_by(make, index, row, made, raised):
     """A C function that has make() give the values. made: holds them until the step is over; raised: what went wrong."""
     def fill(_, field):
@@ -355,10 +402,11 @@ class Session:
         self._retired.append(self._held.pop(name, None))
 
     def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, components=1,
-                  changed=CHANGED_ALL):
+                  patches=(), changed=CHANGED_ALL):
         """Hand over this rank's part of a field: values of n tuples, or n x components. index: which of the tuples each
         vertex, cell or corner has, from the mesh's index_base on; of corners the first columns of a table will do:
         dofs[:, :8]. corner_row: of corners, values (or entries of index) from one cell's first to the next one's.
+        patches: of cells, the values on the boundary, each a Patch.
 
         values may be a callable that returns them, of so many components: it is called by the steps that need the field,
         on all ranks in the same order. Local."""
@@ -369,12 +417,15 @@ class Session:
             borrowed, _, corner_row, array = self._index(mesh, index, centring, corner_row)
             held.append(array)
         if callable(values):
+            if len(patches) > 0:
+                raise TypeError("patches: are given, and values are made by a callable; expected an array of values")
             field.fill = _fill_by(values, borrowed, corner_row, self._made, self._raised)
             field.component_count = components
             held.append(field.fill)
         else:
             held.append(_put_values(field, values))
             field.index = borrowed
+            held.append(_patches(field, patches))
         field.corner_row = corner_row
         self._hand_over(_library.insitu_set_field, mesh, field, name, held)
 
