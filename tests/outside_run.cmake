@@ -31,6 +31,26 @@ if(WITH_FORTRAN)
   endif()
 endif()
 
+# Projects of C++ and of Fortran alone.
+function(build_alone language compiler sources)
+  set(folder ${FOLDER}/alone_${language})
+  file(WRITE ${folder}/CMakeLists.txt "cmake_minimum_required(VERSION 3.16)
+project(alone LANGUAGES ${language})
+find_package(insitu REQUIRED)
+find_package(MPI REQUIRED COMPONENTS ${language})
+add_executable(alone ${sources})
+target_link_libraries(alone PRIVATE insitu::insitu MPI::MPI_${language})
+")
+  run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${folder} -B ${folder}/build -DCMAKE_PREFIX_PATH=${prefix}
+    -DCMAKE_FIND_USE_PACKAGE_REGISTRY=OFF ${compiler} "-DCMAKE_${language}_FLAGS=${FLAGS}")
+  run(${CMAKE_COMMAND} --build ${folder}/build)
+endfunction()
+build_alone(CXX -DCMAKE_CXX_COMPILER=${CXX} ${SOURCE}/outside_user.cpp)
+run(${FOLDER}/alone_CXX/build/alone)
+if(WITH_FORTRAN)
+  build_alone(Fortran -Wno-dev "${SOURCE}/../../examples/six_calls.f90 \${insitu_FORTRAN_SOURCE}")
+endif()
+
 # Python's module finds the library from where it is installed.
 if(PYTHON)
   set(ENV{PYTHONPATH} ${prefix}/${PYTHON_DIR})

@@ -1,7 +1,7 @@
 #!/bin/sh
 # package_chroot.sh CPACK BUILD SOURCE FOLDER: a bare Debian in FOLDER, into which the packages of BUILD are installed by apt,
-# builds the example programs of SOURCE in C, C++17 and Fortran, by CMake and by pkg-config, and runs them and Python's
-# on two ranks. As root; 77, which ctest takes for skipped, where debootstrap or its archive is not to be had.
+# builds the example programs of SOURCE in C, C++17 and Fortran, by CMake and by pkg-config, and the tutorial's, and runs
+# them and Python's on two ranks. As root; 77, which ctest takes for skipped, where debootstrap or its archive is not to be had.
 set -eu
 cpack=$1 build=$2 source=$3 folder=$4 packages=$4.packages
 skip() {
@@ -24,6 +24,7 @@ cp "$packages"/*.deb "$folder/packages"
 cp "$source"/examples/six_calls.c "$source"/examples/six_calls.cpp "$source"/examples/six_calls.f90 \
     "$source"/examples/six_calls.py "$source"/examples/finite_volume.c "$folder/work"
 cp "$source/examples/six_calls.yaml" "$folder/work/scene.yaml"
+cp -r "$source/examples/tutorial" "$folder/work"
 cat >"$folder/work/run.sh" <<'END'
 set -eux
 export DEBIAN_FRONTEND=noninteractive OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
@@ -52,11 +53,21 @@ for program in c/program cpp/program fortran/program "python3 six_calls.py" proj
     mpirun -n 2 $program
     find . -name '*.png' | grep . && find . -name '*.png' -delete
 done
+cd tutorial
+mpicc heat.c $(pkg-config --cflags --libs insitu) -lm -o heat_c
+mpifort $(pkg-config --variable=includedir insitu)/insitu/insitu.f90 heat.f90 $(pkg-config --libs insitu) -o heat_fortran
+for program in ./heat_c ./heat_fortran "python3 heat.py"; do
+    mpirun -n 2 $program
+    rm heat_00.png heat_03.png heat_06.png heat_09.png
+done
+cd ..
 apt-get -qq -y install --no-install-recommends /packages/insitu-tools*.deb \
     /packages/libinsitu-vtk0*.deb >/dev/null
 insitu-render --help >/dev/null
 apt-get -qq -y remove libinsitu0 >/dev/null
 [ ! -e /usr/lib/libinsitu.so.0 ]
 END
-chroot "$folder" /bin/sh /work/run.sh
+# Nothing of this environment but the way to the archive.
+env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root ${http_proxy:+http_proxy="$http_proxy"} \
+    ${https_proxy:+https_proxy="$https_proxy"} chroot "$folder" /bin/sh /work/run.sh
 echo 'The packages serve programs in C, C++, Fortran and Python.'
