@@ -1,7 +1,8 @@
-/* The three phases of compositing: fragments to the owners of their pixels, merging there, pixels to rank 0. Each ends
- * with all ranks of one mind, so that a rank that ran out of memory stops the others where it stopped. Memory
- * is given back as soon as its phase is over: at the peak a rank holds its own fragments, those of the pixels it owns,
- * and the finished pixels. One rank alone merges its list where it lies (or has none: comp_tiles.h). */
+/* The three phases of compositing: fragments to the owners of their pixels, merging there, pixels to rank 0. Before them
+ * all ranks agree that everyone has what it takes to see them through, and after them whether they did: a rank that runs
+ * out of memory on the way goes on without what it lacks, so that nobody waits for it, and tells in the end. Memory
+ * is given back as soon as its phase is over: at the peak a rank holds its own fragments twice, or those of the pixels it
+ * owns and the bytes that they came in. One rank alone merges its list where it lies (or has none: comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>
@@ -12,142 +13,174 @@
 #include "comp_gather.h"
 #include "memory.h"
 
+/* A picture that is being composited, on this rank. */
+typedef struct composition {
+    const comp_group *group;
+    image *out;
+    comp_merged merged;
+    comp_statistics *statistics;
+    comp_mailroom room;
+    comp_route route;
+    comp_layout layout;
+    comp_windows windows;
+} composition;
+
 static double milliseconds_since(double start)
 {
     return 1e3 * (MPI_Wtime() - start);
 }
 
-static insitu_status merge_alone(const comp_layout *layout, fragment_list *items, const comp_merged *merged,
-                                 comp_statistics *statistics, base_error *error)
+static insitu_status merge_alone(composition *c, fragment_list *items, base_error *error)
 {
     const double start = MPI_Wtime();
-    if (!comp_bucket_fits(layout, items->items, items->count))
+    comp_pixels_clear(&c->layout, c->out, c->merged.background);
+    c->merged.out = c->out;
+    const insitu_status status = comp_pixels_merge(&c->layout, items, &c->merged, error);
+    c->statistics->merge_ms = milliseconds_since(start);
+    return status;
+}
+
+/* All that one rank alone may lack. */
+static insitu_status prepare(composition *c, fragment_list *items, base_error *error)
+{
+    if (error && error->status) return error->status;
+    if (!comp_bucket_fits(&c->layout, items->items, items->count))
         return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
-    comp_pixels_clear(layout, merged->out, merged->background);
-    const insitu_status status = comp_pixels_merge(layout, 0, items, merged, error);
-    statistics->merge_ms = milliseconds_since(start);
-    return status;
+    if (c->out->deep) c->merged.deep = base_calloc((size_t)c->layout.threads, sizeof *c->merged.deep);
+    if (c->out->deep && !c->merged.deep)
+        return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image");
+    if (c->layout.ranks == 1) return INSITU_OK;
+    const insitu_status status = comp_mailroom_open(c->group->comm, &c->room, error);
+    return status ? status : comp_windows_make(&c->layout, items, &c->windows, error);
 }
 
-static insitu_status merge_and_gather(MPI_Comm comm, const comp_layout *layout, fragment_list *owned,
-                                      image *out, comp_merged *merged, comp_statistics *statistics, base_error *error)
+/* Merged pixels of this rank: on rank 0 in the picture, elsewhere in *finished. */
+static insitu_status merge_owned(composition *c, comp_owned *owned, comp_pixel_list *finished, insitu_status status,
+                                 base_error *error)
 {
     const double start = MPI_Wtime();
-    comp_pixel_list finished = {NULL, 0};
-    int rank = 0;
-    MPI_Comm_rank(comm, &rank);
-    merged->out = rank == 0 ? out : NULL;
-    merged->finished = &finished;
-    if (merged->out) comp_pixels_clear(layout, out, merged->background);
-    insitu_status status = comp_pixels_merge(layout, rank, owned, merged, error);
+    const int place = comp_route_place(&c->route, c->room.rank);
+    c->merged.out = place == 0 ? c->out : NULL;
+    c->merged.finished = finished;
+    if (c->merged.out) comp_pixels_clear(&c->layout, c->out, c->merged.background);
+    if (!status && place < c->route.owners)
+        status = comp_pixels_blend(&c->layout, (uint32_t)place, owned, &c->merged, error);
     base_free(owned->items);
-    status = comp_agree(comm, status, error);
-    statistics->merge_ms = milliseconds_since(start);
-    if (status == INSITU_OK) {
-        const double gather_start = MPI_Wtime();
-        status = comp_gather(comm, &finished, comp_message_pixels, out, &statistics->sent_bytes, error);
-        statistics->gather_ms = milliseconds_since(gather_start);
-    }
-    base_free(finished.items);
+    base_free(owned->starts);
+    c->statistics->merge_ms = milliseconds_since(start);
     return status;
 }
 
-static insitu_status layout_of(MPI_Comm comm, const image *out, int threads, comp_layout *layout, base_error *error)
+static insitu_status run_phases(composition *c, base_error *error)
+{
+    const double start = MPI_Wtime();
+    comp_owned owned = {NULL, NULL};
+    comp_pixel_list finished = {NULL, 0};
+    insitu_status status = comp_exchange(&c->room, &c->route, &c->windows, &owned, INSITU_OK, error);
+    c->statistics->exchange_ms = milliseconds_since(start);
+    status = merge_owned(c, &owned, &finished, status, error);
+    const double gather_start = MPI_Wtime();
+    status = comp_gather(&c->room, &c->route, &c->layout, &finished, c->out, status, error);
+    base_free(finished.items);
+    c->statistics->gather_ms = milliseconds_since(gather_start);
+    c->statistics->sent_bytes = c->room.sent_bytes;
+    c->statistics->sent_messages = c->room.sent_messages;
+    return status;
+}
+
+static insitu_status begin(composition *c, int threads, base_error *error)
 {
     int ranks = 1;
-    MPI_Comm_size(comm, &ranks);
-    const insitu_status status = comp_check_size(out, error);
+    MPI_Comm_size(c->group->comm, &ranks);
+    const insitu_status status = comp_check_size(c->out, error);
+    c->statistics->has_failed = status != INSITU_OK;
     if (status) return status;
-    *layout = comp_layout_of((uint32_t)((int64_t)out->width * out->height), ranks);
-    layout->threads = threads > 0 ? threads : omp_get_max_threads();
+    c->route = comp_route_of(c->group->schedule, ranks, c->group->nodes, 4);
+    if (c->group->longest_dense) c->route.longest_dense = c->group->longest_dense;
+    c->layout = comp_layout_of((uint32_t)((int64_t)c->out->width * c->out->height), c->route.owners);
+    c->layout.threads = threads > 0 ? threads : omp_get_max_threads();
     return INSITU_OK;
 }
 
-static insitu_status composite_flat(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
-                                    image *out, comp_merged *merged, comp_statistics *statistics, base_error *error)
+/* The samples of deep pixels, where all went well; or they are forgotten. Allocated lists are freed. */
+static insitu_status gather_deep(composition *c, insitu_status status, base_error *error)
 {
-    statistics->sent_fragments = items->count;
-    merged->out = out;
-    if (layout->ranks == 1) return merge_alone(layout, items, merged, statistics, error);
-    const double start = MPI_Wtime();
-    fragment_list owned = {NULL, 0, 0};
-    const insitu_status status =
-        comp_exchange_direct(comm, layout, items, comp_message_fragments, &owned, &statistics->sent_bytes, error);
-    statistics->exchange_ms = milliseconds_since(start);
-    if (status != INSITU_OK) return status;
-    return merge_and_gather(comm, layout, &owned, out, merged, statistics, error);
-}
-
-/* A list a thread. */
-static insitu_status composite_deep(MPI_Comm comm, const comp_layout *layout, fragment_list *items,
-                                    image *out, comp_merged *merged, comp_statistics *statistics, base_error *error)
-{
-    merged->deep = base_calloc((size_t)layout->threads, sizeof *merged->deep);
-    insitu_status status = INSITU_OK;
-    if (!merged->deep) status = base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image");
-    status = comp_agree(comm, status, error);
-    if (!status) status = composite_flat(comm, layout, items, out, merged, statistics, error);
+    comp_deep_list *const lists = c->merged.deep;
     if (!status)
-        status = comp_deep_gather(comm, merged->deep, layout->threads, out->deep, &statistics->sent_bytes, error);
-    else if (merged->deep)
-        comp_deep_free(merged->deep, layout->threads);
-    base_free(merged->deep);
+        status = comp_deep_gather(c->group->comm, lists, c->layout.threads, c->out->deep, &c->statistics->sent_bytes, error);
+    else if (lists)
+        comp_deep_free(lists, c->layout.threads);
+    base_free(lists);
     return status;
 }
 
-static insitu_status composite(MPI_Comm comm, const comp_layout *layout, fragment_list *items, image *out,
-                               comp_merged *merged, comp_statistics *statistics, base_error *error)
+/* *has_overlaps: on any rank. */
+static insitu_status composite(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
-    return (out->deep ? composite_deep : composite_flat)(comm, layout, items, out, merged, statistics, error);
+    comp_statistics *const statistics = c->statistics;
+    const MPI_Comm comm = c->group->comm;
+    statistics->sent_fragments = items->count;
+    statistics->schedule = c->route.schedule;
+    insitu_status own = prepare(c, items, error), status = own;
+    if (c->route.ranks > 1) status = comp_agree(comm, own, NULL, error);
+    if (!status) {
+        own = c->route.ranks > 1 ? run_phases(c, error) : merge_alone(c, items, error);
+        *has_overlaps = c->merged.overlaps && pixel_set_count(c->merged.overlaps, c->layout.pixel_count) > 0;
+        status = c->route.ranks > 1 ? comp_agree(comm, own, has_overlaps, error) : own;
+    }
+    statistics->has_failed = own != INSITU_OK || status == INSITU_ERROR_MPI;
+    comp_windows_free(&c->windows);
+    comp_mailroom_close(&c->room);
+    base_free(items->items);
+    *items = (fragment_list){NULL, 0, 0};
+    return c->out->deep ? gather_deep(c, status, error) : status;
 }
 
-insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
-                             comp_statistics *statistics, base_error *error)
+insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
+                             image *out, comp_statistics *statistics, base_error *error)
 {
     comp_statistics unwanted;
-    comp_layout layout;
     if (!statistics) statistics = &unwanted;
     *statistics = (comp_statistics){0};
-    const insitu_status status = layout_of(comm, out, threads, &layout, error);
-    comp_merged merged = {.background = background};
-    return status ? status : composite(comm, &layout, items, out, &merged, statistics, error);
+    composition c = {.group = group, .merged.background = background, .out = out, .statistics = statistics};
+    int64_t none = 0;
+    const insitu_status status = begin(&c, threads, error);
+    return status ? status : composite(&c, items, &none, error);
 }
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Tells all ranks the pixels in which owners found overlaps. found is NULL on a rank that has no memory for them. */
-static insitu_status share_overlaps(MPI_Comm comm, const comp_layout *layout, unsigned char *found,
-                                    comp_overlaps *overlaps, base_error *error)
+/* Tells all ranks the pixels in which owners found overlaps. */
+static insitu_status share_overlaps(const composition *c, comp_overlaps *overlaps, base_error *error)
 {
-    const int64_t own[2] = {found ? pixel_set_count(found, layout->pixel_count) : 0, !found};
-    int64_t all[2] = {0, 0};
-    insitu_status status = comp_mpi_status(MPI_Allreduce(own, all, 2, MPI_INT64_T, MPI_SUM, comm), error);
-    if (!status && all[1])
-        status = base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels",
-                           (long long)layout->pixel_count);
-    if (status || all[0] == 0) return status;
-    const int bytes = (int)pixel_set_bytes(layout->pixel_count);
-    status = comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, found, bytes, MPI_BYTE, MPI_BOR, comm), error);
-    status = comp_agree(comm, status, error);
-    if (!status) *overlaps = (comp_overlaps){all[0], found};
+    const int bytes = (int)pixel_set_bytes(c->layout.pixel_count);
+    const MPI_Comm comm = c->group->comm;
+    const insitu_status status =
+        comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, c->merged.overlaps, bytes, MPI_BYTE, MPI_BOR, comm), error);
+    if (!status) *overlaps = (comp_overlaps){pixel_set_count(c->merged.overlaps, c->layout.pixel_count), c->merged.overlaps};
     return status;
 }
 
-insitu_status comp_composite_overlaps(MPI_Comm comm, fragment_list *items, const float background[4], int threads,
-                                      image *out, comp_overlaps *overlaps, comp_statistics *statistics,
+insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4],
+                                      int threads, image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error)
 {
     comp_statistics unwanted;
-    comp_layout layout;
     if (!statistics) statistics = &unwanted;
     *statistics = (comp_statistics){0};
     *overlaps = (comp_overlaps){0, NULL};
-    insitu_status status = layout_of(comm, out, threads, &layout, error);
+    composition c = {.group = group, .merged.background = background, .out = out, .statistics = statistics};
+    base_error here = {INSITU_OK, ""};
+    if (!error) error = &here;
+    insitu_status status = begin(&c, threads, error);
     if (status) return status;
-    unsigned char *const found = base_calloc(pixel_set_bytes(layout.pixel_count), 1);
-    comp_merged merged = {.background = background, .overlaps = found};
-    status = composite(comm, &layout, items, out, &merged, statistics, error);
-    if (!status) status = share_overlaps(comm, &layout, found, overlaps, error);
-    if (!overlaps->pixels) base_free(found);
+    c.merged.overlaps = base_calloc(pixel_set_bytes(c.layout.pixel_count), 1);
+    if (!c.merged.overlaps && !error->status)
+        base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels",
+                  (long long)c.layout.pixel_count);
+    int64_t has_overlaps = 0;
+    status = composite(&c, items, &has_overlaps, error);
+    if (!status && has_overlaps) status = share_overlaps(&c, overlaps, error);
+    if (!overlaps->pixels) base_free(c.merged.overlaps);
     return status;
 }

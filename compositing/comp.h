@@ -1,7 +1,7 @@
 /* Compositing: fragments of many ranks to one image on rank 0. Knows no cells, no trees, no scene.
  *
  * Pixels are owned in turn by ranks (comp_owner: plain arithmetic). Every rank sends each pixel owner its fragments
- * (direct send), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels. Fragments
+ * (comp_route.h: by which ranks), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels. Fragments
  * need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The result is a function
  * of the set of fragments alone: not of ranks, of order of arrival, nor of threads.
  *
@@ -16,12 +16,21 @@
 #include <mpi.h>
 #include <stdbool.h>
 
+#include "comp_route.h"
 #include "error.h"
 #include "fragment.h"
 #include "image.h"
 #include "pixel_set.h"
 
-/* Which rank of ranks owns pixel (of pixel_count pixels)? Runs of consecutive pixels go round, so that an object
+/* Who composites, and how. */
+typedef struct comp_group {
+    MPI_Comm comm; /* on which only compositing talks */
+    comp_nodes nodes;
+    comp_schedule schedule; /* COMP_AUTOMATIC: chosen each time */
+    int longest_dense;      /* rounds of more partners are sparse (comp_mail.h); 0: as comp_route.h has it */
+} comp_group;
+
+/* Which rank of ranks owns pixel (of pixel_count pixels) where all ranks are owners? Runs of consecutive pixels go round, so that an object
  * in the middle of the image is shared out. */
 int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
 
@@ -38,17 +47,21 @@ bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
     int64_t sent_fragments; /* by this rank, own ones included */
-    int64_t sent_bytes;     /* by this rank to others: fragments and finished pixels */
+    int64_t sent_bytes;     /* by this rank to others: fragments and finished pixels, what it passed on included */
+    int64_t sent_messages;
     double exchange_ms, merge_ms, gather_ms;
+    comp_schedule schedule;
+    bool has_failed; /* here: the error is this rank's own */
 } comp_statistics;
 
-/* Collective over comm, on which only compositing talks. out->rgba must be allocated on rank 0, out->depth may be
- * (width and height set on all ranks), and are filled there; elsewhere they are not touched. out->deep may be given, on
- * all ranks: rank 0's, whose first and counts are allocated, gets the samples of the pixels that have fragments
- * (comp_deep.h), with t for their depths. items is reordered. An error on one rank (memory) is an error on all. threads:
- * of this rank, 0: as many as OpenMP would take. statistics may be NULL. */
-insitu_status comp_composite(MPI_Comm comm, fragment_list *items, const float background[4], int threads, image *out,
-                             comp_statistics *statistics, base_error *error);
+/* Collective over group->comm: two reductions, and a barrier where a round is sparse (comp_mail.h). out->rgba must be
+ * allocated on rank 0, out->depth may be (width and height set on all ranks), and are filled there; elsewhere they are not
+ * touched. out->deep may be given, on all ranks: rank 0's, whose first and counts are allocated, gets the samples of the
+ * pixels that have fragments (comp_deep.h), with t for their depths. The list is emptied, and its memory given back, whatever comes. An error on one rank (memory) is an error on all, and so is one that *error holds before
+ * the call: whoever could make no fragments says so here. threads: of this rank, 0: as many as OpenMP would take.
+ * statistics may be NULL. */
+insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
+                             image *out, comp_statistics *statistics, base_error *error);
 
 /* Pixels whose fragments overlap; the same on every rank. */
 typedef struct comp_overlaps {
@@ -56,9 +69,9 @@ typedef struct comp_overlaps {
     unsigned char *pixels; /* pixel_set.h, of the whole image; the caller's to base_free(). NULL where count is 0 */
 } comp_overlaps;
 
-/* The same, and tells every rank the overlaps. Costs one small reduction more, and one of a bit a pixel where there are
- * any. On an error overlaps is empty. */
-insitu_status comp_composite_overlaps(MPI_Comm comm, fragment_list *items, const float background[4], int threads,
+/* The same, and tells every rank the overlaps. Costs a reduction of a bit a pixel where there are any. On an error
+ * overlaps is empty. */
+insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4], int threads,
                                       image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error);
 

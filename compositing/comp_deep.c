@@ -178,7 +178,7 @@ static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int c
     if (lacks_memory || !in->counts)
         base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image's %lld samples",
                   (long long)own[1]);
-    const insitu_status status = comp_agree(comm, lacks_memory || !in->counts ? INSITU_ERROR_MEMORY : INSITU_OK, error);
+    const insitu_status status = comp_agree(comm, lacks_memory || !in->counts ? INSITU_ERROR_MEMORY : INSITU_OK, NULL, error);
     if (status) return status;
     return comp_mpi_status(MPI_Gather(own, 2, MPI_INT64_T, in->counts, 2, MPI_INT64_T, 0, comm), error);
 }
@@ -188,11 +188,11 @@ static insitu_status gather(MPI_Comm comm, int rank, const comp_deep_list *lists
 {
     insitu_status status = count_all(comm, lists, list_count, in, error);
     if (!status && rank == 0) status = open_inbox(in, out, error);
-    status = comp_agree(comm, status, error);
+    status = comp_agree(comm, status, NULL, error);
     if (status) return status;
     if (rank == 0) take_own(out, lists, list_count);
     const int code = rank == 0 ? receive_all(comm, in, out) : send_lists(comm, lists, list_count);
-    return comp_agree(comm, comp_mpi_status(code, error), error);
+    return comp_agree(comm, comp_mpi_status(code, error), NULL, error);
 }
 
 insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_count, deep_image *out,

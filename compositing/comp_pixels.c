@@ -1,5 +1,5 @@
-/* A list of fragments may be most of a rank's memory, in no order, and longer than any cache. So it is cut into blocks
- * that fit in one, and owned pixels into slices. Threads first sort each block by slice where it lies; then they take
+/* What a rank alone has may be most of its memory, in no order, and longer than any cache. So the list is cut into blocks
+ * that fit in one, and pixels into slices. Threads first sort each block by slice where it lies; then they take
  * slices, collect a slice's pieces from all blocks by pixel in a scratch list, and blend:
  *
  *     block 0 | s0 | s1  | s2 |     block 1 | s0  | s1 | s2 |     block 2 ...
@@ -22,18 +22,12 @@ enum { block_fragments = 1 << 14, most_slices = 512, least_slice_shift = 8 };
 
 typedef struct merging {
     const comp_layout *layout;
-    const float *background;
+    const comp_merged *merged;
     fragment *items;
     int64_t count;
     uint32_t slice_shift;
     int64_t slices, blocks;
-    int64_t *starts;       /* row-major, blocks × (slices + 1), within the block */
-    int64_t *pixel_starts; /* slices + 1: room in finished, one pixel a fragment and at most the slice */
-    int64_t *pixel_counts; /* slices: of pixels that have fragments */
-    image *out;
-    comp_pixel *finished;
-    unsigned char *overlaps;
-    comp_deep_list *deep;
+    int64_t *starts; /* row-major, blocks × (slices + 1), within the block */
 } merging;
 
 /* One thread's. */
@@ -45,7 +39,7 @@ typedef struct scratch {
 
 void comp_pixels_store(image *out, const comp_pixel *from)
 {
-    for (int c = 0; c < 4; c++) out->rgba[4 * (int64_t)from->pixel + c] = from->rgba[c];
+    memcpy(out->rgba + 4 * (int64_t)from->pixel, from->rgba, sizeof from->rgba);
     if (out->depth) out->depth[from->pixel] = from->depth;
 }
 
@@ -76,12 +70,6 @@ static void sort_blocks(merging *m)
         comp_bucket_by_slice(m->layout, m->slice_shift, m->items + first,
                              left < block_fragments ? left : block_fragments, m->starts + b * (m->slices + 1),
                              m->slices);
-    }
-    const int64_t slice_pixels = (int64_t)1 << m->slice_shift;
-    m->pixel_starts[0] = 0;
-    for (int64_t s = 0; s < m->slices; s++) {
-        const int64_t count = slice_fragments(m, s);
-        m->pixel_starts[s + 1] = m->pixel_starts[s] + (count < slice_pixels ? count : slice_pixels);
     }
 }
 
@@ -130,25 +118,28 @@ void comp_add_overlap(unsigned char *overlaps, uint32_t pixel)
     __atomic_fetch_or(&overlaps[pixel >> 3], (unsigned char)(1u << (pixel & 7)), __ATOMIC_RELAXED);
 }
 
-static void blend_slice(merging *m, int64_t slice, scratch *own)
+/* Merges a pixel. pixel: of the image. */
+static comp_pixel blend(const comp_merged *merged, fragment *items, int64_t count, uint32_t pixel)
 {
-    comp_pixel *const first = m->finished ? m->finished + m->pixel_starts[slice] : NULL;
-    int64_t pixels = 0;
+    comp_pixel blended = {.pixel = pixel};
+    comp_merge_pixel(items, count, merged->background, blended.rgba, &blended.depth);
+    if (merged->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(merged->overlaps, pixel);
+    if (merged->deep) {
+        items->pixel = pixel;
+        comp_deep_add(&merged->deep[omp_get_thread_num()], items, count);
+    }
+    return blended;
+}
+
+static void blend_slice(const merging *m, scratch *own)
+{
     for (uint32_t k = 0; k < 1u << m->slice_shift; k++) {
         fragment *const items = own->items + own->starts[k];
         const int64_t count = own->starts[k + 1] - own->starts[k];
         if (count == 0) continue;
-        comp_pixel pixel = {.pixel = items->pixel};
-        comp_merge_pixel(items, count, m->background, pixel.rgba, &pixel.depth);
-        if (m->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(m->overlaps, pixel.pixel);
-        if (m->deep) comp_deep_add(&m->deep[omp_get_thread_num()], items, count);
-        if (m->out)
-            comp_pixels_store(m->out, &pixel);
-        else
-            first[pixels] = pixel;
-        pixels++;
+        const comp_pixel pixel = blend(m->merged, items, count, items->pixel);
+        comp_pixels_store(m->merged->out, &pixel);
     }
-    m->pixel_counts[slice] = pixels;
 }
 
 static bool merge_slices(merging *m)
@@ -160,12 +151,11 @@ static bool merge_slices(merging *m)
 #pragma omp for schedule(dynamic, 1)
         for (int64_t s = 0; s < m->slices; s++) {
             const int64_t count = slice_fragments(m, s);
-            m->pixel_counts[s] = 0;
             if (count == 0) continue;
             well = well && make_scratch(&own, m, count);
             if (!well) continue;
             collect_slice(m, s, count, &own);
-            blend_slice(m, s, &own);
+            blend_slice(m, &own);
         }
         base_free(own.items);
         base_free(own.starts);
@@ -173,57 +163,94 @@ static bool merge_slices(merging *m)
     return well;
 }
 
-/* Close the gaps between slices' pixels; returns how many there are. */
-static int64_t close_up(merging *m)
+insitu_status comp_pixels_merge(const comp_layout *layout, fragment_list *fragments, const comp_merged *merged,
+                                base_error *error)
 {
-    int64_t count = 0;
-    for (int64_t s = 0; s < m->slices; s++) {
-        memmove(m->finished + count, m->finished + m->pixel_starts[s], (size_t)m->pixel_counts[s] * sizeof(comp_pixel));
-        count += m->pixel_counts[s];
-    }
-    return count;
-}
-
-static bool merge(merging *m)
-{
-    m->starts = base_alloc((size_t)(m->blocks * (m->slices + 1)) * sizeof *m->starts);
-    m->pixel_starts = base_alloc((size_t)(m->slices + 1) * sizeof *m->pixel_starts);
-    m->pixel_counts = base_alloc((size_t)m->slices * sizeof *m->pixel_counts);
-    if (!m->starts || !m->pixel_starts || !m->pixel_counts) return false;
-    sort_blocks(m);
-    if (!m->out) {
-        m->finished = base_alloc((size_t)m->pixel_starts[m->slices] * sizeof *m->finished);
-        if (!m->finished) return false;
-    }
-    return merge_slices(m);
-}
-
-insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
-                                const comp_merged *merged, base_error *error)
-{
-    if (!merged->out) *merged->finished = (comp_pixel_list){NULL, 0};
     if (fragments->count == 0) return INSITU_OK;
-    const int64_t owned = comp_layout_owned(layout, rank);
-    merging m = {.layout = layout,
-                 .background = merged->background,
-                 .out = merged->out,
-                 .overlaps = merged->overlaps,
-                 .deep = merged->deep};
+    const int64_t owned = layout->pixel_count;
+    merging m = {.layout = layout, .merged = merged};
     m.items = fragments->items;
     m.count = fragments->count;
     m.slice_shift = least_slice_shift;
     while (owned >> m.slice_shift >= most_slices) m.slice_shift++;
     m.slices = ((owned - 1) >> m.slice_shift) + 1;
     m.blocks = (m.count - 1) / block_fragments + 1;
-    const bool well = merge(&m);
-    if (well && !m.out)
-        *merged->finished = (comp_pixel_list){m.finished, close_up(&m)};
-    else
-        base_free(m.finished);
-    base_free(m.pixel_counts);
-    base_free(m.pixel_starts);
+    m.starts = base_alloc((size_t)(m.blocks * (m.slices + 1)) * sizeof *m.starts);
+    if (m.starts) sort_blocks(&m);
+    const bool well = m.starts && merge_slices(&m);
     base_free(m.starts);
     if (well) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory to merge %lld fragments",
                      (long long)fragments->count);
+}
+
+/* ---- an owner's ---------------------------------------------------------------------------------------------- */
+
+/* Owned indices that a thread takes at a time. */
+enum { STRETCH = 256 };
+
+typedef struct blending {
+    const comp_layout *layout;
+    uint32_t owner, pixels;
+    const comp_owned *owned;
+    const comp_merged *merged;
+    comp_pixel *finished;
+    int64_t *first; /* of each stretch: where its pixels begin in finished */
+} blending;
+
+static uint32_t stretch_end(const blending *b, int64_t stretch)
+{
+    const int64_t end = (stretch + 1) * STRETCH;
+    return end < b->pixels ? (uint32_t)end : b->pixels;
+}
+
+static void count_finished(blending *b, int64_t stretches)
+{
+    int64_t count = 0;
+    for (int64_t s = 0; s < stretches; s++) {
+        b->first[s] = count;
+        for (uint32_t k = (uint32_t)(s * STRETCH); k < stretch_end(b, s); k++)
+            count += b->owned->starts[k + 1] > b->owned->starts[k];
+    }
+    b->first[stretches] = count;
+}
+
+static void blend_stretch(const blending *b, int64_t stretch)
+{
+    comp_pixel *next = b->finished ? b->finished + b->first[stretch] : NULL;
+    for (uint32_t k = (uint32_t)(stretch * STRETCH); k < stretch_end(b, stretch); k++) {
+        const uint32_t *starts = b->owned->starts + k;
+        if (starts[1] == starts[0]) continue;
+        comp_pixel pixel = blend(b->merged, b->owned->items + starts[0], starts[1] - starts[0],
+                                 comp_layout_pixel(b->layout, b->owner, k));
+        if (b->merged->out) {
+            comp_pixels_store(b->merged->out, &pixel);
+        } else {
+            pixel.pixel = k;
+            *next++ = pixel;
+        }
+    }
+}
+
+insitu_status comp_pixels_blend(const comp_layout *layout, uint32_t owner, const comp_owned *owned,
+                                const comp_merged *merged, base_error *error)
+{
+    blending b = {layout, owner, comp_layout_owned(layout, (int)owner), owned, merged, NULL, NULL};
+    const int64_t stretches = ((int64_t)b.pixels + STRETCH - 1) / STRETCH;
+    *merged->finished = (comp_pixel_list){NULL, 0};
+    if (!merged->out) {
+        b.first = base_alloc((size_t)(stretches + 1) * sizeof *b.first);
+        if (b.first) count_finished(&b, stretches);
+        if (b.first) b.finished = base_alloc((size_t)b.first[stretches] * sizeof *b.finished);
+        if (b.finished) *merged->finished = (comp_pixel_list){b.finished, b.first[stretches]};
+    }
+    const bool is_well = merged->out || b.finished;
+    if (is_well) {
+#pragma omp parallel for num_threads(layout->threads) schedule(dynamic, 1)
+        for (int64_t s = 0; s < stretches; s++) blend_stretch(&b, s);
+    }
+    base_free(b.first);
+    return is_well ? INSITU_OK
+                   : base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for %lld finished pixels",
+                               (long long)b.pixels);
 }

@@ -10,7 +10,7 @@
 
 /* A finished pixel, as it travels to rank 0. */
 typedef struct comp_pixel {
-    uint32_t pixel;
+    uint32_t pixel; /* its owned index */
     float depth;
     float rgba[4];
 } comp_pixel;
@@ -19,6 +19,12 @@ typedef struct comp_pixel_list {
     comp_pixel *items; /* base_free() */
     int64_t count;
 } comp_pixel_list;
+
+/* An owner's fragments, pixel by pixel. */
+typedef struct comp_owned {
+    fragment *items;  /* .pixel is the owned index */
+    uint32_t *starts; /* where those of each owned index begin, and one more */
+} comp_owned;
 
 /* Has the image pixels, as many as fragments can name? */
 insitu_status comp_check_size(const image *out, base_error *error);
@@ -29,10 +35,10 @@ void comp_add_overlap(unsigned char *overlaps, uint32_t pixel);
 /* Every pixel of out becomes background, without depth. Local. */
 void comp_pixels_clear(const comp_layout *layout, image *out, const float background[4]);
 
+/* Writes pixel from->pixel of the image. */
 void comp_pixels_store(image *out, const comp_pixel *from);
 
-/* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned index.
- */
+/* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned index. */
 typedef struct comp_merged {
     const float *background; /* 4 */
     image *out;
@@ -41,9 +47,13 @@ typedef struct comp_merged {
     comp_deep_list *deep;    /* as many as the layout has threads: what they hold is added. NULL: not wanted */
 } comp_merged;
 
-/* Merge the pixels that have fragments; all of fragments belong to pixels that rank owns, and are reordered. Local. On
- * an error *finished is empty, and out and deep may hold some pixels. */
-insitu_status comp_pixels_merge(const comp_layout *layout, int rank, fragment_list *fragments,
+/* One rank alone: merge the pixels that have fragments, which are reordered, into merged->out. Local. On an error out and
+ * deep may hold some pixels. */
+insitu_status comp_pixels_merge(const comp_layout *layout, fragment_list *fragments, const comp_merged *merged,
+                                base_error *error);
+
+/* Merge what owner has, which is reordered within pixels. Local; on an error *finished is empty. */
+insitu_status comp_pixels_blend(const comp_layout *layout, uint32_t owner, const comp_owned *owned,
                                 const comp_merged *merged, base_error *error);
 
 #endif

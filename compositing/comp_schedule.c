@@ -12,7 +12,8 @@ enum { longest_run_shift = 6, least_runs = 1024 };
 
 comp_layout comp_layout_of(uint32_t pixel_count, int ranks)
 {
-    comp_layout layout = {pixel_count, (uint32_t)ranks, longest_run_shift, 1};
+    comp_layout layout = {pixel_count, (uint32_t)ranks, longest_run_shift, 0, 1};
+    if (ranks > 1) layout.inverse = UINT64_MAX / layout.ranks + 1;
     while (layout.run_shift > 0 && pixel_count >> layout.run_shift < (uint64_t)layout.ranks * least_runs)
         layout.run_shift--;
     return layout;

@@ -4,10 +4,16 @@ target_link_libraries(test_comp PRIVATE insitu_compositing insitu_base insitu_fl
 add_test(NAME comp COMMAND test_comp)
 set_tests_properties(comp PROPERTIES TIMEOUT 60)
 
+add_executable(test_comp_wire test_comp_wire.c)
+target_link_libraries(test_comp_wire
+  PRIVATE insitu_compositing insitu_base insitu_flags PkgConfig::CMOCKA OpenMP::OpenMP_C m)
+add_test(NAME comp_wire COMMAND test_comp_wire)
+set_tests_properties(comp_wire PROPERTIES TIMEOUT 60)
+
 add_executable(test_comp_mpi test_comp_mpi.c)
 target_link_libraries(test_comp_mpi
   PRIVATE insitu_compositing insitu_base insitu_flags PkgConfig::CMOCKA OpenMP::OpenMP_C m)
-insitu_add_mpi_test(comp_mpi test_comp_mpi 1 2 3 4 7)
+insitu_add_mpi_test(comp_mpi test_comp_mpi 1 2 3 5 7 16)
 
 # The same with threads that share the merging.
 add_test(NAME comp_mpi_4_threads

@@ -16,13 +16,12 @@
 #include <cmocka.h>
 
 #include "comp.h"
-#include "comp_exchange.h"
-#include "comp_gather.h"
 #include "memory.h"
 
 typedef enum dealing { deal_random, deal_checkerboard, deal_blocks, deal_all_to_first, deal_all_to_last } dealing;
 
 static MPI_Comm comm;
+static comp_group group;
 static int own_rank, rank_count;
 static const float background[4] = {0.125f, 0.25f, 0.5f, 0.75f};
 
@@ -118,7 +117,7 @@ typedef struct setting {
 
 static setting make_setting(int width, int height, uint32_t count, dealing how, uint32_t seed)
 {
-    setting s = {.count = count, .expected = make_image(width, height), .out = {width, height, NULL, NULL}};
+    setting s = {.count = count, .expected = make_image(width, height), .out = {width, height, NULL, NULL, NULL}};
     if (own_rank == 0) s.out = make_image(width, height);
     fragment *all = count ? base_alloc(count * sizeof *all) : NULL;
     s.own.items = count ? base_alloc(count * sizeof *all) : NULL;
@@ -140,17 +139,34 @@ static void free_setting(setting *s)
     free_image(&s->out);
 }
 
+/* Every schedule in turn, by dense rounds and sparse ones. Nodes are made up: any two, three ... ranks that divide all may stand for one. */
+static void set_schedule(uint32_t turn)
+{
+    group.schedule = (comp_schedule)(COMP_DIRECT + turn % (COMP_SCHEDULE_COUNT - 1));
+    group.nodes = (comp_nodes){1, false};
+    group.longest_dense = turn / 4 % 2; /* 1: all rounds are sparse */
+    for (int n = 2; n < rank_count && turn / 8 % 2; n++)
+        if (rank_count % n == 0) group.nodes = (comp_nodes){n, turn / 16 % 2};
+}
+
+/* Bytes that are held for the list. */
+static int64_t held_by(const fragment_list *list)
+{
+    return list->items ? list->capacity * (int64_t)sizeof *list->items : 0;
+}
+
 static void check_composite(int width, int height, uint32_t count, dealing how, uint32_t seed)
 {
     setting s = make_setting(width, height, count, how, seed);
     comp_statistics statistics;
     base_error error = {INSITU_OK, ""};
-    const int64_t held = base_memory_held();
-    const insitu_status status = comp_composite(comm, &s.own, background, 0, &s.out, &statistics, &error);
+    const int64_t own_count = s.own.count;
+    const int64_t held = base_memory_held() - held_by(&s.own);
+    const insitu_status status = comp_composite(&group, &s.own, background, 0, &s.out, &statistics, &error);
     assert_everywhere(status == INSITU_OK && error.message[0] == '\0', "composite succeeds");
     assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
     assert_everywhere(base_memory_held() == held, "nothing is left allocated");
-    assert_everywhere(statistics.sent_fragments == s.own.count, "fragments are counted");
+    assert_everywhere(statistics.sent_fragments == own_count, "fragments are counted");
     assert_everywhere(rank_count > 1 || statistics.sent_bytes == 0, "one rank sends nothing");
     free_setting(&s);
 }
@@ -163,8 +179,14 @@ static void composite_equals_serial_merge(void **context)
     uint32_t seed = 1;
     for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
         for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
-            for (dealing how = deal_random; how <= deal_all_to_last; how++)
+            for (dealing how = deal_random; how <= deal_all_to_last; how++) {
+                set_schedule(seed);
                 check_composite(sizes[s][0], sizes[s][1], counts[c], how, seed++);
+            }
+    for (uint32_t turn = 0; turn < 32; turn++) {
+        set_schedule(turn);
+        check_composite(101, 67, 20000, deal_random, seed++);
+    }
 }
 
 /* Every pair of every pixel; nothing is opaque here. */
@@ -192,9 +214,10 @@ static void check_overlaps(int width, int height, uint32_t count, dealing how, u
     find_overlaps(all, count, expected);
     const int64_t wanted = pixel_set_count(expected, pixel_count);
     setting s = make_setting(width, height, count, how, seed);
+    set_schedule(seed);
     comp_overlaps found;
     const insitu_status status =
-        comp_composite_overlaps(comm, &s.own, background, 0, &s.out, &found, NULL, &(base_error){0});
+        comp_composite_overlaps(&group, &s.own, background, 0, &s.out, &found, NULL, &(base_error){0});
     assert_everywhere(status == INSITU_OK && found.count == wanted, "all overlaps are found");
     assert_everywhere(wanted ? !memcmp(found.pixels, expected, pixel_set_bytes(pixel_count)) : !found.pixels,
                       "all ranks know the pixels");
@@ -225,56 +248,36 @@ static void large_image_equals_serial_merge(void **context)
     check_composite(601, 401 * rank_count, 40000, deal_random, 1001);
 }
 
-static void statistics_count_what_travelled(void **context)
+/* The pixels of one row each, as a surface that bends: what a tile of a picture is like. */
+static fragment smooth_fragment(uint32_t pixel, int width)
+{
+    const float x = (float)(pixel % (uint32_t)width) / 500, y = (float)(pixel / (uint32_t)width) / 500;
+    fragment f = {.pixel = pixel, .t_in = 1 + 0.3f * x * x + 0.1f * y, .kind = FRAGMENT_SURFACE};
+    f.t_out = f.t_in;
+    for (int c = 0; c < 3; c++) f.colour[c] = 0.5f + 0.3f * x * (float)(c + 1) - 0.2f * y * y;
+    return f;
+}
+
+/* A hit is 32 bytes and a finished pixel 24 in memory. Depth and three colours, of which each leaves one or two bytes and two
+ * bits, and no other word, are at most 9; a message has a head and blocks have theirs. */
+static void smooth_surfaces_travel_in_a_third(void **context)
 {
     (void)context;
-    setting s = make_setting(64 * rank_count, 1, 1000, deal_all_to_last, 5);
+    enum { WIDTH = 512, HEIGHT = 256, MOST_BYTES = 9 };
+    setting s = {.out = {WIDTH, HEIGHT, NULL, NULL, NULL}};
+    if (own_rank == 0) s.out = make_image(WIDTH, HEIGHT);
+    s.own = (fragment_list){base_alloc(WIDTH * HEIGHT * sizeof(fragment)), 0, WIDTH * HEIGHT};
+    for (uint32_t p = 0; p < WIDTH * HEIGHT; p++)
+        if ((int)(p / WIDTH * (uint32_t)rank_count / HEIGHT) == own_rank) s.own.items[s.own.count++] = smooth_fragment(p, WIDTH);
     comp_statistics statistics;
-    const insitu_status status = comp_composite(comm, &s.own, background, 0, &s.out, &statistics, NULL);
-    assert_everywhere(status == INSITU_OK, "composite succeeds");
-    int64_t foreign = 0, touched = 0;
-    const uint32_t pixels = 64 * (uint32_t)rank_count;
-    for (int64_t i = 0; i < s.own.count; i++)
-        foreign += comp_owner(s.own.items[i].pixel, pixels, rank_count) != own_rank;
-    for (uint32_t p = 0; own_rank > 0 && p < pixels; p++)
-        touched += comp_owner(p, pixels, rank_count) == own_rank &&
-                   memcmp(s.expected.rgba + 4 * p, background, sizeof background) != 0;
-    const int64_t expected = foreign * (int64_t)sizeof(fragment) + touched * (int64_t)sizeof(comp_pixel);
-    assert_everywhere(statistics.sent_bytes == expected, "bytes are those of foreign fragments and touched pixels");
-    free_setting(&s);
-}
-
-static bool owns_all_of(const fragment_list *owned, const comp_layout *layout)
-{
-    for (int64_t i = 0; i < owned->count; i++)
-        if ((int)comp_layout_owner(layout, owned->items[i].pixel) != own_rank) return false;
-    return true;
-}
-
-static void long_messages_are_cut(void **context)
-{
-    (void)context;
-    setting s = make_setting(101, 67, 5000, deal_random, 9);
-    const comp_layout layout = comp_layout_of(101 * 67, rank_count);
-    fragment_list owned = {NULL, 0, 0};
-    int64_t bytes = 0, all = 0;
-    insitu_status status = comp_exchange_direct(comm, &layout, &s.own, 3, &owned, &bytes, NULL);
-    assert_everywhere(status == INSITU_OK, "exchange in messages of 3 succeeds");
-    assert_everywhere(owns_all_of(&owned, &layout), "an owner has its pixels only");
-    MPI_Allreduce(&owned.count, &all, 1, MPI_INT64_T, MPI_SUM, comm);
-    assert_everywhere(all == s.count, "no fragment is lost");
-    image *const here = own_rank == 0 ? &s.out : NULL;
-    comp_pixel_list finished = {NULL, 0};
-    if (here) comp_pixels_clear(&layout, here, background);
-    status = comp_pixels_merge(&layout, own_rank, &owned,
-                               &(comp_merged){.background = background, .out = here, .finished = &finished}, NULL);
-    assert_everywhere(status == INSITU_OK, "merge succeeds");
-    status = comp_gather(comm, &finished, 5, &s.out, &bytes, NULL);
-    assert_everywhere(status == INSITU_OK, "gather in messages of 5 succeeds");
-    assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is the serial merge");
-    base_free(finished.items);
-    base_free(owned.items);
-    free_setting(&s);
+    assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK, "composite succeeds");
+    int64_t own[2] = {statistics.sent_bytes, statistics.sent_messages}, all[2];
+    MPI_Allreduce(own, all, 2, MPI_INT64_T, MPI_SUM, comm);
+    const double travelled = (double)WIDTH * HEIGHT * (rank_count - 1) / rank_count; /* to owners, and to rank 0 */
+    assert_everywhere(rank_count == 1 ? all[0] == 0 : (double)all[0] < 2 * MOST_BYTES * travelled + 64.0 * (double)all[1],
+                      "smooth surfaces travel in few bytes");
+    base_free(s.own.items);
+    if (own_rank == 0) free_image(&s.out);
 }
 
 /* Every allocation of every rank fails once; after the last the picture is right again. */
@@ -282,13 +285,16 @@ static void failed_allocation_is_an_error_on_all(void **context)
 {
     (void)context;
     for (int victim = 0; victim < rank_count; victim++) {
+        set_schedule((uint32_t)victim + 8 + 4 * (uint32_t)(victim / 4 % 2));
         setting s = make_setting(65, 33, 3000, deal_random, 21);
         const int64_t held = base_memory_held();
         int64_t n = 1;
         for (insitu_status status = INSITU_ERROR_MEMORY; status != INSITU_OK; n++) {
             base_error error = {INSITU_OK, ""};
+            fragment_list list = {base_alloc((size_t)s.own.count * sizeof(fragment)), s.own.count, s.own.count};
+            if (list.count) memcpy(list.items, s.own.items, (size_t)list.count * sizeof *list.items);
             if (own_rank == victim) base_memory_fail_nth(n);
-            status = comp_composite(comm, &s.own, background, 0, &s.out, NULL, &error);
+            status = comp_composite(&group, &list, background, 0, &s.out, NULL, &error);
             base_memory_fail_nth(0);
             int lowest = 0, highest = 0, mine = (int)status;
             MPI_Allreduce(&mine, &lowest, 1, MPI_INT, MPI_MIN, comm);
@@ -302,16 +308,19 @@ static void failed_allocation_is_an_error_on_all(void **context)
         assert_everywhere(own_rank != 0 || same_image(&s.out, &s.expected), "the image is right afterwards");
         free_setting(&s);
     }
+    set_schedule(0);
 }
 
 static void pixel_beyond_the_image_is_an_error_on_all(void **context)
 {
     (void)context;
     setting s = make_setting(8, 8, 100, deal_random, 33);
-    fragment stray = {.pixel = 64};
-    fragment_list bad = own_rank == rank_count - 1 ? (fragment_list){&stray, 1, 1} : s.own;
+    if (own_rank == rank_count - 1) {
+        s.own.count = 1;
+        s.own.items[0].pixel = 64;
+    }
     base_error error = {INSITU_OK, ""};
-    const insitu_status status = comp_composite(comm, &bad, background, 0, &s.out, NULL, &error);
+    const insitu_status status = comp_composite(&group, &s.own, background, 0, &s.out, NULL, &error);
     assert_everywhere(status == INSITU_ERROR_INTERNAL, "a stray pixel is refused");
     char name[32];
     snprintf(name, sizeof name, "rank %d", rank_count - 1);
@@ -324,8 +333,8 @@ static void image_without_pixels_is_refused(void **context)
     (void)context;
     image none = {0, 4, NULL, NULL, NULL}, huge = {65536, 65536, NULL, NULL, NULL};
     fragment_list items = {NULL, 0, 0};
-    assert_everywhere(comp_composite(comm, &items, background, 0, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
-    assert_everywhere(comp_composite(comm, &items, background, 0, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");
+    assert_everywhere(comp_composite(&group, &items, background, 0, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
+    assert_everywhere(comp_composite(&group, &items, background, 0, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");
 }
 
 int main(int argc, char **argv)
@@ -335,12 +344,12 @@ int main(int argc, char **argv)
     MPI_Comm_set_errhandler(comm, MPI_ERRORS_RETURN);
     MPI_Comm_rank(comm, &own_rank);
     MPI_Comm_size(comm, &rank_count);
+    group = (comp_group){comm, {1, false}, COMP_DIRECT, 0};
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(composite_equals_serial_merge),
         cmocka_unit_test(overlaps_are_told_to_all),
         cmocka_unit_test(large_image_equals_serial_merge),
-        cmocka_unit_test(statistics_count_what_travelled),
-        cmocka_unit_test(long_messages_are_cut),
+        cmocka_unit_test(smooth_surfaces_travel_in_a_third),
         cmocka_unit_test(failed_allocation_is_an_error_on_all),
         cmocka_unit_test(pixel_beyond_the_image_is_an_error_on_all),
         cmocka_unit_test(image_without_pixels_is_refused),

@@ -51,13 +51,13 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
     comp_statistics composited = {0};
     if (job->part_count > 0) render_frame(job, &fragments, &rendered, error);
     const double start = MPI_Wtime();
-    insitu_status status = session_agree(t->comm, error);
-    if (status == INSITU_OK && overlaps)
-        status = comp_composite_overlaps(t->compositing_comm, &fragments, t->background, job->threads, out, overlaps,
-                                         &composited, error);
-    else if (status == INSITU_OK)
-        status = comp_composite(t->compositing_comm, &fragments, t->background, job->threads, out, &composited, error);
-    if (status) status = session_agree_as_is(t->comm, error); /* compositing agrees on the status alone */
+    const comp_group group = {t->compositing_comm, {1, false}, COMP_AUTOMATIC, 0};
+    insitu_status status = overlaps ? comp_composite_overlaps(&group, &fragments, t->background, job->threads, out,
+                                                              overlaps, &composited, error)
+                                    : comp_composite(&group, &fragments, t->background, job->threads, out, &composited,
+                                                     error);
+    if (status && !composited.has_failed) *error = (base_error){0};
+    if (status) status = session_agree(t->comm, error); /* compositing agrees on the status alone */
     base_free(fragments.items);
     add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
     return status;

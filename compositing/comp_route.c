@@ -1,0 +1,83 @@
+#include "comp_route.h"
+
+/* The largest radix that divides the number, at most so large: 1 where only 1 does. */
+static int largest_divisor(int number, int most)
+{
+    for (int k = most; k > 1; k--)
+        if (number % k == 0) return k;
+    return 1;
+}
+
+static bool has_radices(int number, int most)
+{
+    for (int k = most; k > 1; k--)
+        while (number % k == 0) number /= k;
+    return number == 1;
+}
+
+/* The largest product of radices up to the number: more than half of it, as the largest power of two is. */
+static int largest_product(int number, int most)
+{
+    while (!has_radices(number, most)) number--;
+    return number;
+}
+
+static void add_round(comp_route *route, int radix)
+{
+    if (radix > 1) route->radix[route->round_count++] = radix;
+}
+
+static void add_rounds(comp_route *route, int number, int most)
+{
+    while (number > 1) {
+        const int radix = largest_divisor(number, most);
+        add_round(route, radix);
+        number /= radix;
+    }
+}
+
+comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix)
+{
+    const bool is_by_nodes = schedule == COMP_NODES || schedule == COMP_RADIX;
+    comp_route route = {.schedule = schedule, .ranks = ranks, .nodes = {1, false}, .longest_dense = COMP_LONGEST_DENSE};
+    if (is_by_nodes) route.nodes = nodes;
+    int groups = ranks / route.nodes.ranks;
+    if (schedule == COMP_RADIX || schedule == COMP_BINARY) {
+        const int most = schedule == COMP_BINARY || radix < 2 ? 2 : radix;
+        groups = largest_product(groups, most);
+        add_round(&route, route.nodes.ranks);
+        add_rounds(&route, groups, most);
+    } else {
+        add_round(&route, route.nodes.ranks);
+        add_round(&route, groups);
+    }
+    route.owners = route.nodes.ranks * groups;
+    return route;
+}
+
+int comp_route_place(const comp_route *route, int rank)
+{
+    if (!route->nodes.is_cyclic) return rank;
+    const int count = route->ranks / route->nodes.ranks;
+    return rank % count * route->nodes.ranks + rank / count;
+}
+
+int comp_route_rank(const comp_route *route, int place)
+{
+    if (!route->nodes.is_cyclic) return place;
+    const int count = route->ranks / route->nodes.ranks;
+    return place % route->nodes.ranks * count + place / route->nodes.ranks;
+}
+
+int comp_route_stride(const comp_route *route, int round)
+{
+    int stride = 1;
+    for (int i = 0; i < round; i++) stride *= route->radix[i];
+    return stride;
+}
+
+const char *comp_schedule_name(comp_schedule schedule)
+{
+    static const char *const names[COMP_SCHEDULE_COUNT] = {"automatic", "direct", "nodes", "radix", "binary"};
+    return names[schedule];
+}

@@ -1,0 +1,28 @@
+/* Statuses rise with no gravity, but any fixed choice among several failures will do: the largest, and of its ranks the
+ * lowest, is the greatest of one number, which leaves room for another question in the same reduction. */
+#include "comp_agree.h"
+
+insitu_status comp_mpi_status(int code, base_error *error)
+{
+    if (code == MPI_SUCCESS) return INSITU_OK;
+    char text[MPI_MAX_ERROR_STRING] = "";
+    int length = 0;
+    MPI_Error_string(code, text, &length);
+    return base_fail(error, INSITU_ERROR_MPI, "compositing: %s", text);
+}
+
+insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, base_error *error)
+{
+    int rank = 0;
+    MPI_Comm_rank(comm, &rank);
+    const int64_t mine[2] = {own ? ((int64_t)own << 32) - rank : 0, greatest ? *greatest : 0};
+    int64_t all[2] = {0, 0};
+    const insitu_status status = comp_mpi_status(MPI_Allreduce(mine, all, 2, MPI_INT64_T, MPI_MAX, comm), error);
+    if (status != INSITU_OK) return status;
+    if (greatest) *greatest = all[1];
+    const insitu_status worst = (insitu_status)((all[0] + INT32_MAX) >> 32);
+    if (worst == INSITU_OK || worst == own) return worst;
+    const char *what = worst == INSITU_ERROR_MEMORY ? "ran out of memory" : "failed";
+    return base_fail(error, worst, "compositing: rank %lld %s (status %d)", (long long)(((int64_t)worst << 32) - all[0]),
+                     what, (int)worst);
+}

@@ -1,0 +1,279 @@
+/* A dense round is one in which every partner sends to every other, if only that there is nothing: nothing else need be
+ * said. In a sparse one only who has something sends, and nobody knows how many that are. So sends are synchronous,
+ * which end when they are received; a rank whose sends have ended enters a barrier, and receives on until all have
+ * entered it: then nothing is under way (Hoefler, Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse
+ * Data Exchange, 2010). No count is exchanged, and a rank alone costs the rounds of a barrier. */
+#include "comp_mail.h"
+
+#include <string.h>
+
+#include "comp_agree.h"
+#include "comp_words.h"
+#include "memory.h"
+
+enum { TAG_ROUND = 32, TAG_FOLD = 8, NO_MORE_BYTES = COMP_MESSAGE_HEAD };
+
+static const unsigned char no_more[NO_MORE_BYTES] = {0};
+
+/* ---- messages ------------------------------------------------------------------------------------------------ */
+
+void comp_messages_free(comp_messages *messages)
+{
+    for (comp_message *m = messages->first, *next; m; m = next) {
+        next = m->next;
+        base_free(m);
+    }
+    *messages = (comp_messages){NULL, NULL};
+}
+
+void comp_messages_append(comp_messages *to, comp_messages *from)
+{
+    if (!from->first) return;
+    if (to->last)
+        to->last->next = from->first;
+    else
+        to->first = from->first;
+    to->last = from->last;
+    *from = (comp_messages){NULL, NULL};
+}
+
+bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *out)
+{
+    uint32_t head[3];
+    if (*offset + COMP_PARCEL_HEAD > (size_t)message->bytes) return false;
+    memcpy(head, message->data + *offset, sizeof head);
+    *out = (comp_parcel){head[0], head[1], head[2], message->data + *offset + COMP_PARCEL_HEAD};
+    *offset += COMP_PARCEL_HEAD + head[2];
+    return true;
+}
+
+static bool add_message(comp_writer *w, size_t bytes)
+{
+    comp_message *m = base_alloc(sizeof *m + bytes + COMP_WORDS_SLACK);
+    if (!m) return false;
+    *m = (comp_message){NULL, w->rank, COMP_MESSAGE_HEAD};
+    memset(m->data, 0, COMP_MESSAGE_HEAD);
+    comp_messages_append(&w->messages, &(comp_messages){m, m});
+    w->room = bytes;
+    w->parcel = 0;
+    return true;
+}
+
+static void put_head(comp_message *m, size_t parcel, uint32_t owner, uint32_t records)
+{
+    const uint32_t head[3] = {owner, records, (uint32_t)((size_t)m->bytes - parcel - COMP_PARCEL_HEAD)};
+    memcpy(m->data + parcel, head, sizeof head);
+}
+
+static uint32_t owner_of(const comp_writer *w)
+{
+    uint32_t owner;
+    memcpy(&owner, w->messages.last->data + w->parcel, sizeof owner);
+    return owner;
+}
+
+unsigned char *comp_writer_room(comp_writer *w, uint32_t owner, size_t bytes, size_t expected)
+{
+    if (!w->messages.last || (size_t)w->messages.last->bytes + COMP_PARCEL_HEAD + bytes > w->room) {
+        const size_t wished = COMP_MESSAGE_HEAD + COMP_PARCEL_HEAD + (expected > bytes ? expected : bytes);
+        if (!add_message(w, wished < COMP_MESSAGE_BYTES ? wished : COMP_MESSAGE_BYTES)) return NULL;
+    }
+    comp_message *const m = w->messages.last;
+    if (!w->parcel || owner_of(w) != owner) {
+        w->parcel = (size_t)m->bytes;
+        m->bytes += COMP_PARCEL_HEAD;
+        put_head(m, w->parcel, owner, 0);
+    }
+    return m->data + m->bytes;
+}
+
+void comp_writer_commit(comp_writer *w, unsigned char *end, uint32_t records)
+{
+    comp_message *const m = w->messages.last;
+    uint32_t head[3];
+    memcpy(head, m->data + w->parcel, sizeof head);
+    m->bytes = (int)(end - m->data);
+    put_head(m, w->parcel, head[0], head[1] + records);
+}
+
+/* ---- rounds -------------------------------------------------------------------------------------------------- */
+
+insitu_status comp_mailroom_open(MPI_Comm comm, comp_mailroom *out, base_error *error)
+{
+    *out = (comp_mailroom){.comm = comm};
+    MPI_Comm_rank(comm, &out->rank);
+    out->waste = base_alloc(COMP_MESSAGE_BYTES + COMP_WORDS_SLACK);
+    out->reserve = base_alloc(COMP_LONGEST_DENSE * sizeof(MPI_Request));
+    out->block = base_alloc(sizeof *out->block);
+    for (int i = 0; i < 2; i++) out->outgoing[i] = base_alloc(COMP_MESSAGE_BYTES + COMP_WORDS_SLACK);
+    if (out->waste && out->reserve && out->block && out->outgoing[0] && out->outgoing[1]) return INSITU_OK;
+    comp_mailroom_close(out);
+    return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for messages (%d bytes)", COMP_MESSAGE_BYTES);
+}
+
+void comp_mailroom_close(comp_mailroom *room)
+{
+    base_free(room->waste);
+    base_free(room->reserve);
+    base_free(room->block);
+    for (int i = 0; i < 2; i++) base_free(room->outgoing[i]);
+    *room = (comp_mailroom){0};
+}
+
+/* A round under way. */
+typedef struct round {
+    comp_mailroom *room;
+    int tag;
+    bool is_sparse;
+    int open; /* partners that have more to send; of a sparse round 0 */
+    comp_messages *in;
+    MPI_Request *requests;
+    int request_count;
+    insitu_status status;
+    base_error *error;
+} round;
+
+static void fail_memory(round *r, int bytes)
+{
+    if (r->status == INSITU_OK)
+        r->status = base_fail(r->error, INSITU_ERROR_MEMORY, "compositing: no memory for a message of %d bytes", bytes);
+}
+
+static void check(round *r, int code)
+{
+    if (code != MPI_SUCCESS && r->status == INSITU_OK) r->status = comp_mpi_status(code, r->error);
+}
+
+static void send(round *r, const unsigned char *data, int bytes, int rank)
+{
+    MPI_Request *const request = &r->requests[r->request_count++];
+    check(r, r->is_sparse ? MPI_Issend(data, bytes, MPI_BYTE, rank, r->tag, r->room->comm, request)
+                          : MPI_Isend(data, bytes, MPI_BYTE, rank, r->tag, r->room->comm, request));
+    r->room->sent_bytes += bytes;
+    r->room->sent_messages++;
+}
+
+/* Makes room for the requests, where there is none for all of them for those that end each partner's wait. */
+static void make_requests(round *r, comp_messages *out, int partners)
+{
+    int count = r->is_sparse ? 0 : partners;
+    for (const comp_message *m = out->first; m; m = m->next) count++;
+    r->requests = r->status == INSITU_OK ? base_alloc((size_t)count * sizeof *r->requests) : NULL;
+    if (r->requests) return;
+    fail_memory(r, count * (int)sizeof *r->requests);
+    comp_messages_free(out);
+    r->requests = r->room->reserve;
+}
+
+/* Takes a message that a probe has found. */
+static void receive(round *r, MPI_Message *found, const MPI_Status *status)
+{
+    int bytes = 0;
+    MPI_Get_count(status, MPI_BYTE, &bytes);
+    comp_message *m = NULL;
+    if (bytes > COMP_MESSAGE_HEAD && r->status == INSITU_OK) {
+        m = base_alloc(sizeof *m + (size_t)bytes + COMP_WORDS_SLACK);
+        if (!m) fail_memory(r, bytes);
+    }
+    unsigned char *const data = m ? m->data : r->room->waste;
+    check(r, MPI_Mrecv(data, bytes, MPI_BYTE, found, MPI_STATUS_IGNORE));
+    r->open -= !data[0];
+    if (!m) return;
+    m->next = NULL;
+    m->rank = status->MPI_SOURCE;
+    m->bytes = bytes;
+    comp_messages_append(r->in, &(comp_messages){m, m});
+}
+
+static void receive_dense(round *r)
+{
+    while (r->open > 0) {
+        MPI_Message found;
+        MPI_Status status;
+        const int code = MPI_Mprobe(MPI_ANY_SOURCE, r->tag, r->room->comm, &found, &status);
+        check(r, code);
+        if (code != MPI_SUCCESS) return;
+        receive(r, &found, &status);
+    }
+    check(r, MPI_Waitall(r->request_count, r->requests, MPI_STATUSES_IGNORE));
+}
+
+static void receive_sparse(round *r)
+{
+    MPI_Request barrier = MPI_REQUEST_NULL;
+    int is_over = 0, code = MPI_SUCCESS;
+    for (bool is_within = false; !is_over && code == MPI_SUCCESS;) {
+        int is_there = 0, are_sent = 0;
+        MPI_Message found;
+        MPI_Status status;
+        code = MPI_Improbe(MPI_ANY_SOURCE, r->tag, r->room->comm, &is_there, &found, &status);
+        if (code == MPI_SUCCESS && is_there) receive(r, &found, &status);
+        if (code == MPI_SUCCESS && is_within) {
+            code = MPI_Test(&barrier, &is_over, MPI_STATUS_IGNORE);
+        } else if (code == MPI_SUCCESS) {
+            code = MPI_Testall(r->request_count, r->requests, &are_sent, MPI_STATUSES_IGNORE);
+            if (code == MPI_SUCCESS && are_sent) code = MPI_Ibarrier(r->room->comm, &barrier);
+            is_within = are_sent;
+        }
+    }
+    check(r, code);
+}
+
+/* The last message to the rank says that no more follow. False: there is none. */
+static bool mark_last(const comp_messages *out, int rank)
+{
+    comp_message *last = NULL;
+    for (comp_message *m = out->first; m; m = m->next) {
+        if (m->rank != rank) continue;
+        m->data[0] = 1;
+        last = m;
+    }
+    if (last) last->data[0] = 0;
+    return last != NULL;
+}
+
+static insitu_status run(round *r, comp_messages *out)
+{
+    for (const comp_message *m = out->first; m; m = m->next) send(r, m->data, m->bytes, m->rank);
+    if (r->is_sparse)
+        receive_sparse(r);
+    else
+        receive_dense(r);
+    if (r->requests != r->room->reserve) base_free(r->requests);
+    comp_messages_free(out);
+    if (r->status) comp_messages_free(r->in);
+    return r->status;
+}
+
+insitu_status comp_mail_round(comp_mailroom *room, const comp_route *route, int number, comp_messages *out,
+                              comp_messages *in, insitu_status status, base_error *error)
+{
+    const int place = comp_route_place(route, room->rank), stride = comp_route_stride(route, number);
+    const bool takes_part = place < route->owners;
+    const int partners = takes_part ? route->radix[number] - 1 : 0;
+    round r = {.room = room, .tag = TAG_ROUND + number, .in = in, .status = status, .error = error};
+    r.is_sparse = !comp_route_is_dense(route, number);
+    if (!takes_part && !r.is_sparse) return status;
+    make_requests(&r, out, partners);
+    if (!r.is_sparse) r.open = partners;
+    const int own = comp_route_digit(route, number, stride, place);
+    for (int i = 1; i <= partners && !r.is_sparse; i++) {
+        const int digit = (own + i) % route->radix[number];
+        const int rank = comp_route_rank(route, comp_route_partner(route, number, stride, place, digit));
+        if (!mark_last(out, rank)) send(&r, no_more, NO_MORE_BYTES, rank);
+    }
+    return run(&r, out);
+}
+
+insitu_status comp_mail_fold(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *in,
+                             insitu_status status, base_error *error)
+{
+    const int place = comp_route_place(route, room->rank);
+    const bool gives = place >= route->owners, takes = place + route->owners < route->ranks;
+    round r = {.room = room, .tag = TAG_FOLD, .in = in, .open = takes, .status = status, .error = error};
+    if (!gives && !takes) return status;
+    make_requests(&r, out, 1);
+    const int partner = gives ? comp_route_rank(route, place - route->owners) : 0;
+    if (gives && !mark_last(out, partner)) send(&r, no_more, NO_MORE_BYTES, partner);
+    return run(&r, out);
+}
