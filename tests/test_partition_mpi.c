@@ -68,7 +68,8 @@ static void draw(const test_mesh *mesh, const scene *scene, MPI_Comm comm, bool 
     out->height = HEIGHT;
     out->rgba = malloc(4 * PIXELS * sizeof(float));
     out->depth = malloc(PIXELS * sizeof(float));
-    assert_int_equal(comp_composite(&(comp_group){comm, {1, false}, COMP_AUTOMATIC, 0}, &list, fixture_background, 0, out, NULL, &error), INSITU_OK);
+    const comp_group group = {comm, {1, false}, COMP_AUTOMATIC, 0};
+    assert_int_equal(comp_composite(&group, &list, fixture_background, 0, out, NULL, &error), INSITU_OK);
     base_free(list.items);
     fixture_free(&f);
 }
