@@ -125,7 +125,7 @@ static comp_pixel blend(const comp_merged *merged, fragment *items, int64_t coun
     comp_merge_pixel(items, count, merged->background, blended.rgba, &blended.depth);
     if (merged->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(merged->overlaps, pixel);
     if (merged->deep) {
-        items->pixel = pixel;
+        for (int64_t i = 0; i < count; i++) items[i].pixel = pixel;
         comp_deep_add(&merged->deep[omp_get_thread_num()], items, count);
     }
     return blended;
