@@ -446,6 +446,50 @@ static void faces_are_found_once_for_the_cells(void **state)
     input_free(&whole);
 }
 
+/* ---- polygons -------------------------------------------------------------------------------------------------- */
+
+/* A cube whose face towards the eye has a vertex amid one edge, as hanging nodes make them. Rays go exactly along the
+ * line between two of the face's triangles, y = z: they hit it all the same. */
+static void rays_along_the_diagonals_of_polygons_hit(void **state)
+{
+    (void)state;
+    static const double places[9][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},  {0, 0, 1},
+                                        {1, 0, 1}, {1, 1, 1}, {0, 1, 1}, {1, 0.5, 0}};
+    static const int64_t connectivity[6] = {0, 1, 2, 3, 4, 5}, offsets[2] = {0, 6};
+    static const int64_t vertices[26] = {1, 8, 2, 6, 5, 0, 4, 7, 3, 0, 1, 5, 4, 3, 7, 6, 2, 0, 3, 2, 8, 1, 4, 5, 6, 7};
+    static const int64_t faces[7] = {0, 5, 9, 13, 17, 22, 26};
+    insitu_session *session = open_session(
+        MPI_COMM_WORLD, write_scene("images:\n  - name: a\n    size: [64, 64]\n    layers: [{surface: {}}]\n"
+                                    "    camera: {position: [5, 0.5, 0.5], focal: [0, 0.5, 0.5], up: [0, 0, 1], "
+                                    "projection: orthographic, height: 2}\n    outputs: [{path: a.exr}]\n"));
+    insitu_mesh mesh;
+    insitu_mesh_defaults(&mesh);
+    mesh.vertex_count = 9;
+    insitu_mesh_interleaved(&mesh, places, INSITU_FLOAT64);
+    mesh.cell_count = 1;
+    mesh.cell_type = INSITU_POLYHEDRON;
+    mesh.connectivity_count = 6;
+    mesh.connectivity = (insitu_array){connectivity, INSITU_INT64, 0};
+    mesh.offsets = (insitu_array){offsets, INSITU_INT64, 0};
+    mesh.face_count = 6;
+    mesh.face_offsets = (insitu_array){faces, INSITU_INT64, 0};
+    mesh.face_connectivity_count = 26;
+    mesh.face_connectivity = (insitu_array){vertices, INSITU_INT64, 0};
+    forget_pictures();
+    everywhere(own_rank != 0 || insitu_set_mesh(session, "m", &mesh) == INSITU_OK);
+    everywhere(insitu_step(session, 0, 0) == INSITU_OK);
+    bool is_right = own_rank != 0 || caught_count == 1;
+    for (int i = 0; is_right && own_rank == 0 && i < 64 * 64; i++) {
+        const int column = i % 64, row = i / 64;
+        const bool is_inside = column >= 16 && column < 48 && row >= 16 && row < 48;
+        /* The camera's depth is a float of size 4. */
+        is_right = is_inside ? fabs((double)caught[0].depth[i] - 4) < 1e-6 : isinf(caught[0].depth[i]);
+        if (!is_right) fprintf(stderr, "pixel %d, %d: depth %g\n", column, row, (double)caught[0].depth[i]);
+    }
+    everywhere(is_right);
+    insitu_destroy(&session);
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
@@ -454,6 +498,7 @@ static int run(void)
         cmocka_unit_test(cubes_are_true_and_one_picture_on_any_ranks),
         cmocka_unit_test(warped_faces_are_bilinear_patches),
         cmocka_unit_test(faces_are_found_once_for_the_cells),
+        cmocka_unit_test(rays_along_the_diagonals_of_polygons_hit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -138,20 +138,25 @@ static int64_t place_vertex(outer_work *w, int64_t origin, const double place[3]
     return *out;
 }
 
-/* A tet or a pyramid on a triangle or quad; none where that has no area. */
-static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
+/* A tet or a pyramid on a triangle or quad, with an apex that is there. */
+static void add_cell_below(outer_work *w, const corner_loop *loop, int64_t apex, int64_t origin)
 {
-    double apex[3];
-    if (loop->count < 3) return;
-    order_corners(loop);
-    if (!find_apex(loop, inside, apex)) return;
     w->out->offsets[w->cell_count] = w->entry_count;
     w->out->types[w->cell_count] = loop->count == 3 ? GRID_TET : GRID_PYRAMID;
     w->pyramid_count += loop->count == 4;
     w->out->cell_origins[w->cell_count++] = origin;
     for (int i = 0; i < loop->count; i++)
         w->out->connectivity[w->entry_count++] = place_vertex(w, loop->vertices[i], loop->places[i]);
-    w->out->connectivity[w->entry_count++] = add_vertex(w, apex, loop->vertices[0], -1);
+    w->out->connectivity[w->entry_count++] = apex;
+}
+
+/* The same with an apex of its own; none where the face has no area. */
+static void add_cell(outer_work *w, corner_loop *loop, const double inside[3], int64_t origin)
+{
+    double apex[3];
+    if (loop->count < 3) return;
+    order_corners(loop);
+    if (find_apex(loop, inside, apex)) add_cell_below(w, loop, add_vertex(w, apex, loop->vertices[0], -1), origin);
 }
 
 /* The polygon that the cells from first on are of. */
@@ -168,24 +173,85 @@ static void add_loop(outer_work *w, const session_face_loop *face, int64_t first
     }
 }
 
+/* A polygon's triangles, from its least vertex on, towards the lesser of that one's neighbours. */
+typedef struct face_fan {
+    const session_face_loop *face;
+    int64_t least, step;
+} face_fan;
+
+static int64_t fan_vertex(const face_fan *fan, int64_t i)
+{
+    const int64_t size = fan->face->size;
+    return session_face_vertex(fan->face, (fan->least + (fan->step > 0 ? i : size - i)) % size);
+}
+
+static face_fan make_fan(const grid *g, const session_face_loop *face)
+{
+    face_fan fan = {face, 0, 1};
+    double least[3], place[3], after[3], before[3];
+    grid_vertex(g, session_face_vertex(face, 0), least);
+    for (int64_t i = 1; i < face->size; i++) {
+        grid_vertex(g, session_face_vertex(face, i), place);
+        if (compare_places(place, least) >= 0) continue;
+        memcpy(least, place, sizeof place);
+        fan.least = i;
+    }
+    grid_vertex(g, fan_vertex(&fan, 1), after);
+    grid_vertex(g, fan_vertex(&fan, face->size - 1), before);
+    if (compare_places(before, after) < 0) fan.step = -1;
+    return fan;
+}
+
+/* False where it has no area; its own apex else. */
+static bool fan_triangle(const grid *g, const face_fan *fan, int64_t i, const double inside[3], corner_loop *out,
+                         double apex[3])
+{
+    *out = (corner_loop){0};
+    add_corner(out, g, fan_vertex(fan, 0));
+    add_corner(out, g, fan_vertex(fan, i));
+    add_corner(out, g, fan_vertex(fan, i + 1));
+    if (out->count < 3) return false;
+    order_corners(out);
+    return find_apex(out, inside, apex);
+}
+
+/* The mean of the triangles' apexes, for all of them: so the tets share faces, and a ray along the line between two of
+ * the triangles leaves the one for the other, where from tets that part there it would come out with nothing. False
+ * where it is not well over each triangle: they are too far from a plane. */
+static bool find_common_apex(const grid *g, const face_fan *fan, const double inside[3], double out[3])
+{
+    corner_loop loop;
+    double own[3], height[3], normal[3];
+    int count = 0;
+    out[0] = out[1] = out[2] = 0;
+    for (int64_t i = 1; i + 1 < fan->face->size; i++) {
+        if (!fan_triangle(g, fan, i, inside, &loop, own)) continue;
+        for (int axis = 0; axis < 3; axis++) out[axis] += own[axis];
+        count++;
+    }
+    for (int axis = 0; axis < 3 && count; axis++) out[axis] /= count;
+    for (int64_t i = 1; i + 1 < fan->face->size; i++) {
+        if (!fan_triangle(g, fan, i, inside, &loop, own)) continue;
+        find_normal(&loop, normal);
+        subtract(own, loop.places[0], height);
+        const double most = dot(height, normal);
+        subtract(out, loop.places[0], height);
+        if (!(dot(height, normal) / most > 0.25)) return false;
+    }
+    return count > 0;
+}
+
 static void add_fan(outer_work *w, const session_face_loop *face, const double inside[3], int64_t origin)
 {
-    int64_t least = 0;
-    double least_place[3], place[3];
-    grid_vertex(w->cells, session_face_vertex(face, 0), least_place);
-    for (int64_t i = 1; i < face->size; i++) {
-        grid_vertex(w->cells, session_face_vertex(face, i), place);
-        if (compare_places(place, least_place) >= 0) continue;
-        memcpy(least_place, place, sizeof place);
-        least = i;
-    }
+    const face_fan fan = make_fan(w->cells, face);
     const int64_t first = w->cell_count;
+    double common[3], own[3];
+    corner_loop loop;
+    const bool is_shared = find_common_apex(w->cells, &fan, inside, common);
+    const int64_t apex = is_shared ? add_vertex(w, common, fan_vertex(&fan, 0), -1) : -1;
     for (int64_t i = 1; i + 1 < face->size; i++) {
-        corner_loop loop = {0};
-        add_corner(&loop, w->cells, session_face_vertex(face, least));
-        add_corner(&loop, w->cells, session_face_vertex(face, (least + i) % face->size));
-        add_corner(&loop, w->cells, session_face_vertex(face, (least + i + 1) % face->size));
-        add_cell(w, &loop, inside, origin);
+        if (!fan_triangle(w->cells, &fan, i, inside, &loop, own)) continue;
+        add_cell_below(w, &loop, is_shared ? apex : add_vertex(w, own, loop.vertices[0], -1), origin);
     }
     add_loop(w, face, first);
 }
