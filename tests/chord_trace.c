@@ -41,7 +41,7 @@ static void chord_polyhedron(kernel_packet *p, const chord_state *state, const g
         kernel_polyhedron_place(c, p);
         for (int i = 0; i <= c->vertex_count; i++) c->f[i] = 0;
     }
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
     while (kernel_passage_next(&r, &stay))
         chord_note(state, stay.interval.mask, stay.interval.t_in, stay.interval.t_out);
 }

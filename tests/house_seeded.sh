@@ -60,6 +60,8 @@ planted compositing/seeded.c '#include "render.h"' 'compositing must not include
 planted render/rays/seeded.h '#include "kernel_cell.h"' 'rays must not include kernel_cell.h of cells'
 planted render/cells/seeded.h '#include "kernel_finder.h"' 'cells must not include kernel_finder.h of find'
 planted render/find/seeded.c '#include "kernel_surface.h"' 'find must not include kernel_surface.h of surface'
+planted render/thesis/seeded.h '#include "kernel_surface.h"' 'thesis must not include kernel_surface.h of surface'
+planted render/volume/seeded.h '#include "kernel_neubauer.h"' 'volume must not include kernel_neubauer.h of thesis'
 planted render/surface/seeded.h '#include "kernel_samples.h"' 'surface must not include kernel_samples.h of volume'
 planted render/volume/seeded.h '#include "kernel_roots.h"' 'volume must not include kernel_roots.h of surface'
 planted render/volume/seeded.h '#include "render_frame.h"' 'no file of the tree is called render_frame.h'

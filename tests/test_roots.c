@@ -10,7 +10,7 @@
 
 #include "kernel_cell.h"
 #include "kernel_map.h"
-#include "kernel_surface.h"
+#include "kernel_neubauer.h"
 #include "root_bundle.h"
 #include "test_meshes.h"
 

@@ -138,16 +138,18 @@ SIMD_INLINE kernel_four kernel_four_load(const float *p)
     return v;
 }
 
-/* Lanes of a vector, and of the three of a place. */
+/* Lanes of a vector, and of the four of kernel_spots. */
 #define KERNEL_PICKED(v, i, j, k, l) __builtin_shufflevector(v, v, i, j, k, l)
 #define KERNEL_PICK(at, i, j, k, l)                                                                                    \
     (kernel_spots)                                                                                                     \
     {                                                                                                                  \
-        KERNEL_PICKED(at[0], i, j, k, l), KERNEL_PICKED(at[1], i, j, k, l), KERNEL_PICKED(at[2], i, j, k, l)           \
+        KERNEL_PICKED(at[0], i, j, k, l), KERNEL_PICKED(at[1], i, j, k, l), KERNEL_PICKED(at[2], i, j, k, l),          \
+            KERNEL_PICKED(at[3], i, j, k, l)                                                                           \
     }
 
+/* Four vertices, and kernel_spot_size() of each. */
 typedef struct kernel_spots {
-    kernel_four x, y, z;
+    kernel_four x, y, z, size;
 } kernel_spots;
 
 typedef double kernel_doubles __attribute__((vector_size(32)));
@@ -160,8 +162,7 @@ SIMD_INLINE kernel_four kernel_four_abs(kernel_four v)
 
 /* kernel_line_between() of edges from a to b, and kernel_line_blur(). */
 SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_spots a, kernel_spots b,
-                                   kernel_four size_a, kernel_four size_b, kernel_line lines[4], kernel_four *errors,
-                                   kernel_four *extents)
+                                   kernel_line lines[4], kernel_four *errors, kernel_four *extents)
 {
     const bool flat = f->job->camera.is_orthographic;
     const kernel_doubles ax = __builtin_convertvector(a.x, kernel_doubles),
@@ -174,7 +175,7 @@ SIMD_INLINE void kernel_four_lines(const kernel_frame *f, float radius, kernel_s
     const kernel_four c = __builtin_convertvector(ax * by - bx * ay, kernel_four);
     const kernel_four cu = __builtin_convertvector(db * ay - da * by, kernel_four);
     const kernel_four cv = __builtin_convertvector(da * bx - db * ax, kernel_four);
-    const kernel_four bound = 6 * 6e-8f * (size_a * size_b);
+    const kernel_four bound = 6 * 6e-8f * (a.size * b.size);
     for (int n = 0; n < 4; n++) lines[n] = (kernel_line){c[n], cu[n], cv[n], bound[n]};
     const kernel_four x = kernel_four_abs(a.x - b.x), y = kernel_four_abs(a.y - b.y), z = kernel_four_abs(a.z - b.z);
     *errors = 6e-8f * (3 * kernel_four_abs(c) + radius * (4 * kernel_four_abs(cu) + 3 * kernel_four_abs(cv)));
@@ -457,18 +458,17 @@ SIMD_INLINE kernel_four kernel_tet_face_sums(const kernel_four e[2])
 
 SIMD_INLINE void kernel_tet_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
-    kernel_four at[3], size, errors[2], extents[2];
+    kernel_four at[4], errors[2], extents[2];
     kernel_line lines[8];
     float doubt = 0;
-    for (int i = 0; i < 4; i++) size[i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
+    for (int i = 0; i < 4; i++) at[3][i] = kernel_spot_size(f, tile, kernel_cell_spot(c, i));
     at[0] = kernel_four_load(c->x);
     at[1] = kernel_four_load(c->y);
     at[2] = kernel_four_load(c->z);
     /* Edges 0 to 3, 4 and 5. */
-    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2),
-                      KERNEL_PICKED(size, 0, 0, 0, 1), KERNEL_PICKED(size, 1, 2, 3, 2), lines, &errors[0], &extents[0]);
-    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3),
-                      KERNEL_PICKED(size, 1, 2, 2, 2), KERNEL_PICKED(size, 3, 3, 3, 3), lines + 4, &errors[1],
+    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 0, 0, 0, 1), KERNEL_PICK(at, 1, 2, 3, 2), lines, &errors[0],
+                      &extents[0]);
+    kernel_four_lines(f, tile->radius, KERNEL_PICK(at, 1, 2, 2, 2), KERNEL_PICK(at, 3, 3, 3, 3), lines + 4, &errors[1],
                       &extents[1]);
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         c->lines[n] = lines[n];

@@ -13,6 +13,7 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
+#include "kernel_shapes.h"
 #include "kernel_tile.h"
 #include "simd.h"
 
@@ -131,7 +132,7 @@ static const kernel_differential kernel_differentials[3] = {
 
 SIMD_INLINE const kernel_differential *kernel_cell_differential(int type)
 {
-    return &kernel_differentials[type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : 2];
+    return &kernel_differentials[kernel_shape_number(type)];
 }
 
 /* inverse: that of the Jacobian at the middle, times volume. What is left to 1 is far more than all rounding. */

@@ -53,8 +53,12 @@ typedef struct kernel_tet_span {
     int facet;
 } kernel_tet_span;
 
-/* What a packet meets of one polyhedron; in the thread's scratch memory. */
+/* A packet's passage through one polyhedron; its arrays are in the thread's scratch memory. */
 typedef struct kernel_passage {
+    const kernel_packet *packet;
+    const polyhedron *cell;
+    vm rays;                /* those that are asked for */
+    bool has_colour;        /* w is asked for too */
     vf *x, *y;              /* vertices and centre in the rays' planes */
     vf *edge;               /* edge functions: of the edges, then of the spokes, from each vertex to the centre */
     kernel_meeting *facets; /* by number; only those met are set */
@@ -102,6 +106,8 @@ static bool kernel_passage_open(const kernel_packet *p, const polyhedron *c, ker
         p->thread->out_of_memory = true;
         return false;
     }
+    out->packet = p;
+    out->cell = c;
     out->x = kernel_carve(&at, points * sizeof(vf));
     out->y = kernel_carve(&at, points * sizeof(vf));
     out->edge = kernel_carve(&at, (edges + points) * sizeof(vf));
@@ -154,32 +160,33 @@ SIMD_INLINE void kernel_meet(const polyhedron *c, const kernel_weights *w, bool 
     out->w_face = out->w;
 }
 
-SIMD_INLINE void kernel_passage_edge(const kernel_packet *p, const polyhedron *c, kernel_passage *r, int number, int a,
-                                     int b)
+SIMD_INLINE void kernel_passage_edge(kernel_passage *r, int number, int a, int b)
 {
+    const polyhedron *c = r->cell;
     kernel_line line;
     memcpy(&line, c->lines[number], sizeof line);
-    r->edge[number] = kernel_edge(p, &line, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
+    r->edge[number] = kernel_edge(r->packet, &line, kernel_polyhedron_spot(c, a), kernel_polyhedron_spot(c, b));
 }
 
-SIMD_INLINE void kernel_polyhedron_mend(const kernel_packet *p, const polyhedron *c, vm hit, kernel_weights *w)
+SIMD_INLINE void kernel_passage_mend(const kernel_passage *r, vm hit, kernel_weights *w)
 {
-    kernel_weights_mend(p, c->least, hit, kernel_polyhedron_spot(c, w->i), kernel_polyhedron_spot(c, w->j),
+    const polyhedron *c = r->cell;
+    kernel_weights_mend(r->packet, c->least, hit, kernel_polyhedron_spot(c, w->i), kernel_polyhedron_spot(c, w->j),
                         kernel_polyhedron_spot(c, w->k), w);
 }
 
 /* Who crosses the triangle, and its place. The weights are for guesses at its quad's patch, as a hex beside it has
  * them. */
-static vm kernel_passage_facet(const kernel_packet *p, const polyhedron *c, const polyhedron_facet *t, vm rays,
-                               bool has_colour, kernel_passage *r, kernel_weights *w, kernel_meeting *out)
+static vm kernel_passage_facet(const kernel_passage *r, const polyhedron_facet *t, kernel_weights *w,
+                               kernel_meeting *out)
 {
     const vf ij = r->edge[t->edge[0]], jk = r->edge[t->edge[1]], ik = r->edge[t->edge[2]];
-    out->mask = kernel_inside(rays, ij, jk, ik);
+    out->mask = kernel_inside(r->rays, ij, jk, ik);
     if (!vm_any(out->mask)) return out->mask;
     *w = kernel_weights_of(t->vertex[0], t->vertex[1], t->vertex[2], ij, jk, ik);
     kernel_weights mended = *w;
-    kernel_polyhedron_mend(p, c, out->mask, &mended);
-    kernel_meet(c, &mended, has_colour, out);
+    kernel_passage_mend(r, out->mask, &mended);
+    kernel_meet(r->cell, &mended, r->has_colour, out);
     return out->mask;
 }
 
@@ -196,13 +203,13 @@ SIMD_INLINE bool kernel_facet_has(const polyhedron_facet *t, int vertex)
     return t->vertex[0] == vertex || t->vertex[1] == vertex || t->vertex[2] == vertex;
 }
 
-SIMD_INLINE void kernel_quad_of_facets(const polyhedron *c, const kernel_passage *r, const polyhedron_facet *const t[2],
-                                       const int corner[4], kernel_quad *out)
+SIMD_INLINE void kernel_quad_of_facets(const kernel_passage *r, const polyhedron_facet *const t[2], const int corner[4],
+                                       kernel_quad *out)
 {
     for (int i = 0; i < 4; i++) {
         out->x[i] = r->x[corner[i]];
         out->y[i] = r->y[corner[i]];
-        out->z[i] = vf_set(c->z[corner[i]]);
+        out->z[i] = vf_set(r->cell->z[corner[i]]);
     }
     out->e01 = kernel_facet_side(t[0], r, corner[0], corner[1]);
     out->e12 = kernel_facet_side(t[0], r, corner[1], corner[2]);
@@ -241,10 +248,10 @@ static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *c
 }
 
 /* A quad, by the first of its two triangles: where its patch is met, as a hex beside it has it. */
-static void kernel_passage_quad(const kernel_packet *p, const polyhedron *c, int first, vm rays, bool has_colour,
-                                kernel_passage *r)
+static void kernel_passage_quad(kernel_passage *r, int first)
 {
     static const signed char loop[4] = {0, 1, 2, 3};
+    const polyhedron *c = r->cell;
     const int *around = c->quads[c->facets[first].quad];
     kernel_cell ranks;
     kernel_weights w;
@@ -258,18 +265,18 @@ static void kernel_passage_quad(const kernel_packet *p, const polyhedron *c, int
     const int twin = c->facets[first].twin, half_of[2] = {has_corner ? first : twin, has_corner ? twin : first};
     const polyhedron_facet *t[2] = {&c->facets[half_of[0]], &c->facets[half_of[1]]};
     kernel_meeting *m[2] = {&r->facets[half_of[0]], &r->facets[half_of[1]]};
-    for (int half = 0; half < 2; half++) kernel_passage_facet(p, c, t[half], rays, has_colour, r, &w, m[half]);
-    kernel_quad_of_facets(c, r, t, corner, &quad);
+    for (int half = 0; half < 2; half++) kernel_passage_facet(r, t[half], &w, m[half]);
+    kernel_quad_of_facets(r, t, corner, &quad);
     const vm once = vm_xor(m[0]->mask, m[1]->mask);
-    const vm twice = kernel_quad_sides(rays, quad.e01, quad.e32, quad.e03, quad.e12);
+    const vm twice = kernel_quad_sides(r->rays, quad.e01, quad.e32, quad.e03, quad.e12);
     const int count = kernel_quad_places(&quad, once, twice, places);
     if (count == 2) kernel_places_pair(m, places);
     r->uneven = vm_or(r->uneven, vm_xor(vm_and(m[0]->mask, m[1]->mask), count == 2 ? places[1].mask : vm_none()));
     for (int half = 0; half < 2; half++) {
         vm left = count ? vm_and(once, m[half]->mask) : vm_none();
-        if (vm_any(left)) kernel_facet_face(c, corner, &places[0], left, has_colour, m[half]);
+        if (vm_any(left)) kernel_facet_face(c, corner, &places[0], left, r->has_colour, m[half]);
         if (count == 2) {
-            kernel_facet_face(c, corner, &places[half], places[1].mask, has_colour, m[half]);
+            kernel_facet_face(c, corner, &places[half], places[1].mask, r->has_colour, m[half]);
             left = vm_or(left, places[1].mask);
         }
         r->left[half_of[half]] = left;
@@ -278,21 +285,23 @@ static void kernel_passage_quad(const kernel_packet *p, const polyhedron *c, int
 }
 
 /* All crossings of the surface; false where no ray has any. */
-static bool kernel_passage_cross(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
-                                 kernel_passage *r)
+static bool kernel_passage_cross(kernel_passage *r, vm rays, bool has_colour)
 {
+    const polyhedron *c = r->cell;
+    r->rays = rays;
+    r->has_colour = has_colour;
     for (int i = 0; i <= c->vertex_count; i++) {
-        r->x[i] = kernel_project_x(p, kernel_polyhedron_spot(c, i));
-        r->y[i] = kernel_project_y(p, kernel_polyhedron_spot(c, i));
+        r->x[i] = kernel_project_x(r->packet, kernel_polyhedron_spot(c, i));
+        r->y[i] = kernel_project_y(r->packet, kernel_polyhedron_spot(c, i));
     }
-    for (int i = 0; i < c->edge_count; i++) kernel_passage_edge(p, c, r, i, c->edges[i][0], c->edges[i][1]);
+    for (int i = 0; i < c->edge_count; i++) kernel_passage_edge(r, i, c->edges[i][0], c->edges[i][1]);
     for (int i = 0; i < c->facet_count; i++) {
         kernel_weights w;
         if (c->facets[i].quad >= 0) {
-            if (i < c->facets[i].twin) kernel_passage_quad(p, c, i, rays, has_colour, r);
+            if (i < c->facets[i].twin) kernel_passage_quad(r, i);
             continue;
         }
-        r->left[i] = kernel_passage_facet(p, c, &c->facets[i], rays, has_colour, r, &w, &r->facets[i]);
+        r->left[i] = kernel_passage_facet(r, &c->facets[i], &w, &r->facets[i]);
         if (vm_any(r->left[i])) r->met[r->met_count++] = i;
     }
     return r->met_count > 0;
@@ -338,21 +347,21 @@ static bool kernel_passage_next(kernel_passage *r, kernel_stay *out)
 
 /* ---- the inside ---- */
 
-static void kernel_passage_sheets(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
-                                  kernel_passage *r)
+static void kernel_passage_sheets(kernel_passage *r)
 {
+    const polyhedron *c = r->cell;
     const int centre = c->vertex_count, spokes = c->edge_count;
     if (r->has_sheets) return;
     r->has_sheets = true;
-    for (int i = 0; i < centre; i++) kernel_passage_edge(p, c, r, spokes + i, i, centre);
+    for (int i = 0; i < centre; i++) kernel_passage_edge(r, spokes + i, i, centre);
     for (int i = 0; i < c->edge_count; i++) {
         const int a = c->edges[i][0], b = c->edges[i][1];
         kernel_meeting *m = &r->sheets[i];
-        m->mask = kernel_inside(rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
+        m->mask = kernel_inside(r->rays, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
         if (!vm_any(m->mask)) continue;
         kernel_weights w = kernel_weights_of(a, b, centre, r->edge[i], r->edge[spokes + b], r->edge[spokes + a]);
-        kernel_polyhedron_mend(p, c, m->mask, &w);
-        kernel_meet(c, &w, has_colour, m);
+        kernel_passage_mend(r, m->mask, &w);
+        kernel_meet(c, &w, r->has_colour, m);
         r->met_sheets[r->sheet_count++] = i;
     }
 }
@@ -370,8 +379,9 @@ SIMD_INLINE void kernel_segment_add(kernel_tet_span *s, const kernel_meeting *m,
 }
 
 /* The tets that rays pass. */
-static void kernel_passage_segments(const polyhedron *c, vm rays, kernel_passage *r)
+static void kernel_passage_segments(kernel_passage *r)
 {
+    const polyhedron *c = r->cell;
     if (r->segment_count) return;
     for (int i = 0; i < c->facet_count; i++) {
         const polyhedron_facet *t = &c->facets[i];
@@ -385,7 +395,7 @@ static void kernel_passage_segments(const polyhedron *c, vm rays, kernel_passage
             if (vm_any(r->sheets[t->edge[k]].mask))
                 kernel_segment_add(s, &r->sheets[t->edge[k]], r->sheets[t->edge[k]].mask);
         /* A ray that meets the tet meets a sheet of it; its triangle is met by who is inside all three edges. */
-        const vm hit = kernel_inside(rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
+        const vm hit = kernel_inside(r->rays, r->edge[t->edge[0]], r->edge[t->edge[1]], r->edge[t->edge[2]]);
         if (vm_any(hit)) kernel_segment_add(s, &r->facets[i], hit);
         if (!vm_any(s->mask)) continue;
         s->sign = t->sign;
@@ -450,13 +460,12 @@ SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const ker
 }
 
 /* Make the sheets ready to be the profile of the stay: their values, and those at its ends, the field's. */
-static void kernel_passage_profile(const kernel_packet *p, const polyhedron *c, vm rays, bool has_colour,
-                                   kernel_passage *r, kernel_stay *stay)
+static void kernel_passage_profile(kernel_passage *r, kernel_stay *stay)
 {
     kernel_interval *i = &stay->interval;
-    kernel_passage_sheets(p, c, rays, has_colour, r);
-    if (c->is_star) return;
-    kernel_passage_segments(c, rays, r);
+    kernel_passage_sheets(r);
+    if (r->cell->is_star) return;
+    kernel_passage_segments(r);
     kernel_passage_lift(r, i->mask, &stay->in, false, &stay->u_in, &i->w_in);
     kernel_passage_lift(r, i->mask, &stay->out, true, &stay->u_out, &i->w_out);
     for (int n = 0; n < r->sheet_count; n++) {

@@ -43,9 +43,15 @@ static const kernel_shape kernel_shapes[3] = {
      {{0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}, {0, 0, 0}}},
 };
 
+/* The row of a hex, wedge or pyramid in tables of their shapes. */
+SIMD_INLINE int kernel_shape_number(int type)
+{
+    return type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : 2;
+}
+
 SIMD_INLINE const kernel_shape *kernel_cell_shape(int type)
 {
-    return &kernel_shapes[type == GRID_HEX ? 0 : type == GRID_WEDGE ? 1 : 2];
+    return &kernel_shapes[kernel_shape_number(type)];
 }
 
 #endif

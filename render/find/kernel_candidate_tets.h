@@ -32,19 +32,27 @@ SIMD_INLINE void kernel_tet_lanes_turn(const kernel_finder *s, const kernel_tet_
                 (l->at[0][i] * (float)axes[a][0] + l->at[1][i] * (float)axes[a][1]) + l->at[2][i] * (float)axes[a][2];
 }
 
-SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_lanes *l, kernel_tet_ends *e)
+SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_lanes *l, kernel_ends_lanes *e)
 {
     vf at[4][3];
     kernel_tet_lanes_turn(s, l, at);
-    *e = kernel_tet_no_ends();
+    *e = kernel_no_ends();
     for (int n = 0; n < KERNEL_TET_EDGES; n++) {
         const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
         const vm crossed = vm_xor(l->negative[i], l->negative[j]);
         const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* not 0 / 0 */
         vf point[3];
         for (int a = 0; a < 3; a++) point[a] = at[i][a] + along * (at[j][a] - at[i][a]);
-        kernel_tet_ends_add(s, e, point, crossed);
+        kernel_ends_add(s, e, point, crossed);
     }
+}
+
+SIMD_INLINE void kernel_tets_add(kernel_finder *s, const kernel_ends_lanes *e, unsigned lanes, const uint32_t *cells,
+                                 uint32_t source)
+{
+    uint32_t sources[SIMD_WIDTH];
+    for (int n = 0; n < SIMD_WIDTH; n++) sources[n] = source;
+    kernel_add_lanes(s, e, lanes, cells, sources);
 }
 
 /* Tets of a packed mesh. v < value is v < the least float not below it. The differences' signs are right but where they
@@ -70,14 +78,14 @@ SIMD_INLINE void kernel_packed_value(kernel_finder *s, const vf v[4], kernel_tet
     /* Values too large, too small or NaN for lanes are handled one by one. */
     const unsigned good = crossed & vm_bits(usual);
     if (good) {
-        kernel_tet_ends e;
+        kernel_ends_lanes e;
         kernel_tet_lanes_ends(s, l, &e);
-        kernel_add_lanes(s, &e, good, s->tets.cell, s->source + (uint32_t)value);
+        kernel_tets_add(s, &e, good, s->tets.cell, s->source + (uint32_t)value);
     }
     for (unsigned odd = crossed & ~good; odd; odd &= odd - 1) {
         kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part],
                           s->tets.cell[__builtin_ctz(odd)]);
-        if (s->cell.is_finite) kernel_find_value(s, value);
+        kernel_find_alone(s, &s->cell, value);
     }
 }
 
@@ -92,16 +100,16 @@ SIMD_INLINE void kernel_packed_volume(kernel_finder *s, const vf v[4], const ker
     const vm shows = kernel_interest_meets_values(s->interest, v);
     const unsigned all = (1u << s->tets.count) - 1, good = all & vm_bits(vm_and(usual, shows));
     if (good) {
-        kernel_tet_ends e = kernel_tet_no_ends();
+        kernel_ends_lanes e = kernel_no_ends();
         vf at[4][3];
         kernel_tet_lanes_turn(s, l, at);
-        for (int i = 0; i < 4; i++) kernel_tet_ends_add(s, &e, at[i], vm_all_lanes());
-        kernel_add_lanes(s, &e, good, s->tets.cell, s->source);
+        for (int i = 0; i < 4; i++) kernel_ends_add(s, &e, at[i], vm_all_lanes());
+        kernel_tets_add(s, &e, good, s->tets.cell, s->source);
     }
     for (unsigned odd = all & ~vm_bits(usual); odd; odd &= odd - 1) {
         kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part],
                           s->tets.cell[__builtin_ctz(odd)]);
-        kernel_find_cell(s);
+        kernel_find_volume(s);
     }
 }
 
@@ -155,14 +163,14 @@ static void kernel_find_any_tets(kernel_finder *s)
         }
         if (!count) continue;
         kernel_tet_lanes l;
-        kernel_tet_ends e;
+        kernel_ends_lanes e;
         for (int i = 0; i < 4; i++) {
             l.f[i] = vf_load(f[i]);
             l.negative[i] = vf_lt(l.f[i], vf_set(0));
             for (int a = 0; a < 3; a++) l.at[a][i] = vf_load(at[a][i]);
         }
         kernel_tet_lanes_ends(s, &l, &e);
-        kernel_add_lanes(s, &e, (1u << count) - 1, cells, s->source + (uint32_t)value);
+        kernel_tets_add(s, &e, (1u << count) - 1, cells, s->source + (uint32_t)value);
     }
     s->tets.count = 0;
 }

@@ -17,7 +17,7 @@
 
 #include "grid.h"
 #include "kernel_active_cells.h"
-#include "kernel_candidate_hexes.h"
+#include "kernel_candidate_polys.h"
 #include "kernel_candidate_tets.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
@@ -107,7 +107,7 @@ static void kernel_find_rest(kernel_finder *s)
     kernel_find_pending(s);
     kernel_find_queued(s);
     kernel_find_pending(s);
-    kernel_find_crossed_hexes(s);
+    kernel_find_all_crossed(s);
 }
 
 /* A node is looked at beside others, each of which has what it needs on its way from memory while they wait. */
@@ -219,7 +219,7 @@ static void kernel_find_active(kernel_finder *s, int64_t first, int64_t count)
         }
         kernel_find_pending(s);
     }
-    kernel_find_crossed_hexes(s);
+    kernel_find_all_crossed(s);
 }
 
 #endif

@@ -1,6 +1,6 @@
-/* The search of a subtree for what shows of it (kernel_candidates.h), and what it asks of a cell alone: the pixels that
- * its isosurfaces, or all of it, may show in. Types of which there are many are asked for many at once
- * (kernel_candidate_tets.h, kernel_candidate_hexes.h). */
+/* The search of a subtree for the cells that show (kernel_candidates.h), and the pixels that a cell alone may show in.
+ * Isosurfaces are looked for in many cells at once (kernel_candidate_tets.h, kernel_candidate_polys.h), but for those
+ * whose numbers are too large, too small or NaN for lanes. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
@@ -31,12 +31,14 @@ SIMD_INLINE void kernel_tets_fill(kernel_tets *t, int vertices)
         for (int i = 0; i < vertices; i++) t->packed[i][n] = t->packed[i][0];
 }
 
-/* Hexes of a packed mesh that the isovalue under way crosses (kernel_candidate_hexes.h). */
-typedef struct kernel_crossed_hexes {
-    int count, value;
-    uint32_t cell[SIMD_WIDTH];
-    int32_t vertex[8][SIMD_WIDTH];
-} kernel_crossed_hexes;
+/* Cells of one type with quads that isovalues cross, one a lane, until there is one in each (kernel_candidate_polys.h).
+ * Hexes of a packed mesh are all crossed by one isovalue, and their places and values are still to be fetched. */
+typedef struct kernel_crossed {
+    int type, count, value;
+    uint32_t cell[SIMD_WIDTH], source[SIMD_WIDTH];
+    int32_t vertex[8][SIMD_WIDTH];   /* of a packed mesh; else */
+    float place[4][8][SIMD_WIDTH];   /* along the camera's axes from the eye; values less the isovalue, scaled */
+} kernel_crossed;
 
 /* One subtree's search. */
 typedef struct kernel_finder {
@@ -55,7 +57,7 @@ typedef struct kernel_finder {
     kernel_cell cell;
     uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
     kernel_tets tets;            /* tets whose vertices are */
-    kernel_crossed_hexes hexes;
+    kernel_crossed crossed[3];   /* by kernel_shape_number() */
     kernel_packed packed;
     int queued_count;
     /* The other end: what is crossed is kept, and the picture is not asked. */
@@ -91,7 +93,12 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
-    s->queued_count = s->tets.count = s->hexes.count = s->hexes.value = 0;
+    s->queued_count = s->tets.count = 0;
+    for (int type = GRID_HEX; type <= GRID_PYRAMID; type++) {
+        kernel_crossed *h = &s->crossed[kernel_shape_number(type)];
+        h->type = type;
+        h->count = h->value = 0;
+    }
     s->writer = NULL;
     if (s->surface)
         kernel_packed_surface(&s->packed, f, subtree->surface, s->part);
@@ -182,79 +189,6 @@ SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline
     return kernel_extents_candidate(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
 }
 
-/* ---- hexes: kernel_slab_outline() with a pair of vertices a lane ---- */
-
-enum { KERNEL_HEX_PAIRS = 32 }; /* 28 of them */
-
-/* A hex's vertices by lane. */
-SIMD_INLINE vf kernel_eight_pick(const float v[16], vi index)
-{
-    if (SIMD_WIDTH >= 8) return vf_permute(vf_load(v), index);
-    return vf_gather(v, index);
-}
-
-typedef struct kernel_slab_ends {
-    vm any;
-    vf low[3], high[3]; /* depth; columns and rows, relative to the axis of view */
-} kernel_slab_ends;
-
-SIMD_INLINE void kernel_slab_add(const kernel_finder *s, kernel_slab_ends *e, vm points, const vf at[3])
-{
-    vf by = at[2] - s->t_near;
-    if (s->frame->job->camera.is_orthographic) by = vf_set(1);
-    const vf places[3] = {at[2], at[0] * s->column_scale / by, at[1] * s->row_scale / by};
-    e->any = vm_or(e->any, points);
-    for (int a = 0; a < 3; a++) {
-        e->low[a] = vf_select(points, vf_min(e->low[a], places[a]), e->low[a]);
-        e->high[a] = vf_select(points, vf_max(e->high[a], places[a]), e->high[a]);
-    }
-}
-
-/* L at the vertices, and the slab's thickness. */
-SIMD_INLINE bool kernel_slab_candidate(const kernel_finder *s, const kernel_cell *c, const float values[16],
-                                       float thickness, kernel_candidate *out)
-{
-    static const int32_t from[KERNEL_HEX_PAIRS] = {1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 5, 6,
-                                                   6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 7, 0, 0, 0, 0};
-    static const int32_t to[KERNEL_HEX_PAIRS] = {0, 0, 1, 0, 1, 2, 0, 1, 2, 3, 0, 1, 2, 3, 4, 0,
-                                                 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 6, 0, 0, 0, 0};
-    static const int32_t own[16] = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
-    float place[3][16] = {{0}};
-    kernel_slab_ends ends = {.any = vm_none()};
-    memcpy(place[0], c->x, sizeof c->x);
-    memcpy(place[1], c->y, sizeof c->y);
-    memcpy(place[2], c->z, sizeof c->z);
-    for (int a = 0; a < 3; a++) ends.low[a] = vf_set(INFINITY), ends.high[a] = vf_set(-INFINITY);
-    for (int n = 0; n < 8; n += SIMD_WIDTH) {
-        vi i;
-        vf at[3];
-        memcpy(&i, own + n, sizeof i);
-        for (int a = 0; a < 3; a++) at[a] = kernel_eight_pick(place[a], i);
-        kernel_slab_add(s, &ends, vf_le(vf_abs(kernel_eight_pick(values, i)), vf_set(thickness)), at);
-    }
-    for (int n = 0; n < KERNEL_HEX_PAIRS; n += SIMD_WIDTH) {
-        vi i, j;
-        vf begin[3], edge[3];
-        memcpy(&i, from + n, sizeof i);
-        memcpy(&j, to + n, sizeof j);
-        const vf v = kernel_eight_pick(values, i), w = kernel_eight_pick(values, j), inverse = 1.0f / (w - v);
-        for (int a = 0; a < 3; a++) {
-            begin[a] = kernel_eight_pick(place[a], i);
-            edge[a] = kernel_eight_pick(place[a], j) - begin[a];
-        }
-        for (int side = -1; side <= 1; side += 2) {
-            const vf level = vf_set((float)side * thickness), along = (level - v) * inverse;
-            const vf at[3] = {begin[0] + along * edge[0], begin[1] + along * edge[1], begin[2] + along * edge[2]};
-            kernel_slab_add(s, &ends, vm_xor(vf_lt(v, level), vf_lt(w, level)), at);
-        }
-    }
-    if (!vm_any(ends.any)) return false;
-    kernel_extent extents[3];
-    for (int a = 0; a < 3; a++) extents[a] = (kernel_extent){vf_reduce_min(ends.low[a]), vf_reduce_max(ends.high[a])};
-    return kernel_extents_candidate(s, extents[0], kernel_largest(c->z, 8) + fabsf(s->t_near), extents[1], extents[2],
-                                    out);
-}
-
 /* One more in each of its tiles. Most have one, or two side by side: no branch foresees which. */
 SIMD_INLINE void kernel_count_tiles(kernel_candidate_list *list, int x0, int x1, int y0, int y1)
 {
@@ -307,22 +241,24 @@ static void kernel_find_polyhedron(kernel_finder *s, uint32_t index)
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* One isovalue of the fetched cell. */
-static void kernel_find_value(kernel_finder *s, int value)
+/* Places the fetched cell, with its values less the isovalue; false where that does not cross it. */
+SIMD_INLINE bool kernel_find_place(const kernel_finder *s, kernel_cell *c, int value)
 {
-    const render_surface_layer *layer = s->surface->layer;
-    kernel_cell *c = &s->cell;
+    const double isovalue = s->surface->layer->values[value];
+    if (!c->is_finite || !kernel_cell_straddles(c, isovalue)) return false;
+    if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
+    kernel_cell_relative(c, isovalue);
+    return true;
+}
+
+/* Looks for one isovalue in the fetched cell alone. */
+static void kernel_find_alone(kernel_finder *s, kernel_cell *c, int value)
+{
     kernel_outline o;
     kernel_candidate candidate = {.cell = c->index, .source = s->source + (uint32_t)value};
-    float at[16] = {0}, thickness;
-    if (!kernel_cell_straddles(c, layer->values[value])) return;
-    if (!c->is_placed) kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
-    kernel_cell_relative(c, layer->values[value]);
+    if (!kernel_find_place(s, c, value)) return;
     if (c->type == GRID_TET) {
         if (!kernel_tet_outline(c, &o)) return;
-    } else if (c->type == GRID_HEX && kernel_linearize(c, at, &thickness)) {
-        if (kernel_slab_candidate(s, c, at, thickness, &candidate)) kernel_add_candidate(s, &candidate);
-        return;
     } else {
         kernel_vertex_outline(c, &o);
         if (!kernel_slab_outline(c, &o)) return;
@@ -330,36 +266,27 @@ static void kernel_find_value(kernel_finder *s, int value)
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* All of the fetched cell, in the volume. */
+/* Adds all of the fetched cell, where it shows in the volume. */
 static void kernel_find_volume(kernel_finder *s)
 {
     kernel_cell *c = &s->cell;
     kernel_outline o;
     kernel_candidate candidate = {.cell = c->index, .source = s->source};
-    if (!kernel_cell_shows(c, s->transfer)) return;
+    if (!c->is_finite || !kernel_cell_shows(c, s->transfer)) return;
     kernel_cell_move(c, s->frame, &s->picture, s->frame->job->parts[s->part].cells);
     kernel_vertex_outline(c, &o);
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* Adds the parts of the fetched cell that may be seen. */
-static void kernel_find_cell(kernel_finder *s)
-{
-    if (!s->cell.is_finite) return;
-    if (!s->surface) {
-        kernel_find_volume(s);
-        return;
-    }
-    for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_value(s, value);
-}
+/* ---- cells in lanes ---- */
 
-/* Where the surface of one isovalue is in each: ends over the edges that it crosses. */
-typedef struct kernel_tet_ends {
+/* Bounds of the surface of one isovalue in each lane's cell. */
+typedef struct kernel_ends_lanes {
     vf near, far, left, right, top, bottom;
-} kernel_tet_ends;
+} kernel_ends_lanes;
 
-/* Ends that take in the point, in the lanes that are meant. */
-SIMD_INLINE void kernel_tet_ends_add(const kernel_finder *s, kernel_tet_ends *e, const vf point[3], vm lanes)
+/* Widens the bounds to hold the point, in the given lanes. */
+SIMD_INLINE void kernel_ends_add(const kernel_finder *s, kernel_ends_lanes *e, const vf point[3], vm lanes)
 {
     const vf most = vf_set(INFINITY);
     vf inverse = vf_set(1);
@@ -373,10 +300,10 @@ SIMD_INLINE void kernel_tet_ends_add(const kernel_finder *s, kernel_tet_ends *e,
     e->bottom = vf_max(e->bottom, vf_select(lanes, y, -most));
 }
 
-SIMD_INLINE kernel_tet_ends kernel_tet_no_ends(void)
+SIMD_INLINE kernel_ends_lanes kernel_no_ends(void)
 {
     const vf most = vf_set(INFINITY);
-    return (kernel_tet_ends){most, -most, most, -most, most, -most};
+    return (kernel_ends_lanes){most, -most, most, -most, most, -most};
 }
 
 /* kernel_extent_range() lane by lane: the first and last pixels. Returns the lanes that have any. */
@@ -388,9 +315,9 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, int p
     return vf_le(*first, *last);
 }
 
-/* kernel_extents_candidate() lane by lane, of so many lanes those whose bits are set. */
-static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigned lanes, const uint32_t *cells,
-                             uint32_t source)
+/* Adds the cells of the lanes whose bits are set: kernel_extents_candidate() lane by lane. */
+static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsigned lanes, const uint32_t *cells,
+                             const uint32_t *sources)
 {
     const render_camera *camera = &s->frame->job->camera;
     const bool flat = camera->is_orthographic;
@@ -421,7 +348,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_tet_ends *e, unsigne
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         list->items[list->count++] = (kernel_candidate){.cell = cells[n],
-                                                        .source = source,
+                                                        .source = sources[n],
                                                         .near = near[n],
                                                         .far = far[n],
                                                         .x0 = (uint16_t)ends[0][n],

@@ -18,6 +18,7 @@
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_map.h"
+#include "kernel_neubauer.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
 #include "kernel_roots.h"
@@ -27,26 +28,6 @@
 #include "render.h"
 #include "render_polyhedra.h"
 #include "simd.h"
-
-/* Neubauer's method (thesis, algorithm 4.2). */
-
-/* Neubauer's method: steps of regula falsi on the field along the ray. The guess for an inverse map is on the line
- * between the places found so far, and so better in every step. */
-SIMD_INLINE void kernel_neubauer(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, int steps,
-                                 kernel_point *out)
-{
-    kernel_point low, high;
-    kernel_point_ends(i, &low, &high);
-    *out = low;
-    for (int n = 0; n <= steps; n++) {
-        out->t = kernel_secant(low.t, low.value, high.t, high.value);
-        kernel_place_between(&low, &high, out->t, out->r);
-        out->value = kernel_solve(p, map, i, rays, out->t, out->r);
-        const vm same = vm_not(vm_xor(vf_lt(out->value, vf_set(0)), vf_lt(low.value, vf_set(0))));
-        kernel_place_move(same, out, &low);
-        kernel_place_move(vm_not(same), out, &high);
-    }
-}
 
 /* The gradient of a tet's field, by Cramer's rule in double; its length and sign do not matter. */
 SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
@@ -482,31 +463,31 @@ static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, ker
     return found;
 }
 
-static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
-                                     vm rays, kernel_passage *r, vm hit, const kernel_walk *walk)
+static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *state, int value, kernel_passage *r,
+                                     vm hit, const kernel_walk *walk)
 {
     kernel_hit_places at = {.t = walk->t, .w = walk->w};
     if (!vm_any(hit)) return;
-    kernel_passage_segments(c, rays, r);
+    kernel_passage_segments(r);
     if (state->surface->layer->normal == RENDER_VERTEX)
-        kernel_polyhedron_smooth(p, c, state->surface->layer, r, hit, walk->t, at.normal);
+        kernel_polyhedron_smooth(p, r->cell, state->surface->layer, r, hit, walk->t, at.normal);
     else
-        kernel_polyhedron_normal(p, c, r, hit, walk->t, at.normal);
+        kernel_polyhedron_normal(p, r->cell, r, hit, walk->t, at.normal);
     kernel_accept(p, state, NULL, value, hit, &at);
 }
 
 /* The crossings of a stay. An opaque surface's first before the eye is the ray's last. */
-static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, const polyhedron *c, int value,
-                                    vm rays, vm wanted, kernel_passage *r, kernel_stay *stay)
+static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
+                                    kernel_passage *r, kernel_stay *stay)
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_walk walk;
-    kernel_passage_profile(p, c, rays, layer->colour_map != NULL, r, stay);
+    kernel_passage_profile(r, stay);
     kernel_walk_begin(stay, wanted, &walk);
     do {
         const vm found = kernel_walk_next(r, stay, &walk);
         const vm kept = kernel_kept(p, state->surface, found, walk.t);
-        kernel_polyhedron_accept(p, state, c, value, rays, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
+        kernel_polyhedron_accept(p, state, value, r, vm_and(kept, vf_le(walk.t, p->t_far)), &walk);
         if (state->is_opaque) walk.open = vm_andnot(walk.open, kept);
     } while (layer->root == RENDER_ROBUST && vm_any(walk.open));
 }
@@ -516,14 +497,14 @@ static void kernel_polyhedron_surface(kernel_packet *p, kernel_surface_state *st
     const render_surface_layer *layer = state->surface->layer;
     kernel_passage r;
     kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, layer->colour_map != NULL, &r)) return;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, layer->colour_map != NULL)) return;
     while (kernel_passage_next(&r, &stay)) {
         const vm near = kernel_is_near(p, &stay.interval);
         vm wanted = kernel_changes_sign(&stay.interval);
         if (!vm_any(near)) continue;
         if (layer->root == RENDER_ROBUST) wanted = vm_or(wanted, kernel_polyhedron_turns(p, c, &r, &stay));
         wanted = vm_and(wanted, near);
-        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, c, value, rays, wanted, &r, &stay);
+        if (vm_any(wanted)) kernel_polyhedron_cross(p, state, value, wanted, &r, &stay);
     }
 }
 

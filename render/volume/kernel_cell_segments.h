@@ -653,14 +653,13 @@ static void kernel_polyhedron_fill(kernel_packet *p, kernel_volume_state *state,
     }
 }
 
-static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state, const polyhedron *c, vm rays,
-                                   kernel_passage *r, kernel_stay *stay)
+static void kernel_polyhedron_stay(kernel_packet *p, kernel_volume_state *state, kernel_passage *r, kernel_stay *stay)
 {
     const kernel_interval *i = &stay->interval;
     int begin, end;
     kernel_sample_span(p, state->samples, i, &begin, &end);
     if (begin >= end) return;
-    if (!c->is_constant) kernel_passage_profile(p, c, rays, false, r, stay);
+    if (!r->cell->is_constant) kernel_passage_profile(r, stay);
     kernel_profile_piece piece = kernel_profile_begin(stay, stay->u_in);
     while (vm_any(kernel_profile_open(stay, &piece, i->mask))) {
         kernel_profile_next(r, stay, stay->u_out, &piece);
@@ -689,8 +688,8 @@ static void kernel_polyhedron_volume(kernel_packet *p, kernel_volume_state *stat
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
     kernel_passage r;
     kernel_stay stay;
-    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
-    while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, c, rays, &r, &stay);
+    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
+    while (kernel_passage_next(&r, &stay)) kernel_polyhedron_stay(p, state, &r, &stay);
 }
 
 /* Segments are the profile's pieces, on which the field is linear: exact. */
@@ -699,11 +698,11 @@ static void kernel_polyhedron_segments(kernel_packet *p, kernel_segment_state *s
     const polyhedron *c = kernel_polyhedron_ready(p, state->volume, part, index);
     kernel_passage r;
     kernel_stay stay;
-    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
+    if (!c || !kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
     kernel_span span = {.map = NULL};
     if (state->mixing > 0) kernel_span_bound(state, c->f, c->vertex_count, &span);
     while (kernel_passage_next(&r, &stay)) {
-        if (!c->is_constant) kernel_passage_profile(p, c, rays, false, &r, &stay);
+        if (!c->is_constant) kernel_passage_profile(&r, &stay);
         kernel_profile_piece piece = kernel_profile_begin(&stay, stay.u_in);
         vm open = kernel_profile_open(&stay, &piece, stay.interval.mask);
         while (vm_any(open)) {

@@ -1,7 +1,7 @@
-/* Isosurfaces of hexes of packed meshes, found as many at once as there are lanes (kernel_candidates.h):
+/* Isosurfaces of hexes, wedges and pyramids, found as many at once as there are lanes (kernel_candidates.h):
  *
- *     lanes are cells that come out of leaves:  do their values straddle an isovalue?
- *     lanes are cells that do:                  kernel_linearize(), kernel_slab_outline() and the box of pixels
+ *     lanes are hexes of a packed mesh:  do their values straddle an isovalue? Of others each is asked alone.
+ *     lanes are cells that do:           kernel_linearize(), kernel_slab_outline() and the box of pixels
  *
  * Places are float32 differences from the eye, along the camera's axes. A hit is the mean of the vertices with weights
  * that are not negative, and its value is that of theirs (kernel_outline.h), so that |L| <= E there for whatever places
@@ -9,8 +9,8 @@
  * the vertices are, 8 roundings of their distance from the eye, which is within the pads of kernel_add_lanes(). What
  * is said of cells that are not folded holds but for rounding as well, and those whose size is near that are within
  * the pads anywhere. */
-#ifndef RENDER_KERNEL_CANDIDATE_HEXES_H
-#define RENDER_KERNEL_CANDIDATE_HEXES_H
+#ifndef RENDER_KERNEL_CANDIDATE_POLYS_H
+#define RENDER_KERNEL_CANDIDATE_POLYS_H
 
 #include <math.h>
 #include <string.h>
@@ -22,51 +22,40 @@
 #include "render.h"
 #include "simd.h"
 
-typedef struct kernel_hex_lanes {
+typedef struct kernel_poly_lanes {
+    int count;         /* of a cell's vertices */
     vf at[8][3], f[8]; /* along the camera's axes; values less the isovalue, scaled as kernel_cell_relative() does */
     vm usual;          /* numbers are of usual sizes: others are for the cell alone */
-} kernel_hex_lanes;
+} kernel_poly_lanes;
 
 /* L of kernel_outline.h at the vertices; the slab is |L| <= thickness, which is infinite where there is none. */
-typedef struct kernel_hex_slab {
+typedef struct kernel_poly_slab {
     vf at[8], thickness;
-} kernel_hex_slab;
-
-SIMD_INLINE vf kernel_mean(vf a, vf b, vf c, vf d)
-{
-    return 0.25f * ((a + b) + (c + d));
-}
-
-/* A number's differences along the hex's axes, at its middle. */
-SIMD_INLINE void kernel_hex_differences(const vf v[8], vf out[3])
-{
-    out[0] = kernel_mean(v[1], v[2], v[5], v[6]) - kernel_mean(v[0], v[3], v[4], v[7]);
-    out[1] = kernel_mean(v[2], v[3], v[6], v[7]) - kernel_mean(v[0], v[1], v[4], v[5]);
-    out[2] = kernel_mean(v[4], v[5], v[6], v[7]) - kernel_mean(v[0], v[1], v[2], v[3]);
-}
+} kernel_poly_slab;
 
 /* kernel_is_unfolded(). */
-SIMD_INLINE vm kernel_hex_lanes_unfolded(const kernel_hex_lanes *l, vf inverse[3][3])
+SIMD_INLINE vm kernel_poly_lanes_unfolded(const kernel_poly_lanes *l, const kernel_differential *d, int count,
+                                          vf inverse[3][3])
 {
-    const kernel_differential *d = &kernel_differentials[0];
     vf y[8][3], off[12];
     vm unfolded = vm_all_lanes();
-    for (int i = 1; i < 8; i++) {
+    for (int i = 1; i < count; i++) {
         vf move[3];
         for (int a = 0; a < 3; a++) move[a] = l->at[i][a] - l->at[0][a];
         for (int a = 0; a < 3; a++)
             y[i][a] = (inverse[a][0] * move[0] + inverse[a][1] * move[1]) + inverse[a][2] * move[2];
     }
     for (int a = 0; a < 3; a++) y[0][a] = vf_set(0);
-    for (int n = 0; n < 12; n++) {
+    for (int n = 0; n < d->column_count; n++) {
         const signed char *v = d->columns[n].vertex;
         off[n] = vf_set(0);
         for (int a = 0; a < 3; a++) {
-            const vf part = (y[v[1]][a] - y[v[0]][a]) - (a == d->columns[n].along ? 1.0f : 0);
+            vf part = (y[v[1]][a] - y[v[0]][a]) - (a == d->columns[n].along ? 1.0f : 0);
+            if (v[2] != v[3]) part += y[v[3]][a] - y[v[2]][a];
             off[n] += part * part;
         }
     }
-    for (int n = 0; n < 8; n++) {
+    for (int n = 0; n < d->corner_count; n++) {
         const signed char *columns = d->corners[n];
         unfolded = vm_and(unfolded, vf_lt(off[columns[0]] + off[columns[1]] + off[columns[2]], vf_set(0.9f)));
     }
@@ -74,14 +63,18 @@ SIMD_INLINE vm kernel_hex_lanes_unfolded(const kernel_hex_lanes *l, vf inverse[3
 }
 
 /* kernel_linearize(). Lanes whose volume is near float32's least are not usual. */
-static __attribute__((noinline)) void kernel_hex_lanes_slab(kernel_hex_lanes *l, kernel_hex_slab *out)
+SIMD_INLINE void kernel_poly_lanes_slab_of(kernel_poly_lanes *l, int type, kernel_poly_slab *out)
 {
+    const kernel_differential *differential = kernel_cell_differential(type);
+    const int count = grid_type_vertices(type);
     vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, blur = size;
     for (int a = 0; a < 4; a++) {
-        vf v[8];
-        for (int i = 0; i < 8; i++) v[i] = a < 3 ? l->at[i][a] : l->f[i];
-        kernel_hex_differences(v, d[a]);
-        middle[a] = 0.125f * (((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7])));
+        middle[a] = d[a][0] = d[a][1] = d[a][2] = vf_set(0);
+        for (int i = 0; i < count; i++) {
+            const vf v = a < 3 ? l->at[i][a] : l->f[i];
+            middle[a] += v * (1 / (float)count);
+            for (int k = 0; k < 3; k++) d[a][k] += v * differential->middle[k][i];
+        }
     }
     for (int i = 0; i < 3; i++) {
         const int u = (i + 1) % 3, v = (i + 2) % 3;
@@ -96,7 +89,7 @@ static __attribute__((noinline)) void kernel_hex_lanes_slab(kernel_hex_lanes *l,
     for (int i = 0; i < 3; i++)
         for (int a = 0; a < 3; a++) n[i][a] *= inverse;
     for (int a = 0; a < 3; a++) g[a] = (d[3][0] * n[0][a] + d[3][1] * n[1][a]) + d[3][2] * n[2][a];
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < count; i++) {
         out->at[i] = middle[3];
         for (int a = 0; a < 3; a++) {
             const vf part = g[a] * (l->at[i][a] - middle[a]);
@@ -105,23 +98,31 @@ static __attribute__((noinline)) void kernel_hex_lanes_slab(kernel_hex_lanes *l,
         }
         error = vf_max(vf_abs(out->at[i] - l->f[i]), error);
     }
-    error *= vf_select(kernel_hex_lanes_unfolded(l, n), vf_set(1), vf_set(3.4f));
+    error *= vf_select(kernel_poly_lanes_unfolded(l, differential, count, n), vf_set(1), vf_set(3.4f));
     for (int a = 0; a < 3; a++) {
         vf reach = vf_set(0);
-        for (int i = 0; i < 8; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
+        for (int i = 0; i < count; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
         blur += vf_abs(g[a]) * reach;
     }
     const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * blur;
     out->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
 }
 
-/* kernel_slab_outline()'s points: vertices in the slab, and where lines between two vertices meet its sides. */
-static __attribute__((noinline)) void kernel_hex_lanes_ends(const kernel_finder *s, const kernel_hex_lanes *l,
-                                                            const kernel_hex_slab *slab, kernel_tet_ends *e)
+static __attribute__((noinline)) void kernel_poly_lanes_slab(kernel_poly_lanes *l, int type, kernel_poly_slab *out)
 {
-    *e = kernel_tet_no_ends();
-    for (int i = 0; i < 8; i++) {
-        kernel_tet_ends_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
+    if (type == GRID_HEX)
+        kernel_poly_lanes_slab_of(l, GRID_HEX, out); /* loops of known length */
+    else
+        kernel_poly_lanes_slab_of(l, type, out);
+}
+
+/* kernel_slab_outline()'s points: vertices in the slab, and where lines between two vertices meet its sides. */
+static __attribute__((noinline)) void kernel_poly_lanes_ends(const kernel_finder *s, const kernel_poly_lanes *l,
+                                                            const kernel_poly_slab *slab, kernel_ends_lanes *e)
+{
+    *e = kernel_no_ends();
+    for (int i = 0; i < l->count; i++) {
+        kernel_ends_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
         for (int j = 0; j < i; j++) {
             const vf inverse = 1.0f / (slab->at[j] - slab->at[i]);
             for (int side = 0; side < 2; side++) {
@@ -130,18 +131,18 @@ static __attribute__((noinline)) void kernel_hex_lanes_ends(const kernel_finder 
                 vf point[3];
                 if (!vm_any(crossed)) continue;
                 for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
-                kernel_tet_ends_add(s, e, point, crossed);
+                kernel_ends_add(s, e, point, crossed);
             }
         }
     }
 }
 
-/* The vertices along the camera's axes, and the values, of the crossed cells. */
-SIMD_INLINE void kernel_hex_lanes_fetch(const kernel_finder *s, kernel_hex_lanes *l)
+/* Gathers the vertices along the camera's axes, and the values, of a packed mesh's hexes. */
+SIMD_INLINE void kernel_packed_lanes_fetch(const kernel_finder *s, const kernel_crossed *h, kernel_poly_lanes *l)
 {
     const kernel_packed *p = &s->packed;
     const render_camera *camera = &s->frame->job->camera;
-    const double isovalue = s->surface->layer->values[s->hexes.value],
+    const double isovalue = s->surface->layer->values[h->value],
                  *axes[3] = {camera->right, camera->up, camera->forward};
     const float middle = (float)isovalue, rest = (float)(isovalue - (double)middle);
     vf size = vf_set(0);
@@ -149,7 +150,7 @@ SIMD_INLINE void kernel_hex_lanes_fetch(const kernel_finder *s, kernel_hex_lanes
     for (int i = 0; i < 8; i++) {
         vi vertex;
         vf from_eye[3];
-        memcpy(&vertex, s->hexes.vertex[i], sizeof vertex);
+        memcpy(&vertex, h->vertex[i], sizeof vertex);
         l->f[i] = (vf_gather(p->values, vertex * p->value_stride) - middle) - rest;
         size = vf_max(vf_abs(l->f[i]), size);
         l->usual = vm_and(l->usual, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
@@ -168,53 +169,106 @@ SIMD_INLINE void kernel_hex_lanes_fetch(const kernel_finder *s, kernel_hex_lanes
     for (int i = 0; i < 8; i++) l->f[i] *= vf_from_bits(power);
 }
 
-/* Fetches a pending hex, from the mesh or from its active record; a record's number is not the mesh's. */
-static void kernel_hex_fetch(kernel_finder *s, int n)
+SIMD_INLINE void kernel_crossed_lanes_load(const kernel_crossed *h, kernel_poly_lanes *l)
+{
+    l->usual = vm_all_lanes();
+    for (int i = 0; i < l->count; i++) {
+        l->f[i] = vf_load(h->place[3][i]);
+        for (int a = 0; a < 3; a++) {
+            l->at[i][a] = vf_load(h->place[a][i]);
+            l->usual = vm_and(l->usual, vf_lt(vf_abs(l->at[i][a]), vf_set(1e15f)));
+        }
+    }
+}
+
+/* Fetches a cell of odd numbers, from the mesh or from its active record; a record's number is not the mesh's. */
+static void kernel_odd_fetch(const kernel_finder *s, uint32_t cell, kernel_cell *c)
 {
     const kernel_packed *p = &s->packed;
-    kernel_cell *c = &s->cell;
-    if (p->connectivity) {
-        kernel_cell_fetch(c, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], s->hexes.cell[n]);
+    if (!p->is_hexes || p->connectivity) {
+        kernel_cell_fetch(c, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], cell);
         return;
     }
-    kernel_packed_fetch(c, p, s->hexes.cell[n], 8);
+    kernel_packed_fetch(c, p, cell, 8);
     for (int i = 0; i < 8; i++) kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
 }
 
-/* Finds where the pending hexes may be seen. */
-static __attribute__((noinline)) void kernel_find_crossed_hexes(kernel_finder *s)
+/* Finds where the surface in the crossed cells may be seen. */
+static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_crossed *h)
 {
-    kernel_crossed_hexes *h = &s->hexes;
-    kernel_hex_lanes l;
-    kernel_hex_slab slab;
-    kernel_tet_ends e;
+    kernel_poly_lanes l = {.count = grid_type_vertices(h->type)};
+    kernel_poly_slab slab;
+    kernel_ends_lanes e;
     if (!h->count) return;
-    for (int n = h->count; n < SIMD_WIDTH; n++)
-        for (int i = 0; i < 8; i++) h->vertex[i][n] = h->vertex[i][0];
-    kernel_hex_lanes_fetch(s, &l);
-    kernel_hex_lanes_slab(&l, &slab);
-    kernel_hex_lanes_ends(s, &l, &slab, &e);
+    if (s->packed.is_hexes)
+        kernel_packed_lanes_fetch(s, h, &l);
+    else
+        kernel_crossed_lanes_load(h, &l);
+    kernel_poly_lanes_slab(&l, h->type, &slab);
+    kernel_poly_lanes_ends(s, &l, &slab, &e);
     const unsigned all = (1u << h->count) - 1, usual = all & vm_bits(l.usual);
-    kernel_add_lanes(s, &e, usual & vm_bits(vf_le(e.near, e.far)), h->cell, s->source + (uint32_t)h->value);
+    kernel_add_lanes(s, &e, usual & vm_bits(vf_le(e.near, e.far)), h->cell, h->source);
     for (unsigned odd = all & ~usual; odd; odd &= odd - 1) {
-        kernel_hex_fetch(s, __builtin_ctz(odd));
-        if (s->cell.is_finite) kernel_find_value(s, h->value);
+        const int n = __builtin_ctz(odd);
+        kernel_cell own;
+        kernel_odd_fetch(s, h->cell[n], &own);
+        kernel_find_alone(s, &own, (int)(h->source[n] - s->source));
     }
     h->count = 0;
 }
 
-/* Makes the hexes of these lanes, which the isovalue crosses, pending. */
+static void kernel_find_all_crossed(kernel_finder *s)
+{
+    for (int i = 0; i < 3; i++) kernel_find_crossed(s, &s->crossed[i]);
+}
+
+/* A lane for another crossed cell. The first one's numbers stand in all lanes that are still free. */
+SIMD_INLINE int kernel_crossed_lane(kernel_finder *s, kernel_crossed *h, uint32_t cell, int value)
+{
+    if (h->count == SIMD_WIDTH) kernel_find_crossed(s, h);
+    h->cell[h->count] = cell;
+    h->source[h->count] = s->source + (uint32_t)value;
+    return h->count++;
+}
+
+/* Puts the hexes of these lanes, which the isovalue crosses, to the crossed ones. */
 SIMD_INLINE void kernel_crossed_hexes_add(kernel_finder *s, int value, unsigned lanes)
 {
-    kernel_crossed_hexes *h = &s->hexes;
-    if (lanes && value != h->value) kernel_find_crossed_hexes(s);
+    kernel_crossed *h = &s->crossed[kernel_shape_number(GRID_HEX)];
+    if (lanes && value != h->value) kernel_find_crossed(s, h);
     for (; lanes; lanes &= lanes - 1) {
-        const int n = __builtin_ctz(lanes), to = h->count++;
+        const int n = __builtin_ctz(lanes), to = kernel_crossed_lane(s, h, s->tets.cell[n], value);
         h->value = value;
-        h->cell[to] = s->tets.cell[n];
-        for (int i = 0; i < 8; i++) h->vertex[i][to] = s->tets.packed[i][n];
-        if (h->count == SIMD_WIDTH) kernel_find_crossed_hexes(s);
+        for (int i = 0; i < 8; i++)
+            for (int at = to; at < (to ? to + 1 : SIMD_WIDTH); at++) h->vertex[i][at] = s->tets.packed[i][n];
     }
+}
+
+/* Looks for one isovalue in the fetched cell: in lanes, but for tets. */
+static void kernel_find_value(kernel_finder *s, int value)
+{
+    kernel_cell *c = &s->cell;
+    if (c->type == GRID_TET) {
+        kernel_find_alone(s, c, value);
+        return;
+    }
+    if (!kernel_find_place(s, c, value)) return;
+    kernel_crossed *h = &s->crossed[kernel_shape_number(c->type)];
+    const int to = kernel_crossed_lane(s, h, c->index, value);
+    for (int i = 0; i < c->count; i++)
+        for (int n = to; n < (to ? to + 1 : SIMD_WIDTH); n++) {
+            h->place[0][i][n] = c->x[i];
+            h->place[1][i][n] = c->y[i];
+            h->place[2][i][n] = c->z[i] - s->t_near;
+            h->place[3][i][n] = c->f[i];
+        }
+}
+
+/* Adds the parts of the fetched cell that may be seen. */
+static void kernel_find_cell(kernel_finder *s)
+{
+    if (!s->surface) kernel_find_volume(s);
+    for (int value = 0; s->surface && value < s->surface->layer->value_count; value++) kernel_find_value(s, value);
 }
 
 /* Hexes whose vertices have come. v < value is v < the least float not below it. */
