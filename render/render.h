@@ -51,15 +51,15 @@ bool render_camera_look_at(render_camera *camera, const double eye[3], const dou
  * length 1 along forward, not 1 overall. */
 void render_camera_ray(const render_camera *camera, int x, int y, double base[3], double direction[3]);
 
-/* Where float32 numbers live: positions are taken relative to origin and multiplied by scale, a power of two that
- * brings the scene to a size near 1. The trees' origin and scale are the same. */
+/* The space of float32 numbers. Positions are taken relative to origin and multiplied by scale, a power of two that
+ * brings the scene to a size near 1. The trees have the same origin and scale. */
 typedef struct render_space {
     double origin[3];
     double scale;
     double depth_origin; /* z at which t = 0 */
 } render_space;
 
-/* How values are spaced along a colour table: by value; by the logarithm, low > 0; or by render_scaled(). */
+/* The spacing of values along a colour table: linear; by the logarithm, for which low > 0; or by render_scaled(). */
 typedef enum render_scale { RENDER_LINEAR, RENDER_LOG, RENDER_SYMLOG } render_scale;
 
 /* The scale's function s, which never falls, and its inverse. RENDER_LOG: ln value, -infinity where value <= 0.
@@ -155,7 +155,7 @@ typedef struct render_volume_layer {
     const render_transfer *transfer;
 } render_volume_layer;
 
-/* Of a colour table's length: what the rounding of a value at an end of the range may come to. */
+/* The share of a colour table's length that rounding may move a value at an end of the range by. */
 #define RENDER_END 4e-6f
 
 /* Linear grey of surfaces where their colour field is not a number: what a scene's colour of 0.6 is in float. */
@@ -214,8 +214,8 @@ typedef struct render_clip {
     double centre[3], radius;   /* sphere */
 } render_clip;
 
-/* What hits are painted with: their colours, lit; or numbers of the pixel's nearest surface, as red, green and blue.
- * Then surfaces are to be opaque, and volumes none. */
+/* The paint of hits: their lit colours, or numbers of the pixel's nearest surface as red, green and blue. With numbers,
+ * surfaces must be opaque and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
     RENDER_NORMALS, /* the unit normal that light falls on, towards the eye, in world axes */
@@ -277,8 +277,8 @@ int render_visible_intervals(const render_transfer *t, mmbvh_interval out[RENDER
  * freed by the caller with base_free(out->items)). Parallel over tiles. statistics may be NULL. */
 insitu_status render_frame(const render_job *job, fragment_list *out, render_statistics *statistics, base_error *error);
 
-/* The same fragments, given away a tile at a time: every pixel of the camera lies in one of the tiles, and tiles
- * without fragments are given too. As many threads call take as the job has. */
+/* As render_frame(), but gives the fragments away a tile at a time. Every pixel of the camera lies in one of the tiles,
+ * and tiles without fragments are given too. As many threads call take as the job has. */
 insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, void *state,
                                  render_statistics *statistics, base_error *error);
 

@@ -29,7 +29,7 @@ static double now(void)
 /* Most tiles make no more fragments than this; those that do leave their piece. */
 enum { TILE_FRAGMENTS = KERNEL_TILE * KERNEL_TILE };
 
-/* Where fragments go: into each writer's piece of a list, or to a taker, tile by tile. */
+/* The destination of fragments: each writer's piece of a list, or a taker that gets them tile by tile. */
 typedef struct frame_end {
     fragment_writer *writers; /* a thread each */
     fragment_taker *take;     /* NULL: nobody */

@@ -58,7 +58,7 @@ static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const ke
     kernel_blocks_meet(t, blocks, part, c->index, c, value);
 }
 
-/* Set the layer of the tile by the source; returns the isovalue's number in it. */
+/* Sets the tile's layer by the source. Returns the isovalue's number in that layer. */
 SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *part)
 {
     const kernel_isovalue *isovalue = &t->frame->isovalues[source % RENDER_MAX_ISOVALUES];
@@ -67,7 +67,7 @@ SIMD_INLINE int kernel_tile_source(kernel_tile_trace *t, uint32_t source, int *p
     return isovalue->value;
 }
 
-/* What comes first of a cell: its vertices' indices, or all of it, where it is kept. */
+/* Prefetches what is read first of a cell: its vertices' indices, or its active record. */
 SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_tile_candidate *candidate)
 {
     const int part = (int)(candidate->source / RENDER_MAX_ISOVALUES);
@@ -81,7 +81,7 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
     for (int at = 0; at < active->vertices * KERNEL_ACTIVE_FLOATS; at += 16) __builtin_prefetch(record + at);
 }
 
-/* Cells whose vertices' indices are on their way from memory. */
+/* Cells whose vertices' indices are being prefetched. */
 typedef struct kernel_pending {
     int count;
     const kernel_tile_candidate *items[SIMD_WIDTH];
@@ -92,7 +92,7 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
 }
 
-/* Vertices of all that wait come from memory while those that came before are traced. */
+/* Prefetches the vertices of all pending cells, then traces them. */
 static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_batch *b, kernel_hexes *h,
                                                                kernel_pending *w)
 {
@@ -124,7 +124,7 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
     w->count = 0;
 }
 
-/* The tile's opaque surfaces, or the transparent ones, for which those must be known. */
+/* Traces the tile's opaque surfaces, or the transparent ones, which need the opaque ones to be known. */
 static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_trace *t, const kernel_by_depth *q,
                                                                    bool transparent)
 {
@@ -269,7 +269,7 @@ static void trace_tile_surfaces(kernel_tile_trace *t)
     t->thread->surface_seconds += t->thread->now() - start;
 }
 
-/* Each as a fragment of its own: packet by packet. */
+/* Traces volumes packet by packet, each sample or segment as a fragment of its own. */
 static void trace_tile_apart(kernel_tile_trace *t)
 {
     for (unsigned left = t->wanted; left; left &= left - 1) {

@@ -148,7 +148,8 @@ static double value_scale(const render_job *job, const render_surface_layer *lay
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
-/* Those that every layer has and that leave a ray in one piece; and how many pieces the volumes' others may leave. */
+/* Finds the clips that every layer has and that leave a ray in one piece, and how many pieces the volumes' other clips
+ * may leave. */
 static void prepare_clips(kernel_frame *f)
 {
     const render_job *job = f->job;
@@ -276,8 +277,8 @@ static insitu_status prepare_segments(kernel_frame *f, base_error *error)
     const double error_of_each = job->max_error / job->volume_count;
     f->allowance = (float)((is_apart ? 0.2 : 0.4) * error_of_each);
     if (is_apart) f->mixing = (float)(0.4 * (error_of_each > 0 ? error_of_each : RENDER_MIXING_ERROR));
-    /* Whether overlaps that are clear in front of a surface are found depends on the partition: where compositing cuts
-     * at the surface must then agree with where a rank does, to 1e-6. Of several volumes compositing cuts always. */
+    /* The partition decides whether overlaps are found that are clearly in front of a surface. So compositing and a
+     * rank must cut at the surface in the same place, to 1e-6. Several volumes are always cut by compositing. */
     if (is_apart && job->surface_count && job->volume_count == 1) f->mixing = fminf(f->mixing, 5e-7f);
     const double reach = job->extent > 0 ? job->extent * job->space.scale : scene_reach(job);
     for (int i = 0; i < job->volume_count && status == INSITU_OK; i++) {

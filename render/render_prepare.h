@@ -1,4 +1,4 @@
-/* From a job to the constants of a frame. */
+/* Makes the constants of a frame from a job. */
 #ifndef RENDER_RENDER_PREPARE_H
 #define RENDER_RENDER_PREPARE_H
 

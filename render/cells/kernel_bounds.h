@@ -268,7 +268,8 @@ static inline void kernel_bounds_setup(kernel_bounds *b, const kernel_map *map, 
     kernel_bounds_linear(b, map, &slopes, (const kernel_corners(*)[3])bend, theta, type, beam);
 }
 
-/* What is set up once for a cell and isovalue, for all packets of a tile: beside each place of the cache. */
+/* Set up once for a cell and isovalue and used by all packets of a tile. Each place of the cell cache has one beside
+ * it. */
 typedef struct kernel_poly {
     bool is_set_up;
     int value;

@@ -310,7 +310,7 @@ static __attribute__((noinline)) void kernel_hexes_bound(const float at[4][8][SI
     for (int half = 0; half < 2; half++) kernel_half_bounds(at, half, beam, out);
 }
 
-/* The same of a cell that has its bounds: of planes, those across the line of sight. */
+/* Puts the bounds of a cell that has them already. Of its planes only those that face the viewer are used. */
 SIMD_INLINE void kernel_hexes_bounds_put(kernel_hexes_bounds *out, int lane, const kernel_bounds *b, const float z[8])
 {
     float near = z[0], far = z[0], size = fabsf(z[0]);

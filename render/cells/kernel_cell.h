@@ -96,7 +96,8 @@ SIMD_INLINE kernel_line kernel_line_between(const kernel_frame *f, kernel_spot a
  */
 #define KERNEL_WEIGHT_ERROR 2.4e-7f
 
-/* By how much an edge's function may err, d above, and its extent, the distances across for a quarter. */
+/* The error d that an edge's function may have (see above), and the edge's extent, in which distances across the ray
+ * count for a quarter. */
 typedef struct kernel_blur {
     float error, extent;
 } kernel_blur;
@@ -202,7 +203,8 @@ typedef struct kernel_cell {
     float normal[3];                     /* of a tet: kernel_tet_normal(), where has_normal */
 } kernel_cell;
 
-/* Where rays go through a face: v of f, w of g, at the cell's own coordinates r (for tets not set). */
+/* The places where rays go through a face: v is the value of f, w that of g, r the cell's own coordinates, which are
+ * not set for tets. */
 typedef struct kernel_crossing {
     vm mask;
     vf t, v, w;
@@ -228,7 +230,8 @@ SIMD_INLINE bool kernel_position_before(const double *a, const double *b)
     return a[2] < b[2];
 }
 
-/* Which of the vertices, bit by bit, the face has; those not yet known are added. 0: it needs more than four. */
+/* Returns the face's vertices as bits of their places in the list, to which new ones are added. Returns 0 where there
+ * would be more than four. */
 static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)
 {
     int64_t first, end;
@@ -449,7 +452,7 @@ SIMD_INLINE bool kernel_quad_collapses(const kernel_cell *c, const int corner[4]
 
 /* ---- the lines of a cell ---- */
 
-/* Over the edges of each face, in kernel_triangle_least()'s order. */
+/* Sums over the edges of each face, in kernel_triangle_least()'s order. */
 SIMD_INLINE kernel_four kernel_tet_face_sums(const kernel_four e[2])
 {
     return (__builtin_shufflevector(e[0], e[1], 0, 0, 1, 3) + __builtin_shufflevector(e[0], e[1], 3, 4, 5, 5)) +
@@ -571,14 +574,14 @@ static inline void kernel_packed_begin(kernel_packed *p, const kernel_frame *f, 
     p->is_tets = p->is_tets && g->cell_type == GRID_TET;
 }
 
-/* What is kept of a surface's cells on a part; NULL: nothing is. */
+/* Returns the active records of a surface's cells on a part, or NULL where there are none. */
 SIMD_INLINE const kernel_active *kernel_active_of(const kernel_frame *f, int surface, int part)
 {
     const kernel_active *active = f->active ? &f->active[surface * f->job->part_count + part] : NULL;
     return active && active->records ? active : NULL;
 }
 
-/* A surface's cells on a part: as they are kept, or else in the mesh. */
+/* Sets up a surface's cells on a part: its active records, or else the mesh. */
 static inline void kernel_packed_surface(kernel_packed *p, const kernel_frame *f, int surface, int part)
 {
     const kernel_active *active = kernel_active_of(f, surface, part);
@@ -592,14 +595,14 @@ static inline void kernel_packed_surface(kernel_packed *p, const kernel_frame *f
     p->is_interleaved = true;
 }
 
-/* A cell's i-th vertex, of so many. */
+/* Returns the cell's i-th vertex, of cells of so many. */
 SIMD_INLINE int32_t kernel_packed_vertex(const kernel_packed *p, uint32_t cell, int vertices, int i)
 {
     const int64_t at = (int64_t)cell * vertices + i;
     return p->connectivity ? p->connectivity[at] : (int32_t)at;
 }
 
-/* Nothing of cells that are kept: all of one was asked for at once (kernel_candidate_prefetch()). */
+/* Active records are prefetched whole (kernel_candidate_prefetch()), so this does nothing for them. */
 SIMD_INLINE void kernel_packed_prefetch(const kernel_packed *p, int32_t vertex)
 {
     if (!p->connectivity) return;

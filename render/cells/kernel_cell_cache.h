@@ -15,7 +15,8 @@ typedef struct kernel_cell_cache {
     kernel_cell cells[KERNEL_CACHE_CELLS];
 } kernel_cell_cache;
 
-/* The same from the cache, where it may have been placed. layer tells apart the fields that cells are asked for. */
+/* Returns the cell from the cache, fetched where it was not there; it may have been placed before. layer tells apart
+ * the fields that cells are fetched with. */
 SIMD_INLINE kernel_cell *kernel_cell_find(const kernel_packet *p, int layer, int part, const grid_field *field,
                                           uint32_t index)
 {

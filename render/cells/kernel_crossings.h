@@ -150,7 +150,7 @@ SIMD_INLINE void kernel_tet_project(const kernel_packet *p, const kernel_cell *c
     }
 }
 
-/* What kernel_edge() gives of each, from vertices that are projected once. */
+/* Computes what kernel_edge() gives for each edge, from vertices that are projected once. */
 static __attribute__((noinline)) void kernel_tet_edges_exactly(const kernel_packet *p, const kernel_cell *c,
                                                                vf e[KERNEL_TET_EDGES])
 {
@@ -209,7 +209,7 @@ SIMD_INLINE kernel_sums kernel_sums_select(vm m, const kernel_sums *a, const ker
                          vf_select(m, a->colour, b->colour), vf_select(m, a->weight, b->weight)};
 }
 
-/* Where a ray goes in and out, in whichever order. */
+/* The two crossings of a ray, in either order. */
 typedef struct kernel_ends {
     kernel_sums a, b;
 } kernel_ends;
@@ -222,7 +222,7 @@ SIMD_INLINE kernel_ends kernel_tet_choose(const vm hit[4], const kernel_sums sum
     return (kernel_ends){kernel_sums_select(hit[0], &sums[0], &a), kernel_sums_select(hit[3], &sums[3], &b)};
 }
 
-/* With the edges of faces projected on rays where their weights are not good enough. */
+/* As kernel_tet_choose(), with edges projected again on the rays whose weights are not good enough. */
 static __attribute__((noinline, cold)) kernel_ends
 kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf e[KERNEL_TET_EDGES], bool has_colour)
 {
@@ -243,7 +243,7 @@ kernel_tet_mend(const kernel_packet *p, const kernel_cell *c, vm rays, const vf 
     return kernel_tet_choose(hit, sums);
 }
 
-/* Which rays cross which of the faces, in kernel_tet_face's order. */
+/* Finds the rays that cross each of the faces, in kernel_tet_face's order. */
 SIMD_INLINE void kernel_tet_faces(const kernel_packet *p, const kernel_cell *c, vm rays, vm hit[4])
 {
     vf e[KERNEL_TET_EDGES];
@@ -323,7 +323,8 @@ SIMD_INLINE kernel_weights kernel_weights_of(int i, int j, int k, vf ij, vf jk, 
     return (kernel_weights){i, j, k, ij, jk, ik, 1.0f / kernel_weight(ij, jk, ik)};
 }
 
-/* Those of a triangle of these spots, made good enough on rays that cross it; least is no less than its own. */
+/* Makes the weights of the triangle of these spots good enough on the rays that cross it. least is at least
+ * kernel_triangle_least() of it. */
 SIMD_INLINE void kernel_weights_mend(const kernel_packet *p, float least, vm hit, kernel_spot i, kernel_spot j,
                                      kernel_spot k, kernel_weights *w)
 {
@@ -415,7 +416,7 @@ SIMD_INLINE void kernel_triangle_order(const kernel_cell *c, const int corners[3
     out[2] = k;
 }
 
-/* Who crosses the triangle. */
+/* Returns the rays that cross the triangle. */
 SIMD_INLINE vm kernel_triangle(const kernel_edges *edges, vm rays, const int ijk[3])
 {
     return kernel_inside(rays, edges->e[ijk[0]][ijk[1]], edges->e[ijk[1]][ijk[2]], edges->e[ijk[0]][ijk[2]]);

@@ -58,7 +58,7 @@ static __attribute__((noinline)) void kernel_double_begin(const kernel_frame *f,
 
 /* ---- rays in it ---- */
 
-/* Where rays meet a face; is_sound: it is not seen edge on. */
+/* The place where rays meet a face. is_sound: the face is not seen edge on. */
 typedef struct kernel_double_end {
     kernel_half t, v;
     kernel_half_mask is_sound;
@@ -123,7 +123,7 @@ SIMD_INLINE void kernel_double_half(const kernel_double_cell *cell, const kernel
     kernel_double_value(last.v, out->v_out + lane, out->rest_out + lane);
 }
 
-/* Of the tet's interval i as kernel_tet_interval() has it: its values become the nearest to those in double. */
+/* Takes the tet's interval i from kernel_tet_interval(); its values become the floats nearest to those in double. */
 static __attribute__((noinline)) kernel_double kernel_tet_double(const kernel_packet *p, const kernel_cell *c,
                                                                  const kernel_double_cell *cell,
                                                                  const kernel_double_rays *rays, kernel_interval *i)

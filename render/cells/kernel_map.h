@@ -234,9 +234,9 @@ SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map_lanes 
     out[2] = t - map->origin[2];
 }
 
-/* From the guess in r to the coordinates of the point at depth t on each ray of wanted, by Newton's method. Returns the
- * rays that did not converge. A ray that has converged is left alone, so that its result
- * does not depend on the others of the packet. */
+/* Finds the coordinates of the point at depth t on each wanted ray by Newton's method, from the guess in r. Returns the
+ * rays that did not converge. A ray that has converged is left alone, so that its result does not depend on the others
+ * of the packet. */
 SIMD_INLINE vm kernel_map_newton(const kernel_rays *rays, const kernel_map_lanes *map, vm wanted, vf t, vf r[3])
 {
     vf target[3];
@@ -317,7 +317,7 @@ SIMD_INLINE void kernel_map_normal(const kernel_map *map, const vf r[3], vf out[
 
 /* The field along a ray through a cell: on the line between the values at its faces, and by the inverse map. */
 
-/* Where the line through the ends is zero. */
+/* Returns the depth at which the line through the two ends is zero. */
 SIMD_INLINE vf kernel_secant(vf t0, vf v0, vf t1, vf v1)
 {
     return vf_clamp(t0 - v0 * ((t1 - t0) / (v1 - v0)), t0, t1);
@@ -398,7 +398,7 @@ SIMD_INLINE void kernel_place_move(vm mask, const kernel_point *from, kernel_poi
     for (int a = 0; a < 3; a++) to->r[a] = vf_select(mask, from->r[a], to->r[a]);
 }
 
-/* On the line between the places, at t. */
+/* Interpolates between the two places, at t. */
 SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_point *high, vf t, vf r[3])
 {
     const vf length = high->t - low->t;
@@ -409,7 +409,7 @@ SIMD_INLINE void kernel_place_between(const kernel_point *low, const kernel_poin
 #define KERNEL_FACE_BAND 1e-6f /* F at a face and the face's value differ by rounding up to here */
 #define KERNEL_DOMAIN_RIM 0.03125
 
-/* Of one cell and isovalue. */
+/* Bounds for one cell and isovalue. */
 typedef struct kernel_bounds {
     kernel_polynomial bent[3]; /* N */
     float inverse[3][3];       /* J0^-1 */

@@ -36,7 +36,7 @@ SIMD_INLINE float kernel_largest(const float *v, int count)
 /* False where the field has one sign at all vertices. Not negative counts as inside. */
 SIMD_INLINE bool kernel_tet_outline(const kernel_cell *c, kernel_outline *o)
 {
-    /* By the bits of the vertices that are negative: the edges' ends, those of triangles with one twice. */
+    /* Indexed by the bits of the negative vertices: the ends of the crossed edges. Triangles have one edge twice. */
     static const int32_t from[16][4] = {
         {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 1, 1, 1}, {0, 0, 1, 1}, {2, 2, 2, 2}, {0, 0, 2, 2}, {1, 1, 2, 2}, {3, 3, 3, 3},
         {3, 3, 3, 3}, {0, 0, 3, 3}, {1, 1, 3, 3}, {2, 2, 2, 2}, {2, 2, 3, 3}, {1, 1, 1, 1}, {0, 0, 0, 0}, {0, 0, 0, 0}};

@@ -153,7 +153,7 @@ SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_c
     c->doubt = placed->doubt[n];
 }
 
-/* What kernel_double.h asks beside that. */
+/* Adds to the cell what kernel_double.h needs. */
 SIMD_INLINE void kernel_placed_exactly(const kernel_placed *placed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {

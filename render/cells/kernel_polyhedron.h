@@ -175,8 +175,8 @@ SIMD_INLINE void kernel_passage_mend(const kernel_passage *r, vm hit, kernel_wei
                         kernel_polyhedron_spot(c, w->k), w);
 }
 
-/* Who crosses the triangle, and its place. The weights are for guesses at its quad's patch, as a hex beside it has
- * them. */
+/* Returns the rays that cross the triangle, and where. The weights are for guesses at its quad's patch, and the same as
+ * in a hex beside it. */
 static vm kernel_passage_facet(const kernel_passage *r, const polyhedron_facet *t, kernel_weights *w,
                                kernel_meeting *out)
 {
@@ -233,7 +233,7 @@ SIMD_INLINE void kernel_facet_face(const polyhedron *c, const int corner[4], con
     m->w = vf_select(apart, m->w_face, m->w);
 }
 
-/* Of rays that meet the patch twice and both triangles, the nearer place is the nearer triangle's. */
+/* On rays that meet the patch twice, and both triangles, gives the nearer place to the nearer triangle. */
 static __attribute__((noinline, cold)) void kernel_places_pair(kernel_meeting *const m[2], kernel_quad_place places[2])
 {
     const vm both = vm_and(places[1].mask, vm_and(m[0]->mask, m[1]->mask));
@@ -449,7 +449,7 @@ SIMD_INLINE vm kernel_stay_holds(const kernel_stay *stay, const kernel_meeting *
     return vm_and(vm_and(stay->interval.mask, sheet->mask), vm_and(inside, within));
 }
 
-/* What other tets have at an end, beside the one whose triangle it is: added to the face's value. */
+/* Adds to the face's value the fields of other tets at an end, beside the tet whose triangle it is. */
 SIMD_INLINE void kernel_passage_lift(const kernel_passage *r, vm rays, const kernel_meeting *end, bool before, vf *u,
                                      vf *w)
 {

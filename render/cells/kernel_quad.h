@@ -69,7 +69,7 @@ typedef struct kernel_flat_quadratic {
     bool is_negative0, is_negative2;
 } kernel_flat_quadratic;
 
-/* Of float32 corners exact but for one rounding. */
+/* Exact but for one rounding, for float32 corners. */
 static inline double kernel_flat_cross(const kernel_flat_quad *q, int i, int j)
 {
     return q->x[i] * q->y[j] - q->x[j] * q->y[i];
@@ -114,7 +114,7 @@ static inline double kernel_flat_root(const kernel_flat_quadratic *c, double tur
     return x >= 0 ? fmin(x, 1) : 0;
 }
 
-/* Where v0 + x (v1 - v0) = 0, v0 and v1 not both 0. */
+/* Solves v0 + x (v1 - v0) = 0 for x. v0 and v1 must not both be 0. */
 static inline double kernel_flat_zero(double v0, double v1)
 {
     const double x = v0 / (v0 - v1);
@@ -139,7 +139,7 @@ static inline void kernel_flat_place(const kernel_flat_quad *q, const kernel_fla
     place[2] = (1 - r) * ((1 - s) * q->z[0] + s * q->z[1]) + r * ((1 - s) * q->z[3] + s * q->z[2]);
 }
 
-/* Of a ray that meets the triangles once. */
+/* Finds the place of a ray that meets the two triangles once. */
 static inline void kernel_flat_once(const kernel_flat_quad *q, double place[3])
 {
     const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
@@ -155,7 +155,7 @@ static inline bool kernel_flat_bends(const kernel_flat_quadratic *c)
     return !kernel_flat_turns(c) && (c->is_negative0 ? c->c1 > 0 : c->c1 < 0);
 }
 
-/* Of a ray that meets the triangles twice or never. False where it does not meet the patch. */
+/* Finds the places of a ray that meets the triangles twice or never. Returns false where it does not meet the patch. */
 static inline bool kernel_flat_twice(const kernel_flat_quad *q, double places[2][3])
 {
     const kernel_flat_quadratic a = kernel_flat_a(q), b = kernel_flat_b(q);
@@ -401,7 +401,7 @@ SIMD_INLINE vf kernel_turned(vf v, vf other)
     return vf_from_bits(vi_from_bits(v) ^ (vi_from_bits(other) & vi_set((int32_t)0x80000000u)));
 }
 
-/* Of rays of which kernel_quad_sides() is true those that may indeed. */
+/* Returns, of the rays for which kernel_quad_sides() is true, those that may really meet the patch twice. */
 SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
 {
     const vf across = vf_diff_of_products(q->x[0], q->y[2], q->x[2], q->y[0]);
@@ -412,7 +412,8 @@ SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
-/* Where rays meet the patch, those of twice in two places or none. Returns how many of out there are, 0 to 2. */
+/* Finds the places where rays meet the patch; the rays of twice meet it in two places or none. Returns how many entries
+ * of out are set, 0 to 2. */
 SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kernel_quad_place out[2])
 {
     const vf zero = vf_set(0);

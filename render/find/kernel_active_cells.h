@@ -13,7 +13,8 @@
 #include "render.h"
 #include "simd.h"
 
-/* Lanes that some isovalue crosses; unusual: one of these has a difference that float32 has not, or hardly. */
+/* Returns the lanes that some isovalue crosses. unusual: one of these has a difference that float32 cannot hold with
+ * full precision. */
 SIMD_INLINE unsigned kernel_activate_crossed(const kernel_finder *s, const vf *v, int vertices, bool *unusual)
 {
     const render_surface_layer *layer = s->surface->layer;
@@ -41,7 +42,7 @@ SIMD_INLINE unsigned kernel_activate_crossed(const kernel_finder *s, const vf *v
     return vm_bits(any) & lanes;
 }
 
-/* False where a coordinate is of no usual size. */
+/* Writes the cell's record. Returns false where a coordinate is too large. */
 SIMD_INLINE bool kernel_activate_cell(kernel_finder *s, int lane, int vertices)
 {
     const kernel_packed *p = &s->packed;
@@ -60,7 +61,7 @@ SIMD_INLINE bool kernel_activate_cell(kernel_finder *s, int lane, int vertices)
     return is_usual;
 }
 
-/* Cells whose vertices have come. */
+/* Makes records of the pending cells, whose vertices have come. */
 static void kernel_activate_pending(kernel_finder *s)
 {
     const int vertices = s->writer->vertices;

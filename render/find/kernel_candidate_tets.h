@@ -21,7 +21,7 @@ typedef struct kernel_tet_lanes {
     vm negative[4];
 } kernel_tet_lanes;
 
-/* The vertices along the camera's axes. */
+/* Turns the vertices into the camera's axes. */
 SIMD_INLINE void kernel_tet_lanes_turn(const kernel_finder *s, const kernel_tet_lanes *l, vf at[4][3])
 {
     const render_camera *camera = &s->frame->job->camera;
@@ -89,7 +89,7 @@ SIMD_INLINE void kernel_packed_value(kernel_finder *s, const vf v[4], kernel_tet
     }
 }
 
-/* As above, for all that a volume shows of them. */
+/* As kernel_packed_value(), for all that a volume shows of the tets. */
 SIMD_INLINE void kernel_packed_volume(kernel_finder *s, const vf v[4], const kernel_tet_lanes *l)
 {
     vm usual = vm_all_lanes();
@@ -135,7 +135,7 @@ static void kernel_find_packed_tets(kernel_finder *s)
     t->count = 0;
 }
 
-/* Tets of any other mesh, one by one until they are in lanes. */
+/* Looks for tets of any other mesh, which are fetched one by one into lanes. */
 static void kernel_find_any_tets(kernel_finder *s)
 {
     if (!s->tets.count) return;

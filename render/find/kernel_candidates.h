@@ -43,7 +43,7 @@ static void kernel_find_pending(kernel_finder *s)
 
 /* ---- leaves ---- */
 
-/* Their vertices are on their way. */
+/* Makes the queued cells of a packed mesh pending, and prefetches their vertices. */
 static void kernel_find_queued_packed(kernel_finder *s)
 {
     const kernel_packed *p = &s->packed;
@@ -59,7 +59,8 @@ static void kernel_find_queued_packed(kernel_finder *s)
     s->queued_count = 0;
 }
 
-/* Cells whose connectivity has come: tets wait for their vertices, others are done with. */
+/* Looks for cells whose connectivity has come. Tets become pending until their vertices come; others are looked for
+ * now. */
 static void kernel_find_queued(kernel_finder *s)
 {
     if (s->packed.is_tets || s->packed.is_hexes) {
@@ -119,7 +120,7 @@ typedef struct kernel_front {
     int64_t entries[KERNEL_FRONT];
 } kernel_front;
 
-/* May it show in the picture? Children of one that lies in it need not be asked. */
+/* Tells whether the node may show in the picture. Children of a node within the picture need not be tested. */
 SIMD_INLINE bool kernel_node_in_picture(const kernel_finder *s, const mmbvh *tree, int64_t node, bool *is_inside)
 {
     kernel_placement placement = {0};
@@ -150,7 +151,7 @@ SIMD_INLINE void kernel_front_choose(const kernel_finder *s, const mmbvh *tree, 
     }
 }
 
-/* The leaves among them, whose cells are asked for, and the inner nodes' left children, likewise. */
+/* Sorts out the leaves, whose cells are prefetched, and the inner nodes' left children, which are too. */
 SIMD_INLINE void kernel_front_open(const mmbvh *tree, const mmbvh_ranges *ranges, const kernel_front *front,
                                    kernel_front *leaves, kernel_front *children)
 {

@@ -133,15 +133,16 @@ SIMD_INLINE kernel_extent kernel_extent_of(const kernel_outline *o, vf scale, co
     return (kernel_extent){vf_reduce_min(low), vf_reduce_max(high)};
 }
 
-/* Whole vectors of points: the last ones are the first again. */
+/* Fills the last vector of points with the first point. */
 SIMD_INLINE void kernel_outline_fill(kernel_outline *o)
 {
     for (int a = 0; a < 3; a++)
         for (int i = o->count; i % SIMD_WIDTH; i++) o->point[a][i] = o->point[a][0];
 }
 
-/* The pixels between, of so many: false where there are none. A part in 1e5 of the cell and its place, and a hundredth
- * of a pixel, are more than rays are off by when they hit by a rounding; blur is what places may be off by. */
+/* Finds the pixels between the ends, of so many. Returns false where there are none. The pad, a part in 1e5 of the cell
+ * and its place and a hundredth of a pixel, is more than rays are off by that hit by a rounding. blur is the error of
+ * the places. */
 SIMD_INLINE bool kernel_extent_range(kernel_extent e, float zero, float blur, int pixels, uint16_t *first,
                                      uint16_t *last)
 {
@@ -189,7 +190,7 @@ SIMD_INLINE bool kernel_outline_candidate(const kernel_finder *s, kernel_outline
     return kernel_extents_candidate(s, depth, o->size[2] + fabsf(s->t_near), columns, rows, out);
 }
 
-/* One more in each of its tiles. Most have one, or two side by side: no branch foresees which. */
+/* Counts the candidate in each of its tiles. Most lie in one, or two side by side, which no branch could predict. */
 SIMD_INLINE void kernel_count_tiles(kernel_candidate_list *list, int x0, int x1, int y0, int y1)
 {
     const int left = x0 / KERNEL_TILE, columns = x1 / KERNEL_TILE - left, top = y0 / KERNEL_TILE,

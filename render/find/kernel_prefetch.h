@@ -1,4 +1,4 @@
-/* What cells are made of is asked of memory before it is read. */
+/* Prefetches: the vertices of cells are asked of memory before they are read. */
 #ifndef RENDER_KERNEL_PREFETCH_H
 #define RENDER_KERNEL_PREFETCH_H
 

@@ -12,12 +12,12 @@
 
 #include "render.h"
 
-/* Of a ray, between two depths; empty where begin > end. */
+/* The stretch of a ray between two depths. It is empty where begin > end. */
 typedef struct kernel_ray_part {
     double begin, end;
 } kernel_ray_part;
 
-/* What lies between is base + t * direction, in tree space. */
+/* A ray in tree space: its points are base + t * direction. */
 typedef struct kernel_clip_ray {
     double base[3], direction[3];
 } kernel_clip_ray;
@@ -71,7 +71,7 @@ static inline kernel_ray_part kernel_clip_sphere(const render_clip *c, const ren
     return (kernel_ray_part){nearest - half, nearest + half};
 }
 
-/* Of the ray within the body. */
+/* Returns the stretch of the ray within the body. */
 static inline kernel_ray_part kernel_clip_body(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     switch (c->kind) {

@@ -156,7 +156,7 @@ SIMD_INLINE void kernel_emit(kernel_packet *p, vm mask, uint32_t kind, const ker
     }
 }
 
-/* Of bands, and with colours of their own for what is outside of the range. */
+/* Looks up colours in bands, or with colours of their own for values outside of the range. */
 static __attribute__((noinline)) void kernel_marked_colour(const kernel_transfer *t, vf w, vf out[3])
 {
     const vf place = kernel_colour_place(t, w), one = vf_set(1), zero = vf_set(0);

@@ -1,4 +1,4 @@
-/* What a packet knows of surfaces: the nearest opaque hits, and the crossings of transparent ones. */
+/* A packet's hits on surfaces: the nearest opaque ones, and the crossings of transparent ones. */
 #ifndef RENDER_KERNEL_HITS_H
 #define RENDER_KERNEL_HITS_H
 
@@ -9,7 +9,7 @@
 /* Nearest opaque hits so far; and the crossings of transparent surfaces, by which volume fragments are cut. */
 enum { KERNEL_MAX_CUTS = 32 };
 
-/* What rays hit; part -1: no cell that is looked at again. */
+/* The cells that rays hit. part is -1 where the cell is not needed again. */
 typedef struct kernel_hit_cells {
     vi part, index;
 } kernel_hit_cells;

@@ -15,7 +15,7 @@ SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float lo
     return false;
 }
 
-/* As above, for cells of four values, a cell a lane. */
+/* As kernel_interest_meets(), for a cell of four values in each lane. */
 SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf v[4])
 {
     const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3]));

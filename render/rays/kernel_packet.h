@@ -181,7 +181,7 @@ static inline void kernel_packet_samples(kernel_packet *p, kernel_lanes *l)
     p->sample_inverse = 1.0f / p->sample_step;
 }
 
-/* What the clips leave of each of the packet's rays, in front of the eye: the stretch of the number. */
+/* Finds the stretch, by its number, that the clips leave of each of the packet's rays in front of the eye. */
 static __attribute__((noinline, cold)) void kernel_packet_part(const kernel_packet *p, uint32_t clips, int number,
                                                                vf *begin, vf *end)
 {
@@ -200,7 +200,7 @@ static __attribute__((noinline, cold)) void kernel_packet_part(const kernel_pack
     *end = vf_load(to);
 }
 
-/* What all layers are cut by. */
+/* Applies the clips that all layers are cut by. */
 static inline void kernel_packet_clip(kernel_packet *p)
 {
     kernel_packet_part(p, p->frame->common_clips, 0, &p->clip_in, &p->clip_out);
@@ -209,7 +209,8 @@ static inline void kernel_packet_clip(kernel_packet *p)
     p->active = vm_and(p->active, vf_le(p->t_near, p->t_far));
 }
 
-/* What volumes are cut by: the stretch of the turn's number. Surfaces are all there. */
+/* Applies the clips of volumes: the packet keeps the stretch of the turn's number. All surfaces have been traced
+ * before. */
 static inline void kernel_packet_clip_volumes(kernel_packet *p, int turn)
 {
     if (turn == 0) {
@@ -270,7 +271,7 @@ static inline void kernel_packet_complete(kernel_packet *p)
     if (f->volume_count) kernel_packet_samples(p, &l);
 }
 
-/* Where the packet's rays are in the node's box, between low and high. */
+/* Finds the depths between which the packet's rays are in the node's box, within those given. */
 SIMD_INLINE vm kernel_box(const kernel_packet *p, const mmbvh *tree, int64_t node, vf *t_in, vf *t_out)
 {
     vf low = *t_in, high = *t_out;

@@ -79,7 +79,7 @@ typedef struct kernel_planes {
     vf offset[KERNEL_LANE_VECTORS], error[KERNEL_LANE_VECTORS];
 } kernel_planes;
 
-/* On which sides of the planes a body is, a bit a lane. */
+/* The sides of the planes that a body is on, a bit a lane. */
 typedef struct kernel_sides {
     unsigned below, above; /* on the negative or zero, and on the positive or zero side, in part at least */
 } kernel_sides;
@@ -236,7 +236,7 @@ typedef struct kernel_placement {
     float near, far, along;
 } kernel_placement;
 
-/* On which sides a node's box is; of its placement all but the blocks. */
+/* Finds the sides that a node's box is on, and its placement but for the blocks. */
 SIMD_INLINE kernel_sides kernel_box_sides(const kernel_planes *q, const mmbvh *tree, int64_t node,
                                           kernel_placement *placement)
 {

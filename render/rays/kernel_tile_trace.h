@@ -33,7 +33,7 @@ typedef struct kernel_tile_trace {
     kernel_hits hits[KERNEL_TILE_PACKETS];
 } kernel_tile_trace;
 
-/* Blocks that know of nothing before the depth. */
+/* Returns the blocks whose rays know of no hit before the depth. */
 SIMD_INLINE unsigned kernel_blocks_beyond(const kernel_tile_trace *t, float near)
 {
     unsigned bits = 0;
@@ -59,7 +59,7 @@ SIMD_INLINE void kernel_block_begin(kernel_tile_trace *t, int block)
     }
 }
 
-/* The farthest of what the block's rays know. */
+/* Returns the farthest hit that the block's rays know of. */
 SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
 {
     vf far = vf_set(-INFINITY);
@@ -70,7 +70,7 @@ SIMD_INLINE float kernel_block_far(const kernel_tile_trace *t, int block)
     return vf_reduce_max(far);
 }
 
-/* Blocks in which a body of this outline may show. */
+/* Returns those of the blocks in which a body of this outline may show. */
 SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_outline *outline, unsigned blocks)
 {
     const kernel_placement placement = kernel_outline_placement(&t->tile_planes, outline);
@@ -78,7 +78,7 @@ SIMD_INLINE unsigned kernel_tile_keep(const kernel_tile_trace *t, const kernel_o
     return blocks & placement.blocks & kernel_blocks_beyond(t, placement.near);
 }
 
-/* The farthest that a block knows of. */
+/* Returns the farthest hit that any wanted block knows of. */
 SIMD_INLINE float kernel_tile_far(const kernel_tile_trace *t)
 {
     const unsigned lanes = (1u << SIMD_WIDTH) - 1;
@@ -118,7 +118,8 @@ typedef struct kernel_tile_entry {
 
 typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
 
-/* Where the node may be met, of blocks: none where it does not show. interest NULL: everything shows. */
+/* Returns those of the blocks in which the node may be met, none where its values do not show. interest NULL: all
+ * values show. */
 SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,
                                               const kernel_interest *interest, int64_t node, unsigned blocks)
 {
@@ -181,7 +182,7 @@ SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);
 }
 
-/* Where a pixel of the tile is in its packets. */
+/* Returns the place of a pixel among the tile's packets: packet * SIMD_WIDTH + lane. */
 SIMD_INLINE vi kernel_batch_at(vi column, vi row)
 {
     const vi block = (row & ~3) + (column >> 2);

@@ -1,5 +1,5 @@
-/* What render_frame.c prepares once a frame and the kernels of every instruction set read: constants in the forms
- * that inner loops want. Kernel headers include nothing but static inline code and these types. */
+/* The constants of a frame in the forms that inner loops want. render_prepare.c makes them once a frame, and the
+ * kernels of every instruction set read them. Kernel headers have nothing but static inline code and these types. */
 #ifndef RENDER_KERNEL_TYPES_H
 #define RENDER_KERNEL_TYPES_H
 
@@ -55,13 +55,13 @@ typedef struct kernel_piece {
     kernel_real entry[KERNEL_PIECE_ENTRIES];
 } kernel_piece;
 
-/* Over a stretch of values: how the function may change in it, between steps. Extinctions are per unit distance, slopes
- * per domain. */
+/* Bounds of the function over a stretch of values, between steps. Extinctions are per unit distance, slopes per
+ * domain. */
 typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
 } kernel_bound;
 
-/* Where the opacity steps: at, and the end of pieces there, which is at rounded. */
+/* A step of the opacity: its value, and that value rounded, at which pieces end. */
 typedef struct kernel_step {
     double at;
     float cut;
@@ -127,7 +127,7 @@ typedef struct kernel_interest {
     float low[KERNEL_MAX_INTERVALS], high[KERNEL_MAX_INTERVALS];
 } kernel_interest;
 
-/* What places in a colour table are by where its scale is not linear: a value's s times slope, plus shift. */
+/* How values become places in a colour table whose scale s is not linear: place = s(value) * slope + shift. */
 typedef struct kernel_scale {
     render_scale kind;
     float threshold; /* below it s is linear (symlog), or no more than at it (log) */

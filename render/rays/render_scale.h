@@ -1,10 +1,10 @@
-/* Where the values of a transfer function are. */
+/* Places of values in a transfer function. */
 #ifndef RENDER_RENDER_SCALE_H
 #define RENDER_RENDER_SCALE_H
 
 #include "render.h"
 
-/* Where its domain begins, and 1 / its width (kernel_types.h). */
+/* Finds where the transfer's domain begins, and 1 / its width (kernel_types.h). */
 void render_transfer_domain(const render_transfer *t, double *low, double *inverse_width);
 /* In the domain: where a value is, and where entry i of the colours is. */
 double render_domain_of(const render_transfer *t, double value);

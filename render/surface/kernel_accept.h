@@ -1,5 +1,5 @@
-/* What becomes of a ray's hits on an isosurface: clips, normals, colours, and which is kept (thesis, sections 4.3.4 and
- * 4.3.5). */
+/* A ray's hits on isosurfaces: they are clipped, get their normals and colours, and the nearest is kept (thesis,
+ * sections 4.3.4 and 4.3.5). */
 #ifndef RENDER_KERNEL_ACCEPT_H
 #define RENDER_KERNEL_ACCEPT_H
 
@@ -261,7 +261,7 @@ SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double plac
     }
 }
 
-/* Where a ray is at t, in tile space. */
+/* Returns the ray's place at t, in tile space. */
 SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, double out[3])
 {
     out[0] = (double)p->origin_x[ray] + (double)p->slope_x[ray] * (double)t;
@@ -349,13 +349,14 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
-/* Where rays hit: the depth, a vector along the normal (or what kernel_vertex_normals() makes one of), and the value
- * that the surface is coloured by. */
+/* The places of hits: the depth, a vector along the normal (or the coordinates that kernel_vertex_normals() makes one
+ * of), and the value that the surface is coloured by. */
 typedef struct kernel_hit_places {
     vf t, normal[3], w;
 } kernel_hit_places;
 
-/* What colours the surface, or its isovalue. w: the first's place along the colour map's range. */
+/* Returns the value that colours the surface, or else its isovalue. w is the value's place along the colour map's
+ * range. */
 SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
 {
     if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
@@ -456,7 +457,7 @@ SIMD_INLINE vm kernel_visible(const kernel_packet *p, const kernel_surface *s, v
 
 /* ---- hits of rays that are lanes of several cells ---- */
 
-/* What one ray hits. */
+/* One ray's hit. */
 typedef struct kernel_ray_hit {
     int part, value;
     uint32_t cell;
@@ -465,7 +466,7 @@ typedef struct kernel_ray_hit {
     float colour[3]; /* not lit */
 } kernel_ray_hit;
 
-/* Of one ray that hits in the place of the nearest. */
+/* Takes a hit of one ray in the place of the nearest. */
 static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, const kernel_surface *s, int ray,
                                                             const kernel_ray_hit *hit)
 {

@@ -323,7 +323,7 @@ static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, ker
     b->count = 0;
 }
 
-/* What is added from now on is of the part and the layer under way: what waits, of others, is traced. */
+/* Starts a new part and layer: traces the pending cells of the last one first. */
 SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int part)
 {
     const int layer = t->layer;

@@ -24,7 +24,7 @@ SIMD_INLINE vf kernel_edge_distance(const vf a[2], const vf b[2], vf *length)
     return x * x + y * y;
 }
 
-/* Of a vertex from each ray, where the ray has the vertex's depth. */
+/* Finds the vertex's distance across each ray, at the vertex's depth. */
 SIMD_INLINE void kernel_edge_place(const kernel_packet *p, float x, float y, float z, vf out[2])
 {
     out[0] = x - (p->origin_x + p->slope_x * z);

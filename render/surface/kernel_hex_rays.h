@@ -85,15 +85,16 @@ SIMD_INLINE void kernel_hex_rays_of(kernel_hex_rays *rays, unsigned box, int lan
     }
 }
 
-/* So that whole vectors may be read. */
+/* Pads the list with zeros, so that whole vectors may be read. */
 SIMD_INLINE void kernel_hex_rays_close(kernel_hex_rays *rays)
 {
     memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
     memset(rays->lane + rays->count, 0, SIMD_WIDTH);
 }
 
-/* Of rays on the same sides of a quad's opposite sides, those that may meet its patch twice: kernel_quad_bends(), and
- * a little more. Corners 0 to 3 around, and the signs of its sides from 0 to 1 and from 3 to 0. */
+/* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more, among rays on the
+ * same sides of its opposite sides. loop has the corners 0 to 3 around; side01 and side30 are the signs of its sides
+ * from 0 to 1 and from 3 to 0. */
 SIMD_INLINE vm kernel_hex_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, vm side01, vm side30)
 {
     const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
@@ -103,7 +104,7 @@ SIMD_INLINE vm kernel_hex_bends(const vf x[8], const vf y[8], const signed char 
     return vm_and(rays, vm_and(bent, vf_le(vf_select(side30, difference, -difference), slack)));
 }
 
-/* Which faces are crossed once, the first and the last of them; and who is for the cell alone. */
+/* The first and the last of the faces that are crossed once, and the rays that must be traced in the cell alone. */
 typedef struct kernel_hex_crossed {
     vm two, alone;
     vi first, last;
@@ -155,7 +156,7 @@ SIMD_INLINE void kernel_hex_faces(const kernel_placed_hexes *h, const kernel_hex
     out->last = vi_from_vf(last);
 }
 
-/* Where rays cross the face: kernel_quad_crossings(). */
+/* The place where rays cross a face, as kernel_quad_crossings() finds it. */
 typedef struct kernel_hex_place {
     vf t, v, r[3];
 } kernel_hex_place;

@@ -261,7 +261,7 @@ static __attribute__((noinline)) void kernel_hexes_fetch_colours(const kernel_ti
         }
 }
 
-/* Where lanes hit: r, of the cells' own coordinates, is looked at for colours, normal as in kernel_hits. */
+/* The places of hits in lanes: r, in the cells' own coordinates, is used for colours; normal is as in kernel_hits. */
 typedef struct kernel_hexes_places {
     vf t, normal[3], r[3];
 } kernel_hexes_places;
@@ -459,7 +459,7 @@ static __attribute__((noinline)) void kernel_hexes_run(kernel_tile_trace *t, ker
     h->count = 0;
 }
 
-/* What waits is traced. */
+/* Traces the pending cells. */
 SIMD_INLINE void kernel_hexes_end(kernel_tile_trace *t, kernel_hexes *h)
 {
     const int layer = t->layer;
@@ -469,7 +469,7 @@ SIMD_INLINE void kernel_hexes_end(kernel_tile_trace *t, kernel_hexes *h)
     kernel_tile_set_layer(t, layer);
 }
 
-/* What is added from now on is of the part and the layer under way. */
+/* Starts a new part and layer. */
 SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const kernel_packed *packed, int part)
 {
     if (h->layer == t->layer && h->part == part) return;
@@ -479,19 +479,19 @@ SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const 
     h->packed = *packed;
 }
 
-/* Are hexes of the layer under way for batches? */
+/* Can hexes of the layer under way be traced in batches? */
 SIMD_INLINE bool kernel_hexes_layer_fits(const kernel_tile_trace *t)
 {
     return t->surface->layer->root == RENDER_ROBUST && kernel_tile_layer_batches(t);
 }
 
-/* Those of the mesh, all together? */
+/* Can all hexes of the mesh be traced in batches? */
 SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t, const kernel_packed *packed)
 {
     return packed->is_hexes && kernel_hexes_layer_fits(t);
 }
 
-/* A hex of a packed mesh waits. */
+/* Adds a hex of a packed mesh to the pending ones. */
 SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_candidate *candidate,
                                    int value)
 {
@@ -509,7 +509,7 @@ SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const 
     }
 }
 
-/* Is the tile's cell, with all that it takes to meet rays, one for a batch? */
+/* Tells whether the tile's cell, which is ready to meet rays, can be traced in a batch. */
 SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell *c)
 {
     if (c->type != GRID_HEX || !kernel_hexes_layer_fits(t)) return false;
@@ -521,7 +521,7 @@ SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell
     return true;
 }
 
-/* The tile's cell is put to the others. */
+/* Adds the tile's cell to the pending ones. */
 SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_candidate *candidate,
                                   int value)
 {

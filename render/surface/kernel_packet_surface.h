@@ -19,7 +19,7 @@
 #include "render.h"
 #include "simd.h"
 
-/* Make the cell ready for the isovalue. */
+/* Makes the cell ready for the isovalue. */
 SIMD_INLINE void kernel_surface_prepare(const kernel_frame *f, const kernel_tile *tile, const kernel_surface *s,
                                         int part, int value, kernel_cell *c, kernel_poly *poly)
 {
@@ -90,7 +90,7 @@ SIMD_INLINE void kernel_opaque_differences(kernel_packet *p, const kernel_surfac
     }
 }
 
-/* The nearest opaque hits, lit. */
+/* Writes the nearest opaque hits, lit, as fragments. */
 SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
 {
     for (int n = 0; n < p->frame->opaque_count; n++) {

@@ -41,7 +41,7 @@
 #define KERNEL_SMALLEST_PIECE 0x1p-12f
 enum { KERNEL_ROOT_PIECES = 256, KERNEL_POLISH_STEPS = 8, KERNEL_BRACKET_STEPS = 48 };
 
-/* What is known of a piece. */
+/* The verdict on a piece of the interval. */
 typedef struct kernel_verdict {
     vm clear;    /* no root, and all of side's sign */
     vm monotone; /* at most one root */
@@ -112,7 +112,7 @@ SIMD_INLINE kernel_verdict kernel_judge(const kernel_map_lanes *map, const kerne
     vf b1 = from->value + d0 * (1.0f / 3), b2 = to->value - d1 * (1.0f / 3), middle = 3.0f * (b2 - b1);
     vf scale = vf_set(1);
     if (is_pyramid) {
-        /* Where the tangents at the ends meet. */
+        /* The tangents at the ends meet at this share of the way. */
         const vf turn = d0 - d1;
         const vf at = vf_select(vf_eq(turn, vf_set(0)), vf_set(0), (rise - d1) / turn);
         b1 = b2 = from->value + d0 * vf_clamp(at, vf_set(0), vf_set(1));
@@ -186,7 +186,7 @@ SIMD_INLINE vf kernel_linear_at(const kernel_rays *rays, const kernel_map *map, 
     return (b->level + g[0] * x) + (g[1] * y + g[2] * (t - origin[2]));
 }
 
-/* Nothing is known but the interval's ends. */
+/* Begins a search of which only the interval's ends are known. */
 SIMD_INLINE void kernel_search_begin(kernel_search *s)
 {
     kernel_point_ends(s->interval, &s->low, &s->high);
@@ -203,7 +203,8 @@ SIMD_INLINE vm kernel_search_changes(const kernel_search *s)
     return vm_xor(vf_lt(s->interval->v_in, vf_set(0)), vf_lt(s->interval->v_out, vf_set(0)));
 }
 
-/* What the ends tell by bounds of the whole cell, which all rays are in: returns the rays that it leaves. */
+/* Decides rays by the ends and the bounds of the whole cell, which all rays are in. Returns the rays that are left
+ * undecided. */
 SIMD_INLINE vm kernel_search_ends(kernel_search *s, const kernel_map *map, const kernel_bounds *b, vm rays)
 {
     const kernel_interval *i = s->interval;
@@ -247,7 +248,7 @@ SIMD_INLINE void kernel_search_whole(kernel_search *s, vm rays)
     s->found = vm_or(s->found, jumps);
 }
 
-/* What a search in one cell reads, each lane the same. */
+/* The numbers that a search in one cell reads, the same in each lane. */
 typedef struct kernel_search_cell {
     kernel_map_lanes map;
     kernel_limits limits;
@@ -287,7 +288,7 @@ SIMD_INLINE void kernel_search_piece(const kernel_search *s, vm rays, kernel_poi
     kernel_place_move(inner, &at, to);
 }
 
-/* On to the next piece, to a longer one where there is one that starts there. */
+/* Goes on to the next piece, the longest that starts there. */
 SIMD_INLINE void kernel_search_advance(kernel_search *s, vm rays, const kernel_point *to)
 {
     kernel_place_move(rays, to, &s->from);
@@ -336,7 +337,7 @@ SIMD_INLINE void kernel_search_end(kernel_search *s)
     kernel_place_move(s->found, &s->end, &s->high);
 }
 
-/* On to further roots: false where there can be none. */
+/* Goes on to further roots. Returns false where there can be none. */
 SIMD_INLINE bool kernel_search_on(kernel_search *s)
 {
     if (vm_any(s->open))
@@ -478,7 +479,7 @@ SIMD_INLINE vm kernel_polish_lanes(const kernel_rays *rays, const kernel_map_lan
     return open;
 }
 
-/* Of those that are found; where steps do not converge, by the bracket alone. */
+/* Polishes the roots that are found. Where Newton's steps do not converge, the bracket alone is halved. */
 SIMD_INLINE void kernel_polish(const kernel_search *s, kernel_point *out)
 {
     const vm open = kernel_polish_lanes(&s->rays, s->map, s->found, &s->low, &s->high, out);

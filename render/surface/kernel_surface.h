@@ -124,7 +124,7 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
     for (int n = 0; n < count; n++) {
         const kernel_interval *i = &list[n];
         const vm near = kernel_is_near(p, i);
-        /* Where a ray crosses both halves of a quad, but not its patch, in and out are one place, beside the ray. */
+        /* Where a ray crosses both halves of a quad but not its patch, both ends are one place beside the ray. */
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
         const vm wanted = vm_and(near, layer->root == RENDER_ROBUST ? room : kernel_changes_sign(i));
         if (!vm_any(wanted)) continue;
@@ -231,7 +231,7 @@ static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron 
     }
 }
 
-/* Where tets overlap: the signed sum of their gradients. Returns the rays that have one. */
+/* Finds the signed sum of gradients where tets overlap. Returns the rays that have one. */
 static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit,
                                         vf t, vf out[3])
 {
@@ -350,7 +350,7 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
     *rise = aside + g[2];
 }
 
-/* Of all tets. Those without a volume have any slope. */
+/* Bounds the slopes of all tets. Those without a volume have any slope. */
 static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
 {
     const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;

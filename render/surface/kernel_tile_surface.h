@@ -16,7 +16,7 @@
 #include "render.h"
 #include "simd.h"
 
-/* Of a moved cell with its values, before blocks meet it. */
+/* Makes a placed cell with its values ready for blocks to meet it. */
 SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
 {
     t->cell->part = part;
@@ -25,7 +25,7 @@ SIMD_INLINE void kernel_tile_ready(kernel_tile_trace *t, int part)
     if (t->surface->layer->colour_map) kernel_cell_colours(t->cell, t->surface, part);
 }
 
-/* Blocks in which the cell's surface may show. */
+/* Returns the blocks in which the cell's surface may show. */
 SIMD_INLINE unsigned kernel_tile_narrow(const kernel_tile_trace *t, const kernel_cell *c, unsigned blocks)
 {
     kernel_outline outline;
@@ -86,7 +86,7 @@ static void kernel_tile_parts(kernel_tile_trace *t, int unused, const uint32_t *
     }
 }
 
-/* Of all parts; opaque hits stand in the packets afterwards. */
+/* Traces the surface of all parts. Opaque hits stand in the packets afterwards. */
 SIMD_INLINE void kernel_tile_surface(kernel_tile_trace *t)
 {
     const render_job *job = t->frame->job;

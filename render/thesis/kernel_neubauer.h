@@ -7,8 +7,8 @@
 #include "kernel_packet.h"
 #include "simd.h"
 
-/* Makes steps of regula falsi on the field along the ray. The guess for an inverse map is on the line between the places
- * found so far, and so better in every step. */
+/* Makes steps of regula falsi on the field along the ray. The guess for an inverse map is on the line between the
+ * places found so far, and so better in every step. */
 SIMD_INLINE void kernel_neubauer(kernel_packet *p, const kernel_map *map, const kernel_interval *i, vm rays, int steps,
                                  kernel_point *out)
 {

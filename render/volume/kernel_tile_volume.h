@@ -13,9 +13,9 @@
 #ifndef RENDER_KERNEL_TILE_VOLUME_H
 #define RENDER_KERNEL_TILE_VOLUME_H
 
+#include <limits.h>
 #include <math.h>
 
-#include <limits.h>
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
