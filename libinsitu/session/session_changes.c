@@ -1,7 +1,8 @@
 /* The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
  * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
  * all tables of names are alike, whether any rank lacks threads, the lowest of the instruction sets, and, from rank 0,
- * the time, whether the scene file was edited, and whether pictures could not be written. After it, ranks decide alike
+ * the time, whether the scene file was edited, whether pictures could not be written, and whether they are written in the
+ * step; and whether any field is filled on demand. After it, ranks decide alike
  * without another word. */
 #include "session_changes.h"
 
@@ -21,6 +22,8 @@ enum change_word {
     SCENE_CHANGED,
     THREADS_LACKING,
     UNWRITTEN,
+    FILLED,
+    WRITES_AT_ONCE,
     ISA_LOW,
     ROOT_TIME, /* the bits of rank 0's */
     CHANGE_WORDS
@@ -40,6 +43,14 @@ static double double_of(int64_t bits)
     return value;
 }
 
+static bool has_filled_field(const session_meshes *meshes)
+{
+    for (int m = 0; m < meshes->count; m++)
+        for (int f = 0; f < meshes->items[m]->field_count; f++)
+            if (meshes->items[m]->fields[f].given.fill) return true;
+    return false;
+}
+
 static void fill_words(const insitu_session *session, int64_t cycle, double time, int64_t words[CHANGE_WORDS])
 {
     const session_team *team = &session->team;
@@ -56,6 +67,8 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[SCENE_CHANGED] = session_is_scene_edited(file, team->rank);
     words[THREADS_LACKING] = session_lacks_threads(&session->threads, file->scene.threads, team->node_ranks);
     words[UNWRITTEN] = session->writer.failures;
+    words[FILLED] = has_filled_field(meshes);
+    words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);
     words[ISA_LOW] = -render_isa_level();
     words[ROOT_TIME] = team->rank == 0 ? bits_of(time) : INT64_MIN;
 }
@@ -78,6 +91,8 @@ insitu_status session_find_changes(const insitu_session *session, int64_t cycle,
                              .are_names_shared = all[NAMES_HIGH] == ~all[NAMES_LOW],
                              .are_threads_lacking = all[THREADS_LACKING],
                              .are_unwritten = all[UNWRITTEN],
+                             .is_filled = all[FILLED],
+                             .writes_behind = !all[WRITES_AT_ONCE] && !all[SCENE_CHANGED],
                              .isa_level = (int)-all[ISA_LOW]};
     return INSITU_OK;
 }

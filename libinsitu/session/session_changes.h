@@ -13,6 +13,8 @@ typedef struct session_changes {
     bool are_names_shared; /* all ranks have the same tables of names */
     bool are_threads_lacking;
     bool are_unwritten; /* pictures of earlier steps */
+    bool is_filled;     /* some field's values are made on demand: what fills it may call MPI */
+    bool writes_behind; /* this step's pictures are written when it is over */
     int isa_level;      /* the lowest of the ranks' instruction sets (render_isa.h) */
 } session_changes;
 

@@ -78,11 +78,12 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     const double start = MPI_Wtime();
     const session_team *team = &s->team;
     const session_extent *extent = &s->space.extent;
-    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent};
+    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment,           0,
+                                &s->catalogue,        extent,             changes->is_filled};
     base_error of_events = {.status = INSITU_OK};
     const session_drawing drawing = {team,       s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
                                      &s->space,  &s->run_ranges,     &s->report,     &s->kept,   basis.scene,
-                                     &s->cinema, &s->writer,         &s->catalogue};
+                                     &s->cinema, &s->writer,         &s->catalogue, changes->writes_behind};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
@@ -101,10 +102,10 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status && plan.surface_count)
         status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, extent->half_diagonal, error);
     s->report.numbers.prepare_ms = milliseconds_since(start);
-    if (!status)
-        status =
-            session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
-    if (!status) status = session_check_isovalues(&plan, &s->meshes, team, &s->report, error);
+    if (!status) { /* their failure is told by the reduction after them */
+        session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
+        status = session_check_isovalues(&plan, &s->meshes, team, &s->report, error);
+    }
     if (!status) status = session_draw_images(&drawing, &plan, error);
     if (!status) note_drawn(s, &plan);
     session_plan_free(&plan);

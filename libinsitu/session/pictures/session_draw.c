@@ -314,17 +314,21 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     session_writer_give(d->writer, files, d->report, error);
 }
 
-/* ranges: NULL, or those of the run. */
+/* Where nothing is written in the step, all that can go wrong is that rank 0 lacks the memory to hand the picture over:
+ * that is told when the next step begins, as all is that its thread meets. ranges: NULL, or those of the run. */
 static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
                                    session_image_ranges *ranges, base_error *error)
 {
     const double start = MPI_Wtime();
+    const bool is_told_later = d->writes_behind && !d->kept->is_on && !ranges;
+    base_error later = {.status = INSITU_OK};
     if (d->team->rank == 0) {
-        give_picture(d, image, c, error);
+        give_picture(d, image, c, is_told_later ? &later : error);
+        session_writer_note(d->writer, d->cycle, &later);
         if (ranges) session_write_run_ranges(ranges, error);
         d->report->numbers.write_ms += 1e3 * (MPI_Wtime() - start);
     }
-    return session_agree(d->team->comm, error);
+    return is_told_later ? INSITU_OK : session_agree(d->team->comm, error);
 }
 
 /* ---- active cells --------------------------------------------------------------------------------------------
@@ -392,7 +396,7 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
     const insitu_status status =
         session_find_outline(&image->decorations, d->catalogue, d->meshes, &d->space->extent, d->team, &outline, error);
     if (status) return status;
-    if (image->decorations.is_given && d->team->rank == 0) {
+    if (image->decorations.is_given && d->team->rank == 0 && !error->status) {
         out->decorations = session_make_decorations(
             image, &(session_decoration_basis){&moment, &d->space->extent, view, layers, &outline});
         if (!out->decorations) session_no_memory(error, (int64_t)sizeof *out->decorations, "decorations");
@@ -401,7 +405,8 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
     return INSITU_OK;
 }
 
-/* active: NULL, or for the image's frames to fill and to draw from. */
+/* What one rank alone may lack goes in *error to the next agreement, of which there are few: the layers' and the first
+ * frame's. active: NULL, or for the image's frames to fill and to draw from. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
                                 base_error *error)
 {
@@ -411,12 +416,11 @@ static insitu_status draw_image(const session_drawing *d, const scene_image *ima
     canvas canvas = {0};
     insitu_status status = session_make_view(d->space, d->scene_path, image, d->team, d->report, &view, error);
     if (!status) status = session_open_run_ranges(d->run_ranges, image, d->team, &basis.run_ranges, error);
-    if (!status) status = session_make_layers(&basis, image, &layers, error);
     if (status) return status;
+    if (!error->status) canvas_create(d, image, &canvas, error);
+    status = session_make_layers(&basis, image, &layers, error);
     layers.active = active;
-    status = decorate(d, image, &view, &layers, &canvas, error);
-    if (!status) canvas_create(d, image, &canvas, error);
-    if (!status) status = session_agree(d->team->comm, error);
+    if (!status) status = decorate(d, image, &view, &layers, &canvas, error);
     if (!status) status = draw_frames(d, image, &view, &layers, &canvas, error);
     if (!status) {
         if (d->kept->is_on && d->team->rank == 0) session_keep_picture(d->kept, image, &canvas.frame, error);

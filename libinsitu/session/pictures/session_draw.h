@@ -28,6 +28,7 @@ typedef struct session_drawing {
     session_cinema *cinema; /* rank 0's */
     session_writer *writer; /* rank 0's */
     const session_catalogue *catalogue;
+    bool writes_behind; /* pictures are written when the step is over */
 } session_drawing;
 
 /* Is an isosurface of the image drawn so often in this step, by this and others of the plan's images or frame by frame,

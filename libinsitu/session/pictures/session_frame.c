@@ -32,7 +32,7 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     render_statistics rendered = {0};
     comp_statistics composited = {0};
     comp_tiles tiles;
-    if (comp_tiles_begin(&tiles, t->background, job->threads, overlaps != NULL, out, error) == INSITU_OK) {
+    if (!error->status && comp_tiles_begin(&tiles, t->background, job->threads, overlaps != NULL, out, error) == INSITU_OK) {
         render_frame_tiles(job, comp_tiles_take, &tiles, &rendered, error);
         comp_tiles_end(&tiles, overlaps, &composited);
     }
@@ -49,7 +49,7 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
-    if (job->part_count > 0) render_frame(job, &fragments, &rendered, error);
+    if (job->part_count > 0 && !error->status) render_frame(job, &fragments, &rendered, error);
     const double start = MPI_Wtime();
     const comp_group group = {t->compositing_comm, {1, false}, COMP_AUTOMATIC, 0};
     insitu_status status = overlaps ? comp_composite_overlaps(&group, &fragments, t->background, job->threads, out,

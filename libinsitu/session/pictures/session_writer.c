@@ -205,10 +205,15 @@ void session_writer_create(session_writer *w)
     pthread_cond_init(&w->has_changed, NULL);
 }
 
+bool session_writer_is_behind(const session_writer *w, const scene *scene)
+{
+    return scene->writing == SCENE_WRITE_BEHIND && (w->is_running || (session_writes_behind && !w->is_refused));
+}
+
 void session_writer_begin(session_writer *w, const scene *scene)
 {
     sigset_t all, before;
-    if (w->is_running || w->is_refused || scene->writing != SCENE_WRITE_BEHIND || !session_writes_behind) return;
+    if (w->is_running || !session_writer_is_behind(w, scene)) return;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     w->is_loading = true;
@@ -248,13 +253,17 @@ void session_writer_give(session_writer *w, session_files *files, session_report
     session_files_free(files);
 }
 
+void session_writer_note(session_writer *w, int64_t cycle, const base_error *error)
+{
+    if (!error->status || w->failures++) return;
+    base_fail(&w->failure, error->status, "cycle %lld: %.1000s", (long long)cycle, error->message);
+}
+
 static void collect_one(session_writer *w, const session_files *files, session_report *report)
 {
     warn(files, report);
     report->numbers.background_ms += files->ms;
-    if (!files->error.status) return;
-    if (!w->failures++)
-        base_fail(&w->failure, files->error.status, "cycle %lld: %.1000s", files->moment.cycle, files->error.message);
+    session_writer_note(w, files->moment.cycle, &files->error);
 }
 
 void session_writer_collect(session_writer *w, session_report *report)

@@ -46,6 +46,12 @@ void session_writer_create(session_writer *writer);
  * Local. */
 void session_writer_begin(session_writer *writer, const scene *scene);
 
+/* Will session_writer_begin() start the thread for this scene, or has it? Local. */
+bool session_writer_is_behind(const session_writer *writer, const scene *scene);
+
+/* An error of handing a picture over, for the next step to tell. Local. */
+void session_writer_note(session_writer *writer, int64_t cycle, const base_error *error);
+
 /* Memory of at least so many bytes for a picture, undefined; waits for room in the queue. NULL pixels: there is no
  * memory, though all that waited is written. Local. */
 session_picture session_writer_reserve(session_writer *writer, size_t bytes);

@@ -82,19 +82,24 @@ static int list_surfaces(const session_plan *plan, planned_surface *out)
     return count;
 }
 
-/* Over all ranks. Collective. */
+/* Over all ranks, with what a rank failed at before: then the ranges mean nothing. Collective. */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, planned_surface *surfaces,
                                    int count, bool of_all_cells, base_error *error)
 {
-    double lows[2 * count];
-    for (int i = 0; i < count; i++) {
+    double lows[2 * count + 1];
+    lows[2 * count] = error->status ? -1 : 0;
+    for (int i = 0; i < count && !error->status; i++) {
         planned_surface *s = &surfaces[i];
         if (!of_all_cells || s->is_news) s->range = own_range(meshes, &s->layer->field, team->threads, of_all_cells);
-        lows[2 * i] = s->range.low;
-        lows[2 * i + 1] = s->range.minus_high;
     }
-    const insitu_status status = session_mpi(
-        error, MPI_Allreduce(MPI_IN_PLACE, lows, 2 * count, MPI_DOUBLE, MPI_MIN, team->comm), "MPI_Allreduce");
+    for (int i = 0; i < count; i++) {
+        lows[2 * i] = surfaces[i].range.low;
+        lows[2 * i + 1] = surfaces[i].range.minus_high;
+    }
+    const int code = MPI_Allreduce(MPI_IN_PLACE, lows, 2 * count + 1, MPI_DOUBLE, MPI_MIN, team->comm);
+    const insitu_status status = code == MPI_SUCCESS && lows[2 * count] < 0
+                                     ? session_agree(team->comm, error)
+                                     : session_mpi(error, code, "MPI_Allreduce");
     for (int i = 0; i < count; i++) surfaces[i].range = (field_range){lows[2 * i], lows[2 * i + 1]};
     return status;
 }
@@ -133,7 +138,7 @@ insitu_status session_check_isovalues(const session_plan *plan, const session_me
     int most = 0;
     for (int i = 0; i < plan->image_count; i++)
         if (is_listed(plan->images[i])) most += plan->images[i]->isosurface_count;
-    if (most == 0 || plan->cell_count == 0) return INSITU_OK;
+    if (most == 0 || plan->cell_count == 0) return session_agree(team->comm, error);
     planned_surface surfaces[most];
     const int count = list_surfaces(plan, surfaces);
     insitu_status status = reduce_ranges(meshes, team, surfaces, count, false, error);

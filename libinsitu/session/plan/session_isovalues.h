@@ -7,7 +7,8 @@
 #include "session_report.h"
 #include "session_team.h"
 
-/* Warn of isovalues outside of their fields. After the trees were made: their ranges tell of most. Collective. */
+/* Warn of isovalues outside of their fields. After the trees were made: their ranges tell of most. Collective; what
+ * *error holds of any rank is the error of all. */
 insitu_status session_check_isovalues(const session_plan *plan, const session_meshes *meshes, const session_team *team,
                                       session_report *report, base_error *error);
 

@@ -323,9 +323,9 @@ insitu_status session_make_plan(const session_plan_basis *basis, session_meshes 
     const bool is_whole = plan.images && plan_recentrings(basis->catalogue, &plan) &&
                           session_mark_needs(meshes, plan.images, plan.image_count, extent);
     if (!is_whole) session_no_memory(error, (int64_t)(due * sizeof *plan.images), "the plan of the images");
-    insitu_status status = session_agree(team->comm, error); /* what fills fields may be collective */
+    insitu_status status = basis->is_filled ? session_agree(team->comm, error) : INSITU_OK; /* it may be collective */
     if (!status) {
-        if (session_fill_fields(meshes, basis->catalogue, true, error) == INSITU_OK)
+        if (is_whole && session_fill_fields(meshes, basis->catalogue, true, error) == INSITU_OK)
             session_copy_used(meshes, team->threads, error);
         status = session_agree(team->comm, error);
     }

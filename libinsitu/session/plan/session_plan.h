@@ -40,6 +40,7 @@ typedef struct session_plan_basis {
     uint64_t let_images; /* a bit an image of the file: those that no condition holds back */
     const session_catalogue *catalogue;
     const session_extent *extent;
+    bool is_filled; /* some field is filled on demand, on any rank */
 } session_plan_basis;
 
 /* How many images are due, but for conditions. Local. */

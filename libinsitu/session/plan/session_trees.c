@@ -14,7 +14,6 @@
 #include "session_trees.h"
 
 #include "memory.h"
-#include "session_agree.h"
 #include "session_candidates.h"
 #include "session_scalars.h"
 
@@ -297,8 +296,7 @@ insitu_status session_update_trees(session_trees *trees, const session_meshes *m
                                    base_error *error)
 {
     const tree_update update = {trees, space, choice, team->threads, report};
-    update_all(&update, meshes, error);
-    return session_agree(team->comm, error);
+    return update_all(&update, meshes, error);
 }
 
 void session_trees_free(session_trees *trees)

@@ -21,7 +21,7 @@ typedef struct session_trees {
 } session_trees;
 
 /* Build or refit what the plan marked and what is out of date. choice: the scene's. Adds to the report's times.
- * Collective. */
+ * Local: the next reduction tells what went wrong. */
 insitu_status session_update_trees(session_trees *trees, const session_meshes *meshes, const session_space *space,
                                    scene_tree choice, const session_team *team, insitu_report *report,
                                    base_error *error);

@@ -158,7 +158,7 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
         session_widen_run_range(basis->run_ranges, map, &low, &high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
-    return session_takes_memory(map, volume) ? session_agree(basis->team->comm, error) : INSITU_OK;
+    return INSITU_OK; /* what lacks memory is for the next agreement */
 }
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
@@ -337,8 +337,10 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
                                   base_error *error)
 {
     session_layers layers = {0};
-    if (!allocate_layers(basis->meshes, image, &layers)) session_no_memory(error, 1 << 10, "an image's layers");
-    insitu_status status = session_agree(basis->team->comm, error);
+    if (!error->status && !allocate_layers(basis->meshes, image, &layers))
+        session_no_memory(error, 1 << 10, "an image's layers");
+    /* What the scene asks too much of is no one rank's. */
+    insitu_status status = (error->status == INSITU_ERROR_SCENE ? session_agree_as_is : session_agree)(basis->team->comm, error);
     if (!status) fill_parts(basis->meshes, &layers);
     for (int i = 0; i < image->isosurface_count && !status; i++)
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);

@@ -1,0 +1,122 @@
+/* How often all ranks wait for each other in a step: MPI's collective calls, counted where the library makes them. */
+#include <mpi.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "session_image.h"
+#include "test_session_fixture.h"
+
+enum { MOST_IDLE = 1, MOST_DRAWN = 6 };
+
+static int calls;
+
+/* MPI's own names, of which the library's calls find these first. */
+int MPI_Allreduce(const void *send, void *receive, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
+{
+    calls++;
+    return PMPI_Allreduce(send, receive, count, type, op, comm);
+}
+
+int MPI_Bcast(void *buffer, int count, MPI_Datatype type, int root, MPI_Comm comm)
+{
+    calls++;
+    return PMPI_Bcast(buffer, count, type, root, comm);
+}
+
+int MPI_Allgather(const void *send, int count, MPI_Datatype type, void *receive, int receive_count,
+                  MPI_Datatype receive_type, MPI_Comm comm)
+{
+    calls++;
+    return PMPI_Allgather(send, count, type, receive, receive_count, receive_type, comm);
+}
+
+int MPI_Gather(const void *send, int count, MPI_Datatype type, void *receive, int receive_count,
+               MPI_Datatype receive_type, int root, MPI_Comm comm)
+{
+    calls++;
+    return PMPI_Gather(send, count, type, receive, receive_count, receive_type, root, comm);
+}
+
+int MPI_Alltoall(const void *send, int count, MPI_Datatype type, void *receive, int receive_count,
+                 MPI_Datatype receive_type, MPI_Comm comm)
+{
+    calls++;
+    return PMPI_Alltoall(send, count, type, receive, receive_count, receive_type, comm);
+}
+
+int MPI_Barrier(MPI_Comm comm)
+{
+    calls++;
+    return PMPI_Barrier(comm);
+}
+
+int MPI_Ibarrier(MPI_Comm comm, MPI_Request *request)
+{
+    calls++;
+    return PMPI_Ibarrier(comm, request);
+}
+
+typedef struct counted_scene {
+    const char *name, *layer;
+} counted_scene;
+
+static const counted_scene scenes[] = {
+    {"isosurface", "      - isosurface: {field: f, values: [0.1]}\n"},
+    {"transparent isosurfaces", "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n"},
+    {"volume", "      - volume: {field: f, map: viridis, range: [-1, 1], opacity: [[0, 0], [1, 0.5]], unit_distance: 1}\n"},
+};
+
+static const char *scene_of(const counted_scene *s)
+{
+    char text[600];
+    snprintf(text, sizeof text,
+             "images:\n  - name: a\n    size: [64, 48]\n    every: 2\n"
+             "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n"
+             "    layers:\n%s    outputs: [{path: a.exr}]\n",
+             s->layer);
+    return write_scene(text);
+}
+
+/* The third and the fourth step, when all is known of meshes that stay as they are. The writer's thread calls no MPI. */
+static void count_steps(const counted_scene *s)
+{
+    session_input in;
+    input_create(&in, TEST_HEXES, 6, TEST_BLOCK, own_rank, rank_count);
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene_of(s));
+    everywhere(hand_over(session, &in) == INSITU_OK);
+    for (int cycle = 0; cycle < 2; cycle++) everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
+    everywhere(insitu_set_field(session, "m", &in.field) == INSITU_OK);
+    calls = 0;
+    const insitu_status drawn = insitu_step(session, 2, 2);
+    const int of_drawn = calls;
+    calls = 0;
+    const insitu_status idle = insitu_step(session, 3, 3);
+    const int of_idle = calls;
+    if (own_rank == 0) printf("%s: %d of a drawn step, %d of an idle one\n", s->name, of_drawn, of_idle);
+    everywhere(drawn == INSITU_OK && idle == INSITU_OK);
+    everywhere(insitu_last_report(session)->images == 0);
+    everywhere(of_drawn > 2 && of_drawn <= MOST_DRAWN);
+    everywhere(of_idle <= MOST_IDLE);
+    everywhere(insitu_destroy(&session) == INSITU_OK);
+    input_free(&in);
+    forget_pictures();
+}
+
+static void a_step_waits_few_times(void **state)
+{
+    (void)state;
+    session_writes_behind = true;
+    for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) count_steps(&scenes[i]);
+    session_writes_behind = false;
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_waits_few_times)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
