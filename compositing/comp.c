@@ -9,6 +9,7 @@
 
 #include "comp_agree.h"
 #include "comp_bucket.h"
+#include "comp_cost.h"
 #include "comp_exchange.h"
 #include "comp_gather.h"
 #include "memory.h"
@@ -40,7 +41,25 @@ static insitu_status merge_alone(composition *c, fragment_list *items, base_erro
     return status;
 }
 
-/* All that one rank alone may lack. */
+/* Bytes that a fragment takes on its way: 10 of a hit in most pictures, 11 of a stretch of volume. */
+static const double usual_bytes = 11;
+
+/* The same on all ranks: fragments is the most that any of them has. */
+static void choose_route(composition *c, int64_t fragments)
+{
+    enum { USUAL_RADIX = 8 };
+    const comp_group *g = c->group;
+    const comp_load load = {fragments, usual_bytes};
+    c->route = g->schedule == COMP_AUTOMATIC ? comp_cheapest_route(c->route.ranks, g->nodes, &load, &comp_usual_machine)
+                                             : comp_route_of(g->schedule, c->route.ranks, g->nodes, USUAL_RADIX);
+    if (g->longest_dense) c->route.longest_dense = g->longest_dense;
+    const int threads = c->layout.threads;
+    c->layout = comp_layout_of(c->layout.pixel_count, c->route.owners);
+    c->layout.threads = threads;
+    c->statistics->schedule = c->route.schedule;
+}
+
+/* What it takes to see the phases through. */
 static insitu_status prepare(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
@@ -50,8 +69,7 @@ static insitu_status prepare(composition *c, fragment_list *items, base_error *e
     if (c->out->deep && !c->merged.deep)
         return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image");
     if (c->layout.ranks == 1) return INSITU_OK;
-    const insitu_status status = comp_mailroom_open(c->group->comm, &c->room, error);
-    return status ? status : comp_windows_make(&c->layout, items, &c->windows, error);
+    return comp_mailroom_open(c->group->comm, &c->room, error);
 }
 
 /* Merged pixels of this rank: on rank 0 in the picture, elsewhere in *finished. */
@@ -71,12 +89,13 @@ static insitu_status merge_owned(composition *c, comp_owned *owned, comp_pixel_l
     return status;
 }
 
-static insitu_status run_phases(composition *c, base_error *error)
+static insitu_status run_phases(composition *c, fragment_list *items, base_error *error)
 {
     const double start = MPI_Wtime();
     comp_owned owned = {NULL, NULL};
     comp_pixel_list finished = {NULL, 0};
-    insitu_status status = comp_exchange(&c->room, &c->route, &c->windows, &owned, INSITU_OK, error);
+    insitu_status status = comp_windows_make(&c->layout, items, &c->windows, error);
+    status = comp_exchange(&c->room, &c->route, &c->windows, &owned, status, error);
     c->statistics->exchange_ms = milliseconds_since(start);
     status = merge_owned(c, &owned, &finished, status, error);
     const double gather_start = MPI_Wtime();
@@ -95,8 +114,7 @@ static insitu_status begin(composition *c, int threads, base_error *error)
     const insitu_status status = comp_check_size(c->out, error);
     c->statistics->has_failed = status != INSITU_OK;
     if (status) return status;
-    c->route = comp_route_of(c->group->schedule, ranks, c->group->nodes, 4);
-    if (c->group->longest_dense) c->route.longest_dense = c->group->longest_dense;
+    c->route = comp_route_of(COMP_DIRECT, ranks, c->group->nodes, 0);
     c->layout = comp_layout_of((uint32_t)((int64_t)c->out->width * c->out->height), c->route.owners);
     c->layout.threads = threads > 0 ? threads : omp_get_max_threads();
     return INSITU_OK;
@@ -120,11 +138,12 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     comp_statistics *const statistics = c->statistics;
     const MPI_Comm comm = c->group->comm;
     statistics->sent_fragments = items->count;
-    statistics->schedule = c->route.schedule;
+    int64_t most = items->count;
     insitu_status own = prepare(c, items, error), status = own;
-    if (c->route.ranks > 1) status = comp_agree(comm, own, NULL, error);
+    if (c->route.ranks > 1) status = comp_agree(comm, own, &most, error);
     if (!status) {
-        own = c->route.ranks > 1 ? run_phases(c, error) : merge_alone(c, items, error);
+        if (c->route.ranks > 1) choose_route(c, most);
+        own = c->route.ranks > 1 ? run_phases(c, items, error) : merge_alone(c, items, error);
         *has_overlaps = c->merged.overlaps && pixel_set_count(c->merged.overlaps, c->layout.pixel_count) > 0;
         status = c->route.ranks > 1 ? comp_agree(comm, own, has_overlaps, error) : own;
     }

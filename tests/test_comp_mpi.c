@@ -16,6 +16,7 @@
 #include <cmocka.h>
 
 #include "comp.h"
+#include "comp_cost.h"
 #include "memory.h"
 
 typedef enum dealing { deal_random, deal_checkerboard, deal_blocks, deal_all_to_first, deal_all_to_last } dealing;
@@ -281,6 +282,27 @@ static void smooth_surfaces_travel_in_a_third(void **context)
     if (own_rank == 0) free_image(&s.out);
 }
 
+/* The arithmetic of the schedules against what is sent: with no fragment, a message a partner and round, and up the tree one
+ * of each owner but rank 0. */
+static void messages_are_as_counted(void **context)
+{
+    (void)context;
+    for (uint32_t turn = 0; turn < 32; turn++) {
+        comp_statistics statistics;
+        set_schedule(turn);
+        if (group.longest_dense) continue;
+        setting s = make_setting(16, 16, 0, deal_random, 1);
+        assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK, "all is well");
+        const comp_route route = comp_route_of(group.schedule, rank_count, group.nodes, 8);
+        const int place = comp_route_place(&route, own_rank);
+        const int64_t up = place > 0 && place < route.owners;
+        assert_everywhere(statistics.sent_messages == comp_route_messages(&route, place) * (rank_count > 1) + up,
+                          "messages are as counted");
+        free_setting(&s);
+    }
+    set_schedule(0);
+}
+
 /* Every allocation of every rank fails once; after the last the picture is right again. */
 static void failed_allocation_is_an_error_on_all(void **context)
 {
@@ -351,6 +373,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(overlaps_are_told_to_all),
         cmocka_unit_test(large_image_equals_serial_merge),
         cmocka_unit_test(smooth_surfaces_travel_in_a_third),
+        cmocka_unit_test(messages_are_as_counted),
         cmocka_unit_test(failed_allocation_is_an_error_on_all),
         cmocka_unit_test(pixel_beyond_the_image_is_an_error_on_all),
         cmocka_unit_test(image_without_pixels_is_refused),

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "comp_block.h"
+#include "comp_cost.h"
 #include "comp_gather.h"
 #include "comp_route.h"
 #include "comp_schedule.h"
@@ -222,6 +223,39 @@ static void gathering_is_a_tree(void **context)
                 check_gather(counts[i], (comp_nodes){node, false}, s);
 }
 
+/* What is chosen is as cheap as each schedule on its own; few ranks send directly; and at no number of ranks up to 100,000,
+ * of a picture's share each, does one send more than a few hundred messages. */
+static void the_cheapest_route_is_chosen(void **context)
+{
+    (void)context;
+    const int counts[] = {2, 3, 5, 7, 8, 16, 32, 64, 127, 1000, 4000, 32768, 97336, 100000};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        const int ranks = counts[i], node = ranks % 8 == 0 && ranks > 8 ? 8 : 1;
+        const comp_load load = {(int64_t)(4e6 / pow(ranks, 2.0 / 3)), 11};
+        const comp_route best = comp_cheapest_route(ranks, (comp_nodes){node, false}, &load, &comp_usual_machine);
+        const comp_cost cost = comp_cost_of(&best, &load, &comp_usual_machine);
+        for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
+            const comp_route other = comp_route_of(s, ranks, (comp_nodes){node, false}, 8);
+            assert_true(cost.seconds <= comp_cost_of(&other, &load, &comp_usual_machine).seconds);
+        }
+        if (ranks <= 8) assert_int_equal(best.schedule, COMP_DIRECT);
+        assert_true(cost.messages < 300);
+    }
+}
+
+/* A round of direct send among eight costs what the model says, term by term. */
+static void costs_are_those_of_the_model(void **context)
+{
+    (void)context;
+    const comp_machine machine = {1, 10, 100, 0, 0, 0};
+    const comp_load load = {800, 2};
+    const comp_route route = comp_route_of(COMP_DIRECT, 8, (comp_nodes){1, false}, 0);
+    const comp_cost cost = comp_cost_of(&route, &load, &machine);
+    assert_true(cost.messages == 7 && cost.bytes == 1400);
+    assert_true(cost.seconds == 1 + 2 * 10 * 7 + 100 * 1400);
+    assert_int_equal(comp_route_messages(&route, 3), 7);
+}
+
 /* Owned index and pixel are one to one, for any number of ranks: the division by a product is a division. */
 static void indices_and_pixels_are_one_to_one(void **context)
 {
@@ -248,6 +282,8 @@ int main(void)
         cmocka_unit_test(straight_lines_are_a_byte_a_word),
         cmocka_unit_test(routes_lead_to_owners),
         cmocka_unit_test(gathering_is_a_tree),
+        cmocka_unit_test(the_cheapest_route_is_chosen),
+        cmocka_unit_test(costs_are_those_of_the_model),
         cmocka_unit_test(indices_and_pixels_are_one_to_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

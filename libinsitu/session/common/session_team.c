@@ -11,7 +11,7 @@ static insitu_status duplicate(MPI_Comm comm, MPI_Comm *out, base_error *error)
 
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error)
 {
-    *out = (session_team){.comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1};
+    *out = (session_team){.comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1, .each_node_ranks = 1};
     insitu_status status = duplicate(comm, &out->comm, error);
     if (!status) status = duplicate(out->comm, &out->compositing_comm, error);
     if (status) return status;
@@ -20,12 +20,29 @@ insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *
     return INSITU_OK;
 }
 
+/* Nodes of one size, on which ranks lie one node after the other, or round the nodes: only what all ranks find. */
+static void find_placing(session_team *team, MPI_Comm node)
+{
+    int within = 0, first = team->rank, all[4];
+    MPI_Comm_rank(node, &within);
+    MPI_Bcast(&first, 1, MPI_INT, 0, node);
+    const int size = team->node_ranks, nodes = team->ranks / size;
+    const bool is_after = first % size == 0 && team->rank == first + within;
+    const bool is_round = first < nodes && team->rank == first + within * nodes;
+    const int own[4] = {size, -size, !is_after, !is_round};
+    if (MPI_Allreduce(own, all, 4, MPI_INT, MPI_MAX, team->comm) != MPI_SUCCESS) return;
+    if (all[0] != -all[1] || team->ranks % size || (all[2] && all[3])) return;
+    team->each_node_ranks = size;
+    team->is_round_nodes = all[2];
+}
+
 void session_team_count_node(session_team *team)
 {
     MPI_Comm node = MPI_COMM_NULL;
     team->node_ranks = 1;
     if (MPI_Comm_split_type(team->comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node) != MPI_SUCCESS) return;
     MPI_Comm_size(node, &team->node_ranks);
+    find_placing(team, node);
     MPI_Comm_free(&node);
 }
 

@@ -35,7 +35,7 @@ static insitu_status draw_numbers(const session_frame_target *target, const rend
                                   float *rgba, session_frame *taken, base_error *error)
 {
     static const float nothing[4] = {0, 0, 0, 0};
-    const session_frame_target bare = {target->comm, target->compositing_comm, nothing, target->fragment_limit};
+    const session_frame_target bare = {target->comm, target->compositing, nothing, target->fragment_limit};
     image out = {.width = job->camera.width, .height = job->camera.height, .rgba = rgba};
     render_job numbers = *job;
     session_frame frame = {0};

@@ -267,7 +267,9 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
 {
     static const float no_background[4] = {0, 0, 0, 0}; /* edges may go between it and the picture */
     const float *background = image->decorations.is_given ? no_background : image->background;
-    frames_basis basis = {d, {d->team->comm, d->team->compositing_comm, background, overlap_fragments}, canvas, 0,
+    const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
+    const comp_group compositing = {d->team->compositing_comm, nodes, COMP_AUTOMATIC, 0};
+    frames_basis basis = {d, {d->team->comm, compositing, background, overlap_fragments}, canvas, 0,
                           session_wants_deep(image) ? &canvas->deep : NULL};
     render_job job = make_job(d, image, view, layers);
     const insitu_status status = draw_all(&basis, image, &job, error);

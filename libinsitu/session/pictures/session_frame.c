@@ -51,10 +51,9 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
     comp_statistics composited = {0};
     if (job->part_count > 0 && !error->status) render_frame(job, &fragments, &rendered, error);
     const double start = MPI_Wtime();
-    const comp_group group = {t->compositing_comm, {1, false}, COMP_AUTOMATIC, 0};
-    insitu_status status = overlaps ? comp_composite_overlaps(&group, &fragments, t->background, job->threads, out,
+    insitu_status status = overlaps ? comp_composite_overlaps(&t->compositing, &fragments, t->background, job->threads, out,
                                                               overlaps, &composited, error)
-                                    : comp_composite(&group, &fragments, t->background, job->threads, out, &composited,
+                                    : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited,
                                                      error);
     if (status && !composited.has_failed) *error = (base_error){0};
     if (status) status = session_agree(t->comm, error); /* compositing agrees on the status alone */

@@ -15,7 +15,7 @@ typedef struct session_frame {
 /* Where and how a frame is drawn. */
 typedef struct session_frame_target {
     MPI_Comm comm;
-    MPI_Comm compositing_comm; /* on which compositing alone talks */
+    comp_group compositing;
     const float *background;   /* 4; borrowed */
     int64_t fragment_limit;    /* for all ranks together: more pixels in which cells overlap than make so many fragments
                                   are drawn in turns; the same on every rank */

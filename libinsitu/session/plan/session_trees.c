@@ -14,6 +14,7 @@
 #include "session_trees.h"
 
 #include "memory.h"
+#include "session_agree.h"
 #include "session_candidates.h"
 #include "session_scalars.h"
 

@@ -1,0 +1,65 @@
+#include "comp_cost.h"
+
+#include <math.h>
+
+const comp_machine comp_usual_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
+
+/* Fragments that go to one owner together: a row of one of the renderer's tiles. */
+enum { TOGETHER = 16 };
+
+/* Partners of a round that a rank has something for. */
+static double partners_of(const comp_route *route, int round, const comp_load *load)
+{
+    const double all = route->radix[round] - 1, own = ceil((double)load->fragments / TOGETHER);
+    return comp_route_is_dense(route, round) || own > all ? all : own;
+}
+
+comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const comp_machine *m)
+{
+    comp_cost cost = {0, 0, 0};
+    const double bytes = (double)load->fragments * load->bytes;
+    for (int i = 0; i < route->round_count; i++) {
+        const bool is_within = i == 0 && route->nodes.ranks > 1;
+        const double latency = is_within ? m->node_latency : m->latency;
+        const double overhead = is_within ? m->node_overhead : m->overhead;
+        const double partners = partners_of(route, i, load), share = 1 - 1.0 / route->radix[i];
+        cost.messages += partners;
+        cost.bytes += share * bytes;
+        cost.seconds += latency + 2 * overhead * partners + (is_within ? m->node_gap : m->gap) * share * bytes;
+        /* A barrier ends a sparse round: all ranks in pairs, twice as far apart each time. */
+        if (!comp_route_is_dense(route, i)) cost.seconds += ceil(log2(route->ranks)) * (m->latency + 2 * m->overhead);
+    }
+    if (route->ranks > route->owners) {
+        cost.messages += 1;
+        cost.bytes += bytes;
+        cost.seconds += m->latency + 2 * m->overhead + m->gap * bytes;
+    }
+    return cost;
+}
+
+comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine)
+{
+    static const struct {
+        comp_schedule schedule;
+        int radix;
+    } tried[] = {{COMP_NODES, 0}, {COMP_RADIX, 4}, {COMP_RADIX, 8}, {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
+    if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all are as near as each other */
+    comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
+    double least = comp_cost_of(&best, load, machine).seconds;
+    for (unsigned i = 0; i < sizeof tried / sizeof *tried; i++) {
+        const comp_route route = comp_route_of(tried[i].schedule, ranks, nodes, tried[i].radix);
+        const double seconds = comp_cost_of(&route, load, machine).seconds;
+        if (!(seconds < least)) continue;
+        best = route;
+        least = seconds;
+    }
+    return best;
+}
+
+int64_t comp_route_messages(const comp_route *route, int place)
+{
+    if (place >= route->owners) return 1;
+    int64_t messages = 0;
+    for (int i = 0; i < route->round_count; i++) messages += route->radix[i] - 1;
+    return messages;
+}
