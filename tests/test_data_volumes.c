@@ -355,7 +355,8 @@ static void draw(subject *s, double max_error, picture *out)
     image target = {WIDTH, HEIGHT, out->rgba, out->depth, NULL};
     memset(s->ghosts, 0, (size_t)s->rectangle_count);
     s->f.job.max_error = max_error;
-    const session_frame_target where = {MPI_COMM_SELF, MPI_COMM_SELF, fixture_background, MAX_FRAGMENTS};
+    const session_frame_target where = {
+        MPI_COMM_SELF, {MPI_COMM_SELF, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, MAX_FRAGMENTS};
     if (session_draw_frame(&where, &s->f.job, &target, &out->frame, &error) != INSITU_OK)
         fail_msg("session_draw_frame: %s", error.message);
 }

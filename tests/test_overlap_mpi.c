@@ -143,7 +143,7 @@ static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool
     *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL};
     stage(&s, mesh, d);
     s.f.job.is_alone = is_alone;
-    const session_frame_target target = {comm, comm, fixture_background, d->fragment_limit};
+    const session_frame_target target = {comm, {comm, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, d->fragment_limit};
     if (session_draw_frame(&target, &s.f.job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);
     fixture_free(&s.f);
     return frame.overlaps;

@@ -1,0 +1,42 @@
+/* Schedules of compositing by arithmetic (comp_cost.h), for any number of ranks: messages, bytes and time of the rank that
+ * has most to send, of a picture that a block partition cuts into P^(1/3) layers. Prints CSV; takes no MPI.
+ *
+ *     bench_schedules [RANKS_PER_NODE] */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "comp_cost.h"
+
+/* 1920 × 1080 pixels, of which the object covers half; the busiest rank has twice the mean. */
+static comp_load load_of(int ranks)
+{
+    const double covered = 0.5 * 1920 * 1080, layers = cbrt(ranks);
+    return (comp_load){(int64_t)(2 * covered * layers / ranks), 11};
+}
+
+static void print(const char *name, const comp_route *route, const comp_load *load)
+{
+    const comp_cost cost = comp_cost_of(route, load, &comp_usual_machine);
+    printf("%d,%d,%s,%d,%.0f,%.0f,%.3f\n", route->ranks, route->nodes.ranks, name, route->round_count, cost.messages,
+           cost.bytes, 1e3 * cost.seconds);
+}
+
+int main(int argc, char **argv)
+{
+    static const int counts[] = {8, 64, 512, 4096, 32768, 98304};
+    const int node = argc > 1 ? atoi(argv[1]) : 64;
+    if (node < 1) return 1;
+    puts("ranks,ranks a node,schedule,rounds,messages,bytes,ms");
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        const comp_nodes nodes = {counts[i] % node == 0 ? node : 1, false};
+        const comp_load load = load_of(counts[i]);
+        for (comp_schedule s = COMP_DIRECT; s < COMP_SCHEDULE_COUNT; s++) {
+            const comp_route route = comp_route_of(s, counts[i], nodes, 8);
+            print(comp_schedule_name(s), &route, &load);
+        }
+        const comp_route best = comp_cheapest_route(counts[i], nodes, &load, &comp_usual_machine);
+        print("chosen", &best, &load);
+    }
+    return 0;
+}
