@@ -26,6 +26,15 @@ typedef struct composition {
     comp_windows windows;
 } composition;
 
+static composition composition_of(const comp_group *group, const float background[4], image *out,
+                                  comp_statistics *statistics)
+{
+    return (composition){.group = group,
+                         .merged = {.background = background, .is_folded = out->is_folded},
+                         .out = out,
+                         .statistics = statistics};
+}
+
 static double milliseconds_since(double start)
 {
     return 1e3 * (MPI_Wtime() - start);
@@ -161,7 +170,7 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
     comp_statistics unwanted;
     if (!statistics) statistics = &unwanted;
     *statistics = (comp_statistics){0};
-    composition c = {.group = group, .merged.background = background, .out = out, .statistics = statistics};
+    composition c = composition_of(group, background, out, statistics);
     int64_t none = 0;
     const insitu_status status = begin(&c, threads, error);
     return status ? status : composite(&c, items, &none, error);
@@ -188,7 +197,7 @@ insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *it
     if (!statistics) statistics = &unwanted;
     *statistics = (comp_statistics){0};
     *overlaps = (comp_overlaps){0, NULL};
-    composition c = {.group = group, .merged.background = background, .out = out, .statistics = statistics};
+    composition c = composition_of(group, background, out, statistics);
     base_error here = {INSITU_OK, ""};
     if (!error) error = &here;
     insitu_status status = begin(&c, threads, error);

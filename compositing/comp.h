@@ -39,6 +39,10 @@ int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
  * +infinity. Local; the whole rule of merging is here. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
 
+/* The same where a volume's fragments are what folds on the ranks left (fragment_fold.h): the rest is folded here. */
+void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
+                             float *out_depth);
+
 /* Tells whether a pixel's fragments, as comp_merge_pixel() left them, overlap in front of what is opaque. Two volume
  * fragments that hold the same t overlap. A volume's fragment that holds a surface's t overlaps that surface, unless it
  * begins there. A fragment that ends before it begins, being shorter than rounding, overlaps nothing, nor do samples on
@@ -57,7 +61,8 @@ typedef struct comp_statistics {
 /* Collective over group->comm: two reductions, and a barrier where a round is sparse (comp_mail.h). out->rgba must be
  * allocated on rank 0, out->depth may be (width and height set on all ranks), and are filled there; elsewhere they are not
  * touched. out->deep may be given, on all ranks: rank 0's, whose first and counts are allocated, gets the samples of the
- * pixels that have fragments (comp_deep.h), with t for their depths. The list is emptied, and its memory given back, whatever comes. An error on one rank (memory) is an error on all, and so is one that *error holds before
+ * pixels that have fragments (comp_deep.h), with t for their depths. Where out->is_folded, the same on all ranks, pixels
+ * are merged by comp_merge_folded_pixel(). The list is emptied, and its memory given back, whatever comes. An error on one rank (memory) is an error on all, and so is one that *error holds before
  * the call: whoever could make no fragments says so here. threads: of this rank, 0: as many as OpenMP would take.
  * statistics may be NULL. */
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,

@@ -28,8 +28,9 @@ static bool make_room(void **items, int64_t count, int64_t *capacity, size_t siz
 static void take_stretch(void *of_list, const fragment *f)
 {
     comp_deep_list *list = of_list;
-    const insitu_deep_sample sample = {
-        {f->colour[0], f->colour[1], f->colour[2], 1 - f->transmittance}, f->t_in, f->t_out < f->t_in ? f->t_in : f->t_out};
+    const insitu_deep_sample sample = {{f->colour[0], f->colour[1], f->colour[2], 1 - f->transmittance},
+                                       f->t_in,
+                                       f->t_out < f->t_in ? f->t_in : f->t_out};
     if (sample.rgba[3] == 0 && sample.rgba[0] == 0 && sample.rgba[1] == 0 && sample.rgba[2] == 0) return;
     void *items = list->samples;
     if (!make_room(&items, list->sample_count, &list->sample_capacity, sizeof sample)) {
@@ -40,7 +41,7 @@ static void take_stretch(void *of_list, const fragment *f)
     list->samples[list->sample_count++] = sample;
 }
 
-void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count)
+void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded)
 {
     const int64_t first = list->sample_count;
     void *items = list->pixels;
@@ -49,7 +50,10 @@ void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count)
         return;
     }
     list->pixels = items;
-    comp_merge_cut(sorted, count, take_stretch, list);
+    if (is_folded)
+        comp_merge_folded_cut(sorted, count, take_stretch, list);
+    else
+        comp_merge_cut(sorted, count, take_stretch, list);
     list->pixels[list->pixel_count++] = (comp_deep_pixel){sorted->pixel, (uint32_t)(list->sample_count - first)};
 }
 

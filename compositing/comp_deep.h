@@ -23,8 +23,9 @@ typedef struct comp_deep_list {
     bool lacks_memory; /* something was left out */
 } comp_deep_list;
 
-/* One pixel's fragments, as comp_merge_pixel() left them. z and z_back are t. Local. */
-void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count);
+/* One pixel's fragments, as comp_merge_pixel(), or where is_folded comp_merge_folded_pixel(), left them. z and z_back are
+ * t. Local. */
+void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded);
 
 /* NULL items are fine. */
 void comp_deep_free(comp_deep_list *lists, int count);

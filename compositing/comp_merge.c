@@ -19,53 +19,20 @@
 #include "comp_merge.h"
 
 #include "comp.h"
+#include "fragment_fold.h"
+#include "fragment_order.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { insertion_limit = 24 };
 
-/* Bits that rise with the value, for all floats: NaN too has its place. */
-static uint32_t rising_bits(float value)
-{
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
-}
-
-static int compare_numbers(uint32_t a, uint32_t b)
-{
-    return (a > b) - (a < b);
-}
-
-static int compare_rest(const fragment *a, const fragment *b)
-{
-    const float of_a[] = {a->t_in, a->t_out, a->transmittance, a->colour[0], a->colour[1], a->colour[2]};
-    const float of_b[] = {b->t_in, b->t_out, b->transmittance, b->colour[0], b->colour[1], b->colour[2]};
-    int order = compare_numbers(a->kind, b->kind);
-    for (int i = 0; !order && i < 6; i++) order = compare_numbers(rising_bits(of_a[i]), rising_bits(of_b[i]));
-    return order;
-}
-
-/* Negative where a is in front of b. */
-static int compare(const fragment *a, const fragment *b)
-{
-    if (a->t_in < b->t_in) return -1;
-    if (a->t_in > b->t_in) return 1;
-    if (a->t_in != b->t_in) {
-        const int order = compare_numbers(rising_bits(a->t_in), rising_bits(b->t_in));
-        if (order) return order;
-    }
-    const int order = (b->kind >= FRAGMENT_SURFACE) - (a->kind >= FRAGMENT_SURFACE);
-    return order ? order : compare_rest(a, b);
-}
-
 static void insertion_sort(fragment *items, int64_t count)
 {
     for (int64_t i = 1; i < count; i++) {
         const fragment moving = items[i];
         int64_t to = i;
-        for (; to > 0 && compare(&moving, &items[to - 1]) < 0; to--) items[to] = items[to - 1];
+        for (; to > 0 && fragment_compare(&moving, &items[to - 1]) < 0; to--) items[to] = items[to - 1];
         items[to] = moving;
     }
 }
@@ -74,8 +41,8 @@ static void sift_down(fragment *items, int64_t root, int64_t count)
 {
     const fragment moving = items[root];
     for (int64_t child; (child = 2 * root + 1) < count; root = child) {
-        if (child + 1 < count && compare(&items[child], &items[child + 1]) < 0) child++;
-        if (compare(&moving, &items[child]) >= 0) break;
+        if (child + 1 < count && fragment_compare(&items[child], &items[child + 1]) < 0) child++;
+        if (fragment_compare(&moving, &items[child]) >= 0) break;
         items[root] = items[child];
     }
     items[root] = moving;
@@ -336,6 +303,40 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
     *out_depth = nearest_surface(items, count);
 }
 
+/* Those from the first on that a fold makes one of: of a volume, in one stretch. */
+static int64_t folded_together(const fragment *sorted, int64_t count)
+{
+    const int32_t stretch = fragment_stretch(sorted[0].t_in);
+    int64_t n = 1;
+    if (sorted[0].kind >= FRAGMENT_SURFACE) return n;
+    while (n < count && sorted[n].kind < FRAGMENT_SURFACE && fragment_stretch(sorted[n].t_in) == stretch) n++;
+    return n;
+}
+
+/* Is no light left for the fragment behind another? A rank may have left out what is of a later stretch. */
+static bool is_dark(float transmittance, const fragment *before, const fragment *next)
+{
+    return transmittance == 0 || (transmittance <= FRAGMENT_DARK &&
+                                  fragment_stretch(before->t_in) != fragment_stretch(next->t_in));
+}
+
+void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
+                             float *out_depth)
+{
+    sort(items, count);
+    float colour[3] = {0, 0, 0};
+    float transmittance = 1;
+    for (int64_t i = 0, n; i < count && !(i > 0 && is_dark(transmittance, &items[i - 1], &items[i])); i += n) {
+        n = folded_together(items + i, count - i);
+        const fragment f = fragment_fold(items + i, n);
+        for (int c = 0; c < 3; c++) colour[c] += transmittance * f.colour[c];
+        transmittance *= f.transmittance;
+    }
+    for (int c = 0; c < 3; c++) out_rgba[c] = colour[c] + transmittance * background[c];
+    out_rgba[3] = 1 - transmittance + transmittance * background[3];
+    *out_depth = nearest_surface(items, count);
+}
+
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth)
 {
     if (count == 1)
@@ -357,6 +358,17 @@ void comp_merge_cut(fragment *sorted, int64_t count, comp_stretch_taker *take, v
         }
         n = samples_at(sorted + i, count - i);
         const fragment f = n == 1 ? sorted[i] : mix_samples(sorted + i, n);
+        take(state, &f);
+        transmittance *= f.transmittance;
+    }
+}
+
+void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_stretch_taker *take, void *state)
+{
+    float transmittance = 1;
+    for (int64_t i = 0, n; i < count && !(i > 0 && is_dark(transmittance, &sorted[i - 1], &sorted[i])); i += n) {
+        n = folded_together(sorted + i, count - i);
+        const fragment f = fragment_fold(sorted + i, n);
         take(state, &f);
         transmittance *= f.transmittance;
     }

@@ -11,4 +11,7 @@ typedef void comp_stretch_taker(void *state, const fragment *stretch);
  * fragments as comp_merge_pixel() left them, and as they are left again. Local. */
 void comp_merge_cut(fragment *sorted, int64_t count, comp_stretch_taker *take, void *state);
 
+/* The same of fragments that comp_merge_folded_pixel() blends: a stretch each. */
+void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_stretch_taker *take, void *state);
+
 #endif

@@ -122,11 +122,12 @@ void comp_add_overlap(unsigned char *overlaps, uint32_t pixel)
 static comp_pixel blend(const comp_merged *merged, fragment *items, int64_t count, uint32_t pixel)
 {
     comp_pixel blended = {.pixel = pixel};
-    comp_merge_pixel(items, count, merged->background, blended.rgba, &blended.depth);
+    (merged->is_folded ? comp_merge_folded_pixel : comp_merge_pixel)(items, count, merged->background, blended.rgba,
+                                                                     &blended.depth);
     if (merged->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(merged->overlaps, pixel);
     if (merged->deep) {
         for (int64_t i = 0; i < count; i++) items[i].pixel = pixel;
-        comp_deep_add(&merged->deep[omp_get_thread_num()], items, count);
+        comp_deep_add(&merged->deep[omp_get_thread_num()], items, count, merged->is_folded);
     }
     return blended;
 }

@@ -41,6 +41,7 @@ void comp_pixels_store(image *out, const comp_pixel *from);
 /* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned index. */
 typedef struct comp_merged {
     const float *background; /* 4 */
+    bool is_folded;          /* by comp_merge_folded_pixel() */
     image *out;
     comp_pixel_list *finished;
     unsigned char *overlaps; /* pixel_set.h: those whose fragments overlap are added. NULL: not wanted */

@@ -159,7 +159,8 @@ static fragment *collect(comp_tile_scratch *own, fragment *items, const int64_t 
 static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64_t count)
 {
     float depth;
-    comp_merge_pixel(items, count, tiles->background, tiles->out->rgba + 4 * pixel, &depth);
+    (tiles->out->is_folded ? comp_merge_folded_pixel : comp_merge_pixel)(items, count, tiles->background,
+                                                                         tiles->out->rgba + 4 * pixel, &depth);
     if (tiles->out->depth) tiles->out->depth[pixel] = depth;
     if (tiles->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
 }

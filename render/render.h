@@ -256,7 +256,9 @@ typedef struct render_job {
     const unsigned char *pixels;
     bool separate_samples; /* every cell's every sample of every volume becomes a fragment, of no length; every segment
                               one of its length, in parts that compositing may mix */
-    int threads;           /* >= 1; 0: as many as OpenMP would take */
+    bool reproducible; /* fragments of a volume, of which there is one, are what the fold of this rank's samples or
+                          segments leaves (fragment_fold.h); not with separate_samples */
+    int threads;       /* >= 1; 0: as many as OpenMP would take */
 } render_job;
 
 typedef struct render_statistics {

@@ -14,6 +14,7 @@
 #include "render.h"
 #include "render_active_cells.h"
 #include "render_candidates.h"
+#include "render_fold.h"
 #include "render_fragments.h"
 #include "render_kernels.h"
 #include "render_polyhedra.h"
@@ -51,17 +52,22 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     const int rows = (camera->height + KERNEL_TILE - 1) / KERNEL_TILE;
     const int number = omp_get_thread_num();
     fragment_list *own = &end->writers[number].list;
+    const bool folds = frame->job->reproducible && frame->job->volume_count && !frame->job->separate_samples;
+    render_folding fold = {.job = frame->job, .has_segments = frame->has_segments};
 #pragma omp for schedule(dynamic, 4)
     for (int tile = 0; tile < columns * rows; tile++) {
         if (thread->out_of_memory) continue;
         if (thread->polyhedra) polyhedra_reset(thread->polyhedra);
         const pixel_area area = area_of(camera, tile % columns, tile / columns);
         if (!end->take) fragment_writer_advance(&end->writers[number], TILE_FRAGMENTS);
+        const int64_t first = own->count;
         kernels->trace_tile(frame, thread, area.x, area.y);
+        if (folds) thread->out_of_memory = thread->out_of_memory || !render_fold(&fold, &area, own, first);
         if (!end->take || thread->out_of_memory) continue;
         thread->out_of_memory = !end->take(end->state, number, &area, own->items, own->count);
         own->count = 0;
     }
+    render_folding_free(&fold);
 }
 
 /* Threads' states; false where memory ran out. */

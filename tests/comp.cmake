@@ -10,6 +10,11 @@ target_link_libraries(test_comp_wire
 add_test(NAME comp_wire COMMAND test_comp_wire)
 set_tests_properties(comp_wire PROPERTIES TIMEOUT 60)
 
+add_executable(test_fold test_fold.c)
+target_link_libraries(test_fold PRIVATE insitu_compositing insitu_base insitu_flags PkgConfig::CMOCKA OpenMP::OpenMP_C m)
+add_test(NAME fold COMMAND test_fold)
+set_tests_properties(fold PROPERTIES TIMEOUT 60)
+
 add_executable(test_comp_mpi test_comp_mpi.c)
 target_link_libraries(test_comp_mpi
   PRIVATE insitu_compositing insitu_base insitu_flags PkgConfig::CMOCKA OpenMP::OpenMP_C m)

@@ -92,6 +92,14 @@ insitu_add_mpi_test(session_antialias test_session_antialias 1 2 3 7 TIMEOUT 120
 insitu_session_program(test_session_space)
 insitu_add_mpi_test(session_space test_session_space 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_invariance)
+insitu_add_mpi_test(invariance test_invariance 2 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+foreach(ranks 1 2 3 5 7 16 64)
+  insitu_add_long_test(invariance_np${ranks}_whole ${CMAKE_COMMAND} -E env INSITU_TEST_WHOLE=1
+    ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:test_invariance> ${CMAKE_CURRENT_BINARY_DIR})
+  set_tests_properties(invariance_np${ranks}_whole PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
+endforeach()
+
 insitu_session_program(test_session_partition)
 target_sources(test_session_partition PRIVATE test_mesh_honeycomb.c)
 insitu_add_mpi_test(session_partition test_session_partition 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})

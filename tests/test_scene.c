@@ -93,7 +93,7 @@ static const char every_key[] =
     "                  threshold: {field: q, component: 1, from: 1, to: 2.5}}\n"
     "      - surface: {threshold: {field: q, from: -3}}\n"
     "    sampling: {step_cells: 0.25, jitter: false, frames: 4,\n"
-    "               max_seconds: 10, method: segments}\n"
+    "               max_seconds: 10, method: segments, reproducible: true}\n"
     "    clip: {planes: [{normal: [0, 0, -2], point: [1, 2, 3]}], box: [[0, 0, 0], [1, 2, 3]]}\n"
     "    outputs:\n"
     "      - path: \"out/{name}_{cycle:06}.png\"\n"
@@ -214,6 +214,7 @@ static void scene_image_keys_are_read(void **state)
     assert_true(image->step == 0 && image->step_cells == 0.25);
     assert_false(image->jitter);
     assert_int_equal(image->frames, 4);
+    assert_true(image->is_reproducible && !s.images[1].is_reproducible);
     assert_true(image->max_seconds == 10 && s.images[1].max_seconds == 3600);
     assert_true(image->method == SCENE_SEGMENTS && image->max_error == 0);
     assert_true(s.images[2].method == SCENE_SEGMENTS && s.images[2].max_error == 1e-3 && s.images[2].volume_count == 2);

@@ -2,6 +2,7 @@
 #ifndef BASE_IMAGE_H
 #define BASE_IMAGE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "insitu/image_output.h"
@@ -21,6 +22,7 @@ typedef struct image {
     float *depth; /* row-major, height × width: fragment.t_in of the nearest
                      surface hit; +infinity where there is none. NULL: not wanted */
     deep_image *deep; /* NULL on every rank: not wanted */
+    bool is_folded;   /* of fragments that ranks have folded (fragment_fold.h) */
 } image;
 
 #endif

@@ -9,6 +9,7 @@
 #include <math.h>
 
 #include "fragment.h"
+#include "fragment_fold.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
 #include "kernel_hits.h"
@@ -16,19 +17,11 @@
 #include "kernel_packet.h"
 #include "kernel_types.h"
 #include "render.h"
+#include "render_face_error.h"
 #include "simd.h"
 
 /* What is behind so little light does not show: far below the 1e-6 that ranks may differ by. */
-#define KERNEL_DARK 1e-7f
-
-/* Two faces that are one in truth, but not the same to the bit, may be so far apart along a ray, in t: of a hanging
- * node the coarse cell's face and the small ones on it, and faces whose crossings come in the wrong order beside a
- * vertex. Near 1, where t of the scene is, each face's crossing is off by a rounding of its vertices' depths and one of
- * t, 6e-8 each, and by its weights' or Newton's, 2.4e-7 (kernel_cell.h) to 1e-6 times the cell's size (kernel_quad.h):
- * twice that is 3e-6 for a cell as large as the scene. Across the ray vertices are off by 6e-8 of their distance from
- * the tile's centre, a cell's size: of cells of 0.1 that is no more than this where a face's cosine to the ray is above
- * 1.5e-3. */
-#define KERNEL_FACE_ERROR 4e-6f
+#define KERNEL_DARK FRAGMENT_DARK_OF_RANK
 
 /* The samples of a window: NaN where this rank has none. */
 typedef struct kernel_samples {
@@ -92,13 +85,14 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     if (!p->frame->job->separate_samples) {
         mask = vm_and(mask, vf_lt(t, state->samples->marked));
         state->samples->marked = vf_select(mask, t, state->samples->marked);
-        const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), zero};
-        const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, zero};
+        const vf sign = p->frame->job->reproducible ? vf_set(FRAGMENT_LATE) : zero; /* render_fold.h */
+        const kernel_fragments clear = {t, t, {zero, zero, zero}, vf_set(1), sign};
+        const kernel_fragments sample = {t, t, {colour[0], colour[1], colour[2]}, left, sign};
         kernel_emit(p, mask, FRAGMENT_VOLUME, &clear);
         kernel_emit(p, mask, FRAGMENT_VOLUME, &sample);
         return;
     }
-    const vf error = vf_max(vf_abs(t), vf_set(1)) * KERNEL_FACE_ERROR;
+    const vf error = vf_max(vf_abs(t), vf_set(1)) * RENDER_FACE_ERROR;
     const vf early = vf_select(vf_lt(t - cell->t_in, error), vf_set(FRAGMENT_EARLY), zero);
     const vf late = vf_select(vf_lt(cell->t_out - t, error), vf_set(FRAGMENT_LATE), zero);
     const uint32_t kind = FRAGMENT_VOLUME + FRAGMENT_LAYER * (uint32_t)state->volume;
@@ -148,6 +142,9 @@ typedef struct kernel_blend {
     vf colour[3], transmittance;
     vf depth, lost[3]; /* of segments: -ln(transmittance), and what colour has lost to rounding */
     vf light;          /* what reaches this rank's next sample through all its samples so far */
+    /* Where all samples and segments are given to the fold (render_fold.h): of the last one the stretch, and what reaches
+     * the next through all so far; light is then what it was where the last stretch ended. */
+    vf stretch, within;
 } kernel_blend;
 
 /* End the fragments of the rays in mask. */
@@ -159,6 +156,27 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
         b->t_first, b->t_last, {b->colour[0], b->colour[1], b->colour[2]}, b->transmittance, vf_set(0)};
     kernel_emit(p, vm_and(closing, vf_lt(b->transmittance, vf_set(1))), FRAGMENT_VOLUME, &ended);
     b->open = vm_andnot(b->open, closing);
+}
+
+/* A fragment a sample or segment, for the fold, which is told where something may come between it and the one before.
+ * Fragments have no transmittance of their own then, so that none is emitted as they close. */
+SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out,
+                                    const vf colour[3], vf clear)
+{
+    const vm fresh = vm_andnot(has, b->open);
+    const kernel_fragments own = {t_in,
+                                  t_out,
+                                  {colour[0], colour[1], colour[2]},
+                                  clear,
+                                  vf_select(fresh, vf_set(FRAGMENT_EARLY), vf_set(0))};
+    kernel_emit(p, vm_and(has, vm_or(fresh, vf_lt(clear, vf_set(1)))), FRAGMENT_VOLUME, &own);
+    const vf stretch = vf_floor(t_in * (float)FRAGMENT_STRETCHES);
+    const vm next = vm_andnot(has, vf_eq(stretch, b->stretch));
+    b->light = vf_select(next, b->within, b->light);
+    b->stretch = vf_select(has, stretch, b->stretch);
+    b->within = vf_select(has, b->within * clear, b->within);
+    b->t_last = vf_select(has, vf_select(fresh, t_out, vf_max(b->t_last, t_out)), b->t_last);
+    b->open = vm_or(b->open, has);
 }
 
 /* Rays whose fragment must end before the sample at t: a surface is in between, or may be, on another rank. */
@@ -202,7 +220,7 @@ SIMD_INLINE void kernel_sample_colour(const kernel_packet *p, const kernel_sampl
 SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const kernel_samples *s,
                                      const kernel_hits *hits)
 {
-    const bool is_alone = p->frame->job->is_alone;
+    const bool is_alone = p->frame->job->is_alone, is_folded = p->frame->job->reproducible;
     for (int n = 0; n < s->count; n++) {
         const vf t = kernel_sample_t(p, s->first + n);
         vm has = vm_none();
@@ -215,6 +233,14 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const ke
         const vm fresh = vm_andnot(has, b->open);
         vf colour[3], clear;
         kernel_sample_colour(p, s, n, colour, &clear);
+        if (p->frame->needs_contact) {
+            b->contact_in = vf_select(has, s->t_in[n], b->contact_in);
+            b->contact_out = vf_select(has, s->t_out[n], b->contact_out);
+        }
+        if (is_folded) {
+            kernel_blend_apart(p, b, has, t, t, colour, clear);
+            continue;
+        }
         b->t_first = vf_select(fresh, t, b->t_first);
         b->transmittance = vf_select(fresh, vf_set(1), b->transmittance);
         for (int a = 0; a < 3; a++) {
@@ -225,10 +251,6 @@ SIMD_INLINE void kernel_blend_window(kernel_packet *p, kernel_blend *b, const ke
         b->light = vf_select(has, b->light * clear, b->light);
         b->t_last = vf_select(has, t, b->t_last);
         b->open = vm_or(b->open, has);
-        if (p->frame->needs_contact) {
-            b->contact_in = vf_select(has, s->t_in[n], b->contact_in);
-            b->contact_out = vf_select(has, s->t_out[n], b->contact_out);
-        }
     }
 }
 

@@ -35,10 +35,10 @@
 
 /* ---- the ray ---- */
 
-/* So far before an end that what begins there is not known to begin in front of it. */
+/* So far before an end that what begins there is not known to begin in front of it; render_fold.c has it too. */
 SIMD_INLINE vf kernel_segment_end(vf t_out)
 {
-    return t_out - vf_max(vf_abs(t_out), vf_set(1)) * KERNEL_FACE_ERROR;
+    return t_out - vf_max(vf_abs(t_out), vf_set(1)) * RENDER_FACE_ERROR;
 }
 
 /* Rays whose fragment must end before the segment from t_in to t_out: a surface is in between, or there is a gap, or
@@ -108,10 +108,17 @@ static void kernel_blend_segments(kernel_packet *p, kernel_blend *b, const kerne
         else
             kernel_integrate(pieces, has, &run, &light);
         kernel_segments_close(p, b, vm_and(has, kernel_segment_breaks(p, b, &list->cuts, t_in, t_out)));
-        kernel_blend_light(b, has, t_in, t_out, &light);
+        if (p->frame->job->reproducible)
+            kernel_blend_apart(p, b, has, t_in, t_out, light.colour, light.transmittance);
+        else
+            kernel_blend_light(b, has, t_in, t_out, &light);
     }
     const vm heaped = vf_lt(list->heap.transmittance, vf_set(1));
-    if (vm_any(heaped)) kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
+    if (!vm_any(heaped)) return;
+    if (p->frame->job->reproducible)
+        kernel_blend_apart(p, b, heaped, b->t_last, b->t_last, list->heap.colour, list->heap.transmittance);
+    else
+        kernel_blend_light(b, heaped, b->t_last, b->t_last, &list->heap);
 }
 
 /* A window from list->t_begin on. */
@@ -126,7 +133,8 @@ SIMD_INLINE void kernel_segments_begin(kernel_segments *list, vf t_end)
 SIMD_INLINE kernel_blend kernel_blend_begin(void)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    return (kernel_blend){vm_none(), zero, zero, zero, zero, {zero, zero, zero}, one, zero, {zero, zero, zero}, one};
+    return (kernel_blend){
+        vm_none(), zero, zero, zero, zero, {zero, zero, zero}, one, zero, {zero, zero, zero}, one, zero, one};
 }
 
 #endif

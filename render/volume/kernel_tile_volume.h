@@ -98,7 +98,8 @@ SIMD_INLINE void kernel_ray_samples_begin(kernel_packet *p, kernel_tile_ray_samp
     kernel_packet_lanes(p, &lanes);
     kernel_packet_samples(p, &lanes);
     r->active = p->active;
-    r->blend = (kernel_blend){.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
+    r->blend = (kernel_blend){
+        .open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
     r->samples.marked = vf_set(INFINITY);
     const vf end = vf_min(p->t_far, vf_set(far));
     const vf from = (near - p->sample_base) * p->sample_inverse, to = (end - p->sample_base) * p->sample_inverse;

@@ -84,7 +84,7 @@ SIMD_INLINE void kernel_trace_volumes(kernel_packet *p, const kernel_hits *hits)
 {
     const kernel_frame *f = p->frame;
     kernel_samples s;
-    kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1)};
+    kernel_blend b = {.open = vm_none(), .light = vf_set(1), .transmittance = vf_set(1), .within = vf_set(1)};
     int first, last;
     if (!kernel_sample_range(p, &first, &last)) return;
     /* Where samples are separate, all places count as taken, and what is there is not looked at. */

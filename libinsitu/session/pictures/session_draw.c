@@ -169,6 +169,7 @@ static render_job make_job(const session_drawing *d, const scene_image *image, c
                         .step = view->step,
                         .sample_group = RENDER_MAX_GROUP,
                         .jitter = image->jitter,
+                        .reproducible = image->is_reproducible,
                         .is_alone = d->space->extent.rank_count <= 1,
                         .threads = d->team->threads};
 }

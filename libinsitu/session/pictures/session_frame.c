@@ -161,6 +161,7 @@ static insitu_status redraw(const session_frame_target *t, const render_job *job
     render_job again = *job;
     again.pixels = second->turn;
     again.separate_samples = true;
+    again.reproducible = false;
     for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
         comp_overlaps found = {0};
         at = take_pixels(out, overlaps->pixels, at, most, second->turn);
@@ -185,10 +186,12 @@ static insitu_status draw_overlaps(const session_frame_target *t, const render_j
     return status;
 }
 
-/* Segments of several volumes are at one place on every pixel: there is no first picture to put right. */
+/* Segments of several volumes are at one place on every pixel: there is no first picture to put right. Samples of
+ * several are mixed by a rank that has them all, and in another order of roundings by compositing; so are all by that,
+ * if pictures are to be the same to the bit. */
 static bool is_mixed_throughout(const render_job *job)
 {
-    return job->integration == RENDER_SEGMENTS && job->volume_count > 1;
+    return (job->integration == RENDER_SEGMENTS || job->reproducible) && job->volume_count > 1;
 }
 
 static insitu_status take_all(const session_frame_target *t, const image *out, comp_overlaps *all, base_error *error)
@@ -210,7 +213,9 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
     if (is_mixed_throughout(job)) {
         status = take_all(t, out, &overlaps, error);
     } else {
+        out->is_folded = job->reproducible && job->volume_count > 0;
         status = draw(t, job, out, frame, job->volume_count ? &overlaps : NULL, error);
+        out->is_folded = false;
         /* Separate samples tell whether any has two owners but by rounding of their common face: see redraw(). */
         frame->overlaps = job->integration == RENDER_SAMPLES ? 0 : overlaps.count;
     }

@@ -65,6 +65,7 @@ static insitu_status convert_sampling(const scene_document *d, const char *path,
     out->step_cells = in->step_cells ? *in->step_cells : 0.5;
     out->jitter = in->jitter ? *in->jitter : true;
     out->frames = in->frames ? *in->frames : 1;
+    out->is_reproducible = in->reproducible && *in->reproducible;
     out->max_seconds = in->max_seconds ? *in->max_seconds : 3600;
     if (in->step && in->step_cells)
         return scene_bad(d, path, "sampling.step", "given beside step_cells, expected one of the two");

@@ -333,6 +333,7 @@ typedef struct scene_image {
     double step;                  /* sample distance in scene units; 0: by step_cells */
     double step_cells;            /* in mean cell sizes: a cell's is the cube root of its volume; 0.5 by default */
     bool jitter;                  /* true by default */
+    bool is_reproducible;         /* volumes to the last bit */
     int frames;                   /* accumulated; a multiple of antialias; 1 by default, 1 .. 4096 */
     int antialias; /* places in a pixel that frames go through in turn: 1 (default), 2, 4, 8 or 16. Where there are no
                     * volumes only pixels at edges take more than one frame */

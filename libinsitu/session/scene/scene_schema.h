@@ -154,7 +154,7 @@ typedef struct scene_file_sampling {
     int *method; /* scene_sampling_method */
     double *max_error;
     double *step, *step_cells;
-    bool *jitter;
+    bool *jitter, *reproducible;
     int *frames;
     double *max_seconds;
 } scene_file_sampling;

@@ -1,0 +1,89 @@
+#include "fragment_fold.h"
+
+#include <stdbool.h>
+
+/* ---- the tree ------------------------------------------------------------------------------------------------- */
+
+static void put_behind(fragment *front, const fragment *behind)
+{
+    for (int c = 0; c < 3; c++) front->colour[c] += front->transmittance * behind->colour[c];
+    front->transmittance *= behind->transmittance;
+    if (behind->t_out > front->t_out) front->t_out = behind->t_out;
+}
+
+/* How many halvings up from the leaves the two are first in one node. */
+static int height_of(int32_t a, int32_t b)
+{
+    return a == b ? 0 : 32 - __builtin_clz((uint32_t)(a ^ b));
+}
+
+/* Nodes under way, each with the height at which the one before it meets it. Heights fall from one to the next, but for
+ * the first, so that there is one a halving at most. */
+fragment fragment_fold(const fragment *sorted, int64_t count)
+{
+    fragment open[FRAGMENT_HALVINGS + 2];
+    int heights[FRAGMENT_HALVINGS + 2] = {0}, depth = 1;
+    int32_t leaf = fragment_leaf(sorted[0].t_in);
+    open[0] = sorted[0];
+    for (int64_t i = 1; i < count; i++) {
+        const int32_t next = fragment_leaf(sorted[i].t_in);
+        const int height = height_of(leaf, next);
+        leaf = next;
+        if (height == 0) {
+            put_behind(&open[depth - 1], &sorted[i]);
+            continue;
+        }
+        for (; depth > 1 && heights[depth - 1] < height; depth--) put_behind(&open[depth - 2], &open[depth - 1]);
+        open[depth] = sorted[i];
+        heights[depth++] = height;
+    }
+    for (; depth > 1; depth--) put_behind(&open[depth - 2], &open[depth - 1]);
+    return open[0];
+}
+
+/* ---- parts of it ---------------------------------------------------------------------------------------------- */
+
+/* What a rank has all of. */
+typedef struct fold_part {
+    float begin, end;
+    fragment *out;
+    int64_t count;
+} fold_part;
+
+/* Where a leaf begins: exact, as a product by a power of two. */
+static double begin_of(int32_t leaf)
+{
+    return (double)leaf / (FRAGMENT_STRETCHES << FRAGMENT_HALVINGS);
+}
+
+static bool has_all_of(const fold_part *part, int32_t first_leaf, int height)
+{
+    return (double)part->begin <= begin_of(first_leaf) && begin_of(first_leaf + (1 << height)) <= (double)part->end;
+}
+
+/* The fragments of a node of the height. */
+static void fold_node(fold_part *part, const fragment *sorted, int64_t count, int32_t first_leaf, int height)
+{
+    while (count > 1 && height > 0 && !has_all_of(part, first_leaf, height)) {
+        const int32_t middle = first_leaf + (1 << --height);
+        int64_t left = 0;
+        while (left < count && fragment_leaf(sorted[left].t_in) < middle) left++;
+        if (left) fold_node(part, sorted, left, first_leaf, height);
+        sorted += left;
+        count -= left;
+        first_leaf = middle;
+    }
+    if (count > 1 && !has_all_of(part, first_leaf, height)) {
+        for (int64_t i = 0; i < count; i++) part->out[part->count++] = sorted[i];
+    } else if (count) {
+        part->out[part->count++] = fragment_fold(sorted, count);
+    }
+}
+
+int64_t fragment_fold_between(const fragment *sorted, int64_t count, float begin, float end, fragment *out)
+{
+    fold_part part = {begin, end, out, 0};
+    const int32_t stretch = fragment_stretch(sorted[0].t_in);
+    fold_node(&part, sorted, count, stretch << FRAGMENT_HALVINGS, FRAGMENT_HALVINGS);
+    return part.count;
+}

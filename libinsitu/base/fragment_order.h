@@ -1,0 +1,47 @@
+/* The order of a pixel's fragments: by depth, where a surface and a volume begin at one in front the surface, and then
+ * down to the last bit, so that what compares equal is the same. */
+#ifndef BASE_FRAGMENT_ORDER_H
+#define BASE_FRAGMENT_ORDER_H
+
+#include <stdint.h>
+#include <string.h>
+
+#include "fragment.h"
+
+/* Bits that rise with the value, for all floats: NaN too has its place. */
+static inline uint32_t fragment_rising_bits(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+}
+
+static inline int fragment_compare_numbers(uint32_t a, uint32_t b)
+{
+    return (a > b) - (a < b);
+}
+
+static inline int fragment_compare_rest(const fragment *a, const fragment *b)
+{
+    const float of_a[] = {a->t_in, a->t_out, a->transmittance, a->colour[0], a->colour[1], a->colour[2]};
+    const float of_b[] = {b->t_in, b->t_out, b->transmittance, b->colour[0], b->colour[1], b->colour[2]};
+    int order = fragment_compare_numbers(a->kind, b->kind);
+    for (int i = 0; !order && i < 6; i++)
+        order = fragment_compare_numbers(fragment_rising_bits(of_a[i]), fragment_rising_bits(of_b[i]));
+    return order;
+}
+
+/* Negative where a is in front of b. */
+static inline int fragment_compare(const fragment *a, const fragment *b)
+{
+    if (a->t_in < b->t_in) return -1;
+    if (a->t_in > b->t_in) return 1;
+    if (a->t_in != b->t_in) {
+        const int order = fragment_compare_numbers(fragment_rising_bits(a->t_in), fragment_rising_bits(b->t_in));
+        if (order) return order;
+    }
+    const int order = (b->kind >= FRAGMENT_SURFACE) - (a->kind >= FRAGMENT_SURFACE);
+    return order ? order : fragment_compare_rest(a, b);
+}
+
+#endif

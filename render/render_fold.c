@@ -1,0 +1,145 @@
+/* A run is what touches, sample by sample or segment by segment, without a surface in between: of what its halves of
+ * stretches hold no other rank has anything. A rank alone has all there is between surfaces. */
+#include "render_fold.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "fragment_fold.h"
+#include "fragment_order.h"
+#include "kernel_types.h"
+#include "memory.h"
+#include "render_face_error.h"
+
+static int64_t place_in(const render_folding *folding, const pixel_area *area, uint32_t pixel)
+{
+    const uint32_t width = (uint32_t)folding->job->camera.width;
+    const int y = (int)(pixel / width) - area->y, x = (int)(pixel % width) - area->x;
+    return (int64_t)y * area->width + x;
+}
+
+static bool make_room(render_folding *folding, int64_t count)
+{
+    enum { PIXELS = KERNEL_TILE * KERNEL_TILE };
+    if (!folding->starts) folding->starts = base_alloc((PIXELS + 1) * sizeof *folding->starts);
+    if (folding->capacity < count) {
+        base_free(folding->items);
+        folding->capacity = count + count / 2;
+        folding->items = base_alloc((size_t)folding->capacity * sizeof *folding->items);
+        if (!folding->items) folding->capacity = 0;
+    }
+    return folding->starts && folding->items;
+}
+
+/* The tile's, pixel by pixel and else in the order in which they came: those of the k-th from starts[k] on. */
+static void collect(render_folding *folding, const pixel_area *area, const fragment *items, int64_t count)
+{
+    const int64_t pixels = (int64_t)area->width * area->height;
+    int64_t *starts = folding->starts;
+    memset(starts, 0, (size_t)(pixels + 1) * sizeof *starts);
+    for (int64_t i = 0; i < count; i++) starts[place_in(folding, area, items[i].pixel)]++;
+    for (int64_t k = 1; k < pixels; k++) starts[k] += starts[k - 1];
+    for (int64_t i = count; i-- > 0;) folding->items[--starts[place_in(folding, area, items[i].pixel)]] = items[i];
+    starts[pixels] = count;
+}
+
+/* They come nearly sorted. What begins a run must not change places with it, so its sign is no part of the order. */
+static void sort(fragment *items, int64_t count)
+{
+    for (int64_t i = 1; i < count; i++) {
+        fragment moving = items[i];
+        const uint32_t sign = moving.kind;
+        int64_t to = i;
+        for (; to > 0 && items[to - 1].t_in >= moving.t_in; to--) {
+            fragment before = items[to - 1];
+            before.kind = moving.kind = FRAGMENT_VOLUME;
+            if (fragment_compare(&moving, &before) >= 0) break;
+            items[to] = items[to - 1];
+        }
+        moving.kind = sign;
+        items[to] = moving;
+    }
+}
+
+/* So far from a segment's end another rank's may begin, or end, that touches it. */
+static float error_at(float t)
+{
+    return fmaxf(fabsf(t), 1) * RENDER_FACE_ERROR;
+}
+
+/* Where what is known of a run ends, for compositing to tell what overlaps it (kernel_segments.h). */
+static void shorten(const render_folding *folding, fragment *items, int64_t count)
+{
+    for (int64_t i = 0; i < count && folding->has_segments; i++)
+        items[i].t_out -= error_at(items[i].t_out);
+}
+
+static bool shows(const fragment *f)
+{
+    return f->transmittance < 1 || f->colour[0] != 0 || f->colour[1] != 0 || f->colour[2] != 0;
+}
+
+/* One run, stretch by stretch; returns where out goes on. */
+static fragment *fold_run(const render_folding *folding, fragment *run, int64_t count, fragment *out)
+{
+    const bool is_alone = folding->job->is_alone;
+    float begin = -INFINITY, end = INFINITY;
+    run[0].kind = FRAGMENT_VOLUME;
+    for (int64_t i = 0; i < count && !is_alone; i++) end = i && end > run[i].t_out ? end : run[i].t_out;
+    if (!is_alone) begin = run[0].t_in;
+    if (folding->has_segments && !is_alone) {
+        begin += error_at(begin);
+        end -= error_at(end);
+    }
+    for (int64_t i = 0, n; i < count; i += n) {
+        const int32_t stretch = fragment_stretch(run[i].t_in);
+        for (n = 1; i + n < count && fragment_stretch(run[i + n].t_in) == stretch;) n++;
+        const int64_t made = fragment_fold_between(run + i, n, begin, end, run + i);
+        shorten(folding, run + i, made);
+        for (int64_t k = i; k < i + made; k++)
+            if (shows(&run[k])) *out++ = run[k];
+    }
+    return out;
+}
+
+static fragment *fold_pixel(const render_folding *folding, fragment *items, int64_t count, fragment *out)
+{
+    int64_t volumes = 0;
+    for (int64_t i = 0; i < count; i++) {
+        const bool is_mark = items[i].kind == FRAGMENT_LATE;
+        if (items[i].kind < FRAGMENT_SURFACE && !is_mark) {
+            items[volumes++] = items[i];
+            continue;
+        }
+        *out = items[i];
+        if (is_mark) out->kind = FRAGMENT_VOLUME;
+        out++;
+    }
+    sort(items, volumes);
+    for (int64_t i = 0, n; i < volumes; i += n) {
+        for (n = 1; i + n < volumes && items[i + n].kind == FRAGMENT_VOLUME;) n++;
+        out = fold_run(folding, items + i, n, out);
+    }
+    return out;
+}
+
+bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list, int64_t first)
+{
+    const int64_t count = list->count - first, pixels = (int64_t)area->width * area->height;
+    if (count == 0) return true;
+    if (!make_room(folding, count)) return false;
+    collect(folding, area, list->items + first, count);
+    fragment *out = list->items + first;
+    for (int64_t k = 0; k < pixels; k++) {
+        const int64_t own = folding->starts[k + 1] - folding->starts[k];
+        if (own) out = fold_pixel(folding, folding->items + folding->starts[k], own, out);
+    }
+    list->count = out - list->items;
+    return true;
+}
+
+void render_folding_free(render_folding *folding)
+{
+    base_free(folding->items);
+    base_free(folding->starts);
+}

@@ -1,0 +1,146 @@
+/* The fold of a ray's samples or segments is the same to the bit however they are shared out to ranks, and however many
+ * of them each rank folds before it sends them; and it is what "over" makes of them in double. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "comp.h"
+#include "fragment_fold.h"
+
+enum { MOST = 400, RANKS = 7 };
+
+static uint32_t state_of_chance;
+
+static double chance(void)
+{
+    state_of_chance = state_of_chance * 1664525u + 1013904223u;
+    return (double)(state_of_chance >> 8) / 16777216.0;
+}
+
+/* A ray of segments that touch, of lengths from a millionth to a tenth of the scene, some left out, some surfaces. */
+typedef struct ray {
+    fragment items[MOST];
+    int owners[MOST];
+    int64_t count;
+} ray;
+
+static void make_ray(ray *r, double density, double gap, double surface)
+{
+    float t = (float)(-1.5 + chance());
+    r->count = 0;
+    while (t < 1.5f && r->count < MOST) {
+        const float end = t + (float)pow(10, -6 + 5 * chance());
+        const bool is_surface = chance() < surface;
+        const float clear = (float)exp(-density * chance() * (is_surface ? 1 : (double)(end - t)));
+        if (chance() >= gap) {
+            fragment *f = &r->items[r->count++];
+            *f = (fragment){.t_in = t, .t_out = is_surface ? t : end, .transmittance = clear};
+            f->kind = is_surface ? FRAGMENT_SURFACE : FRAGMENT_VOLUME;
+            for (int c = 0; c < 3; c++) f->colour[c] = (1 - clear) * (float)chance();
+        }
+        t = is_surface ? nextafterf(t, 2) : end; /* two surfaces at one depth have an order of their own */
+    }
+}
+
+/* Runs of some pieces a rank. */
+static void deal(ray *r, double change)
+{
+    int owner = 0;
+    for (int64_t i = 0; i < r->count; i++) {
+        if (chance() < change) owner = (int)(chance() * RANKS);
+        r->owners[i] = owner;
+    }
+}
+
+/* What the rank sends: of each run that touches, between surfaces, the fold of what it has all of. */
+static int64_t send(const ray *r, int rank, fragment *out)
+{
+    int64_t count = 0;
+    for (int64_t i = 0, n; i < r->count; i += n) {
+        n = 1;
+        if (r->owners[i] != rank) continue;
+        if (r->items[i].kind >= FRAGMENT_SURFACE) {
+            out[count++] = r->items[i];
+            continue;
+        }
+        while (i + n < r->count && r->owners[i + n] == rank && r->items[i + n].kind == FRAGMENT_VOLUME &&
+               r->items[i + n].t_in == r->items[i + n - 1].t_out)
+            n++;
+        for (int64_t k = i, m; k < i + n; k += m) {
+            const int32_t stretch = fragment_stretch(r->items[k].t_in);
+            for (m = 1; k + m < i + n && fragment_stretch(r->items[k + m].t_in) == stretch;) m++;
+            count += fragment_fold_between(r->items + k, m, r->items[i].t_in, r->items[i + n - 1].t_out, out + count);
+        }
+    }
+    return count;
+}
+
+static const float background[4] = {0.1f, 0.2f, 0.3f, 1};
+
+static void merge(const ray *r, float rgba[4], int64_t *sent)
+{
+    fragment items[MOST];
+    float depth;
+    *sent = 0;
+    for (int rank = 0; rank < RANKS; rank++) *sent += send(r, rank, items + *sent);
+    comp_merge_folded_pixel(items, *sent, background, rgba, &depth);
+}
+
+static void blend_in_double(const ray *r, double rgba[4])
+{
+    double through = 1;
+    memset(rgba, 0, 4 * sizeof *rgba);
+    for (int64_t i = 0; i < r->count; i++) {
+        for (int c = 0; c < 3; c++) rgba[c] += through * (double)r->items[i].colour[c];
+        through *= (double)r->items[i].transmittance;
+    }
+    for (int c = 0; c < 3; c++) rgba[c] += through * (double)background[c];
+    rgba[3] = 1 - through + through * (double)background[3];
+}
+
+/* A fragment is a product and a sum of colours, and a product of what is let through, by which all behind it is off: three
+ * roundings of 2^-24 of at most 1. What is dark is left out. */
+static void judge(const ray *r, const float rgba[4])
+{
+    double expected[4];
+    blend_in_double(r, expected);
+    for (int c = 0; c < 4; c++) {
+        const double off = fabs((double)rgba[c] - expected[c]);
+        const double bound = ldexp((double)(3 * r->count + 3), -24) + (double)FRAGMENT_DARK;
+        if (off > bound) fail_msg("channel %d of %lld fragments: off by %g", c, (long long)r->count, off);
+    }
+}
+
+static void fold_is_the_same_on_any_ranks(void **state)
+{
+    static ray r;
+    int64_t whole = 0, parts = 0;
+    (void)state;
+    for (int n = 0; n < 3000; n++) {
+        float alone[4], shared[4];
+        int64_t sent;
+        make_ray(&r, n % 3 ? 2 : 200, n % 2 ? 0.05 : 0, n % 5 ? 0 : 0.1);
+        memset(r.owners, 0, sizeof r.owners);
+        merge(&r, alone, &sent);
+        whole += sent;
+        judge(&r, alone);
+        for (int dealt = 0; dealt < 4; dealt++) {
+            deal(&r, dealt == 0 ? 1 : 0.3 / (1 + 3 * dealt));
+            merge(&r, shared, &sent);
+            parts += sent;
+            assert_memory_equal(alone, shared, sizeof alone);
+        }
+    }
+    printf("fragments of a ray: %.1f alone, %.1f on %d ranks\n", (double)whole / 3000, (double)parts / 12000, RANKS);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(fold_is_the_same_on_any_ranks)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,384 @@
+/* One picture of any partition: the matrix of it.
+ *
+ *     ranks (mpiexec's) x block, Morton, random, checkerboard, a rank without cells x 0 to 2 layers of ghost cells
+ *     x hexes, tets, polyhedra, mixed cells x the images below
+ *
+ * Each part lists its cells' vertices and faces its own way. Rank 0 draws the whole mesh alone and compares. Surfaces are
+ * the same to the bit, in depth and colour, and so are volumes that are to be reproducible; other volumes to 1e-6, which
+ * is what compositing promises. Of all, how often they are the same to the bit and what they are off by is told. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "test_effort.h"
+#include "test_session_fixture.h"
+
+enum { WIDTH = 60, HEIGHT = 45, PIXELS = WIDTH * HEIGHT, MOST_LAYERS = 2 };
+
+/* ---- images --------------------------------------------------------------------------------------------------- */
+
+typedef enum promise { TO_THE_BIT, TO_A_MILLIONTH, COUNTED } promise;
+
+typedef struct image_case {
+    const char *name;
+    promise promise;
+    const char *layers, *sampling;
+} image_case;
+
+#define CLEAR "      - isosurface: {field: f, values: [-0.2, 0.3], opacity: 0.4}\n"
+#define VOLUME "      - volume: {field: f, opacity: [[0, 0.1], [0.4, 0.3], [0.4, 0.9], [1, 0.2]]}\n"
+#define OTHER "      - volume: {field: f, map: plasma, opacity: [[0, 0.4], [1, 0]]}\n"
+
+static const image_case cases[] = {
+    {"gradient", TO_THE_BIT, "      - isosurface: {field: f, values: [0.1]}\n", ""},
+    {"vertex normals", TO_THE_BIT, "      - isosurface: {field: f, values: [0.1], normals: vertex}\n", ""},
+    {"differences", COUNTED, "      - isosurface: {field: f, values: [0.1], normals: differences}\n", ""},
+    {"two transparent", TO_THE_BIT, CLEAR, ""},
+    {"coloured by cells", TO_THE_BIT,
+     "      - isosurface: {field: f, values: [0.1], colour_by: {field: c, range: [-1, 1]}}\n", ""},
+    {"samples", TO_A_MILLIONTH, VOLUME, "method: samples"},
+    {"segments", TO_A_MILLIONTH, VOLUME, "method: segments"},
+    {"max_error", TO_A_MILLIONTH, VOLUME, "max_error: 0.01"},
+    {"volume, surfaces", TO_A_MILLIONTH, VOLUME CLEAR, "max_error: 0.01"},
+    {"samples, surfaces", TO_A_MILLIONTH, VOLUME CLEAR, "method: samples"},
+    {"two volumes", TO_A_MILLIONTH, VOLUME OTHER, "method: samples"},
+    {"samples, reproducible", TO_THE_BIT, VOLUME, "method: samples, reproducible: true"},
+    {"segments, reproducible", TO_THE_BIT, VOLUME, "method: segments, reproducible: true"},
+    {"max_error, reproducible", TO_THE_BIT, VOLUME, "max_error: 0.01, reproducible: true"},
+    {"volume, surfaces, reproducible", TO_THE_BIT, VOLUME CLEAR, "max_error: 0.01, reproducible: true"},
+    {"samples, surfaces, reproducible", TO_THE_BIT, VOLUME CLEAR, "method: samples, reproducible: true"},
+    {"two volumes, reproducible", TO_THE_BIT, VOLUME OTHER, "method: samples, reproducible: true"},
+    {"two volumes, max_error, reproducible", TO_THE_BIT, VOLUME OTHER, "max_error: 0.01, reproducible: true"},
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+static const char *scene_of_all(void)
+{
+    static char text[16384];
+    size_t size = 0;
+    size += (size_t)snprintf(text, sizeof text, "images:\n");
+    for (int i = 0; i < CASES; i++)
+        size += (size_t)snprintf(text + size, sizeof text - size,
+                                 "  - name: i%d\n    size: [%d, %d]\n    layers:\n%s    sampling: {%s}\n"
+                                 "    outputs: [{path: i%d.exr}]\n",
+                                 i, WIDTH, HEIGHT, cases[i].layers, cases[i].sampling, i);
+    assert_true(size < sizeof text);
+    return write_scene(text);
+}
+
+/* ---- meshes and partitions ------------------------------------------------------------------------------------ */
+
+typedef enum dealing { BLOCK, MORTON, RANDOM, CHECKERBOARD, RANK_EMPTY, DEALINGS } dealing;
+
+static const char *const dealing_names[DEALINGS] = {"block", "Morton", "random", "checkerboard", "a rank empty"};
+
+static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_POLYHEDRA, TEST_MIXED};
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+/* Calls visit with each vertex of the cell, shared ones more than once. */
+static void for_vertices(const test_mesh *mesh, int64_t cell, void (*visit)(void *state, int64_t vertex), void *state)
+{
+    for (int64_t i = mesh->offsets[cell]; i < mesh->offsets[cell + 1]; i++) {
+        const int64_t entry = mesh->connectivity[i];
+        if (mesh->types[cell] != GRID_POLYHEDRON) {
+            visit(state, entry);
+            continue;
+        }
+        for (int64_t j = mesh->face_offsets[entry]; j < mesh->face_offsets[entry + 1]; j++)
+            visit(state, mesh->face_connectivity[j]);
+    }
+}
+
+typedef struct mean_place {
+    const test_mesh *mesh;
+    double sum[3];
+    int count;
+} mean_place;
+
+static void add_place(void *state, int64_t vertex)
+{
+    mean_place *mean = state;
+    for (int a = 0; a < 3; a++) mean->sum[a] += mean->mesh->coordinates[3 * vertex + a];
+    mean->count++;
+}
+
+static uint64_t morton_code(const test_mesh *mesh, int64_t cell)
+{
+    mean_place mean = {.mesh = mesh};
+    uint64_t code = 0;
+    for_vertices(mesh, cell, add_place, &mean);
+    for (int bit = 9; bit >= 0; bit--)
+        for (int a = 0; a < 3; a++) {
+            const double part = (mean.sum[a] / mean.count + 1) / 2;
+            code = code << 1 | ((uint64_t)(fmin(fmax(part, 0), 0.9999) * 1024) >> bit & 1);
+        }
+    return code << 32 | (uint64_t)cell;
+}
+
+static int compare_codes(const void *a, const void *b)
+{
+    const uint64_t first = *(const uint64_t *)a, second = *(const uint64_t *)b;
+    return (first > second) - (first < second);
+}
+
+static void deal_morton(const test_mesh *mesh, int *owners)
+{
+    const size_t cells = (size_t)mesh->cell_count;
+    uint64_t *codes = calloc(cells, sizeof *codes);
+    assert_non_null(codes);
+    for (size_t i = 0; i < cells; i++) codes[i] = morton_code(mesh, (int64_t)i);
+    qsort(codes, cells, sizeof *codes, compare_codes);
+    for (size_t i = 0; i < cells; i++)
+        owners[codes[i] & 0xffffffffu] = (int)((uint64_t)i * (uint64_t)rank_count / cells);
+    free(codes);
+}
+
+static void deal(const test_mesh *mesh, dealing how, int side, int *owners)
+{
+    static const test_partition_kind known[] = {TEST_BLOCK, TEST_BLOCK, TEST_RANDOM, TEST_CHECKERBOARD, TEST_RANDOM};
+    const int empty = rank_count / 2;
+    const bool has_empty = how == RANK_EMPTY && rank_count > 1;
+    test_partition(mesh, known[how], side, has_empty ? rank_count - 1 : rank_count, owners);
+    if (how == MORTON) deal_morton(mesh, owners);
+    for (int64_t i = 0; has_empty && i < mesh->cell_count; i++) owners[i] += owners[i] >= empty;
+}
+
+typedef struct vertex_set {
+    unsigned char *has;
+    bool found;
+} vertex_set;
+
+static void add_vertex(void *state, int64_t vertex)
+{
+    ((vertex_set *)state)->has[vertex] = 1;
+}
+
+static void find_vertex(void *state, int64_t vertex)
+{
+    vertex_set *set = state;
+    set->found = set->found || set->has[vertex];
+}
+
+/* Adds the cells that share a vertex with those that are taken. */
+static void take_layer(const test_mesh *mesh, unsigned char *taken)
+{
+    vertex_set set = {.has = calloc((size_t)mesh->vertex_count, 1)};
+    assert_non_null(set.has);
+    for (int64_t i = 0; i < mesh->cell_count; i++)
+        if (taken[i]) for_vertices(mesh, i, add_vertex, &set);
+    for (int64_t i = 0; i < mesh->cell_count; i++) {
+        set.found = false;
+        for_vertices(mesh, i, find_vertex, &set);
+        if (set.found) taken[i] = 1;
+    }
+    free(set.has);
+}
+
+/* A part with its field at cells. */
+typedef struct input {
+    session_input vertices;
+    double *cell_values;
+    insitu_field cells;
+} input;
+
+static void describe(input *in, const int *origin)
+{
+    const int64_t cells = in->vertices.part.cell_count;
+    input_describe(&in->vertices);
+    in->cell_values = calloc((size_t)cells + 1, sizeof *in->cell_values);
+    assert_non_null(in->cell_values);
+    for (int64_t i = 0; i < cells; i++) in->cell_values[i] = test_uniform_in((uint64_t)origin[i], 9, -1, 1);
+    in->cells = in->vertices.field;
+    in->cells.name = "c";
+    in->cells.centring = INSITU_CELL;
+    in->cells.count = cells;
+    in->cells.values.data = in->cell_values;
+}
+
+static void free_input(input *in)
+{
+    input_free(&in->vertices);
+    free(in->cell_values);
+}
+
+static void take_part(const test_mesh *mesh, const int *owners, int layers, input *out)
+{
+    const size_t cells = (size_t)mesh->cell_count;
+    unsigned char *taken = calloc(cells, 1);
+    int *of_part = calloc(cells, sizeof *of_part), *origin = calloc(cells, sizeof *origin);
+    assert_true(taken && of_part && origin);
+    for (size_t i = 0; i < cells; i++) taken[i] = owners[i] == own_rank;
+    for (int layer = 0; layer < layers; layer++) take_layer(mesh, taken);
+    int count = 0;
+    for (size_t i = 0; i < cells; i++) {
+        of_part[i] = taken[i] ? 0 : 1;
+        if (taken[i]) origin[count++] = (int)i;
+    }
+    *out = (input){0};
+    test_mesh_part(mesh, of_part, 0, &out->vertices.part);
+    for (int i = 0; i < count; i++) out->vertices.part.ghosts[i] = owners[origin[i]] != own_rank;
+    test_mesh_turn(&out->vertices.part, 11 + (uint64_t)own_rank);
+    describe(out, origin);
+    free(taken);
+    free(of_part);
+    free(origin);
+}
+
+static void take_whole(const test_mesh *mesh, input *out)
+{
+    int *owners = calloc((size_t)mesh->cell_count, sizeof *owners), *origin = calloc((size_t)mesh->cell_count, 4);
+    assert_true(owners && origin);
+    for (int i = 0; i < (int)mesh->cell_count; i++) origin[i] = i;
+    *out = (input){0};
+    test_mesh_part(mesh, owners, 0, &out->vertices.part);
+    describe(out, origin);
+    free(owners);
+    free(origin);
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------------------- */
+
+static void draw(insitu_session *session, const input *in, int cycle)
+{
+    forget_pictures();
+    insitu_status status = hand_over(session, &in->vertices);
+    if (!status) status = insitu_set_field(session, "m", &in->cells);
+    if (!status) status = insitu_step(session, cycle, 0);
+    if (status) fprintf(stderr, "rank %d: %s\n", own_rank, insitu_error(session));
+    everywhere(status == INSITU_OK);
+}
+
+/* What all pictures of an image have shown. */
+typedef struct tally {
+    int pictures, same, depths; /* depths: of pixels that differ */
+    double worst;
+    int64_t codes[2]; /* 8-bit channels of a PNG that are off by one, by more */
+} tally;
+
+static tally tallies[CASES];
+
+static int code_of(const float *rgba, int channel)
+{
+    const double alpha = (double)rgba[3], linear = alpha > 0 ? (double)rgba[channel] / alpha : 0;
+    if (channel == 3) return (int)(fmin(fmax(alpha, 0), 1) * 255 + 0.5);
+    const double l = fmin(fmax(linear, 0), 1);
+    return (int)(255 * (l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055) + 0.5);
+}
+
+static bool compare(const caught_picture *a, const caught_picture *b, const image_case *c, tally *t)
+{
+    double worst = 0;
+    int depths = 0;
+    for (int i = 0; i < 4 * PIXELS; i++) {
+        const int off = abs(code_of(a->rgba + i / 4 * 4, i % 4) - code_of(b->rgba + i / 4 * 4, i % 4));
+        if (off) t->codes[off > 1]++;
+        worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    }
+    for (int p = 0; p < PIXELS; p++) depths += memcmp(a->depth + p, b->depth + p, sizeof(float)) != 0;
+    const bool is_same = !depths && !memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof(float));
+    t->pictures++;
+    t->same += is_same;
+    t->depths += depths;
+    t->worst = test_worse(t->worst, worst);
+    return c->promise == COUNTED || is_same || (c->promise == TO_A_MILLIONTH && !depths && worst <= 1e-6);
+}
+
+static bool are_the_same(const caught_picture *whole, const char *what)
+{
+    bool are_well = caught_count == CASES;
+    for (int i = 0; i < caught_count; i++) {
+        const double before = tallies[i].worst;
+        tallies[i].worst = 0;
+        if (!compare(&whole[i], &caught[i], &cases[i], &tallies[i])) {
+            fprintf(stderr, "%d ranks, %s, %s: off by %g\n", rank_count, what, cases[i].name, tallies[i].worst);
+            are_well = false;
+        }
+        tallies[i].worst = test_worse(before, tallies[i].worst);
+    }
+    return are_well;
+}
+
+/* ---- the matrix ----------------------------------------------------------------------------------------------- */
+
+static bool is_due(int kind, int how, int layers)
+{
+    return test_is_whole() || (kind + how + layers) % 3 == 0;
+}
+
+static bool judge_mesh(insitu_session *session, int kind, int side, const test_mesh *mesh, const caught_picture *whole)
+{
+    static int cycle;
+    bool are_well = true;
+    int *owners = calloc((size_t)mesh->cell_count, sizeof *owners);
+    assert_non_null(owners);
+    for (int how = 0; how < DEALINGS; how++)
+        for (int layers = 0; layers <= MOST_LAYERS; layers++) {
+            char what[96];
+            input part;
+            if (!is_due(kind, how, layers)) continue;
+            snprintf(what, sizeof what, "%s, %s, %d ghost layers", test_mesh_kind_name(kinds[kind]), dealing_names[how],
+                     layers);
+            deal(mesh, how, side, owners);
+            take_part(mesh, owners, layers, &part);
+            draw(session, &part, cycle++);
+            if (own_rank == 0) are_well = are_the_same(whole, what) && are_well;
+            free_input(&part);
+        }
+    free(owners);
+    return are_well;
+}
+
+/* The pictures of the whole, on rank 0. */
+static void draw_whole(const char *scene, const test_mesh *mesh, caught_picture *out)
+{
+    static int cycle;
+    input whole;
+    take_whole(mesh, &whole);
+    insitu_session *session = open_session(MPI_COMM_SELF, scene);
+    forget_pictures();
+    assert_int_equal(hand_over(session, &whole.vertices), INSITU_OK);
+    assert_int_equal(insitu_set_field(session, "m", &whole.cells), INSITU_OK);
+    assert_int_equal(insitu_step(session, cycle++, 0), INSITU_OK);
+    assert_int_equal(caught_count, CASES);
+    memcpy(out, caught, CASES * sizeof *caught);
+    caught_count = 0;
+    insitu_destroy(&session);
+    free_input(&whole);
+}
+
+static void pictures_do_not_depend_on_the_partition(void **state)
+{
+    (void)state;
+    const int side = test_effort(3, 4);
+    const char *scene = scene_of_all();
+    insitu_session *session = open_session(MPI_COMM_WORLD, scene);
+    bool are_well = true;
+    for (int kind = 0; kind < KINDS; kind++) {
+        test_mesh mesh;
+        caught_picture whole[CASES] = {{0}};
+        test_mesh_lattice(kinds[kind], side, 0.2, test_wave, &mesh);
+        if (own_rank == 0) draw_whole(scene, &mesh, whole);
+        are_well = judge_mesh(session, kind, side, &mesh, whole) && are_well;
+        for (int i = 0; i < CASES && own_rank == 0; i++) free_caught(&whole[i]);
+        test_mesh_free(&mesh);
+    }
+    insitu_destroy(&session);
+    for (int i = 0; i < CASES && own_rank == 0; i++)
+        printf("%d ranks, %s: %d of %d to the bit, %d depths differ, off by %.2g; PNG channels off by one: %lld, by more: "
+               "%lld\n",
+               rank_count, cases[i].name, tallies[i].same, tallies[i].pictures, tallies[i].depths, tallies[i].worst,
+               (long long)tallies[i].codes[0], (long long)tallies[i].codes[1]);
+    everywhere(are_well);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_do_not_depend_on_the_partition)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
