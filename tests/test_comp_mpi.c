@@ -91,7 +91,7 @@ static void serial_merge(fragment *all, int64_t count, image *out)
 static image make_image(int width, int height)
 {
     const size_t pixels = (size_t)width * (size_t)height;
-    image made = {width, height, base_alloc(16 * pixels), base_alloc(4 * pixels), NULL};
+    image made = {width, height, base_alloc(16 * pixels), base_alloc(4 * pixels), NULL, false};
     assert_true(made.rgba && made.depth);
     memset(made.rgba, 0xa5, 16 * pixels);
     memset(made.depth, 0xa5, 4 * pixels);
@@ -354,7 +354,7 @@ static void pixel_beyond_the_image_is_an_error_on_all(void **context)
 static void image_without_pixels_is_refused(void **context)
 {
     (void)context;
-    image none = {0, 4, NULL, NULL, NULL}, huge = {65536, 65536, NULL, NULL, NULL};
+    image none = {.height = 4}, huge = {.width = 65536, .height = 65536};
     fragment_list items = {NULL, 0, 0};
     assert_everywhere(comp_composite(&group, &items, background, 0, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
     assert_everywhere(comp_composite(&group, &items, background, 0, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");

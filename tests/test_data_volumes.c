@@ -352,7 +352,7 @@ typedef struct picture {
 static void draw(subject *s, double max_error, picture *out)
 {
     base_error error = {0};
-    image target = {WIDTH, HEIGHT, out->rgba, out->depth, NULL};
+    image target = {WIDTH, HEIGHT, out->rgba, out->depth, NULL, false};
     memset(s->ghosts, 0, (size_t)s->rectangle_count);
     s->f.job.max_error = max_error;
     const session_frame_target where = {

@@ -58,7 +58,7 @@ static int64_t draw(render_fixture *f, MPI_Comm comm, bool is_alone, image *out)
 {
     session_frame frame;
     base_error error = {0};
-    *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL};
+    *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL, false};
     f->job.is_alone = is_alone;
     const session_frame_target target = {comm, {comm, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, MANY};
     if (session_draw_frame(&target, &f->job, out, &frame, &error)) fail_msg("session_draw_frame: %s", error.message);

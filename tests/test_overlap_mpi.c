@@ -140,7 +140,7 @@ static int64_t draw(const test_mesh *mesh, const drawing *d, MPI_Comm comm, bool
     staged s;
     session_frame frame;
     base_error error = {0};
-    *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL};
+    *out = (image){WIDTH, HEIGHT, malloc(4 * PIXELS * sizeof(float)), malloc(PIXELS * sizeof(float)), NULL, false};
     stage(&s, mesh, d);
     s.f.job.is_alone = is_alone;
     const session_frame_target target = {comm, {comm, {1, false}, COMP_AUTOMATIC, 0}, fixture_background, d->fragment_limit};

@@ -63,8 +63,8 @@ DEFINE_MAPPING(light, "lights", LIGHT_KEYS);
       .high = 4096)                                                                                                    \
     X(CYAML_FIELD_BOOL_PTR("reproducible", OPTIONAL, scene_file_sampling, reproducible),                               \
       .help = "Volumes are the same to the last bit on any number of ranks and any partition, where no cells overlap; " \
-              "else to 1e-6. A volume takes 1.1 to 1.6 times the time, and several fragments go from rank to rank in the "     \
-              "place of one; several volumes are drawn sample by sample or segment by segment, slower by far.",        \
+              "else to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank, and twice on eight, where five fragments go " \
+              "from rank to rank in the place of one; several volumes are drawn sample by sample or segment by segment, slower by far.",        \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_FLOAT_PTR("max_seconds", OPTIONAL, scene_file_sampling, max_seconds),                                \
       .help = "An image whose samples would take longer, as estimated before it is drawn, is refused with the "        \
