@@ -32,7 +32,7 @@ static int64_t allocation;
 
 static const char full_scene[] =
     "threads: 1\nimages:\n" IMAGE("a", "[24, 16]", SURFACES VOLUME("f"), "    sampling: {step_cells: 0.5, frames: 3}\n")
-        IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01}\n" DECORATIONS)
+        IMAGE("b", "[35, 21]", VOLUME("c"), "    sampling: {max_error: 0.01, reproducible: true}\n" DECORATIONS)
             IMAGE("d", "[16, 16]", VOLUME("f") VOLUME("c"), "    sampling: {max_error: 0.01}\n");
 
 static const char edited_scene[] = "threads: 1\nimages:\n" IMAGE(
