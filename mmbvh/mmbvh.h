@@ -49,7 +49,10 @@ typedef struct mmbvh {
     int64_t cell_count;
     double origin[3]; /* bounds are of (position - origin) * scale */
     double scale;
-    double built_cost;      /* SAH cost when built: refitted trees are compared with it */
+    double built_cost;      /* SAH cost when built */
+    double area;            /* over all nodes, half the box's surface times the tests in it (mmbvh_cost()), as refits of
+                               the bounds leave it */
+    double built_area;      /* as it was when built: what it has grown by beside the mesh's own surface is decay */
     int64_t unusable_cells; /* cells with the empty range in the nodes' own ranges */
 } mmbvh;
 
@@ -140,6 +143,19 @@ insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *f
 
 /* Moved vertices, same cells: the bounds again, ranges untouched. */
 insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options *options);
+
+/* The part of a tree that can be seen: nodes whose range meets one of the intervals. */
+typedef struct mmbvh_visible {
+    mmbvh_ranges ranges; /* of the values as they are */
+    int interval_count;
+    const mmbvh_interval *intervals;
+} mmbvh_visible;
+
+/* As above, but only nodes that one of so many parts shows need have their bounds again; *is_whole tells whether all
+ * have. Otherwise, the bounds hold what can be seen below a node and no more, until values, intervals or vertices
+ * change: a traversal that passes over nodes that show nothing finds what it would, mmbvh_check() would not agree. */
+insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh_visible *visible, int visible_count,
+                                         const mmbvh_options *options, bool *is_whole);
 
 /* Ranges of a further field over the same tree: pairs is node_count × 2 floats, the caller's memory, written.
  * unusable gets the number of cells with a value that is not finite. */

@@ -7,7 +7,10 @@
 /* Half the surface area of a node's box; 0 for an empty one. */
 double cost_half_area(const float lower[3], const float upper[3]);
 
-/* mmbvh_cost() by so many threads, to the same bits. */
-double cost_of_tree(const mmbvh *tree, int threads);
+/* The nodes' boxes by the tests in them, mmbvh.area, by so many threads, to the same bits. */
+double cost_area_of_tree(const mmbvh *tree, int threads);
+
+/* mmbvh_cost() of a tree of that area. */
+double cost_of_area(const mmbvh *tree, double area);
 
 #endif

@@ -12,9 +12,21 @@ int sweep_threads(const mmbvh_options *options)
     return options && options->threads > 0 ? options->threads : omp_get_max_threads();
 }
 
-static int64_t run_all(const sweep *s, int64_t first, int64_t end)
+bool sweep_shows(const sweep *s, int64_t node)
 {
-    const int64_t sum = s->run(s, first, end);
+    for (int v = 0; v < s->visible_count; v++) {
+        const mmbvh_visible *visible = &s->visible[v];
+        const float low = *(const float *)(const void *)(visible->ranges.low + node * visible->ranges.stride);
+        const float high = *(const float *)(const void *)(visible->ranges.high + node * visible->ranges.stride);
+        for (int i = 0; i < visible->interval_count; i++)
+            if (low <= visible->intervals[i].high && high >= visible->intervals[i].low) return true;
+    }
+    return s->visible_count == 0;
+}
+
+static sweep_sum run_all(const sweep *s, int64_t first, int64_t end)
+{
+    const sweep_sum sum = s->run(s, first, end);
     return s->then ? run_all(s->then, first, end) : sum;
 }
 
@@ -25,37 +37,44 @@ static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
 }
 
 /* A pair and all below it is nodes[first .. end): in runs that are not too long for the sweep. */
-static int64_t sweep_runs(const sweep *s, int64_t first, int64_t end)
+static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->run_max || end - first <= s->run_max) return run_all(s, first, end);
     const int64_t right_first = right_begin(s, first, end);
-    const int64_t right = sweep_runs(s, right_first, end), left = sweep_runs(s, first + 2, right_first);
-    return left + right + run_all(s, first, first + 2);
+    sweep_sum left = {0}, right = {0};
+    if (sweep_shows(s, first + 1)) right = sweep_runs(s, right_first, end);
+    if (sweep_shows(s, first)) left = sweep_runs(s, first + 2, right_first);
+    return sweep_add(sweep_add(left, right), run_all(s, first, first + 2));
 }
 
 /* As above, by tasks of at most RUN_MAX nodes, and then the pair itself. */
-static int64_t sweep_below(const sweep *s, int64_t first, int64_t end)
+static sweep_sum sweep_below(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= RUN_MAX) return sweep_runs(s, first, end);
     const int64_t right_first = right_begin(s, first, end);
-    int64_t left = 0, right = 0;
+    sweep_sum left = {0}, right = {0};
+    if (sweep_shows(s, first)) {
 #pragma omp task default(none) firstprivate(s, first, right_first) shared(left)
-    left = sweep_below(s, first + 2, right_first);
-    right = sweep_below(s, right_first, end);
+        left = sweep_below(s, first + 2, right_first);
+    }
+    if (sweep_shows(s, first + 1)) right = sweep_below(s, right_first, end);
 #pragma omp taskwait
-    return left + right + run_all(s, first, first + 2);
+    return sweep_add(sweep_add(left, right), run_all(s, first, first + 2));
 }
 
-int64_t sweep_tree(const sweep *s, int threads)
+sweep_sum sweep_tree(const sweep *s, int threads)
 {
-    int64_t unusable = 0;
+    sweep_sum sum = {0};
     const int64_t node_count = s->tree->node_count;
-    if (!node_count) return 0;
-    if (node_count <= RUN_MAX) return sweep_runs(s, 1, node_count) + run_all(s, 0, 1);
+    if (!node_count || !sweep_shows(s, 0)) return sum;
+    if (node_count <= RUN_MAX) {
+        sum = sweep_runs(s, 1, node_count);
+    } else {
 #pragma omp parallel num_threads(threads)
 #pragma omp single
-    unusable = sweep_below(s, 1, node_count);
-    return unusable + run_all(s, 0, 1);
+        sum = sweep_below(s, 1, node_count);
+    }
+    return sweep_add(sum, run_all(s, 0, 1)); /* the root after its children */
 }
 
 /* The sweep goes down through the cells too: fetch the connectivity that later leaves will ask for. What is longer than
@@ -113,8 +132,8 @@ MMBVH_INLINE range float_leaf(const sweep *s, int64_t ref, int64_t count, const 
     return (range){vec4_least(low) + 0.0f, vec4_most(high) + 0.0f}; /* zero positive, as round_down() has it */
 }
 
-MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, const fetch_shape shape,
-                                const bool wide_index, const bool wide_number, const bool is_packed)
+MMBVH_INLINE sweep_sum run_ranges(const sweep *s, int64_t first, int64_t end, const fetch_shape shape,
+                                  const bool wide_index, const bool wide_number, const bool is_packed)
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
@@ -126,11 +145,11 @@ MMBVH_INLINE int64_t run_ranges(const sweep *s, int64_t first, int64_t end, cons
         else
             set_range(s, i, float_leaf(s, ref, count, shape, wide_index, is_packed, &unusable));
     }
-    return unusable;
+    return (sweep_sum){.count = unusable};
 }
 
 #define DEFINE_RUN(name, shape, wide_index, wide_number)                                                               \
-    static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
+    static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
         return fetch_is_packed(&s->values) ? run_ranges(s, first, end, shape, wide_index, wide_number, true)           \
                                            : run_ranges(s, first, end, shape, wide_index, wide_number, false);         \
@@ -153,23 +172,23 @@ static range any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusa
     return rounded_range(&leaf);
 }
 
-static int64_t run_any(const sweep *s, int64_t first, int64_t end)
+static sweep_sum run_any(const sweep *s, int64_t first, int64_t end)
 {
     int64_t unusable = 0;
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
         set_range(s, i, count ? any_leaf(s, ref, count, &unusable) : children_range(s, ref));
     }
-    return unusable;
+    return (sweep_sum){.count = unusable};
 }
 
-static int64_t run_infinite(const sweep *s, int64_t first, int64_t end)
+static sweep_sum run_infinite(const sweep *s, int64_t first, int64_t end)
 {
     for (int64_t i = first; i < end; i++) set_range(s, i, (range){-INFINITY, INFINITY});
-    return 0;
+    return (sweep_sum){0};
 }
 
-static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
+static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
 {
     for (int64_t i = end - 1; i >= first; i--) {
         const int64_t count = mmbvh_node_count(s->tree, i), ref = mmbvh_node_ref(s->tree, i);
@@ -180,7 +199,7 @@ static int64_t run_box_ranges(const sweep *s, int64_t first, int64_t end)
         }
         set_range(s, i, r);
     }
-    return 0;
+    return (sweep_sum){0};
 }
 
 /* Can the instances read it? */
@@ -223,7 +242,7 @@ insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *f
     if (!tree || !g) return INSITU_ERROR_ARGUMENT;
     if (!tree->node_count) return INSITU_OK;
     const sweep s = sweep_of_ranges(tree, g, field, mmbvh_own_ranges(tree));
-    tree->unusable_cells = sweep_tree(&s, sweep_threads(options));
+    tree->unusable_cells = sweep_tree(&s, sweep_threads(options)).count;
     return INSITU_OK;
 }
 
@@ -234,7 +253,7 @@ insitu_status mmbvh_compute_ranges(const mmbvh *tree, const grid *g, const grid_
     int64_t count = 0;
     if (tree->node_count) {
         const sweep s = sweep_of_ranges(tree, g, field, mmbvh_pair_ranges(pairs));
-        count = sweep_tree(&s, sweep_threads(options));
+        count = sweep_tree(&s, sweep_threads(options)).count;
     }
     if (unusable) *unusable = count;
     return INSITU_OK;

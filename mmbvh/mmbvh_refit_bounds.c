@@ -2,32 +2,39 @@
 #include <string.h>
 
 #include "mmbvh_bounds.h"
-#include "mmbvh_store.h"
+#include "mmbvh_cost.h"
+#include "mmbvh_measure.h"
 
-enum { PREFETCH_CELLS = 48 };
+enum {
+    PREFETCH_CELLS = 48,
+    VISIBLE_NODES = 16 /* of a run where not all are swept: those below that show nothing are too few to be sought */
+};
 
-static bool store_cells(const mmbvh *tree, const bounds_source *source, int64_t index, int64_t first, int count)
+static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *misfits, double *grown)
 {
+    const mmbvh *tree = s->tree;
     fetch_box box;
     float lower[3], upper[3];
     fetch_box_empty(&box);
     const uint32_t *cells = tree->cells + first; /* the sweep goes down through them */
-    source->unite(source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
+    s->source->unite(s->source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
     fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
-    return store_box(tree, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0});
+    store_measured(s, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0}, misfits,
+                   grown);
 }
 
-/* Returns how many nodes' boxes the tree's grid does not hold. */
-static int64_t run_bounds(const sweep *s, int64_t first, int64_t end)
+static sweep_sum run_bounds(const sweep *s, int64_t first, int64_t end)
 {
-    const mmbvh *tree = s->tree;
-    int64_t misfits = 0;
+    sweep_sum sum = {0};
     for (int64_t i = end - 1; i >= first; i--) {
-        const int count = mmbvh_node_count(tree, i);
-        const int64_t ref = mmbvh_node_ref(tree, i);
-        misfits += !(count ? store_cells(tree, s->source, i, ref, count) : store_union(tree, i, ref));
+        const int count = mmbvh_node_count(s->tree, i);
+        const int64_t ref = mmbvh_node_ref(s->tree, i);
+        if (count)
+            store_cells(s, i, ref, count, &sum.count, &sum.grown);
+        else
+            store_children(s, i, ref, &sum.count, &sum.grown);
     }
-    return misfits;
+    return sum;
 }
 
 sweep sweep_of_bounds(const mmbvh *tree, const bounds_source *source)
@@ -59,9 +66,9 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
 }
 
 /* The mesh has left the tree's grid: a new one, with room for as much again of the same. */
-static insitu_status sweep_new_grid(mmbvh *tree, const sweep *s, int threads)
+static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, int threads)
 {
-    const fetch_box exact = exact_bounds(tree, s->source, threads);
+    const fetch_box exact = exact_bounds(tree, source, threads);
     float lower[3], upper[3];
     fetch_box_round(&exact, tree->origin, tree->scale, lower, upper);
     for (int axis = 0; axis < 3; axis++) {
@@ -71,7 +78,10 @@ static insitu_status sweep_new_grid(mmbvh *tree, const sweep *s, int threads)
         upper[axis] += margin;
     }
     tree->grid = store_grid(lower, upper);
-    return sweep_tree(s, threads) ? INSITU_ERROR_MESH : INSITU_OK;
+    const sweep all = sweep_of_bounds(tree, source); /* boxes of the last grid are none of this one's */
+    if (sweep_tree(&all, threads).count) return INSITU_ERROR_MESH;
+    tree->area = cost_area_of_tree(tree, threads);
+    return INSITU_OK;
 }
 
 /* A mesh that has shrunk leaves most of its grid's steps unused. */
@@ -87,13 +97,35 @@ static bool is_grid_wasted(const mmbvh *tree)
     return false;
 }
 
-insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options *options)
+static sweep sweep_of_visible_bounds(const mmbvh *tree, const bounds_source *source, const mmbvh_visible *visible,
+                                     int visible_count)
 {
-    if (!tree || !g) return INSITU_ERROR_ARGUMENT;
+    sweep s = sweep_of_bounds(tree, source);
+    s.is_measured = true;
+    s.visible = visible;
+    s.visible_count = visible_count;
+    if (visible_count) s.run_max = VISIBLE_NODES;
+    return s;
+}
+
+insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh_visible *visible, int visible_count,
+                                         const mmbvh_options *options, bool *is_whole)
+{
+    if (!tree || !g || !is_whole) return INSITU_ERROR_ARGUMENT;
+    *is_whole = visible_count == 0;
+    if (!tree->node_count) return INSITU_OK;
     const int threads = sweep_threads(options);
     const bounds_source source = bounds_source_make(g, NULL, NULL, g->cell_count, tree->origin, tree->scale);
-    const sweep s = sweep_of_bounds(tree, &source);
-    const int64_t misfits = sweep_tree(&s, threads);
-    if (!tree->compact || !tree->node_count) return INSITU_OK;
-    return misfits || is_grid_wasted(tree) ? sweep_new_grid(tree, &s, threads) : INSITU_OK;
+    const sweep s = sweep_of_visible_bounds(tree, &source, visible, visible_count);
+    const sweep_sum sum = sweep_tree(&s, threads);
+    tree->area += sum.grown;
+    if (!tree->compact || !(sum.count || (*is_whole && is_grid_wasted(tree)))) return INSITU_OK;
+    *is_whole = true;
+    return sweep_new_grid(tree, &source, threads);
+}
+
+insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options *options)
+{
+    bool is_whole;
+    return mmbvh_refit_visible_bounds(tree, g, NULL, 0, options, &is_whole);
 }

@@ -2,7 +2,7 @@
  * is then one vector, its value in the lane that the coordinates leave, and each cell is read once, in one run with its
  * neighbours' whatever the leaves' sizes. */
 #include "mmbvh_bounds.h"
-#include "mmbvh_store.h"
+#include "mmbvh_measure.h"
 
 enum {
     PART_NODES = 256,                                   /* whose cells are read at a time */
@@ -16,6 +16,7 @@ typedef struct part {
     int64_t first;
     int64_t unusable; /* cells */
     int64_t misfits;  /* boxes that the tree's grid does not hold */
+    double grown;     /* sweep_sum */
     fetch_span spans[PART_CELLS];
 } part;
 
@@ -88,7 +89,7 @@ MMBVH_INLINE void store_leaf(const sweep *s, part *p, int64_t node, int64_t firs
     for (int i = 1; i < count; i++) fetch_span_unite(&all, &spans[i]);
     vec4 lower, upper;
     fetch_span_round(&all, tree->origin, tree->scale, &lower, &upper);
-    p->misfits += !store_box(tree, node, lower, upper);
+    store_measured(s, node, lower, upper, &p->misfits, &p->grown);
     if (how.with_values)
         set_range(s, node, (range){all.lower[3] + 0.0f, all.upper[3] + 0.0f}); /* zero positive, as bounds have it */
 }
@@ -101,7 +102,7 @@ MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t en
         if (count) {
             store_leaf(s, p, i, ref, count, how);
         } else {
-            p->misfits += !store_union(s->tree, i, ref);
+            store_children(s, i, ref, &p->misfits, &p->grown);
             if (how.with_values) set_range(s, i, children_range(s, ref));
         }
     }
@@ -131,21 +132,22 @@ static int64_t end_of_cells(const mmbvh *tree, int64_t node)
     return mmbvh_node_ref(tree, node) + mmbvh_node_count(tree, node);
 }
 
-MMBVH_INLINE int64_t run(const sweep *s, int64_t first, int64_t end, const reading how)
+MMBVH_INLINE sweep_sum run(const sweep *s, int64_t first, int64_t end, const reading how)
 {
     part p;
     p.unusable = p.misfits = 0;
+    p.grown = 0;
     if (end - first <= 2) {
         run_nodes(s, &p, first, end, how);
     } else {
         read_cells(s, &p, first_cell(s->tree, first), end_of_cells(s->tree, first + 1), how);
         store_nodes(s, &p, first, end, how);
     }
-    return how.with_values ? p.unusable : p.misfits;
+    return (sweep_sum){how.with_values ? p.unusable : p.misfits, p.grown};
 }
 
 #define DEFINE_RUN_BOUNDS(name, shape, wide_index, wide_number)                                                        \
-    static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
+    static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
         return fetch_is_packed(&s->source->g->coordinates[0])                                                          \
                    ? run(s, first, end, (reading){shape, wide_index, false, true})                                     \
@@ -154,7 +156,7 @@ MMBVH_INLINE int64_t run(const sweep *s, int64_t first, int64_t end, const readi
 FETCH_FLOAT_INSTANCES(DEFINE_RUN_BOUNDS, run_bounds)
 
 #define DEFINE_RUN_BOTH(name, shape, wide_index, wide_number)                                                          \
-    static int64_t name(const sweep *s, int64_t first, int64_t end)                                                    \
+    static sweep_sum name(const sweep *s, int64_t first, int64_t end)                                                  \
     {                                                                                                                  \
         return fetch_is_packed(&s->source->g->coordinates[0]) && fetch_is_packed(&s->values)                           \
                    ? run(s, first, end, (reading){shape, wide_index, true, true})                                      \

@@ -72,12 +72,4 @@ static inline void store_decode(const mmbvh *tree, int64_t index, vec4 *lower, v
     *upper = (vec4){node->upper[0], node->upper[1], node->upper[2], 0};
 }
 
-/* The box that holds a pair's, as store_box(). */
-static inline bool store_union(const mmbvh *tree, int64_t index, int64_t pair)
-{
-    vec4 lower[2], upper[2];
-    for (int side = 0; side < 2; side++) store_decode(tree, pair + side, &lower[side], &upper[side]);
-    return store_box(tree, index, vec4_min(lower[0], lower[1]), vec4_max(upper[0], upper[1]));
-}
-
 #endif

@@ -12,9 +12,13 @@
 typedef struct sweep sweep;
 typedef struct bounds_source bounds_source;
 
-/* Nodes end - 1 down to first: the root, a pair, or a pair and all below it; nothing where there are none. Returns how
- * many cells were found unusable, or boxes that the nodes do not hold. */
-typedef int64_t (*sweep_run)(const sweep *s, int64_t first, int64_t end);
+typedef struct sweep_sum {
+    int64_t count; /* cells that were found unusable, or boxes that the nodes do not hold */
+    double grown;  /* what was added to the tree's area (mmbvh.area); of sweeps of bounds that measure it */
+} sweep_sum;
+
+/* Nodes end - 1 down to first: the root, a pair, or a pair and all below it; nothing where there are none. */
+typedef sweep_sum (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {
     sweep_run run;
@@ -26,11 +30,15 @@ struct sweep {
     const bounds_source *source; /* of a sweep of bounds */
     mmbvh_ranges ranges;         /* written by a sweep of ranges */
     int64_t run_max;             /* nodes of a run; 0: as many as are worth a task */
+    bool is_measured;            /* of a sweep of bounds: the nodes have bounds already, and grown is wanted */
+    int visible_count;           /* 0: all nodes are swept; else those below nodes that one of these shows */
+    const mmbvh_visible *visible;
     const sweep *then; /* NULL, or one of the same tree that runs where this one has just been, in the cache */
 };
 
-/* Over the whole tree; returns the sum of what the runs returned, of the last sweep's if one follows the other. */
-int64_t sweep_tree(const sweep *s, int threads);
+/* Over the whole tree; returns the sum of what the runs returned, of the last sweep's if one follows the other: to the
+ * same bits for any number of threads. */
+sweep_sum sweep_tree(const sweep *s, int threads);
 
 /* The sweep that writes ranges of field (NULL: infinite ones). */
 sweep sweep_of_ranges(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_ranges ranges);
@@ -53,6 +61,14 @@ sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep 
 
 /* Returns how many threads options ask for. */
 int sweep_threads(const mmbvh_options *options);
+
+static inline sweep_sum sweep_add(sweep_sum a, sweep_sum b)
+{
+    return (sweep_sum){a.count + b.count, a.grown + b.grown};
+}
+
+/* Tells whether the sweep goes below the node. */
+bool sweep_shows(const sweep *s, int64_t node);
 
 /* ---- the ranges that sweeps write ------------------------------------------------------------------------------- */
 

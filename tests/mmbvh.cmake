@@ -23,3 +23,8 @@ add_executable(test_mmbvh_select test_mmbvh_select.c)
 target_link_libraries(test_mmbvh_select PRIVATE test_meshes insitu_internal insitu_flags PkgConfig::CMOCKA)
 add_test(NAME mmbvh_select COMMAND test_mmbvh_select)
 set_tests_properties(mmbvh_select PROPERTIES TIMEOUT 60 PROCESSORS 2)
+
+add_executable(test_mmbvh_visible test_mmbvh_visible.c)
+target_link_libraries(test_mmbvh_visible PRIVATE insitu_internal insitu_flags PkgConfig::CMOCKA)
+add_test(NAME mmbvh_visible COMMAND test_mmbvh_visible)
+set_tests_properties(mmbvh_visible PROPERTIES TIMEOUT 60 PROCESSORS 2)

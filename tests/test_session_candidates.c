@@ -17,6 +17,7 @@
 #define STEPPED "      - volume: {field: f, range: [-1, 1], opacity: [[0.6, 0], [0.6, 0.5], [0.7, 0.5], [0.7, 0]]}\n"
 #define OWN_RANGE "      - volume: {field: f, opacity: [[0, 0.5], [1, 0.5]]}\n"
 #define PEAKS "      - isosurface: {field: f, values: [1.2]}\n"
+#define TROUGHS "      - isosurface: {field: f, values: [-1]}\n"
 #define DIFFERENCES "      - isosurface: {field: f, values: [0.1], normals: differences}\n"
 
 static const test_mesh_kind kinds[] = {TEST_TETS, TEST_MIXED, TEST_POLYHEDRA};
@@ -216,12 +217,99 @@ static void trees_of_one_step_are_built_fast(void **context)
     input_free(&in);
 }
 
+static void sway(session_input *in, double by)
+{
+    for (int64_t i = 0; i < in->part.vertex_count; i++) {
+        double *p = in->part.coordinates + 3 * i;
+        p[0] += by * sin(3 * p[1]);
+        p[2] += by * sin(2 * p[0] + 1);
+    }
+}
+
+/* Cells stand and vertices move, with values or without; then values alone are new, which may show what bounds were not
+ * refitted for. Beside it a session that builds its trees anew. Images a and b are due in turns from cycle 2 on. */
+static void compare_moving(const char *images, test_mesh_kind kind)
+{
+    static const struct {
+        double sway, change;
+        bool is_partial; /* bounds, if refits leave something out */
+    } steps[] = {{0, 0, false},      {0.05, 0, true}, {0.05, 0, true}, {0.05, 0.1, true},
+                 {0, 0.3, false},    {0, 0.2, false}, {-0.1, 0, true}, {0, 0, true},
+                 {0.05, -0.2, true}, {0, 0, true},    {0, 0.1, false}};
+    const char *scene = write_scene(images);
+    insitu_session *anew = open_tree(SCENE_TREE_FULL, scene), *kept = open_tree(SCENE_TREE_FULL, scene);
+    session_input in;
+    bool was_partial = false;
+    input_create(&in, kind, 9, TEST_BLOCK, own_rank, rank_count);
+    for (int i = 0; i < (int)(sizeof steps / sizeof steps[0]); i++) {
+        sway(&in, steps[i].sway);
+        change_values(&in, steps[i].change);
+        in.mesh.changed = INSITU_CHANGED_ALL;
+        in.field.changed = INSITU_CHANGED_VALUES;
+        everywhere(hand_over(anew, &in) == INSITU_OK);
+        if (i) in.mesh.changed = steps[i].sway != 0 ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
+        everywhere(hand_over(kept, &in) == INSITU_OK);
+        step_both(anew, kept, 3 * i + 2 + i % 2);
+        was_partial = was_partial || kept->meshes.items[0]->are_bounds_partial;
+        everywhere(!kept->meshes.items[0]->are_bounds_partial || steps[i].is_partial);
+    }
+    everywhere(was_partial || in.part.cell_count < 1000);
+    insitu_destroy(&anew);
+    insitu_destroy(&kept);
+    input_free(&in);
+}
+
+static void moving_vertices_are_drawn_as_by_new_trees(void **context)
+{
+    static const char *const images[] = {IMAGE(SURFACE), IMAGE(SURFACES VOLUME), IMAGE(STEPPED)};
+    (void)context;
+    for (size_t i = 0; i < sizeof images / sizeof images[0]; i++)
+        for (size_t kind = 0; kind < sizeof kinds / sizeof kinds[0]; kind++) compare_moving(images[i], kinds[kind]);
+}
+
+/* What can be seen differs from step to step though values stand: two images, of other layers of the mesh, are due in
+ * turns. The mesh drifts upward, and the camera looks where b's surface is at cycle 9: as bounds were when a alone was
+ * drawn, it would be below the picture. */
+#define CAMERA "    camera: {position: [2.3, 0, 0.56], focal: [0, 0, 0.56], up: [0, 0, 1], angle: 1.7}\n"
+static void bounds_of_one_image_do_not_serve_another(void **context)
+{
+    const char *scene = write_scene("images:\n"
+                                    "  - name: a\n    size: [40, 30]\n    every: 2\n    layers:\n" TROUGHS
+                                    "    outputs:\n      - path: a_{cycle}.exr\n"
+                                    "  - name: b\n    size: [40, 30]\n    every: 3\n" CAMERA "    layers:\n" PEAKS
+                                    "    background: [0, 0, 0, 1]\n    outputs:\n      - path: b_{cycle}.exr\n");
+    static const int cycles[] = {2, 3, 4, 9};
+    session_input in;
+    (void)context;
+    insitu_session *anew = open_tree(SCENE_TREE_FULL, scene), *kept = open_tree(SCENE_TREE_FULL, scene);
+    input_create(&in, TEST_TETS, 13, TEST_BLOCK, own_rank, rank_count);
+    for (int64_t i = 0; i < in.part.vertex_count; i++) in.part.values[i] = 4 * in.part.coordinates[3 * i + 2];
+    for (int i = 0; i < 4; i++) {
+        const bool is_moved = i == 1 || i == 2;
+        for (int64_t v = 0; v < in.part.vertex_count; v++) in.part.coordinates[3 * v + 2] += is_moved ? 0.12 : 0;
+        in.mesh.changed = INSITU_CHANGED_ALL;
+        everywhere(hand_over(anew, &in) == INSITU_OK);
+        if (i) in.mesh.changed = is_moved ? INSITU_CHANGED_GEOMETRY : INSITU_CHANGED_NOTHING;
+        everywhere(hand_over(kept, &in) == INSITU_OK);
+        if (i != 1)
+            step_both(anew, kept, cycles[i]);
+        else
+            everywhere(insitu_step(anew, 3, 0) == INSITU_OK && insitu_step(kept, 3, 0) == INSITU_OK);
+    }
+    insitu_destroy(&anew);
+    insitu_destroy(&kept);
+    input_free(&in);
+}
+
 static int run(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(partial_trees_draw_what_full_ones_do), cmocka_unit_test(trees_of_one_step_are_built_fast),
-        cmocka_unit_test(partial_trees_are_of_the_cells_that_show), cmocka_unit_test(standing_cells_get_a_full_tree),
-        cmocka_unit_test(full_trees_are_built_where_most_cells_show)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(partial_trees_draw_what_full_ones_do),
+                                       cmocka_unit_test(trees_of_one_step_are_built_fast),
+                                       cmocka_unit_test(partial_trees_are_of_the_cells_that_show),
+                                       cmocka_unit_test(standing_cells_get_a_full_tree),
+                                       cmocka_unit_test(full_trees_are_built_where_most_cells_show),
+                                       cmocka_unit_test(moving_vertices_are_drawn_as_by_new_trees),
+                                       cmocka_unit_test(bounds_of_one_image_do_not_serve_another)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

@@ -254,8 +254,9 @@ static insitu_status make(build *b, base_error *error)
 static void finish(build *b, const sweep *ranges, mmbvh *out)
 {
     const sweep s = sweep_of_both(&b->tree, &b->source, ranges);
-    b->tree.unusable_cells = sweep_tree(&s, b->threads);
-    b->tree.built_cost = cost_of_tree(&b->tree, b->threads);
+    b->tree.unusable_cells = sweep_tree(&s, b->threads).count;
+    b->tree.area = b->tree.built_area = cost_area_of_tree(&b->tree, b->threads);
+    b->tree.built_cost = cost_of_area(&b->tree, b->tree.area);
     *out = b->tree;
 }
 

@@ -155,6 +155,8 @@ typedef struct session_mesh {
     bool has_tree;
     mmbvh tree;
     bool is_partial; /* the tree is over the candidates of candidates_key, while nothing changes */
+    bool are_bounds_partial; /* the full tree's bounds are of the candidates, likewise */
+    double built_surface;    /* half the surface of the mesh's bounds when the tree was built */
     uint64_t candidates_key;
     int full_tree_steps; /* that the full tree of now, or the last one, has served; 0: there was none yet */
     double rent; /* seconds spent on partial trees since the cells last changed, beyond what a full one would cost */

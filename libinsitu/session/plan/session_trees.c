@@ -1,6 +1,7 @@
 /* What is up to date is left alone: new cells build a tree, moved vertices refit its bounds (until its cost has grown
  * by half, then it is built again), new values refit ranges. The first scalar that a mesh is drawn with has the nodes'
- * own ranges, further ones have pairs beside the tree.
+ * own ranges, further ones have pairs beside the tree. Where values tell what can be seen, vertices that move in every
+ * step have bounds refitted where something can be seen, and no further: a fifth of the nodes for an isosurface.
  *
  * A full tree is dear to build and cheap to keep; a partial one, over the cells that the images can show, is cheap to
  * build where they show little, but ends with the values. Which serves better depends on how long the cells will stay,
@@ -73,6 +74,14 @@ static session_scalar *choose_own_scalar(session_mesh *mesh)
     return own;
 }
 
+/* Half the surface of the mesh's bounds. */
+static double surface_of(const session_mesh *mesh)
+{
+    double d[3];
+    for (int axis = 0; axis < 3; axis++) d[axis] = mesh->upper[axis] - mesh->lower[axis];
+    return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+}
+
 /* A tree over a selection serves one step as a rule too, but is of few cells: its builder hardly matters. */
 static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_selection *selection)
 {
@@ -99,24 +108,13 @@ static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const 
     mesh->is_geometry_stale = false;
     own->are_ranges_stale = false;
     mesh->is_partial = selection != NULL;
+    mesh->are_bounds_partial = false;
+    mesh->built_surface = surface_of(mesh);
     if (!selection) mesh->full_tree_steps = 0;
     if (!selection) own->unusable = mesh->tree.unusable_cells;
     const double seconds = MPI_Wtime() - start;
     measure(&u->trees->rates.build, seconds, mesh->tree.cell_count);
     u->report->build_ms += 1e3 * seconds;
-    return INSITU_OK;
-}
-
-static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, base_error *error)
-{
-    const double start = MPI_Wtime();
-    const mmbvh_options options = options_of(u);
-    const insitu_status status = mmbvh_refit_bounds(&mesh->tree, &mesh->cells, &options);
-    if (status) return base_fail(error, status, "mesh \"%s\": its tree could not be refitted", mesh->name);
-    u->trees->is_parent_stale = true;
-    u->report->refit_ms += 1e3 * (MPI_Wtime() - start);
-    if (mmbvh_cost(&mesh->tree, &options) > worst_cost * mesh->tree.built_cost) return build_tree(u, mesh, NULL, error);
-    mesh->is_geometry_stale = false;
     return INSITU_OK;
 }
 
@@ -155,6 +153,66 @@ static insitu_status refit_ranges(const tree_update *u, session_mesh *mesh, base
         u->report->refit_ms += 1e3 * seconds;
     }
     return INSITU_OK;
+}
+
+/* ---- bounds ---------------------------------------------------------------------------------------------------- */
+
+static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, base_error *error)
+{
+    const insitu_status status = build_tree(u, mesh, NULL, error);
+    return status ? status : refit_ranges(u, mesh, error);
+}
+
+/* Has the tree grown so much beside its mesh that it is better built anew? Boxes that stand as they were before the
+ * vertices moved count as they are. */
+static bool is_decayed(const session_mesh *mesh)
+{
+    const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * surface_of(mesh);
+    return tree > worst_cost * built;
+}
+
+/* The part of the tree that the scalars show. Where bounds are refitted there, the ranges are up to date. */
+static int list_visible(const session_mesh *mesh, mmbvh_visible *out)
+{
+    int count = 0;
+    for (int i = 0; i < mesh->scalar_count; i++) {
+        const session_scalar *s = &mesh->scalars[i];
+        if (!s->wants_ranges) continue;
+        out[count++] = (mmbvh_visible){session_scalar_ranges(mesh, s), s->interval_count, s->intervals};
+    }
+    return count;
+}
+
+/* All of them, or what can be seen. */
+static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool all, base_error *error)
+{
+    const double start = MPI_Wtime();
+    const mmbvh_options options = options_of(u);
+    bool is_whole;
+    mmbvh_visible *visible = base_alloc((size_t)(mesh->scalar_count + 1) * sizeof *visible);
+    if (!visible) return session_no_memory(error, (mesh->scalar_count + 1) * (int64_t)sizeof *visible, "visible nodes");
+    const int count = all ? 0 : list_visible(mesh, visible);
+    const insitu_status status =
+        mmbvh_refit_visible_bounds(&mesh->tree, &mesh->cells, visible, count, &options, &is_whole);
+    base_free(visible);
+    if (status) return base_fail(error, status, "mesh \"%s\": its tree could not be refitted", mesh->name);
+    u->trees->is_parent_stale = true;
+    u->report->refit_ms += 1e3 * (MPI_Wtime() - start);
+    mesh->is_geometry_stale = false;
+    mesh->are_bounds_partial = !is_whole;
+    return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
+}
+
+/* Bounds of what could be seen do for as long as that can be seen and nothing else. Where the vertices have come to
+ * rest meanwhile, all are refitted, once. */
+static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
+{
+    uint64_t key;
+    const bool is_told = session_find_candidates(mesh, &key);
+    const bool is_other = !is_told || are_values_new || key != mesh->candidates_key;
+    if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
+    mesh->candidates_key = key;
+    return refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
 }
 
 /* ---- the parent tree ----------------------------------------------------------------------------------------- */
@@ -234,13 +292,18 @@ static bool wants_partial(const tree_update *u, const session_mesh *mesh, uint64
     return !has_full_tree(mesh) && mesh->rent < full_price(u, mesh);
 }
 
+static bool has_new_values(const session_mesh *mesh)
+{
+    for (int i = 0; i < mesh->scalar_count; i++)
+        if (mesh->scalars[i].wants_ranges && mesh->scalars[i].are_ranges_stale) return true;
+    return false;
+}
+
 /* Nothing has changed that decides on the cells that show. */
 static bool is_partial_fresh(const session_mesh *mesh, uint64_t key)
 {
     if (!mesh->has_tree || !mesh->is_partial || mesh->is_topology_stale || mesh->is_geometry_stale) return false;
-    for (int i = 0; i < mesh->scalar_count; i++)
-        if (mesh->scalars[i].wants_ranges && mesh->scalars[i].are_ranges_stale) return false;
-    return mesh->candidates_key == key;
+    return !has_new_values(mesh) && mesh->candidates_key == key;
 }
 
 /* key: of the candidates. */
@@ -267,18 +330,24 @@ static insitu_status update_partial(const tree_update *u, session_mesh *mesh, ui
 
 static insitu_status update_full(const tree_update *u, session_mesh *mesh, base_error *error)
 {
-    if (!has_full_tree(mesh)) return build_tree(u, mesh, NULL, error);
-    return mesh->is_geometry_stale ? refit_bounds(u, mesh, error) : INSITU_OK;
+    if (!has_full_tree(mesh)) return build_and_refit(u, mesh, error);
+    const bool are_values_new = has_new_values(mesh);
+    const insitu_status status = refit_ranges(u, mesh, error);
+    return status ? status : update_bounds(u, mesh, are_values_new, error);
 }
 
 static insitu_status update_tree(const tree_update *u, session_mesh *mesh, base_error *error)
 {
     uint64_t key;
-    const insitu_status status =
-        wants_partial(u, mesh, &key) ? update_partial(u, mesh, key, error) : update_full(u, mesh, error);
-    if (status) return status;
-    if (!mesh->is_partial) mesh->full_tree_steps++;
-    return refit_ranges(u, mesh, error);
+    insitu_status status;
+    if (wants_partial(u, mesh, &key)) {
+        status = update_partial(u, mesh, key, error);
+        if (!status) status = refit_ranges(u, mesh, error);
+    } else {
+        status = update_full(u, mesh, error);
+    }
+    if (!status && !mesh->is_partial) mesh->full_tree_steps++;
+    return status;
 }
 
 static insitu_status update_all(const tree_update *u, const session_meshes *meshes, base_error *error)

@@ -1,0 +1,253 @@
+/* Bounds refitted where something can be seen: against brute force over the cells that can, and against a whole refit.
+ */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "mmbvh.h"
+#include "test_mmbvh_grids.h"
+#include "test_mmbvh_nodes.h"
+
+static const double no_shift[3] = {0, 0, 0};
+
+/* Two parts: of the nodes' own ranges, and of a second field's pairs. */
+typedef struct subject {
+    lattice l;
+    mmbvh tree;
+    float *pairs;
+    mmbvh_interval intervals[3];
+    mmbvh_visible visible[2];
+} subject;
+
+/* Inward, so that the compact layout's grid still holds the mesh. */
+static void move(lattice *l, double by)
+{
+    for (int64_t v = 0; v < l->g.vertex_count; v++) {
+        double p[3];
+        grid_vertex(&l->g, v, p);
+        put_number(&l->g.coordinates[0], v, 9 + (1 - by) * (p[0] - 9));
+        put_number(&l->g.coordinates[2], v, 9 + (1 - 2 * by) * (p[2] - 9));
+    }
+}
+
+static subject make(lattice_kind kind, lattice_layout layout, mmbvh_layout nodes)
+{
+    subject s = {.l = make_lattice(18, kind, layout)};
+    const mmbvh_options options = {.threads = 2, .layout = nodes};
+    assert_int_equal(mmbvh_build(&s.l.g, &s.l.field, no_shift, 1, &options, &s.tree, NULL), INSITU_OK);
+    s.pairs = malloc((size_t)s.tree.node_count * 2 * sizeof *s.pairs);
+    for (int64_t i = 0; i < s.tree.node_count; i++) {
+        const node_view node = view_node(&s.tree, i);
+        s.pairs[2 * i] = node.lower[2]; /* as a field that is the height would have it */
+        s.pairs[2 * i + 1] = node.upper[2];
+    }
+    return s;
+}
+
+static void choose_visible(subject *s)
+{
+    const node_view root = view_node(&s->tree, 0);
+    const float low = root.range_low, high = root.range_high, floor = s->pairs[0];
+    s->intervals[0] = (mmbvh_interval){low + 0.3f * (high - low), low + 0.3f * (high - low)};
+    s->intervals[1] = (mmbvh_interval){low + 0.9f * (high - low), high};
+    s->intervals[2] = (mmbvh_interval){floor, floor + 0.2f};
+    s->visible[0] = (mmbvh_visible){mmbvh_own_ranges(&s->tree), 2, s->intervals};
+    s->visible[1] = (mmbvh_visible){mmbvh_pair_ranges(s->pairs), 1, s->intervals + 2};
+}
+
+static void free_subject(subject *s)
+{
+    mmbvh_free(&s->tree);
+    free(s->pairs);
+    free_lattice(&s->l);
+}
+
+static bool shows(const subject *s, int64_t i)
+{
+    const node_view node = view_node(&s->tree, i);
+    bool does = s->pairs[2 * i] <= s->intervals[2].high && s->pairs[2 * i + 1] >= s->intervals[2].low;
+    for (int k = 0; k < 2; k++)
+        does = does || (node.range_low <= s->intervals[k].high && node.range_high >= s->intervals[k].low);
+    return does;
+}
+
+static void grow(node_view *to, const node_view *by)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        to->lower[axis] = fminf(to->lower[axis], by->lower[axis]);
+        to->upper[axis] = fmaxf(to->upper[axis], by->upper[axis]);
+    }
+}
+
+/* The box of a leaf's cells as they lie now. */
+static node_view box_by_hand(const subject *s, int64_t leaf)
+{
+    node_view box = view_node(&s->tree, leaf);
+    for (int axis = 0; axis < 3; axis++) box.lower[axis] = INFINITY, box.upper[axis] = -INFINITY;
+    for (int k = 0; k < box.count; k++) {
+        int64_t vertices[GRID_MAX_CELL_VERTICES];
+        const int count = grid_cell_vertices(&s->l.g, s->tree.cells[box.ref + k], vertices);
+        for (int i = 0; i < count; i++) {
+            double p[3];
+            grid_vertex(&s->l.g, vertices[i], p);
+            const node_view point = {.lower = {(float)p[0], (float)p[1], (float)p[2]},
+                                     .upper = {(float)p[0], (float)p[1], (float)p[2]}};
+            grow(&box, &point);
+        }
+    }
+    return box;
+}
+
+/* Goes down as a traversal does; returns what the nodes below hold that can be seen. slack: of float32 and of the
+ * compact layout's steps, as a share of the mesh's size: 2 steps of its 2^20 and 1/256 of the box, which is as wide as
+ * a leaf. */
+static node_view assert_holds(const subject *s, int64_t i, int64_t *visited)
+{
+    ++*visited;
+    const node_view node = view_node(&s->tree, i);
+    node_view held = box_by_hand(s, i);
+    if (!node.count) {
+        for (int axis = 0; axis < 3; axis++) held.lower[axis] = INFINITY, held.upper[axis] = -INFINITY;
+        for (int side = 0; side < 2; side++) {
+            if (!shows(s, node.ref + side)) continue;
+            const node_view below = assert_holds(s, node.ref + side, visited);
+            grow(&held, &below);
+        }
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        if (!(held.lower[axis] <= held.upper[axis])) continue;
+        assert_true(node.lower[axis] <= held.lower[axis] && held.upper[axis] <= node.upper[axis]);
+    }
+    return held;
+}
+
+/* By the fixed order of sums any number of threads makes the same tree, and measures the same. */
+static void assert_same_by_one_thread(const subject *s, const mmbvh *before)
+{
+    mmbvh again = *before;
+    bool is_whole;
+    assert_int_equal(
+        mmbvh_refit_visible_bounds(&again, &s->l.g, s->visible, 2, &(mmbvh_options){.threads = 1}, &is_whole),
+        INSITU_OK);
+    assert_same_nodes(&again, &s->tree);
+    assert_true(again.area == s->tree.area);
+}
+
+static mmbvh copy_of(const mmbvh *tree)
+{
+    mmbvh copy = *tree;
+    const size_t bytes = (size_t)tree->node_count * node_size(tree);
+    void *nodes = malloc(bytes);
+    memcpy(nodes, node_bytes(tree), bytes);
+    if (tree->compact)
+        copy.compact = nodes;
+    else
+        copy.nodes = nodes;
+    return copy;
+}
+
+static void free_copy(mmbvh *copy)
+{
+    free(copy->compact);
+    free(copy->nodes);
+}
+
+static int64_t count_stale(const subject *s, const mmbvh *before, const mmbvh *whole)
+{
+    int64_t stale = 0;
+    for (int64_t i = 0; i < s->tree.node_count; i++) {
+        const node_view was = view_node(before, i), is = view_node(&s->tree, i), all = view_node(whole, i);
+        stale += memcmp(&was.lower, &is.lower, 12) == 0 && memcmp(&is.lower, &all.lower, 12) != 0;
+    }
+    return stale;
+}
+
+static void check(subject *s)
+{
+    mmbvh before = copy_of(&s->tree), whole = copy_of(&s->tree), other = copy_of(&s->tree);
+    bool is_whole = true;
+    int64_t visited = 0;
+    move(&s->l, 0.02);
+    choose_visible(s);
+    /* Views are of each tree's own ranges, which are the same. */
+    assert_int_equal(
+        mmbvh_refit_visible_bounds(&s->tree, &s->l.g, s->visible, 2, &(mmbvh_options){.threads = 2}, &is_whole),
+        INSITU_OK);
+    assert_false(is_whole);
+    assert_holds(s, 0, &visited);
+    assert_same_by_one_thread(s, &other);
+    assert_int_equal(mmbvh_refit_bounds(&whole, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
+    assert_true(visited > 100 && visited < s->tree.node_count);
+    assert_true(count_stale(s, &before, &whole) > s->tree.node_count / 10);
+    /* What was passed over is caught up with by a whole refit. */
+    assert_int_equal(mmbvh_refit_bounds(&s->tree, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
+    assert_same_nodes(&s->tree, &whole);
+    assert_int_equal(mmbvh_check(&s->tree, &s->l.g, &s->l.field, NULL, NULL), INSITU_OK);
+    free_copy(&before);
+    free_copy(&whole);
+    free_copy(&other);
+}
+
+static void bounds_hold_what_shows_and_stay_where_nothing_does(void **state)
+{
+    (void)state;
+    for (int kind = LATTICE_TETS; kind <= LATTICE_MIXED; kind++)
+        for (int bits = 0; bits < 8; bits++) {
+            const lattice_layout layout = {bits & 1, bits >> 1 & 1, bits >> 1 & 1, bits >> 1 & 1};
+            subject s = make((lattice_kind)kind, layout, bits >> 2 ? MMBVH_REFERENCE : MMBVH_COMPACT);
+            check(&s);
+            free_subject(&s);
+        }
+}
+
+/* The area that refits carry on is what a pass over all nodes finds: n sums of positive doubles and as many of their
+ * differences are off by 2 n 2^-53 of the largest sum at most. */
+static void area_is_carried_on(void **state)
+{
+    (void)state;
+    subject s = make(LATTICE_HEXES, (lattice_layout){0}, MMBVH_COMPACT);
+    for (int i = 0; i < 5; i++) {
+        bool is_whole;
+        move(&s.l, 0.02);
+        choose_visible(&s);
+        mmbvh_refit_visible_bounds(&s.tree, &s.l.g, s.visible, i % 2 ? 0 : 2, NULL, &is_whole);
+        assert_true(is_whole == (i % 2 == 1));
+        if (!is_whole) continue;
+        const node_view root = view_node(&s.tree, 0);
+        const double x = (double)root.upper[0] - (double)root.lower[0],
+                     y = (double)root.upper[1] - (double)root.lower[1],
+                     z = (double)root.upper[2] - (double)root.lower[2];
+        const double cost = 1 + s.tree.area / (x * y + y * z + z * x);
+        assert_true(fabs(cost / mmbvh_cost(&s.tree, NULL) - 1) <= 5 * 2 * (double)s.tree.node_count * 0x1p-53);
+    }
+    free_subject(&s);
+}
+
+static void nothing_visible_is_no_work(void **state)
+{
+    (void)state;
+    subject s = make(LATTICE_TETS, (lattice_layout){0}, MMBVH_COMPACT);
+    mmbvh before = copy_of(&s.tree);
+    bool is_whole;
+    choose_visible(&s);
+    s.visible[0].interval_count = 0;
+    move(&s.l, 0.02);
+    assert_int_equal(mmbvh_refit_visible_bounds(&s.tree, &s.l.g, s.visible, 1, NULL, &is_whole), INSITU_OK);
+    assert_same_nodes(&s.tree, &before);
+    assert_int_equal(mmbvh_refit_visible_bounds(&s.tree, &s.l.g, s.visible, 1, NULL, NULL), INSITU_ERROR_ARGUMENT);
+    free_copy(&before);
+    free_subject(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(bounds_hold_what_shows_and_stay_where_nothing_does),
+        cmocka_unit_test(area_is_carried_on),
+        cmocka_unit_test(nothing_visible_is_no_work),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
