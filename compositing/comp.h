@@ -45,8 +45,9 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
 
 /* Tells whether a pixel's fragments, as comp_merge_pixel() left them, overlap in front of what is opaque. Two volume
  * fragments that hold the same t overlap. A volume's fragment that holds a surface's t overlaps that surface, unless it
- * begins there. A fragment that ends before it begins, being shorter than rounding, overlaps nothing, nor do samples on
- * their own (fragment.h) of two volumes, or of two cells at their common face. Local. */
+ * begins there, within the rounding of a face's depth. A fragment that ends before it begins, being shorter than
+ * rounding, overlaps nothing, nor do samples on their own (fragment.h) of two volumes, or of two cells at their common
+ * face. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {

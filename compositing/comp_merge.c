@@ -115,16 +115,32 @@ static bool are_of_overlaps(const fragment *samples, int64_t count)
     return false;
 }
 
+/* Two cells find the depth of a face that both have, or that one has and small ones of the other lie on, within so much
+ * of it, or of 1: KERNEL_FACE_ERROR in render/volume/kernel_samples.h. */
+static const float face_error = 4e-6f;
+
+/* Goes on to the first that begins within rounding of t, or behind; returns how far the volumes in front of it reach. */
+static float reach_before(const fragment *sorted, int64_t *next, float t, float reach)
+{
+    const float begin = t - face_error * fmaxf(fabsf(t), 1);
+    for (; sorted[*next].t_in < begin; ++*next)
+        if (sorted[*next].kind < FRAGMENT_SURFACE) reach = fmaxf(reach, sorted[*next].t_out);
+    return reach;
+}
+
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count)
 {
-    float reach = -INFINITY;
+    float reach = -INFINITY, before = -INFINITY;
+    int64_t next = 0;
     for (int64_t i = 0, n; i < count; i += n) {
         const fragment *f = &sorted[i];
         n = samples_at(f, count - i);
-        if (f->t_in <= reach && f->t_out >= f->t_in) return true;
+        const bool is_surface = f->kind >= FRAGMENT_SURFACE;
+        if (is_surface) before = reach_before(sorted, &next, f->t_in, before);
+        if (f->t_in <= (is_surface ? before : reach) && f->t_out >= f->t_in) return true;
         if (f->transmittance == 0) return false;
         if (n > 1 && are_of_overlaps(f, n)) return true;
-        if (f->kind < FRAGMENT_SURFACE && f->t_out > reach) reach = f->t_out;
+        if (!is_surface && f->t_out > reach) reach = f->t_out;
     }
     return false;
 }
