@@ -148,6 +148,8 @@ typedef struct render_surface_layer {
                          of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
     uint32_t clips;       /* of the job's, a bit each */
+    float contact; /* of rays from hits (render_light.h): what is nearer to the hit than so many sizes of the cell that
+                      it is met in hides nothing; 0: all of it does */
 } render_surface_layer;
 
 typedef struct render_volume_layer {
@@ -214,14 +216,23 @@ typedef struct render_clip {
     double centre[3], radius;   /* sphere */
 } render_clip;
 
-/* The paint of hits: their lit colours, or numbers of the pixel's nearest surface as red, green and blue. With numbers,
- * surfaces must be opaque and there must be no volumes. */
+/* The paint of hits: their colours, lit or not; or numbers of the pixel's nearest surface as red, green and blue. With
+ * numbers, surfaces must be opaque and there must be no volumes. */
 typedef enum render_paint {
     RENDER_LIGHT,
+    RENDER_UNLIT, /* colours before light falls on them; in the place of t_out and transmittance the normal, from which
+                     render_light_fragment() makes those of RENDER_LIGHT (render_light.h) */
     RENDER_NORMALS, /* the unit normal that light falls on, towards the eye, in world axes */
     RENDER_VALUES   /* the value that colours the surface, or where none does its isovalue; and the number of the
                        isovalue among the job's */
 } render_paint;
+
+/* What light has to come by, of hits painted RENDER_UNLIT: render_light.h. */
+typedef struct render_occlusion {
+    uint32_t lights; /* those that cast shadows, a bit each */
+    int samples;     /* of ambient occlusion: rays of a hit, 0 .. 64; 0: none */
+    double radius;   /* of ambient occlusion: what is farther away does not count; scene units, > 0 */
+} render_occlusion;
 
 typedef struct render_job {
     render_camera camera;
@@ -232,6 +243,7 @@ typedef struct render_job {
     const render_surface_layer *surfaces;
     int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
     render_paint paint;
+    const render_occlusion *occlusion; /* of RENDER_UNLIT */
     render_traversal traversal;
     render_active_cells *active; /* NULL: nothing is kept */
     const render_volume_layer *volumes;

@@ -12,6 +12,7 @@
 #include "kernel_finder.h"
 #include "kernel_hexes.h"
 #include "kernel_hits.h"
+#include "kernel_occlusion.h"
 #include "kernel_packet.h"
 #include "kernel_packet_surface.h"
 #include "kernel_prefetch.h"
@@ -360,4 +361,5 @@ static void begin(kernel_thread *thread)
     m->segments.depth = 0;
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH, sizeof(kernel_memory), begin, trace_tile, find_candidates, write_active};
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH,      sizeof(kernel_memory), begin,         trace_tile,
+                                   find_candidates, write_active,          kernel_occlude};

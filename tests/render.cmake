@@ -38,6 +38,11 @@ insitu_render_program(test_slice)
 add_test(NAME slice COMMAND test_slice)
 set_tests_properties(slice PROPERTIES TIMEOUT 120)
 
+insitu_render_program(test_light)
+target_sources(test_light PRIVATE test_mesh_honeycomb.c)
+add_test(NAME light COMMAND test_light)
+set_tests_properties(light PROPERTIES TIMEOUT 180)
+
 insitu_render_program(test_render_invariance)
 add_test(NAME render_invariance COMMAND test_render_invariance)
 set_tests_properties(render_invariance PROPERTIES TIMEOUT 120)

@@ -37,6 +37,9 @@ insitu_add_mpi_test(session_collectives test_session_collectives 2 5 ARGS ${CMAK
 insitu_session_program(test_session_smooth)
 insitu_add_mpi_test(session_smooth test_session_smooth 1 2 3 7 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+insitu_session_program(test_session_light)
+insitu_add_mpi_test(session_light test_session_light 1 2 3 7 TIMEOUT 240 ARGS ${CMAKE_CURRENT_BINARY_DIR})
+
 insitu_session_program(test_session_outline)
 insitu_add_mpi_test(session_outline test_session_outline 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 

@@ -44,7 +44,7 @@ static const char edited_scene[] = "threads: 1\nimages:\n" IMAGE(
     "          range: run, below: [0, 0, 0]}}\n"
     "      - volume: {field: f, discrete: 3, range: {percentile: [10, 90]}, scale: symlog,\n"
     "          threshold: 0.1, above: [1, 1, 1]}\n",
-    "    sampling: {step_cells: 0.5}\n") "  - name: k\n    size: [8, 8]\n    camera: {orbit: {views: 2}}\n"
+    "    sampling: {step_cells: 0.5}\n    shadows: true\n    ambient_occlusion: {samples: 2}\n") "  - name: k\n    size: [8, 8]\n    camera: {orbit: {views: 2}}\n"
                                          "    sweep: {isovalues: true, fields: [f, c]}\n    layers:\n"
                                          "      - isosurface: {field: f, values: [0.2, 0.5], colour_by: {field: f}}\n"
                                          "    outputs: [{cinema: memory.cdb}]\n";

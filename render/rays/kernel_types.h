@@ -290,6 +290,8 @@ typedef struct kernel_thread {
     double (*now)(void);
 } kernel_thread;
 
+struct kernel_bundle;
+
 /* The functions that one instruction set's object exports. */
 typedef struct kernel_table {
     int width;
@@ -303,6 +305,8 @@ typedef struct kernel_table {
     /* Keep what the surface's isovalues cross of the subtree, whether or not it shows in the picture. */
     void (*write_active)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                          kernel_active_writer *writer, bool (*grow)(kernel_active_writer *writer));
+    /* Closes the bundle's rays that meet an opaque surface. */
+    void (*occlude)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle);
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

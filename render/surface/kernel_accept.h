@@ -307,36 +307,59 @@ SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
     g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
 }
 
-/* RENDER_NORMALS, as kernel_shade() finds it; and of RENDER_VALUES the isovalue's number. */
-static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
-                                                                 vf colour[3])
+/* The unit normal that kernel_shade() lights by, in world axes. */
+SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3], vf out[3])
 {
     const render_camera *c = &p->frame->job->camera;
     vm flat;
     vf unit[3], inverse = kernel_inverse_length(normal, &flat), facing = vf_set(0);
-    if (p->frame->job->paint == RENDER_VALUES) {
-        colour[1] = kind - (float)FRAGMENT_SURFACE;
-        colour[2] = vf_set(0);
-        return;
-    }
     for (int a = 0; a < 3; a++) {
         unit[a] = vf_select(flat, p->view[a], normal[a] * inverse);
         facing += unit[a] * p->view[a];
     }
     const vf turn = vf_select(vf_lt(facing, vf_set(0)), vf_set(-1), vf_set(1));
     for (int a = 0; a < 3; a++)
-        colour[a] =
-            turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
+        out[a] = turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
+}
+
+/* RENDER_NORMALS, as kernel_shade() finds it; and of RENDER_VALUES the isovalue's number. */
+static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
+                                                                 vf colour[3])
+{
+    if (p->frame->job->paint == RENDER_VALUES) {
+        colour[1] = kind - (float)FRAGMENT_SURFACE;
+        colour[2] = vf_set(0);
+        return;
+    }
+    kernel_world_normal(p, normal, colour);
+}
+
+/* RENDER_UNLIT: the normal on the octahedron |x| + |y| + |z| = 1, whose lower half is folded over the upper one (Meyer
+ * et al. 2010). */
+static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p, const vf normal[3],
+                                                         kernel_fragments *f)
+{
+    vf n[3];
+    kernel_world_normal(p, normal, n);
+    const vf one = vf_set(1), zero = vf_set(0), inverse = 1.0f / ((vf_abs(n[0]) + vf_abs(n[1])) + vf_abs(n[2]));
+    const vf u = n[0] * inverse, v = n[1] * inverse;
+    const vf side_u = vf_select(vf_lt(u, zero), -one, one), side_v = vf_select(vf_lt(v, zero), -one, one);
+    const vm is_below = vf_lt(n[2], zero);
+    f->t_out = vf_select(is_below, (1.0f - vf_abs(v)) * side_u, u);
+    f->transmittance = vf_select(is_below, (1.0f - vf_abs(u)) * side_v, v);
 }
 
 /* Hits as the job paints them; kind: that of the fragments. */
-SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind, vf colour[3])
+SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
+                              kernel_fragments *f)
 {
     kernel_packet_view(p);
     if (__builtin_expect(p->frame->job->paint == RENDER_LIGHT, 1))
-        kernel_shade(p, &s->layer->material, normal, colour);
+        kernel_shade(p, &s->layer->material, normal, f->colour);
+    else if (p->frame->job->paint == RENDER_UNLIT)
+        kernel_paint_unlit(p, normal, f);
     else
-        kernel_paint_numbers(p, normal, kind, colour);
+        kernel_paint_numbers(p, normal, kind, f->colour);
 }
 
 /* A hit in the place of the nearest, as folded cells may have them: compositing decides, by bits that do not know which
@@ -345,7 +368,7 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
     kernel_fragments lit = {t, t, {colour[0], colour[1], colour[2]}, vf_set(0), vf_set(0)};
-    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), lit.colour);
+    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), &lit);
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
@@ -406,10 +429,10 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
     }
     if (by_differences) kernel_differences(p, s, value, hit, t, reach, normal);
     if (by_vertices) kernel_vertex_normals(p, s, hit, t, &cells, normal);
-    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), colour);
     const float opacity = s->layer->opacity;
-    const kernel_fragments f = {
-        t, t, {colour[0] * opacity, colour[1] * opacity, colour[2] * opacity}, vf_set(1 - opacity), vf_set(0)};
+    kernel_fragments f = {t, t, {colour[0], colour[1], colour[2]}, vf_set(1 - opacity), vf_set(0)};
+    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), &f);
+    for (int a = 0; a < 3; a++) f.colour[a] *= opacity;
     kernel_emit(p, hit, s->first_kind + (uint32_t)value, &f);
     kernel_hits_cut(hits, hit, t);
 }

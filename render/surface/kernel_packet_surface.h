@@ -103,7 +103,7 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, write, p->t_far, &hits->cells, hits->normal);
         kernel_fragments lit = {
             p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
-        kernel_paint(p, s, hits->normal, hits->kind, lit.colour);
+        kernel_paint(p, s, hits->normal, hits->kind, &lit);
         kernel_emit(p, write, 0, &lit);
     }
 }

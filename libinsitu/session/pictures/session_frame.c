@@ -13,6 +13,7 @@
 #include "comp_tiles.h"
 #include "memory.h"
 #include "session_agree.h"
+#include "session_light.h"
 
 static void add_to_frame(session_frame *frame, const render_statistics *rendered, int64_t fragments,
                          double composite_ms)
@@ -40,21 +41,36 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     return session_agree(t->comm, error);
 }
 
+static insitu_status light(const session_frame_target *t, const render_job *job, fragment_list *fragments,
+                           render_statistics *rendered, base_error *error)
+{
+    const insitu_status status = session_agree(t->comm, error);
+    if (status) return status;
+    return session_light_fragments(t->comm, job, fragments, &rendered->surface_ms, error);
+}
+
 static insitu_status draw(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
                           comp_overlaps *overlaps, base_error *error)
 {
     int ranks = 1;
     MPI_Comm_size(t->comm, &ranks);
-    if (ranks == 1 && job->part_count > 0 && !out->deep) return draw_alone(t, job, out, frame, overlaps, error);
+    const bool is_unlit = job->paint == RENDER_UNLIT;
+    if (ranks == 1 && job->part_count > 0 && !out->deep && !is_unlit)
+        return draw_alone(t, job, out, frame, overlaps, error);
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
     if (job->part_count > 0 && !error->status) render_frame(job, &fragments, &rendered, error);
+    insitu_status status = is_unlit ? light(t, job, &fragments, &rendered, error) : INSITU_OK;
+    if (status) {
+        base_free(fragments.items);
+        return status;
+    }
     const double start = MPI_Wtime();
-    insitu_status status = overlaps ? comp_composite_overlaps(&t->compositing, &fragments, t->background, job->threads, out,
-                                                              overlaps, &composited, error)
-                                    : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited,
-                                                     error);
+    status = overlaps ? comp_composite_overlaps(&t->compositing, &fragments, t->background, job->threads, out, overlaps,
+                                                &composited, error)
+                      : comp_composite(&t->compositing, &fragments, t->background, job->threads, out, &composited,
+                                       error);
     if (status && !composited.has_failed) *error = (base_error){0};
     if (status) status = session_agree(t->comm, error); /* compositing agrees on the status alone */
     base_free(fragments.items);

@@ -103,6 +103,7 @@ static insitu_status convert_image(const scene_document *d, const char *path, co
         status = scene_bad(d, path, "every_time", "given beside every, expected one of the two");
     if (status == INSITU_OK) status = scene_convert_camera(d, camera_path, in->camera, &out->camera);
     if (status == INSITU_OK) status = scene_convert_lights(d, path, in, out);
+    if (status == INSITU_OK) status = scene_convert_shadows(d, path, in, out);
     if (status == INSITU_OK) status = scene_convert_clip(d, clip_path, in->clip, out, &out->clips_of_all);
     if (status == INSITU_OK) status = scene_convert_layers(d, path, in, out);
     if (status == INSITU_OK) status = scene_apply_sweep(d, path, in, out);

@@ -328,6 +328,9 @@ typedef struct scene_image {
     uint32_t clips_of_all; /* a set of them, a bit each: those that cut all layers */
     int light_count;       /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
+    uint32_t shadows;        /* lights that cast some, a bit each; 0 by default */
+    int occlusion_samples;   /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
+    double occlusion_radius; /* how far they go, in scene units; 0: by the bounds */
     scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */
     double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */
     double step;                  /* sample distance in scene units; 0: by step_cells */

@@ -55,6 +55,9 @@ insitu_status scene_convert_camera(const scene_document *d, const char *path, co
                                    scene_camera *out);
 insitu_status scene_convert_lights(const scene_document *d, const char *path, const scene_file_image *in,
                                    scene_image *out);
+/* After the lights. */
+insitu_status scene_convert_shadows(const scene_document *d, const char *path, const scene_file_image *in,
+                                    scene_image *out);
 insitu_status scene_convert_layers(const scene_document *d, const char *path, const scene_file_image *in,
                                    scene_image *out);
 insitu_status scene_convert_outputs(const scene_document *d, const char *path, const scene_file_image *in,

@@ -25,8 +25,19 @@ static const cyaml_strval_t frame_words[] = {{"camera", SCENE_FRAME_CAMERA}, {"w
     X(CHOICE("in", scene_file_light, in, frame_words),                                                                 \
       .help = "The axes of `direction`: `camera` (right, up, towards the eye), so that the light goes with the eye, "  \
               "or `world`.",                                                                                           \
-      .by_default = "`camera`")
+      .by_default = "`camera`")                                                                                        \
+    X(CYAML_FIELD_BOOL_PTR("shadows", OPTIONAL, scene_file_light, shadows),                                            \
+      .help = "With the image's `shadows`: whether this light casts any.", .by_default = "`true`")
 DEFINE_MAPPING(light, "lights", LIGHT_KEYS);
+#define OCCLUSION_KEYS(X)                                                                                              \
+    X(CYAML_FIELD_INT_PTR("samples", OPTIONAL, scene_file_occlusion, samples),                                         \
+      .help = "Rays a pixel and frame. Their error falls as the number; with `antialias` each frame has others.",      \
+      .by_default = "`16`", .low = 1, .high = 64)                                                                      \
+    X(CYAML_FIELD_FLOAT_PTR("radius", OPTIONAL, scene_file_occlusion, radius),                                         \
+      .help = "What is farther away darkens nothing, in scene units.",                                                 \
+      .by_default = "a tenth of the diagonal of the bounds of all the data", .low = 0, .is_low_excluded = true,        \
+      .high = 1e30)
+DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
 #define SAMPLING_KEYS(X)                                                                                               \
     X(CHOICE("method", scene_file_sampling, method, method_words),                                                     \
       .help = "How a volume is integrated: by samples, or by segments, exact on tetrahedra and of second order in "    \
@@ -258,6 +269,20 @@ static const cyaml_schema_value_t statistics = {
       .help = "The lights, in place of the default ones.",                                                             \
       .by_default = "a light from the upper right of the camera and a weaker one from its left",                       \
       .child = &light_mapping)                                                                                         \
+    X(CYAML_FIELD_BOOL_PTR("shadows", OPTIONAL, scene_file_image, shadows),                                            \
+      .help =                                                                                                          \
+          "The opaque isosurfaces, slices and surfaces of all ranks cast shadows on each other, and on transparent "   \
+          "ones, by every light that does not say otherwise; the same picture on any partition. Transparent layers "   \
+          "and volumes cast none, and volumes have none. A layer that takes no light, as slices by default, has "      \
+          "none either. What `clip` cuts away casts none, what the camera does not see casts its own.",                \
+      .by_default = "`false`")                                                                                         \
+    X(CYAML_FIELD_MAPPING_PTR("ambient_occlusion", OPTIONAL, scene_file_image, ambient_occlusion, occlusion_fields),   \
+      .help =                                                                                                          \
+          "Darken what is hidden from the open sky, in corners and hollows: of rays from each hit into the "           \
+          "hemisphere above it, spread as the cosine, the share that meets no opaque layer within `radius` is a "      \
+          "factor on its ambient and diffuse light. By what casts shadows, on what has them. Which rays a pixel has "  \
+          "does not change from step to step. `{}` takes all its defaults.",                                           \
+      .by_default = "none", .child = &occlusion_mapping)                                                               \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, scene_file_image, clip, scene_clip_fields),                            \
       .help = "Cuts parts of all layers away, exactly, and through the cells; volumes keep their `max_error`.",        \
       .by_default = "nothing is cut away", .child = &scene_clip_mapping)                                               \

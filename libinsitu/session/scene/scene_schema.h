@@ -49,7 +49,13 @@ typedef struct scene_file_light {
     double *colour;    /* 3 */
     double *intensity;
     scene_frame *in;
+    bool *shadows;
 } scene_file_light;
+
+typedef struct scene_file_occlusion {
+    int *samples;
+    double *radius;
+} scene_file_occlusion;
 
 typedef struct scene_file_material {
     double *ambient, *diffuse, *specular, *shininess;
@@ -228,6 +234,8 @@ typedef struct scene_file_image {
     int background_count;
     scene_file_light *lights;
     int lights_count;
+    bool *shadows;
+    scene_file_occlusion *ambient_occlusion;
     scene_file_clip *clip;
     scene_file_layer *layers;
     int layers_count;

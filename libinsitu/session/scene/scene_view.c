@@ -134,3 +134,23 @@ insitu_status scene_convert_lights(const scene_document *d, const char *path, co
     }
     return status;
 }
+
+insitu_status scene_convert_shadows(const scene_document *d, const char *path, const scene_file_image *in,
+                                    scene_image *out)
+{
+    const scene_file_occlusion *occlusion = in->ambient_occlusion;
+    const bool has_shadows = in->shadows && *in->shadows;
+    out->shadows = has_shadows ? (1U << out->light_count) - 1 : 0;
+    for (int i = 0; i < in->lights_count; i++) {
+        if (in->lights[i].shadows && !in->shadows) {
+            char light_path[SCENE_PATH_SIZE];
+            snprintf(light_path, sizeof light_path, "%s.lights[%d]", path, i);
+            return scene_bad(d, light_path, "shadows", "given without shadows of the image, expected beside these");
+        }
+        if (in->lights[i].shadows && !*in->lights[i].shadows) out->shadows &= ~(1U << i);
+    }
+    if (!occlusion) return INSITU_OK;
+    out->occlusion_samples = occlusion->samples ? *occlusion->samples : 16;
+    out->occlusion_radius = occlusion->radius ? *occlusion->radius : 0;
+    return INSITU_OK;
+}

@@ -161,6 +161,11 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
     return INSITU_OK; /* what lacks memory is for the next agreement */
 }
 
+/* An isosurface is as rough as its cells are: within one it bends, between two it breaks, and in polyhedra it juts out
+ * at faces. What is nearer than this share of a cell is taken for the surface itself, which does not hide its own
+ * light. */
+#define CONTACT 0.5F
+
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
                                   session_layers *layers, base_error *error)
 {
@@ -177,6 +182,7 @@ static insitu_status fill_surface(const session_layer_basis *basis, const scene_
                                   .root = RENDER_ROBUST,
                                   .normal = normals[layer->normals],
                                   .difference = layer->difference,
+                                  .contact = CONTACT,
                                   .clips = layer->clips};
     if (layer->normals == SCENE_VERTEX) out->gradients = place_gradients(basis->meshes, layers, index, &layer->field);
     if (!layer->has_colour_by) return INSITU_OK;

@@ -43,6 +43,13 @@ static double sample_distance(const session_extent *extent, const scene_image *i
     return cell > 0 ? image->step_cells * cell : 1;
 }
 
+/* A tenth of the diagonal; where that is 0, so that nothing is near, any. */
+static double occlusion_radius(const session_extent *extent, const scene_image *image)
+{
+    if (image->occlusion_radius > 0) return image->occlusion_radius;
+    return extent->half_diagonal > 0 ? extent->half_diagonal / 5 : 1;
+}
+
 static void fill_view(const session_space *space, const scene_image *image, session_view *out)
 {
     out->space.scale = space->scale;
@@ -51,6 +58,9 @@ static void fill_view(const session_space *space, const scene_image *image, sess
         out->space.depth_origin += (space->origin[axis] - out->camera.eye[axis]) * out->camera.forward[axis];
     }
     make_lights(image, &out->camera, out->lights);
+    out->occlusion.lights = image->shadows;
+    out->occlusion.samples = image->occlusion_samples;
+    out->occlusion.radius = occlusion_radius(&space->extent, image);
     out->step = sample_distance(&space->extent, image);
 }
 

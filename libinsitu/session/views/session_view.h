@@ -12,6 +12,7 @@ typedef struct session_view {
     render_camera camera;
     render_space space;
     render_light lights[RENDER_MAX_LIGHTS];
+    render_occlusion occlusion; /* no lights and no samples: the image asks for none */
     double step;
     int clip_count;
     render_clip clips[RENDER_MAX_CLIPS];

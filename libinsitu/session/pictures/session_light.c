@@ -1,0 +1,272 @@
+/* The rank that has a hit lights it: it asks its own cells first, which most of what is near a hit lies in, and then
+ * the ranks whose cells' box an open ray meets. What is sent is the hit with the rays that are asked for, 32 bytes for
+ * all of them: the other rank finds the rays as this one does. 8 or 16 bytes come back, a bit a ray.
+ *
+ *     rank A   hits -> own cells -> open rays -> mail to ranks by their boxes ......... and of all answers -> colours
+ *     rank B                                     mail -> own cells -> open rays -> mail
+ *
+ * Hits go in rounds, so that no rank holds more than a round's mail. */
+#include "session_light.h"
+
+#include <string.h>
+
+#include "memory.h"
+#include "render_light.h"
+#include "session_agree.h"
+#include "session_exchange.h"
+
+enum { ROUND_HITS = 1 << 16 };
+
+/* A question: a hit, and which of its rays are asked for; its answer. */
+enum { ASKED_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8, ANSWER_WORDS = sizeof(render_hit_rays) / 8 };
+
+/* The hits of a round. */
+typedef struct lighting {
+    MPI_Comm comm;
+    const render_job *job;
+    int rank, ranks;
+    render_box *boxes; /* of all ranks */
+    int64_t count;
+    int64_t *fragments; /* whose hits these are */
+    render_hit *hits;
+    render_hit_rays *rays;
+} lighting;
+
+/* Questions in the order in which they are found, and to whom; and in the order of ranks. */
+typedef struct questions {
+    int64_t count, capacity;
+    int *ranks;
+    int64_t *hits;
+    render_hit_rays *rays;
+    int64_t at; /* the hit that is looked at */
+    const lighting *of;
+    int64_t *starts; /* ranks + 1 */
+    int64_t *sent;   /* questions by their place in the mail */
+    bool has_no_memory;
+} questions;
+
+static insitu_status share_boxes(lighting *l, base_error *error)
+{
+    const render_box own = render_occluder_box(l->job);
+    const int doubles = sizeof own / sizeof(double);
+    l->boxes = base_alloc((size_t)l->ranks * sizeof *l->boxes);
+    if (!l->boxes) session_no_memory(error, (int64_t)((size_t)l->ranks * sizeof *l->boxes), "the ranks' bounds");
+    const insitu_status status = session_agree(l->comm, error);
+    if (status) return status;
+    return session_mpi(error, MPI_Allgather(&own, doubles, MPI_DOUBLE, l->boxes, doubles, MPI_DOUBLE, l->comm),
+                       "MPI_Allgather");
+}
+
+/* ---- questions ----------------------------------------------------------------------------------------------- */
+
+static bool grow_questions(questions *q)
+{
+    const int64_t capacity = q->capacity + q->capacity / 2 + 1024;
+    int *ranks = base_realloc(q->ranks, (size_t)capacity * sizeof *ranks);
+    if (ranks) q->ranks = ranks;
+    int64_t *hits = base_realloc(q->hits, (size_t)capacity * sizeof *hits);
+    if (hits) q->hits = hits;
+    render_hit_rays *rays = base_realloc(q->rays, (size_t)capacity * sizeof *rays);
+    if (rays) q->rays = rays;
+    if (!ranks || !hits || !rays) return false;
+    q->capacity = capacity;
+    return true;
+}
+
+static void free_questions(questions *q)
+{
+    base_free(q->ranks);
+    base_free(q->hits);
+    base_free(q->rays);
+    base_free(q->starts);
+    base_free(q->sent);
+}
+
+static void take_question(void *state, int rank, const render_hit_rays *rays)
+{
+    questions *q = state;
+    if (rank == q->of->rank || q->has_no_memory) return;
+    if (q->count == q->capacity && !grow_questions(q)) {
+        q->has_no_memory = true;
+        return;
+    }
+    q->ranks[q->count] = rank;
+    q->hits[q->count] = q->at;
+    q->rays[q->count++] = *rays;
+}
+
+/* By rank. */
+static bool sort_questions(questions *q)
+{
+    const int ranks = q->of->ranks;
+    q->starts = base_calloc((size_t)ranks + 1, sizeof *q->starts);
+    q->sent = base_alloc((size_t)q->count * sizeof *q->sent);
+    if (!q->starts || !q->sent) return false;
+    for (int64_t i = 0; i < q->count; i++) q->starts[q->ranks[i]]++;
+    for (int r = 1; r <= ranks; r++) q->starts[r] += q->starts[r - 1];
+    for (int64_t i = q->count; i-- > 0;) q->sent[--q->starts[q->ranks[i]]] = i;
+    return true;
+}
+
+static bool write_mail(const lighting *l, const questions *q, session_mail *out)
+{
+    out->total = q->count * ASKED_WORDS;
+    out->counts = base_alloc((size_t)l->ranks * sizeof *out->counts);
+    out->words = base_alloc((size_t)out->total * sizeof *out->words);
+    if (!out->counts || !out->words) return false;
+    for (int r = 0; r < l->ranks; r++) out->counts[r] = (q->starts[r + 1] - q->starts[r]) * ASKED_WORDS;
+    for (int64_t i = 0; i < q->count; i++) {
+        uint64_t *words = out->words + i * ASKED_WORDS;
+        const int64_t k = q->sent[i];
+        memcpy(words, &l->hits[q->hits[k]], sizeof *l->hits);
+        memcpy(words + sizeof *l->hits / 8, &q->rays[k], sizeof *q->rays);
+    }
+    return true;
+}
+
+static insitu_status ask(const lighting *l, questions *q, session_mail *in, base_error *error)
+{
+    session_mail out = {0};
+    *q = (questions){.of = l};
+    for (q->at = 0; q->at < l->count; q->at++)
+        if (l->rays[q->at].samples || l->rays[q->at].lights)
+            render_rays_to_boxes(l->job, &l->hits[q->at], &l->rays[q->at], l->boxes, l->ranks, take_question, q);
+    if (q->has_no_memory || !sort_questions(q) || !write_mail(l, q, &out))
+        session_no_memory(error, q->count * ASKED_WORDS * 8, "rays to other ranks");
+    insitu_status status = session_agree(l->comm, error);
+    if (!status) status = session_mail_exchange(l->comm, &out, in, error);
+    session_mail_free(&out);
+    return status;
+}
+
+/* ---- answers ------------------------------------------------------------------------------------------------- */
+
+/* In memory of its own: mail is words. */
+static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays **rays)
+{
+    const int64_t count = in->total / ASKED_WORDS;
+    *hits = base_alloc((size_t)count * sizeof **hits);
+    *rays = base_alloc((size_t)count * sizeof **rays);
+    if (!*hits || !*rays) return false;
+    for (int64_t i = 0; i < count; i++) {
+        const uint64_t *words = in->words + i * ASKED_WORDS;
+        memcpy(&(*hits)[i], words, sizeof **hits);
+        memcpy(&(*rays)[i], words + sizeof **hits / 8, sizeof **rays);
+    }
+    return true;
+}
+
+/* Of the questions in *in, which become their answers. */
+static insitu_status answer(const lighting *l, session_mail *in, base_error *error)
+{
+    render_hit *hits = NULL;
+    render_hit_rays *rays = NULL;
+    const int64_t count = in->total / ASKED_WORDS;
+    if (read_mail(in, &hits, &rays))
+        render_occlude(l->job, hits, rays, count, error);
+    else
+        session_no_memory(error, in->total * 8, "rays of other ranks");
+    if (!error->status && rays) memcpy(in->words, rays, (size_t)count * sizeof *rays);
+    for (int r = 0; r < l->ranks; r++) in->counts[r] = in->counts[r] / ASKED_WORDS * ANSWER_WORDS;
+    in->total = count * ANSWER_WORDS;
+    base_free(hits);
+    base_free(rays);
+    return session_agree(l->comm, error);
+}
+
+static void take_answers(lighting *l, const questions *q, const session_mail *answers)
+{
+    for (int64_t i = 0; i < q->count; i++) {
+        const int64_t k = q->sent[i];
+        const render_hit_rays *asked = &q->rays[k];
+        render_hit_rays open, *rays = &l->rays[q->hits[k]];
+        memcpy(&open, answers->words + i * ANSWER_WORDS, sizeof open);
+        rays->samples &= ~(asked->samples & ~open.samples);
+        rays->lights &= ~(asked->lights & ~open.lights);
+    }
+}
+
+static insitu_status ask_others(lighting *l, base_error *error)
+{
+    questions q;
+    session_mail in = {0}, answers = {0};
+    insitu_status status = ask(l, &q, &in, error);
+    if (!status) status = answer(l, &in, error);
+    if (!status) status = session_mail_exchange(l->comm, &in, &answers, error);
+    if (!status) take_answers(l, &q, &answers);
+    session_mail_free(&in);
+    session_mail_free(&answers);
+    free_questions(&q);
+    return status;
+}
+
+/* ---- rounds -------------------------------------------------------------------------------------------------- */
+
+/* The hits of the fragments from the first on; returns where to go on. What has no rays is lit at once. */
+static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
+{
+    static const render_hit_rays none = {0, 0, 0};
+    for (l->count = 0; first < fragments->count && l->count < ROUND_HITS; first++) {
+        fragment *f = &fragments->items[first];
+        if (render_hit_of(l->job, f, &l->hits[l->count], &l->rays[l->count]))
+            l->fragments[l->count++] = first;
+        else
+            render_light_fragment(l->job, &none, f);
+    }
+    return first;
+}
+
+static void shade_hits(const lighting *l, fragment_list *fragments)
+{
+    for (int64_t i = 0; i < l->count; i++)
+        render_light_fragment(l->job, &l->rays[i], &fragments->items[l->fragments[i]]);
+}
+
+/* Do any have fragments left? */
+static insitu_status agree_to_go_on(const lighting *l, bool has_more, bool *out, base_error *error)
+{
+    int own = has_more, all = 0;
+    const insitu_status status =
+        session_mpi(error, MPI_Allreduce(&own, &all, 1, MPI_INT, MPI_MAX, l->comm), "MPI_Allreduce");
+    *out = all;
+    return status;
+}
+
+static insitu_status light_rounds(lighting *l, fragment_list *fragments, base_error *error)
+{
+    int64_t at = 0;
+    bool goes_on = false;
+    insitu_status status = agree_to_go_on(l, fragments->count > 0, &goes_on, error);
+    while (!status && goes_on) {
+        at = collect_hits(l, fragments, at);
+        render_occlude(l->job, l->hits, l->rays, l->count, error);
+        status = session_agree(l->comm, error);
+        if (!status && l->ranks > 1) status = ask_others(l, error);
+        if (!status) shade_hits(l, fragments);
+        if (!status) status = agree_to_go_on(l, at < fragments->count, &goes_on, error);
+    }
+    return status;
+}
+
+insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
+                                      base_error *error)
+{
+    const double start = MPI_Wtime();
+    lighting l = {.comm = comm, .job = job};
+    MPI_Comm_rank(comm, &l.rank);
+    MPI_Comm_size(comm, &l.ranks);
+    const int64_t most = fragments->count < ROUND_HITS ? fragments->count : ROUND_HITS;
+    l.fragments = base_alloc((size_t)(most + 1) * sizeof *l.fragments);
+    l.hits = base_alloc((size_t)(most + 1) * sizeof *l.hits);
+    l.rays = base_alloc((size_t)(most + 1) * sizeof *l.rays);
+    if (!l.fragments || !l.hits || !l.rays) session_no_memory(error, most * 40, "hits that are lit");
+    insitu_status status = session_agree(comm, error);
+    if (!status) status = share_boxes(&l, error);
+    if (!status) status = light_rounds(&l, fragments, error);
+    base_free(l.fragments);
+    base_free(l.hits);
+    base_free(l.rays);
+    base_free(l.boxes);
+    *ms += 1e3 * (MPI_Wtime() - start);
+    return status;
+}

@@ -1,0 +1,78 @@
+/* Rays that begin at hits: towards lights, and into the hemisphere above a surface.
+ *
+ * What such a ray meets must not depend on the partition. All cells are asked by the functions that primary rays ask
+ * them by, which decide everything about a face from its vertices alone once they are in tile space. So the tile space
+ * of a ray is made of the ray alone: of a hit's hemisphere the hit is the eye, and depth is along its normal; of a
+ * light depth is along its direction, and tiles are those of a lattice across it, of which a ray takes the one that it
+ * lies in. Rays of one space are a bundle; which of them are traced together changes nothing. */
+#ifndef RENDER_KERNEL_BUNDLE_H
+#define RENDER_KERNEL_BUNDLE_H
+
+#include <math.h>
+
+#include "kernel_packet.h"
+#include "kernel_types.h"
+#include "simd.h"
+
+enum { KERNEL_BUNDLE_RAYS = 64 };
+
+typedef struct kernel_bundle {
+    kernel_tile tile; /* centre and radius; its own rays are not used */
+    int count;
+    uint64_t open; /* rays, a bit each, of which nothing is met yet: the ones to trace, and in the end the ones left */
+    /* Tile space. A ray goes from t_near to t_far. */
+    float origin_x[KERNEL_BUNDLE_RAYS], origin_y[KERNEL_BUNDLE_RAYS];
+    float slope_x[KERNEL_BUNDLE_RAYS], slope_y[KERNEL_BUNDLE_RAYS];
+    float t_near[KERNEL_BUNDLE_RAYS], t_far[KERNEL_BUNDLE_RAYS];
+    kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* tree space */
+} kernel_bundle;
+
+/* Planes of boxes are met at plane * inverse - shift, as in kernel_packet_tree_rays(). */
+static inline void kernel_bundle_tree_rays(kernel_packet *p, const kernel_bundle *b, int first, int count)
+{
+    double size = 0;
+    for (int a = 0; a < 3; a++) {
+        float inverses[SIMD_WIDTH], shifts[SIMD_WIDTH];
+        for (int i = 0; i < SIMD_WIDTH; i++) {
+            const kernel_clip_ray *ray = &b->rays[first + (i < count ? i : 0)];
+            const double along = ray->direction[a], base = ray->base[a];
+            const double inverse = (double)(float)(1 / (fabs(along) < 1e-12 ? 1e-12 : along));
+            inverses[i] = (float)inverse;
+            shifts[i] = (float)(base * inverse);
+            size = fabs(base) > size ? fabs(base) : size;
+        }
+        p->inverse[a] = vf_load(inverses);
+        p->shift[a] = vf_load(shifts);
+        p->centre_direction[a] = (float)b->rays[first].direction[a];
+    }
+    p->pad = 16 * 6e-8f * ((float)size + 2);
+}
+
+SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
+{
+    float lanes[SIMD_WIDTH];
+    for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = list[i < count ? i : 0];
+    return vf_load(lanes);
+}
+
+/* Makes a packet of the rays from number first on, of those that are open. */
+static inline void kernel_bundle_packet(kernel_packet *p, const kernel_frame *f, kernel_thread *thread,
+                                        const kernel_bundle *b, int first)
+{
+    const int left = b->count - first, count = left < SIMD_WIDTH ? left : SIMD_WIDTH;
+    p->frame = f;
+    p->tile = &b->tile;
+    p->thread = thread;
+    p->is_nearer = p->has_view = p->is_pencil = false;
+    p->active = vm_from_bits((unsigned)(b->open >> first) & ((1u << count) - 1));
+    p->origin_x = kernel_bundle_load(b->origin_x + first, count);
+    p->origin_y = kernel_bundle_load(b->origin_y + first, count);
+    p->slope_x = kernel_bundle_load(b->slope_x + first, count);
+    p->slope_y = kernel_bundle_load(b->slope_y + first, count);
+    p->t_near = kernel_bundle_load(b->t_near + first, count);
+    p->t_far = kernel_bundle_load(b->t_far + first, count);
+    p->u = p->v = vf_set(0);
+    kernel_bundle_tree_rays(p, b, first, count);
+}
+
+#endif

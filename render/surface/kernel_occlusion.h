@@ -1,0 +1,231 @@
+/* Do opaque surfaces hide a light or the sky from a hit? Every root in [t_near, t_far) does: whichever cell is asked
+ * first, and on whichever rank, the answer is the same. Roots are found as those of primary rays are, but that nothing
+ * else is asked of them: no normal, no colour, and no order. */
+#ifndef RENDER_KERNEL_OCCLUSION_H
+#define RENDER_KERNEL_OCCLUSION_H
+
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_bounds.h"
+#include "kernel_bundle.h"
+#include "kernel_cell.h"
+#include "kernel_cell_cache.h"
+#include "kernel_cell_values.h"
+#include "kernel_crossings.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_polyhedron.h"
+#include "kernel_roots.h"
+#include "kernel_surface.h"
+#include "kernel_traverse.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "render_polyhedra.h"
+#include "simd.h"
+
+typedef struct kernel_occlusion {
+    const kernel_surface *surface;
+    int layer;
+    const kernel_bundle *bundle;
+    int first; /* the packet's first ray in the bundle */
+    /* The cell that is asked. */
+    double (*world)[3];
+    int vertex_count;
+} kernel_occlusion;
+
+/* The cube root of the cell's box's volume, or its longest side where that is flat. */
+static double kernel_occlusion_size(const kernel_occlusion *o)
+{
+    double volume = 1, longest = 0;
+    for (int a = 0; a < 3; a++) {
+        double low = o->world[0][a], high = low;
+        for (int i = 1; i < o->vertex_count; i++) {
+            low = o->world[i][a] < low ? o->world[i][a] : low;
+            high = o->world[i][a] > high ? o->world[i][a] : high;
+        }
+        volume *= high - low;
+        longest = high - low > longest ? high - low : longest;
+    }
+    return volume > 0 ? cbrt(volume) : longest;
+}
+
+/* Roots farther from the hit than the layer's contact. */
+static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet *p, const kernel_occlusion *o, vf t)
+{
+    const double reach = (double)o->surface->layer->contact * kernel_occlusion_size(o) * p->frame->job->space.scale;
+    const vf length = vf_sqrt((p->slope_x * p->slope_x + p->slope_y * p->slope_y) + 1.0f);
+    return vf_le(vf_set((float)reach), (t - p->t_near) * length);
+}
+
+/* What clips cut away hides nothing. */
+static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_packet *p, const kernel_occlusion *o,
+                                                                vm hit, vf t)
+{
+    float depth[SIMD_WIDTH];
+    unsigned kept = 0;
+    vf_store(depth, t);
+    for (unsigned left = vm_bits(hit); left; left &= left - 1) {
+        const int i = __builtin_ctz(left);
+        const bool is_kept = kernel_clip_keeps(p->frame->job, o->surface->layer->clips, &o->bundle->rays[o->first + i],
+                                               (double)depth[i]);
+        kept |= (unsigned)is_kept << i;
+    }
+    return vm_from_bits(kept);
+}
+
+/* Takes the roots found at t: their rays end. Returns these. */
+SIMD_INLINE vm kernel_occlusion_take(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
+{
+    vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
+    if (!vm_any(hit)) return hit;
+    if (o->surface->layer->contact > 0) hit = vm_and(hit, kernel_occlusion_beyond(p, o, t));
+    if (p->frame->job->clip_count) hit = kernel_occlusion_clip(p, o, hit, t);
+    p->t_far = vf_select(hit, vf_set(-INFINITY), p->t_far);
+    p->active = vm_andnot(p->active, hit);
+    return hit;
+}
+
+SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *o, const kernel_cell *c, vm rays)
+{
+    kernel_interval i;
+    kernel_tet_interval(p, c, rays, false, &i);
+    const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
+    if (vm_any(change)) kernel_occlusion_take(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
+}
+
+/* Every root of the interval in turn, of each ray until one counts. */
+SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_poly *poly,
+                                        const kernel_interval *i, vm rays)
+{
+    kernel_search_cell cell;
+    kernel_search s;
+    if (!kernel_search_in(&s, &cell, p, &poly->map, &poly->bounds, i, rays)) return;
+    do {
+        kernel_point at;
+        if (!vm_any(s.found)) continue;
+        kernel_polish(&s, &at);
+        kernel_search_close(&s, kernel_occlusion_take(p, o, s.found, at.t));
+    } while (kernel_search_on(&s));
+}
+
+static __attribute__((noinline)) void kernel_occlusion_poly(kernel_packet *p, const kernel_occlusion *o,
+                                                            const kernel_cell *c, vm rays)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    const kernel_beam beam = kernel_tile_beam(p->frame, p->tile);
+    kernel_poly poly;
+    bool is_set_up = false;
+    const int count = kernel_poly_intervals(p, c, rays, false, list);
+    for (int n = 0; n < count; n++) {
+        const kernel_interval *i = &list[n];
+        const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));
+        const vm wanted = vm_and(kernel_is_near(p, i), room);
+        if (!vm_any(wanted)) continue;
+        if (!is_set_up) {
+            kernel_map_setup(&poly.map, c);
+            kernel_bounds_setup(&poly.bounds, &poly.map, c->type, &beam);
+            is_set_up = true;
+        }
+        kernel_occlusion_roots(p, o, &poly, i, wanted);
+    }
+}
+
+static void kernel_occlusion_stay(kernel_packet *p, const kernel_occlusion *o, const polyhedron *c, vm rays, vm wanted,
+                                  kernel_passage *r, kernel_stay *stay)
+{
+    kernel_walk walk;
+    kernel_passage_profile(p, c, rays, false, r, stay);
+    kernel_walk_begin(stay, wanted, &walk);
+    do {
+        const vm found = kernel_walk_next(r, stay, &walk);
+        walk.open = vm_andnot(walk.open, kernel_occlusion_take(p, o, found, walk.t));
+    } while (vm_any(walk.open));
+}
+
+static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion *o, polyhedron *c, vm rays)
+{
+    kernel_passage r;
+    kernel_stay stay;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
+    while (kernel_passage_next(&r, &stay)) {
+        const vm changes = kernel_changes_sign(&stay.interval);
+        const vm wanted =
+            vm_and(kernel_is_near(p, &stay.interval), vm_or(changes, kernel_polyhedron_turns(p, c, &r, &stay)));
+        if (vm_any(wanted)) kernel_occlusion_stay(p, o, c, rays, wanted, &r, &stay);
+    }
+}
+
+/* Cells stay in the cache, in order, from bundle to bundle; each bundle moves them into its own space. */
+static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, int part, uint32_t index, vm rays)
+{
+    const render_surface_layer *layer = o->surface->layer;
+    polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells,
+                                               &layer->field.fields[part], part, o->layer, index);
+    if (!c) p->thread->out_of_memory = true;
+    if (!c || !c->is_finite) return;
+    c->has_slopes = c->is_placed = false;
+    o->world = c->world;
+    o->vertex_count = c->vertex_count;
+    for (int value = 0; value < layer->value_count; value++) {
+        if (!kernel_polyhedron_straddles(c, layer->values[value])) continue;
+        if (!c->is_placed) kernel_polyhedron_place(c, p);
+        kernel_polyhedron_relative(c, layer->values[value]);
+        kernel_occlusion_polyhedron(p, o, c, rays);
+    }
+}
+
+SIMD_INLINE void kernel_occlusion_place(const kernel_packet *p, kernel_cell *c, int part)
+{
+    if (!c->is_placed) {
+        kernel_cell_place_in(c, p->frame, p->tile, p->frame->job->parts[part].cells);
+        return;
+    }
+    for (int i = 0; i < c->count; i++) kernel_place(p, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+    c->has_lines = c->has_normal = false;
+}
+
+static void kernel_occlusion_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays)
+{
+    kernel_occlusion *o = state;
+    const render_surface_layer *layer = o->surface->layer;
+    for (int n = 0; n < count; n++) {
+        const vm open = vm_and(rays, p->active);
+        if (!vm_any(open)) return;
+        kernel_cell *c = kernel_cell_find(p, o->layer, part, &layer->field.fields[part], cells[n]);
+        if (c->type == GRID_POLYHEDRON) {
+            kernel_occlusion_polyhedra(p, o, part, cells[n], open);
+            continue;
+        }
+        if (!c->is_finite) continue;
+        o->world = c->world;
+        o->vertex_count = c->count;
+        for (int value = 0; value < layer->value_count; value++) {
+            if (!kernel_cell_straddles(c, layer->values[value])) continue;
+            kernel_occlusion_place(p, c, part);
+            kernel_cell_relative(c, layer->values[value]);
+            if (c->type == GRID_TET)
+                kernel_occlusion_tet(p, o, c, vm_and(open, p->active));
+            else
+                kernel_occlusion_poly(p, o, c, vm_and(open, p->active));
+        }
+    }
+}
+
+/* Closes the bundle's rays that meet an opaque surface of this rank. */
+static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, kernel_bundle *b)
+{
+    for (int first = 0; first < b->count; first += SIMD_WIDTH) {
+        kernel_packet p;
+        kernel_bundle_packet(&p, f, thread, b, first);
+        const unsigned asked = vm_bits(p.active);
+        for (int n = 0; n < f->opaque_count && vm_any(p.active); n++) {
+            kernel_occlusion o = {&f->surfaces[n], n, b, first, NULL, 0};
+            const kernel_descent descent = {&f->surfaces[n].interest, p.t_near, &p.t_far, kernel_occlusion_leaf, &o};
+            kernel_trace_parts(&p, &f->surfaces[n].layer->field, &descent);
+        }
+        b->open &= ~((uint64_t)(asked & ~vm_bits(p.active)) << first);
+    }
+}
+
+#endif

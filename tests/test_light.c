@@ -1,0 +1,207 @@
+/* Rays from hits against brute force in double: each is made the only ray of a picture whose eye is where it begins,
+ * and every cell is asked for its roots. For all kinds of cells, by every instruction set; towards lights and into the
+ * hemisphere. Rays on which rounding may decide are left out, and are few. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "render_light.h"
+#include "test_effort.h"
+#include "test_mesh_honeycomb.h"
+#include "test_render_fixture.h"
+
+enum { SIDE = 3, WIDTH = 17, HEIGHT = 13, SAMPLES = 16, LIGHTS = 2 };
+
+static const double isovalues[2] = {0.1, 0.5};
+static const double radius = 0.6;
+
+typedef struct hits {
+    fragment_list fragments;
+    int64_t count;
+    render_hit *hits;
+    render_hit_rays *rays, *open;
+} hits;
+
+static void take_hits(const render_fixture *f, hits *out)
+{
+    base_error error = {0};
+    *out = (hits){0};
+    assert_int_equal(render_frame(&f->job, &out->fragments, NULL, &error), INSITU_OK);
+    const size_t most = (size_t)out->fragments.count + 1;
+    out->hits = calloc(most, sizeof *out->hits);
+    out->rays = calloc(most, sizeof *out->rays);
+    out->open = calloc(most, sizeof *out->open);
+    assert_true(out->hits && out->rays && out->open);
+    for (int64_t i = 0; i < out->fragments.count; i++)
+        out->count += render_hit_of(&f->job, &out->fragments.items[i], &out->hits[out->count], &out->rays[out->count]);
+    memcpy(out->open, out->rays, most * sizeof *out->rays);
+}
+
+static void free_hits(hits *h)
+{
+    base_free(h->fragments.items);
+    free(h->hits);
+    free(h->rays);
+    free(h->open);
+}
+
+/* ---- rays in double ------------------------------------------------------------------------------------------ */
+
+static void unfold(const float folded[2], double n[3])
+{
+    n[0] = (double)folded[0];
+    n[1] = (double)folded[1];
+    n[2] = 1 - fabs(n[0]) - fabs(n[1]);
+    if (n[2] < 0) {
+        n[0] = (1 - fabs((double)folded[1])) * (folded[0] < 0 ? -1 : 1);
+        n[1] = (1 - fabs((double)folded[0])) * (folded[1] < 0 ? -1 : 1);
+    }
+    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int a = 0; a < 3; a++) n[a] /= length;
+}
+
+/* A spiral of equal steps in area on the disk below, turned and begun by the pixel (docs/decisions/surfaces.md). */
+static void sample_ray(uint32_t pixel, const double n[3], int k, double out[3])
+{
+    const double pi = acos(-1.0), x = pixel % WIDTH, y = pixel / WIDTH;
+    const double noise = fmod(52.9829189 * fmod(0.06711056 * x + 0.00583715 * y, 1), 1);
+    const double share = fmin((k + render_jitter(pixel, 0)) / SAMPLES, 1 - 1.0 / 1024);
+    const double angle = 2 * pi * noise + k * pi * (3 - sqrt(5));
+    const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
+    const double right[3] = {1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]};
+    const double up[3] = {b, sign + n[1] * n[1] * a, -n[1]};
+    for (int i = 0; i < 3; i++)
+        out[i] = sqrt(share) * (cos(angle) * right[i] + sin(angle) * up[i]) + sqrt(1 - share) * n[i];
+}
+
+static void start_of(const render_fixture *f, const render_hit *hit, const double n[3], double out[3])
+{
+    double base[3], direction[3];
+    render_camera_ray(&f->job.camera, (int)(hit->pixel % WIDTH), (int)(hit->pixel / WIDTH), base, direction);
+    for (int a = 0; a < 3; a++)
+        out[a] = base[a] + fixture_depth(f, hit->t) * direction[a] + RENDER_LIFT / f->job.space.scale * n[a];
+}
+
+typedef struct tally {
+    int64_t rays, blocked, unsure, wrong;
+    double nearest; /* of the wrong, by the reference */
+} tally;
+
+/* What brute force says of the ray: 1 where something is met in front, 0, or -1. Roots of the hit's own surface lie
+ * behind the start by the lift less what hits are off by; one that is as near in front is a hit's rounding. */
+static int look(const render_fixture *f, const double start[3], const double d[3], double reach)
+{
+    static const float nothing[4] = {0, 0, 0, 0};
+    const double *across = fabs(d[1]) < 0.9 ? (const double[]){0, 1, 0} : (const double[]){1, 0, 0};
+    const double lift = RENDER_LIFT / f->job.space.scale;
+    render_job job = f->job;
+    reference_ray ray;
+    double focal[3];
+    for (int a = 0; a < 3; a++) focal[a] = start[a] + d[a];
+    job.paint = RENDER_LIGHT;
+    assert_true(render_camera_look_at(&job.camera, start, focal, across, 40, 1, 1));
+    job.camera.is_orthographic = true;
+    job.camera.half_height = 1;
+    job.space.depth_origin = 0;
+    reference_scene *scene = reference_create(&job);
+    reference_trace(scene, 0, 0, nothing, &ray);
+    reference_free(scene);
+    const bool is_met = ray.hit_count > 0 && ray.hits[0].depth < reach;
+    if (ray.ambiguous || ray.map_failed || ray.edge_margin < 2e-5 || ray.value_margin < 2e-5) return -1;
+    if (ray.eye_margin * f->cell_size < 0.4 * lift) return -1;
+    if (ray.hit_count && fabs(ray.hits[0].depth - reach) < 1e-4) return -1;
+    return is_met;
+}
+
+static void judge(const render_fixture *f, int said, bool is_open, const char *what, tally *t)
+{
+    (void)f;
+    t->rays++;
+    t->blocked += said == 1;
+    t->unsure += said < 0;
+    if (said < 0 || said != is_open) return;
+    if (!t->wrong++) fprintf(stderr, "%s: %s\n", what, said ? "a blocked ray is open" : "an open ray is blocked");
+}
+
+static void judge_hit(const render_fixture *f, const hits *h, int64_t i, const char *what, tally *t)
+{
+    const render_hit *hit = &h->hits[i];
+    double n[3], start[3], d[3];
+    unfold(hit->normal, n);
+    start_of(f, hit, n, start);
+    for (int k = 0; k < SAMPLES; k += 3) {
+        sample_ray(hit->pixel, n, k, d);
+        judge(f, look(f, start, d, radius), h->open[i].samples >> k & 1, what, t);
+    }
+    for (int k = 0; k < LIGHTS; k++)
+        if (h->rays[i].lights >> k & 1)
+            judge(f, look(f, start, f->lights[k].direction, INFINITY), h->open[i].lights >> k & 1, what, t);
+}
+
+static void judge_mesh(const test_mesh *mesh, fixture_camera camera, const char *what)
+{
+    static const render_occlusion occlusion = {3, SAMPLES, 0.6};
+    render_fixture f;
+    fixture_create(&f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
+                   (const double[]){0, 0, 0});
+    fixture_look(&f, camera, WIDTH, HEIGHT);
+    fixture_add_surface(&f, isovalues, 2, 1);
+    f.surfaces[0].root = RENDER_ROBUST;
+    f.job.paint = RENDER_UNLIT;
+    f.job.occlusion = &occlusion;
+    assert_int_equal(f.job.light_count, LIGHTS);
+    for (int set = 0; set < fixture_set_count(); set++) {
+        base_error error = {0};
+        tally t = {0};
+        hits h;
+        fixture_use_set(set);
+        take_hits(&f, &h);
+        assert_int_equal(render_occlude(&f.job, h.hits, h.open, h.count, &error), INSITU_OK);
+        for (int64_t i = 0; i < h.count; i++)
+            if (test_is_whole() || i % (set + 1 == fixture_set_count() ? 2 : 7) == 0) judge_hit(&f, &h, i, what, &t);
+        free_hits(&h);
+        if (t.wrong || t.unsure * 4 > t.rays || t.blocked < t.rays / 20 || t.rays < 50)
+            fail_msg("%s, %s: of %lld rays %lld blocked, %lld unsure, %lld wrong", what, fixture_set_name(set),
+                     (long long)t.rays, (long long)t.blocked, (long long)t.unsure, (long long)t.wrong);
+        fprintf(stderr, "%s, %s: of %lld rays %lld blocked, %lld unsure, %lld wrong\n", what, fixture_set_name(set),
+                (long long)t.rays, (long long)t.blocked, (long long)t.unsure, (long long)t.wrong);
+    }
+    fixture_free(&f);
+}
+
+static void rays_meet_what_all_cells_say(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        test_mesh mesh;
+        test_mesh_lattice(kind, SIDE, 0.2, test_wave, &mesh);
+        judge_mesh(&mesh, kind % 2 ? CAMERA_ORTHOGRAPHIC : CAMERA_OUTSIDE, test_mesh_kind_name(kind));
+        test_mesh_free(&mesh);
+    }
+}
+
+static void rays_meet_what_honeycombs_say(void **state)
+{
+    test_mesh mesh;
+    (void)state;
+    test_mesh_honeycomb(SIDE, 0.2, test_wave, &mesh);
+    judge_mesh(&mesh, CAMERA_OUTSIDE, "honeycomb");
+    test_mesh_free(&mesh);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rays_meet_what_all_cells_say),
+        cmocka_unit_test(rays_meet_what_honeycombs_say),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,501 @@
+/* Shadows and ambient occlusion. Shadows have outlines in closed form: a ball's worth of a slice throws an ellipse on
+ * another, and an isosurface that is a plane darkens what is behind it. Ambient occlusion in a corner of two planes is
+ * a segment of a disk, and ray by ray what planes in double say; of an isosurface in tets, what all cells asked one by
+ * one in double say, for the same rays. And all of it is the same to the bit on any partition, of all kinds of cells.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render.h"
+#include "session.h"
+#include "test_effort.h"
+#include "test_session_fixture.h"
+
+enum { SIDE = 4, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT, SAMPLES = 16 };
+enum { NX, NY, NZ, CHANNELS = 6 };
+
+static const double eye[3] = {3, 2.2, 4};
+#define IMAGE(more, layers)                                                                                            \
+    "images:\n  - name: a\n    size: [48, 36]\n    background: [0, 0, 0, 0]\n"                                         \
+    "    camera: {position: [3, 2.2, 4], focal: [0, 0, 0], angle: 40}\n" more "    layers:\n" layers                   \
+    "    outputs: [{path: a.exr, data: true}]\n"
+
+/* ---- pictures ------------------------------------------------------------------------------------------------ */
+
+static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    caught_picture picture = {0};
+    insitu_session *session = NULL;
+    forget_pictures();
+    insitu_status status = insitu_create_from_text(comm, scene, &session);
+    if (!status) status = hand_over(session, in);
+    if (!status) status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
+    assert_int_equal(status, INSITU_OK);
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    insitu_destroy(&session);
+    return picture;
+}
+
+static void free_picture(caught_picture *picture)
+{
+    free(picture->rgba);
+    free(picture->depth);
+    free(picture->data);
+}
+
+static void camera_ray(int pixel, double base[3], double direction[3])
+{
+    render_camera camera;
+    render_camera_look_at(&camera, eye, (const double[]){0, 0, 0}, (const double[]){0, 1, 0}, 40, WIDTH, HEIGHT);
+    render_camera_ray(&camera, pixel % WIDTH, pixel / WIDTH, base, direction);
+}
+
+/* Where the pixel's ray is at the depth. */
+static void place_at(int pixel, double depth, double out[3])
+{
+    double base[3], direction[3];
+    camera_ray(pixel, base, direction);
+    for (int a = 0; a < 3; a++) out[a] = base[a] + depth * direction[a];
+}
+
+static void normal_at(const caught_picture *picture, int pixel, double out[3])
+{
+    for (int a = 0; a < 3; a++) out[a] = (double)picture->data[a * PIXELS + pixel];
+}
+
+/* A mesh of its own on every rank's session: the whole of it on one rank, or dealt. */
+static void make_part(session_input *in, test_mesh_kind kind, test_function *f, test_partition_kind dealt, int rank,
+                      int count)
+{
+    test_mesh whole;
+    test_mesh_lattice(kind, SIDE, 0.2, f, &whole);
+    int *owners = calloc((size_t)whole.cell_count, sizeof *owners);
+    assert_non_null(owners);
+    test_partition(&whole, dealt, SIDE, count, owners);
+    test_mesh_part(&whole, owners, rank, &in->part);
+    free(owners);
+    test_mesh_free(&whole);
+    input_describe(in);
+}
+
+/* ---- shadows in closed form ---------------------------------------------------------------------------------- */
+
+/* A floor, a disk above it, and light from the side. Material: ambient 0.2, diffuse 0.8. */
+static const double to_light[3] = {2. / 7, 6. / 7, 3. / 7};
+#define FLOOR                                                                                                          \
+    "      - slice: {field: f, map: {colours: [[0.5, 0.5, 0.5], [1, 1, 1]]}, planes: [{normal: [0, 1, 0], point: [0, " \
+    "-0.5, 0]}], " MATTE "}\n"
+#define MATTE "material: {ambient: 0.2, diffuse: 0.8, specular: 0}"
+#define DISK(more)                                                                                                     \
+    "      - slice: {field: f, map: {colours: [[0.5, 0.5, 0.5], [1, 1, 1]]}, planes: [{normal: [0, 1, 0], point: [0, " \
+    "0.25, 0]}], " MATTE ", clip: {sphere: {centre: [0.1, 0.25, -0.2], radius: 0.5}}" more "}\n"
+#define LIGHT(more) "    lights: [{direction: [2, 6, 3], in: world" more "}]\n"
+
+/* 1 in the light, 0 in the shadow, -1 where rounding decides or the floor is not seen. */
+static int floor_light(int pixel, double depth)
+{
+    double place[3], across = 0;
+    place_at(pixel, depth, place);
+    if (fabs(place[1] + 0.5) > 1e-5) return -1;
+    const double rise = 0.75 / to_light[1];
+    const double at[2] = {place[0] + rise * to_light[0] - 0.1, place[2] + rise * to_light[2] + 0.2};
+    if (fabs(place[0] + rise * to_light[0]) > 0.999 || fabs(place[2] + rise * to_light[2]) > 0.999) return 1;
+    across = hypot(at[0], at[1]);
+    return fabs(across - 0.5) < 1e-4 ? -1 : across > 0.5;
+}
+
+typedef struct tally {
+    int lit, dark, wrong;
+} tally;
+
+/* lit: by the shadowless picture's own light, beside which nothing is measured. */
+static tally judge_floor(const caught_picture *shadowed, const caught_picture *lit)
+{
+    tally out = {0};
+    const double full = 0.2 + 0.8 * to_light[1];
+    for (int p = 0; p < PIXELS; p++) {
+        const double depth = (double)shadowed->depth[p];
+        const int light = isfinite(depth) ? floor_light(p, depth) : -1;
+        if (light < 0) continue;
+        out.lit += light;
+        out.dark += !light;
+        const double expected = (double)lit->rgba[4 * p] / full * (light ? full : 0.2);
+        if (fabs((double)shadowed->rgba[4 * p] - expected) <= 1e-6) continue;
+        if (!out.wrong++)
+            fprintf(stderr, "pixel %d at depth %g: %g, expected %g\n", p, depth, (double)shadowed->rgba[4 * p],
+                    expected);
+    }
+    return out;
+}
+
+static tally draw_floor(test_mesh_kind kind, const char *scene, const char *lit_scene)
+{
+    session_input in = {0};
+    tally out = {0};
+    make_part(&in, kind, test_linear, TEST_RANDOM, own_rank, rank_count);
+    caught_picture shadowed = draw(MPI_COMM_WORLD, scene, &in), lit = draw(MPI_COMM_WORLD, lit_scene, &in);
+    if (own_rank == 0) out = judge_floor(&shadowed, &lit);
+    free_picture(&shadowed);
+    free_picture(&lit);
+    input_free(&in);
+    return out;
+}
+
+static void disks_throw_ellipses(void **context)
+{
+    (void)context;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        const tally t =
+            draw_floor(kind, IMAGE(LIGHT("") "    shadows: true\n", FLOOR DISK("")), IMAGE(LIGHT(""), FLOOR DISK("")));
+        const bool is_right = own_rank != 0 || (t.wrong == 0 && t.lit > 100 && t.dark > 15);
+        if (!is_right)
+            fprintf(stderr, "%s: %d lit, %d dark, %d wrong\n", test_mesh_kind_name(kind), t.lit, t.dark, t.wrong);
+        everywhere(is_right);
+    }
+}
+
+/* A transparent disk, a disk that is cut away, a light that casts none. */
+static void what_casts_no_shadow_casts_none(void **context)
+{
+    static const char *const scenes[][2] = {
+        {IMAGE(LIGHT("") "    shadows: true\n", FLOOR DISK(", opacity: 0.5")),
+         IMAGE(LIGHT(""), FLOOR DISK(", opacity: 0.5"))},
+        {IMAGE(LIGHT(", shadows: false") "    shadows: true\n    ambient_occlusion: {radius: 1e-3}\n", FLOOR DISK("")),
+         IMAGE(LIGHT(""), FLOOR DISK(""))},
+        {IMAGE(LIGHT("") "    shadows: true\n    clip: {planes: [{normal: [0, 1, 0], point: [0, 0, 0]}]}\n",
+               FLOOR DISK("")),
+         IMAGE(LIGHT("") "    clip: {planes: [{normal: [0, 1, 0], point: [0, 0, 0]}]}\n", FLOOR DISK(""))},
+    };
+    (void)context;
+    for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
+        session_input in = {0};
+        double worst = 0;
+        make_part(&in, TEST_MIXED, test_linear, TEST_RANDOM, own_rank, rank_count);
+        caught_picture shadowed = draw(MPI_COMM_WORLD, scenes[i][0], &in),
+                       lit = draw(MPI_COMM_WORLD, scenes[i][1], &in);
+        for (int k = 0; k < 4 * PIXELS && own_rank == 0; k++)
+            worst = fmax(worst, fabs((double)shadowed.rgba[k] - (double)lit.rgba[k]));
+        free_picture(&shadowed);
+        free_picture(&lit);
+        input_free(&in);
+        /* Colours are lit in double here, in float there: of a few products below 1, 5e-7. */
+        if (worst > 5e-7) fprintf(stderr, "scene %zu: off by %g\n", i, worst);
+        everywhere(worst <= 5e-7);
+    }
+}
+
+/* ---- the same rays in double --------------------------------------------------------------------------------- */
+
+/* docs/decisions/light.md: a spiral of equal steps in area on the disk below, turned and begun by the pixel. */
+static void sample_ray(int pixel, const double n[3], int k, double out[3])
+{
+    const double pi = acos(-1.0), x = pixel % WIDTH, y = pixel / WIDTH;
+    const double noise = fmod(52.9829189 * fmod(0.06711056 * x + 0.00583715 * y, 1), 1);
+    const double share = fmin((k + render_jitter((uint32_t)pixel, 0)) / SAMPLES, 1 - 1.0 / 1024);
+    const double angle = 2 * pi * noise + k * pi * (3 - sqrt(5));
+    const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
+    const double right[3] = {1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]};
+    const double up[3] = {b, sign + n[1] * n[1] * a, -n[1]};
+    for (int i = 0; i < 3; i++)
+        out[i] = sqrt(share) * (cos(angle) * right[i] + sin(angle) * up[i]) + sqrt(1 - share) * n[i];
+}
+
+/* Whether something is met within the radius: 1, 0, or -1 where rounding decides. */
+typedef int blocker(const void *scene, const double from[3], const double direction[3]);
+
+typedef struct sky {
+    int pixels, wrong, unsure;
+    double sum; /* of the shares that are open, as drawn */
+} sky;
+
+/* Everything by AO alone: the picture is the unoccluded one times the share. wanted: of which pixels. */
+static sky judge_sky(const caught_picture *drawn, const caught_picture *plain, blocker *is_blocked, const void *scene)
+{
+    sky out = {0};
+    for (int p = 0; p < PIXELS; p++) {
+        double place[3], n[3], d[3];
+        int open = 0, unsure = 0;
+        if (!isfinite(drawn->depth[p])) continue;
+        place_at(p, (double)drawn->depth[p], place);
+        normal_at(drawn, p, n);
+        for (int k = 0; k < SAMPLES; k++) {
+            sample_ray(p, n, k, d);
+            const int blocked = is_blocked(scene, place, d);
+            open += blocked == 0;
+            unsure += blocked < 0;
+        }
+        const double share = (double)drawn->rgba[4 * p] / (double)plain->rgba[4 * p], counted = SAMPLES * share;
+        out.pixels++;
+        out.unsure += unsure > 0;
+        out.sum += share;
+        if (fabs(counted - round(counted)) < 1e-4 && round(counted) >= open && round(counted) <= open + unsure)
+            continue;
+        if (!out.wrong++) fprintf(stderr, "pixel %d: %.6g open, expected %d to %d\n", p, counted, open, open + unsure);
+    }
+    return out;
+}
+
+#define BARE "material: {ambient: 0.6, diffuse: 0.1, specular: 0}"
+#define DARK "    lights: [{direction: [0, 0, 1], intensity: 0}]\n"
+
+/* A floor y = -0.5 and a wall x = -0.3, of the cube; radius 0.4. */
+typedef struct corner {
+    double radius;
+} corner;
+
+static int corner_blocks(const void *scene, const double from[3], const double d[3])
+{
+    static const double planes[2][2] = {{1, -0.5}, {0, -0.3}}; /* axis, place */
+    const corner *c = scene;
+    int blocked = 0;
+    for (int i = 0; i < 2; i++) {
+        const int axis = (int)planes[i][0];
+        const double left = planes[i][1] - from[axis], way = left / d[axis];
+        if (fabs(left) < 1e-5) continue; /* it begins there */
+        if (fabs(way - c->radius) < 1e-4 || fabs(d[axis]) < 1e-6) return -1;
+        if (way < 0 || way > c->radius) continue;
+        for (int a = 0; a < 3; a++) {
+            const double at = fabs(from[a] + way * d[a]);
+            if (fabs(at - 1) < 1e-4) return -1;
+            if (at > 1) way < 0 ? 0 : (blocked -= 1);
+            if (at > 1) break;
+        }
+        blocked += 1;
+    }
+    return blocked > 0;
+}
+
+static void corners_are_as_dark_as_disk_segments(void **context)
+{
+#define CORNER                                                                                                         \
+    "      - slice: {field: f, map: {colours: [[0.5, 0.5, 0.5], [1, 1, 1]]}, planes: [{normal: [0, 1, 0], point: [0, " \
+    "-0.5, 0]},\n"                                                                                                     \
+    "          {normal: [1, 0, 0], point: [-0.3, 0, 0]}], " BARE "}\n"
+    (void)context;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input in = {0};
+        make_part(&in, kind, test_linear, TEST_RANDOM, own_rank, rank_count);
+        caught_picture drawn =
+            draw(MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.4}\n", CORNER), &in);
+        caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, CORNER), &in);
+        bool is_right = true;
+        if (own_rank == 0) {
+            const corner c = {0.4};
+            const sky s = judge_sky(&drawn, &plain, corner_blocks, &c);
+            double expected = 0;
+            int count = 0;
+            for (int p = 0; p < PIXELS; p++) {
+                double at[3];
+                if (!isfinite(drawn.depth[p])) continue;
+                place_at(p, (double)drawn.depth[p], at);
+                /* How far from the other plane, on the side where that is seen; far from the cube's ends. */
+                const double away = fabs(at[1] + 0.5) < 1e-4 ? at[0] + 0.3 : at[1] + 0.5, ratio = fabs(away) / c.radius;
+                expected += ratio < 1 ? 1 - (acos(ratio) - ratio * sqrt(1 - ratio * ratio)) / acos(-1.0) : 1;
+                count++;
+            }
+            /* Of a pixel the share is off by no more than that of 16 independent rays, 1/8; their mean by a root of
+             * their number less, five times; at the cube's ends the planes end, of a tenth of the pixels at most. */
+            const double off = fabs(s.sum - expected) / count;
+            is_right =
+                s.wrong == 0 && s.pixels > 500 && s.unsure < s.pixels / 10 && off < 5 * 0.125 / sqrt(count) + 0.02;
+            if (!is_right)
+                fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, mean off by %g\n", test_mesh_kind_name(kind),
+                        s.pixels, s.wrong, s.unsure, off);
+        }
+        free_picture(&drawn);
+        free_picture(&plain);
+        input_free(&in);
+        everywhere(is_right);
+    }
+}
+
+/* ---- all tets one by one ------------------------------------------------------------------------------------- */
+
+typedef struct tets {
+    const test_mesh *mesh;
+    double isovalue, radius;
+} tets;
+
+/* Solves for the linear field's value and gradient, and for the place's shares of the corners. */
+static double determinant(const double a[3], const double b[3], const double c[3])
+{
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+static void shares(const double corner[4][3], const double place[3], double out[4])
+{
+    double e[3][3], d[3];
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++) e[i][a] = corner[i + 1][a] - corner[0][a], d[a] = place[a] - corner[0][a];
+    const double volume = determinant(e[0], e[1], e[2]);
+    out[1] = determinant(d, e[1], e[2]) / volume;
+    out[2] = determinant(e[0], d, e[2]) / volume;
+    out[3] = determinant(e[0], e[1], d) / volume;
+    out[0] = 1 - out[1] - out[2] - out[3];
+}
+
+static int tet_blocks(const tets *t, int64_t cell, const double from[3], const double d[3])
+{
+    double corner[4][3], value[4], at_from[4], at_ahead[4], ahead[3], place[3], s[4], begin = 0, slope = 0, least = 1;
+    bool below = false, above = false;
+    for (int i = 0; i < 4; i++) {
+        const int64_t v = t->mesh->connectivity[4 * cell + i];
+        memcpy(corner[i], t->mesh->coordinates + 3 * v, sizeof corner[i]);
+        value[i] = t->mesh->values[v] - t->isovalue;
+        below = below || value[i] < 0;
+        above = above || value[i] >= 0;
+    }
+    if (!below || !above) return 0;
+    for (int a = 0; a < 3; a++) ahead[a] = from[a] + d[a];
+    shares((const double(*)[3])corner, from, at_from);
+    shares((const double(*)[3])corner, ahead, at_ahead);
+    for (int i = 0; i < 4; i++) {
+        begin += at_from[i] * value[i];
+        slope += (at_ahead[i] - at_from[i]) * value[i];
+    }
+    const double way = -begin / slope;
+    if (!(fabs(way) < 2 * t->radius)) return 0;
+    for (int a = 0; a < 3; a++) place[a] = from[a] + way * d[a];
+    shares((const double(*)[3])corner, place, s);
+    for (int i = 0; i < 4; i++) least = fmin(least, s[i]);
+    /* Rays begin 8e-6 above the surface, of which rounding may take 2e-6. */
+    if (least < -1e-3 || way < -1e-3 || way > t->radius + 1e-3) return 0;
+    if (fabs(begin) / steepness(t, (const double(*)[3])corner, value) < 3e-6) return -1;
+    if (least < 1e-4 || fabs(way - t->radius) < 1e-4) return -1;
+    if (way < 0) return 0;
+    return 1;
+}
+
+static int tets_block(const void *scene, const double from[3], const double d[3])
+{
+    const tets *t = scene;
+    int unsure = 0;
+    for (int64_t cell = 0; cell < t->mesh->cell_count; cell++) {
+        const int blocked = tet_blocks(t, cell, from, d);
+        if (blocked > 0) return 1;
+        unsure |= blocked;
+    }
+    return unsure;
+}
+
+static void isosurfaces_of_tets_hide_what_all_cells_say(void **context)
+{
+#define BUMPS "      - isosurface: {field: f, values: [0.1], " BARE "}\n"
+    session_input in = {0}, whole = {0};
+    (void)context;
+    make_part(&in, TEST_TETS, test_wave, TEST_RANDOM, own_rank, rank_count);
+    make_part(&whole, TEST_TETS, test_wave, TEST_BLOCK, 0, 1);
+    caught_picture drawn =
+        draw(MPI_COMM_WORLD, IMAGE(DARK "    ambient_occlusion: {samples: 16, radius: 0.7}\n", BUMPS), &in);
+    caught_picture plain = draw(MPI_COMM_WORLD, IMAGE(DARK, BUMPS), &in);
+    bool is_right = true;
+    if (own_rank == 0) {
+        const tets t = {&whole.part, 0.1, 0.7};
+        const sky s = judge_sky(&drawn, &plain, tets_block, &t);
+        is_right = s.wrong == 0 && s.pixels > 300 && s.unsure < s.pixels / 2 && s.sum < 0.95 * s.pixels;
+        fprintf(stderr, "tets: %d pixels, %d wrong, %d unsure, %g open\n", s.pixels, s.wrong, s.unsure,
+                s.sum / s.pixels);
+    }
+    free_picture(&drawn);
+    free_picture(&plain);
+    input_free(&in);
+    input_free(&whole);
+    everywhere(is_right);
+}
+
+/* ---- any partition ------------------------------------------------------------------------------------------- */
+
+#define EVERYTHING                                                                                                     \
+    IMAGE("    shadows: true\n    ambient_occlusion: {samples: 9, radius: 0.8}\n    antialias: 2\n",                   \
+          "      - isosurface: {field: f, values: [0.1, 0.6]}\n"                                                       \
+          "      - isosurface: {field: f, values: [-0.3], opacity: 0.4, normals: vertex}\n"                            \
+          "      - slice: {field: f, planes: [{normal: [0, 1, 0], point: [0, -0.6, 0]}], material: {}}\n"              \
+          "      - surface: {colour_by: {field: f}, clip: {planes: [{normal: [1, 1, 1], point: [-0.2, -0.2, "          \
+          "-0.2]}]}}\n")
+#define WITH_VOLUME                                                                                                    \
+    IMAGE("    shadows: true\n    ambient_occlusion: {}\n    clip: {sphere: {centre: [0, 0, 0], radius: 1.2}}\n",      \
+          "      - isosurface: {field: f, values: [0.3]}\n"                                                            \
+          "      - volume: {field: f, opacity: [[0, 0], [1, 0.4]]}\n")
+
+static double difference(const caught_picture *a, const caught_picture *b)
+{
+    double worst = 0;
+    for (int i = 0; i < 4 * PIXELS; i++) worst = test_worse(worst, fabs((double)a->rgba[i] - (double)b->rgba[i]));
+    for (int i = 0; i < PIXELS; i++)
+        if (memcmp(&a->depth[i], &b->depth[i], sizeof *a->depth) != 0) return INFINITY;
+    return worst;
+}
+
+/* most: 0 where there are surfaces alone, which are one picture to the bit. */
+static void judge_partition(const char *scene, const session_input *whole, const session_input *part, double most,
+                            const char *what)
+{
+    double off = 0;
+    caught_picture dealt = draw(MPI_COMM_WORLD, scene, part);
+    if (own_rank == 0) {
+        caught_picture alone = draw(MPI_COMM_SELF, scene, whole);
+        off = difference(&dealt, &alone);
+        free_picture(&alone);
+    }
+    free_picture(&dealt);
+    if (!(off <= most)) fprintf(stderr, "%s, %d ranks: off by %g\n", what, rank_count, off);
+    everywhere(off <= most);
+}
+
+static void lit_pictures_are_the_same_on_any_partition(void **context)
+{
+    (void)context;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
+        for (test_partition_kind dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
+            session_input whole = {0}, part = {0};
+            /* At random the last rank is left without cells. */
+            const int count = dealt == TEST_RANDOM && rank_count > 1 ? rank_count - 1 : rank_count;
+            make_part(&whole, kind, test_wave, TEST_BLOCK, 0, 1);
+            make_part(&part, kind, test_wave, dealt, own_rank, count);
+            judge_partition(EVERYTHING, &whole, &part, 0, test_mesh_kind_name(kind));
+            if (dealt == TEST_CHECKERBOARD)
+                judge_partition(WITH_VOLUME, &whole, &part, 1e-6, test_mesh_kind_name(kind));
+            input_free(&whole);
+            input_free(&part);
+        }
+}
+
+/* Every rank has all cells, those of others as ghosts. */
+static void ghost_cells_cast_nothing(void **context)
+{
+    session_input whole = {0}, part = {0};
+    (void)context;
+    make_part(&whole, TEST_HEXES, test_wave, TEST_BLOCK, 0, 1);
+    make_part(&part, TEST_HEXES, test_wave, TEST_BLOCK, 0, 1);
+    int *owners = calloc((size_t)part.part.cell_count, sizeof *owners);
+    assert_non_null(owners);
+    test_partition(&part.part, TEST_RANDOM, SIDE, rank_count, owners);
+    for (int64_t cell = 0; cell < part.part.cell_count; cell++) part.part.ghosts[cell] = owners[cell] != own_rank;
+    free(owners);
+    input_describe(&part);
+    judge_partition(EVERYTHING, &whole, &part, 0, "ghost cells");
+    input_free(&whole);
+    input_free(&part);
+}
+
+static int run(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(disks_throw_ellipses),
+        cmocka_unit_test(what_casts_no_shadow_casts_none),
+        cmocka_unit_test(corners_are_as_dark_as_disk_segments),
+        cmocka_unit_test(isosurfaces_of_tets_hide_what_all_cells_say),
+        cmocka_unit_test(lit_pictures_are_the_same_on_any_partition),
+        cmocka_unit_test(ghost_cells_cast_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
+
+int main(int argc, char **argv)
+{
+    return run_session_tests(argc, argv, run);
+}
