@@ -44,7 +44,7 @@ static void normalize(double v[3])
     for (int a = 0; a < 3; a++) v[a] /= length;
 }
 
-/* Two unit vectors across a third (Duff et al. 2017). */
+/* Finds two unit vectors across a third (Duff et al. 2017). */
 static axes axes_around(const double n[3])
 {
     const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
@@ -83,7 +83,7 @@ static place place_of(const render_job *job, const render_hit *hit)
     return out;
 }
 
-/* The fragment's layer. */
+/* Returns the layer that the fragment was hit on. */
 static const render_surface_layer *layer_of(const render_job *job, const fragment *f)
 {
     int value = (int)(f->kind - FRAGMENT_SURFACE), i = 0;
@@ -153,10 +153,10 @@ static void sample_directions(const hemisphere *h, int count, double out[RENDER_
 
 /* ---- tracing ------------------------------------------------------------------------------------------------- */
 
-/* Hits are taken so many at once: of what is found of cells for one of them, the others have the use. */
+/* A thread takes so many hits at once, and keeps the cells that it has fetched for one of them for the others. */
 enum { CHUNK_HITS = 256 };
 
-/* Lattice cells of tiles of light, across scaled units. */
+/* Cells of a light's lattice to a scaled unit. */
 enum { LIGHT_TILES = 32 };
 
 /* A ray towards a light, in that light's scaled axes. */
@@ -166,7 +166,8 @@ typedef struct light_ray {
     double at[3];
 } light_ray;
 
-/* A thread's. Of the frame it has a copy, whose job is its own too: its camera is moved from space to space. */
+/* What a thread traces with. Its frame is a copy whose job is its own, so that the camera can be moved from space to
+ * space. */
 typedef struct tracer {
     const kernel_table *kernels;
     const render_job *job; /* as it was given */
@@ -252,7 +253,7 @@ static int collect_light_rays(tracer *t, int light, const axes *a, const render_
     return n;
 }
 
-/* Rays of one cell of the lattice. */
+/* Traces rays that lie in one cell of the lattice. */
 static void trace_light_tile(tracer *t, int light, const axes *a, const light_ray *list, int count,
                              render_hit_rays *rays)
 {
@@ -327,7 +328,7 @@ static tracer *tracer_create(const kernel_table *kernels, const kernel_frame *fr
     return NULL;
 }
 
-/* False where its memory ran out. */
+/* Returns false where memory ran out. */
 static bool tracer_free(tracer *t)
 {
     if (!t) return false;
@@ -397,7 +398,7 @@ render_box render_occluder_box(const render_job *job)
     return out;
 }
 
-/* Boxes are float32's, and grown by what rays and cells may be off by. */
+/* Scaled units. Boxes are grown by it, which is more than rays and float32 boxes are off by. */
 static const double box_margin = 1e-5;
 
 /* May a ray meet the box before it is reach long? */
@@ -460,7 +461,7 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
-/* kernel_shade() of open lights, in double. */
+/* Does what kernel_shade() does, by the open lights alone and in double. */
 static void shade(const render_job *job, const render_material *m, const place *p, uint32_t lights, double diffuse[3],
                   double specular[3])
 {

@@ -56,7 +56,9 @@ static const char every_key[] =
     "    background: [0.5, 0.25, 1, 0.5]\n"
     "    lights:\n"
     "      - {direction: [0, 0, 2], colour: [1, 0.5, 0], intensity: 0.5, in: world}\n"
-    "      - {direction: [3, 0, 4], in: camera}\n"
+    "      - {direction: [3, 0, 4], in: camera, shadows: false}\n"
+    "    shadows: true\n"
+    "    ambient_occlusion: {samples: 24, radius: 0.75}\n"
     "    layers:\n"
     "      - isosurface:\n"
     "          field: pressure\n"
@@ -258,7 +260,37 @@ static void scene_view_keys_are_read(void **state)
     check_colour(lights[0].colour, 0.5, 0.5 * linear(0.5), 0);
     check_vector(lights[1].direction, 0.6, 0, 0.8);
     assert_false(lights[1].in_world);
+    assert_int_equal(s.images[0].shadows, 1);
+    assert_int_equal(s.images[0].occlusion_samples, 24);
+    assert_true(s.images[0].occlusion_radius == 0.75);
     scene_free(&s);
+}
+
+static void shadows_are_by_all_lights_that_do_not_say_otherwise(void **state)
+{
+    static const char text[] = "images:\n  - name: a\n    %s\n"
+                               "    layers: [{isosurface: {field: f, values: [0]}}]\n"
+                               "    outputs: [{path: a.png}]\n";
+    static const struct {
+        const char *keys;
+        uint32_t shadows;
+        int samples;
+    } cases[] = {{"shadows: true", 3, 0},
+                 {"shadows: false", 0, 0},
+                 {"ambient_occlusion: {}", 0, 16},
+                 {"lights: [{direction: [0, 0, 1], shadows: true}]\n    shadows: false", 0, 0},
+                 {"lights: [{direction: [0, 0, 1], shadows: false}, {direction: [1, 0, 0]}]\n    shadows: true", 2, 0}};
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char filled[512];
+        scene s;
+        snprintf(filled, sizeof filled, text, cases[i].keys);
+        parse_good(filled, &s);
+        assert_int_equal(s.images[0].shadows, cases[i].shadows);
+        assert_int_equal(s.images[0].occlusion_samples, cases[i].samples);
+        assert_true(s.images[0].occlusion_radius == 0);
+        scene_free(&s);
+    }
 }
 
 static void scene_isosurface_keys_are_read(void **state)
@@ -686,6 +718,11 @@ static const struct bad_file {
     {8, "    lights: [{colour: [1, 1, 1]}]", 8, {"lights[0].direction: missing", "a list of 3 numbers"}},
     {8, "    lights:\n      - {direction: [0, 0, 1]}\n      - {direction: [0, 0, 0]}", 10, {"lights[1].direction"}},
     {8, "    lights: [{direction: [0, 0, 1], in: sky}]", 8, {"lights[0].in: \"sky\"", "one of camera, world"}},
+    {8, "    lights: [{direction: [0, 0, 1], shadows: false}]", 8, {"lights[0].shadows: given without shadows"}},
+    {8, "    shadows: maybe", 8, {"shadows: \"maybe\"", "true or false"}},
+    {8, "    ambient_occlusion: {samples: 0}", 8, {"ambient_occlusion.samples: \"0\"", "from 1 to 64"}},
+    {8, "    ambient_occlusion: {samples: 65}", 8, {"ambient_occlusion.samples: \"65\"", "from 1 to 64"}},
+    {8, "    ambient_occlusion: {radius: 0}", 8, {"ambient_occlusion.radius: \"0\"", "above 0 and at most 1e+30"}},
     {8, "    lights: [{direction: [0, 0, 1], intensity: -1}]", 8, {"lights[0].intensity: \"-1\"", "from 0 to 100"}},
     {9, "    layers: []\n    layer:", 9, {"images[0].layers: a list of 0", "1 to 20 mappings"}},
     {10, "      - isosurface: {field: f}", 10, {"isosurface.values: missing", "a list of 1 to 16 numbers"}},
@@ -1140,6 +1177,7 @@ int main(int argument_count, char **arguments)
         cmocka_unit_test(scene_volume_keys_are_read),
         cmocka_unit_test(scene_image_defaults_hold),
         cmocka_unit_test(sampling_is_by_what_is_said),
+        cmocka_unit_test(shadows_are_by_all_lights_that_do_not_say_otherwise),
         cmocka_unit_test(scene_layer_defaults_hold),
         cmocka_unit_test(slices_have_planes_of_unit_normals),
         cmocka_unit_test(surfaces_have_their_colours),

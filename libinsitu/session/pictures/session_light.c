@@ -20,7 +20,7 @@ enum { ROUND_HITS = 1 << 16 };
 /* A question: a hit, and which of its rays are asked for; its answer. */
 enum { ASKED_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8, ANSWER_WORDS = sizeof(render_hit_rays) / 8 };
 
-/* The hits of a round. */
+/* A round: some of this rank's hits, and the rays that are still open. */
 typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
@@ -95,7 +95,7 @@ static void take_question(void *state, int rank, const render_hit_rays *rays)
     q->rays[q->count++] = *rays;
 }
 
-/* By rank. */
+/* Puts them in the order of ranks. */
 static bool sort_questions(questions *q)
 {
     const int ranks = q->of->ranks;
@@ -141,7 +141,7 @@ static insitu_status ask(const lighting *l, questions *q, session_mail *in, base
 
 /* ---- answers ------------------------------------------------------------------------------------------------- */
 
-/* In memory of its own: mail is words. */
+/* Copies the questions out of the mail, whose words are not aligned for them. */
 static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays **rays)
 {
     const int64_t count = in->total / ASKED_WORDS;
@@ -156,7 +156,7 @@ static bool read_mail(const session_mail *in, render_hit **hits, render_hit_rays
     return true;
 }
 
-/* Of the questions in *in, which become their answers. */
+/* Turns the questions in *in into their answers. */
 static insitu_status answer(const lighting *l, session_mail *in, base_error *error)
 {
     render_hit *hits = NULL;
@@ -202,7 +202,7 @@ static insitu_status ask_others(lighting *l, base_error *error)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-/* The hits of the fragments from the first on; returns where to go on. What has no rays is lit at once. */
+/* Takes the hits of the fragments from the first on; returns where to go on. What has no rays is lit at once. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};
@@ -222,7 +222,7 @@ static void shade_hits(const lighting *l, fragment_list *fragments)
         render_light_fragment(l->job, &l->rays[i], &fragments->items[l->fragments[i]]);
 }
 
-/* Do any have fragments left? */
+/* Tells whether any rank has fragments left. */
 static insitu_status agree_to_go_on(const lighting *l, bool has_more, bool *out, base_error *error)
 {
     int own = has_more, all = 0;
