@@ -301,7 +301,7 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_int_equal(s.images[0].isosurface_count, 2);
     const scene_isosurface *first = &s.images[0].isosurfaces[0], *second = first + 1;
     assert_string_equal(first->field.name, "pressure");
-    assert_int_equal(first->field.line, 14);
+    assert_int_equal(first->field.line, 16);
     assert_int_equal(first->field.component, SCENE_COMPONENT_MAGNITUDE);
     assert_int_equal(first->value_count, 3);
     assert_true(first->values[0] == 0.2 && first->values[1] == 0.5 && first->values[2] == -1e-3);
@@ -317,7 +317,7 @@ static void scene_isosurface_keys_are_read(void **state)
     assert_true(second->has_colour_by);
     assert_string_equal(second->colour_by.name, "speed");
     assert_int_equal(second->colour_by.component, 2);
-    assert_int_equal(second->colour_by.line, 34);
+    assert_int_equal(second->colour_by.line, 36);
     assert_true(second->field.mesh_count == 1 && second->colour_by.mesh_count == 1 && first->field.mesh_count == 0);
     assert_true(scene_field_is_on(&second->colour_by, "air") && !scene_field_is_on(&second->colour_by, "sea"));
     assert_true(scene_field_is_on(&first->field, "anything"));
@@ -344,7 +344,7 @@ static void scene_volume_keys_are_read(void **state)
     assert_true(range->is_fixed && range->low == -2 && range->high == 3);
     assert_true(volume->unit_distance == 0.1);
     assert_true(volume->field.at_vertices && !s.images[1].volumes[0].field.at_vertices);
-    assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 25);
+    assert_true(volume->field.mesh_count == 2 && volume->field.meshes_line == 27);
     assert_true(scene_field_is_on(&volume->field, "air") && scene_field_is_on(&volume->field, "sea/12/3"));
     assert_false(scene_field_is_on(&volume->field, "se") || scene_field_is_on(&volume->field, "sea2"));
     assert_int_equal(volume->opacity_count, 4);
