@@ -175,7 +175,8 @@ typedef struct render_part {
 
 /* How rays find isosurfaces and the cells of samples: the same picture to the last bit, at different speed. By tiles of
  * 16 x 16 rays wherever that can be had; packets are taken instead where segments are to be cut by transparent
- * surfaces. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most. */
+ * surfaces. Pictures by segments may differ by the order of those that begin in one place, 5e-7 at most; by samples and
+ * without surfaces tiles and packets round the values of cells with quads in different ways, 2e-6 at most. */
 typedef enum render_traversal {
     RENDER_BINNED,  /* isosurfaces and a single volume: the picture goes down the trees at once, and cells are binned by
                       tile, unless more show than pay; several volumes as by RENDER_TILES */

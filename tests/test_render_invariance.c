@@ -150,15 +150,20 @@ static void refused_tiles_end_the_frame(void **state)
 }
 
 /* The picture at once, a tile, a packet, each ray on its own: the same cells are met, or at least those that have a
- * hit, or samples. */
-static void draw_by_traversals(render_fixture *f)
+ * hit, or samples. Of samples alone, tiles find the values in cells' own coordinates, which are known to 5e-7 there,
+ * and packets between crossings: values differ by that times the field's change across a cell, which is about the
+ * transfer function's range, and pixels by less than four times as much, as each has its samples' light once. */
+static void draw_by_traversals(render_fixture *f, bool samples_alone)
 {
     enum { TRAVERSALS = 4 };
     drawn_frame drawn[TRAVERSALS];
     for (int i = 0; i < TRAVERSALS; i++) {
         f->job.traversal = (render_traversal)i;
         fixture_draw(f, &drawn[i]);
-        drawn_assert_same(&drawn[0], &drawn[i]);
+        if (!samples_alone || i == RENDER_TILES)
+            drawn_assert_same(&drawn[0], &drawn[i]);
+        else
+            assert_true(drawn_difference(&drawn[0], &drawn[i]) <= 2e-6);
         assert_int_equal(drawn[0].list.count, drawn[i].list.count);
     }
     for (int i = 0; i < TRAVERSALS; i++) drawn_free(&drawn[i]);
@@ -180,7 +185,7 @@ static void compare_traversals(test_mesh_kind kind, int n, scene_kind scene, fix
         f.surfaces[0].difference = 1;
     }
     f.job.pixels = all ? NULL : pixels;
-    draw_by_traversals(&f);
+    draw_by_traversals(&f, scene == VOLUME);
     fixture_free(&f);
 }
 
@@ -385,7 +390,8 @@ static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fix
     fixture_create(&f, parts, 2, layout, 0.4, 1, origin);
     fixture_look(&f, camera, 61, 47);
     add_layers(&f, scene);
-    for (f.job.sample_group = 3; f.job.sample_group <= 64; f.job.sample_group += 61) draw_by_traversals(&f);
+    for (f.job.sample_group = 3; f.job.sample_group <= 64; f.job.sample_group += 61)
+        draw_by_traversals(&f, scene == VOLUME);
     fixture_free(&f);
     for (int i = 0; i < 2; i++) test_mesh_free(&parts[i]);
     test_mesh_free(&mesh);

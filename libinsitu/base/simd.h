@@ -371,6 +371,19 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
+/* The lanes of m one after the other, to where there is room for all; returns how many. */
+SIMD_INLINE int vf_compress(float *to, vm m, vf v)
+{
+#if defined(SIMD_AVX512)
+    _mm512_storeu_ps(to, _mm512_maskz_compress_ps((__mmask16)m, (__m512)v));
+    return __builtin_popcount(vm_bits(m));
+#else
+    int count = 0;
+    for (unsigned bits = vm_bits(m); bits; bits &= bits - 1) to[count++] = v[__builtin_ctz(bits)];
+    return count;
+#endif
+}
+
 /* a b - c d to 1.5 units in the last place, zero only where it is zero, and of the right sign: Kahan's two fused
  * steps where there are such, else in double, where the products of floats are exact. */
 SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)

@@ -114,19 +114,27 @@ SIMD_INLINE void kernel_turned_fetch(kernel_turned_hexes *h, const kernel_packed
 
 /* ---- places and values ---- */
 
-/* kernel_place_in() of a vertex. */
-SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const vf world[3], vf out[3])
+/* kernel_place_in() of a vertex: half of the lanes. */
+SIMD_INLINE void kernel_half_place(const kernel_frame *f, const kernel_tile *tile, const kernel_half world[3], int half,
+                                   vf out[3])
 {
     const double *eye = f->job->camera.eye;
+    kernel_half d[3], at[3];
+    for (int a = 0; a < 3; a++) d[a] = world[a] - eye[a];
+    for (int a = 0; a < 3; a++)
+        at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
+    const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
+    kernel_half_put(&out[0], half, at[0] - tile->centre_x * depth);
+    kernel_half_put(&out[1], half, at[1] - tile->centre_y * depth);
+    kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
+}
+
+SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const vf world[3], vf out[3])
+{
     for (int half = 0; half < 2; half++) {
-        kernel_half d[3], at[3];
-        for (int a = 0; a < 3; a++) d[a] = kernel_half_of(&world[a], half) - eye[a];
-        for (int a = 0; a < 3; a++)
-            at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
-        const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
-        kernel_half_put(&out[0], half, at[0] - tile->centre_x * depth);
-        kernel_half_put(&out[1], half, at[1] - tile->centre_y * depth);
-        kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
+        kernel_half at[3];
+        for (int a = 0; a < 3; a++) at[a] = kernel_half_of(&world[a], half);
+        kernel_half_place(f, tile, at, half, out);
     }
 }
 

@@ -141,9 +141,7 @@ static __attribute__((noinline)) void kernel_poly_lanes_ends(const kernel_finder
 SIMD_INLINE void kernel_packed_lanes_fetch(const kernel_finder *s, const kernel_crossed *h, kernel_poly_lanes *l)
 {
     const kernel_packed *p = &s->packed;
-    const render_camera *camera = &s->frame->job->camera;
-    const double isovalue = s->surface->layer->values[h->value],
-                 *axes[3] = {camera->right, camera->up, camera->forward};
+    const double isovalue = s->surface->layer->values[h->value];
     const float middle = (float)isovalue, rest = (float)(isovalue - (double)middle);
     vf size = vf_set(0);
     l->usual = vm_all_lanes();
@@ -154,14 +152,9 @@ SIMD_INLINE void kernel_packed_lanes_fetch(const kernel_finder *s, const kernel_
         l->f[i] = (vf_gather(p->values, vertex * p->value_stride) - middle) - rest;
         size = vf_max(vf_abs(l->f[i]), size);
         l->usual = vm_and(l->usual, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
-        vertex *= p->stride;
-        for (int a = 0; a < 3; a++) {
-            from_eye[a] = ((vf_gather(p->coordinates[a], vertex) - p->eye[a][0]) - p->eye[a][1]) * p->scale;
-            l->usual = vm_and(l->usual, vf_lt(vf_abs(from_eye[a]), vf_set(1e15f)));
-        }
-        for (int a = 0; a < 3; a++)
-            l->at[i][a] =
-                (from_eye[0] * (float)axes[a][0] + from_eye[1] * (float)axes[a][1]) + from_eye[2] * (float)axes[a][2];
+        kernel_packed_place(p, vertex, from_eye);
+        for (int a = 0; a < 3; a++) l->usual = vm_and(l->usual, vf_lt(vf_abs(from_eye[a]), vf_set(1e15f)));
+        kernel_place_turn(s, from_eye, l->at[i]);
     }
     l->usual = vm_and(l->usual, vf_lt(vf_set(1e-30f), size));
     /* The power of two that brings the largest near 1: its exponent, mirrored. */

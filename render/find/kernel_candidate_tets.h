@@ -24,12 +24,10 @@ typedef struct kernel_tet_lanes {
 /* Turns the vertices into the camera's axes. */
 SIMD_INLINE void kernel_tet_lanes_turn(const kernel_finder *s, const kernel_tet_lanes *l, vf at[4][3])
 {
-    const render_camera *camera = &s->frame->job->camera;
-    const double *axes[3] = {camera->right, camera->up, camera->forward};
-    for (int i = 0; i < 4; i++)
-        for (int a = 0; a < 3; a++)
-            at[i][a] =
-                (l->at[0][i] * (float)axes[a][0] + l->at[1][i] * (float)axes[a][1]) + l->at[2][i] * (float)axes[a][2];
+    for (int i = 0; i < 4; i++) {
+        const vf place[3] = {l->at[0][i], l->at[1][i], l->at[2][i]};
+        kernel_place_turn(s, place, at[i]);
+    }
 }
 
 SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_tet_lanes *l, kernel_ends_lanes *e)
@@ -89,28 +87,36 @@ SIMD_INLINE void kernel_packed_value(kernel_finder *s, const vf v[4], kernel_tet
     }
 }
 
-/* As kernel_packed_value(), for all that a volume shows of the tets. */
-SIMD_INLINE void kernel_packed_volume(kernel_finder *s, const vf v[4], const kernel_tet_lanes *l)
+/* As kernel_packed_value(), for all that a volume shows of tets or hexes of a packed mesh, of so many vertices. */
+static __attribute__((noinline)) void kernel_find_packed_volume(kernel_finder *s, int vertices)
 {
+    const kernel_packed *p = &s->packed;
+    kernel_tets *t = &s->tets;
+    kernel_ends_lanes e = kernel_no_ends();
     vm usual = vm_all_lanes();
-    for (int i = 0; i < 4; i++) {
+    vf v[8];
+    if (!t->count) return;
+    kernel_tets_fill(t, vertices);
+    for (int i = 0; i < vertices; i++) {
+        vi vertex;
+        vf place[3], at[3];
+        memcpy(&vertex, t->packed[i], sizeof vertex);
+        v[i] = vf_gather(p->values, vertex * p->value_stride);
         usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
-        for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(l->at[a][i]), vf_set(1e15f)));
+        kernel_packed_place(p, vertex, place);
+        for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
+        kernel_place_turn(s, place, at);
+        kernel_ends_add(s, &e, at, vm_all_lanes());
     }
-    const vm shows = kernel_interest_meets_values(s->interest, v);
-    const unsigned all = (1u << s->tets.count) - 1, good = all & vm_bits(vm_and(usual, shows));
-    if (good) {
-        kernel_ends_lanes e = kernel_no_ends();
-        vf at[4][3];
-        kernel_tet_lanes_turn(s, l, at);
-        for (int i = 0; i < 4; i++) kernel_ends_add(s, &e, at[i], vm_all_lanes());
-        kernel_tets_add(s, &e, good, s->tets.cell, s->source);
-    }
+    const vm shows = kernel_interest_meets_values(s->interest, v, vertices);
+    const unsigned all = (1u << t->count) - 1, good = all & vm_bits(vm_and(usual, shows));
+    if (good) kernel_tets_add(s, &e, good, t->cell, s->source);
     for (unsigned odd = all & ~vm_bits(usual); odd; odd &= odd - 1) {
         kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part],
-                          s->tets.cell[__builtin_ctz(odd)]);
+                          t->cell[__builtin_ctz(odd)]);
         kernel_find_volume(s);
     }
+    t->count = 0;
 }
 
 static void kernel_find_packed_tets(kernel_finder *s)
@@ -123,14 +129,13 @@ static void kernel_find_packed_tets(kernel_finder *s)
     kernel_tets_fill(t, 4);
     for (int i = 0; i < 4; i++) {
         vi vertex;
+        vf place[3];
         memcpy(&vertex, t->packed[i], sizeof vertex);
         v[i] = vf_gather(p->values, vertex * p->value_stride);
-        vertex *= p->stride;
-        for (int a = 0; a < 3; a++)
-            l.at[a][i] = ((vf_gather(p->coordinates[a], vertex) - p->eye[a][0]) - p->eye[a][1]) * p->scale;
+        kernel_packed_place(p, vertex, place);
+        for (int a = 0; a < 3; a++) l.at[a][i] = place[a];
     }
-    if (!s->surface) kernel_packed_volume(s, v, &l);
-    for (int value = 0; s->surface && value < s->surface->layer->value_count; value++)
+    for (int value = 0; value < s->surface->layer->value_count; value++)
         kernel_packed_value(s, v, &l, value);
     t->count = 0;
 }

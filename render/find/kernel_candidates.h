@@ -33,6 +33,8 @@ static void kernel_find_pending(kernel_finder *s)
 {
     if (s->writer)
         kernel_activate_pending(s);
+    else if (!s->surface && (s->packed.is_hexes || s->packed.is_tets))
+        kernel_find_packed_volume(s, s->packed.is_hexes ? 8 : 4);
     else if (s->packed.is_hexes)
         kernel_find_packed_hexes(s);
     else if (s->packed.is_tets)

@@ -104,7 +104,6 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
         kernel_packed_surface(&s->packed, f, subtree->surface, s->part);
     else
         kernel_packed_begin(&s->packed, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
-    s->packed.is_hexes = s->packed.is_hexes && s->surface;
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);
@@ -285,6 +284,23 @@ static void kernel_find_volume(kernel_finder *s)
 typedef struct kernel_ends_lanes {
     vf near, far, left, right, top, bottom;
 } kernel_ends_lanes;
+
+/* Gathers a packed mesh's vertices, as places from the eye on in the space's scale. */
+SIMD_INLINE void kernel_packed_place(const kernel_packed *p, vi vertex, vf out[3])
+{
+    vertex *= p->stride;
+    for (int a = 0; a < 3; a++)
+        out[a] = ((vf_gather(p->coordinates[a], vertex) - p->eye[a][0]) - p->eye[a][1]) * p->scale;
+}
+
+/* Turns such a place into the camera's axes. */
+SIMD_INLINE void kernel_place_turn(const kernel_finder *s, const vf place[3], vf at[3])
+{
+    const render_camera *camera = &s->frame->job->camera;
+    const double *axes[3] = {camera->right, camera->up, camera->forward};
+    for (int a = 0; a < 3; a++)
+        at[a] = (place[0] * (float)axes[a][0] + place[1] * (float)axes[a][1]) + place[2] * (float)axes[a][2];
+}
 
 /* Widens the bounds to hold the point, in the given lanes. */
 SIMD_INLINE void kernel_ends_add(const kernel_finder *s, kernel_ends_lanes *e, const vf point[3], vm lanes)

@@ -15,15 +15,24 @@ SIMD_INLINE bool kernel_interest_meets(const kernel_interest *interest, float lo
     return false;
 }
 
-/* As kernel_interest_meets(), for a cell of four values in each lane. */
-SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf v[4])
+/* As kernel_interest_meets(), for a range in each lane. */
+SIMD_INLINE vm kernel_interest_meets_lanes(const kernel_interest *interest, vf low, vf high)
 {
-    const vf low = vf_min(vf_min(v[0], v[1]), vf_min(v[2], v[3]));
-    const vf high = vf_max(vf_max(v[0], v[1]), vf_max(v[2], v[3]));
     vm meets = vm_none();
     for (int i = 0; i < interest->count; i++)
         meets = vm_or(meets, vm_and(vf_le(low, vf_set(interest->high[i])), vf_le(vf_set(interest->low[i]), high)));
     return meets;
+}
+
+/* As kernel_interest_meets(), for a cell of so many values in each lane. */
+SIMD_INLINE vm kernel_interest_meets_values(const kernel_interest *interest, const vf *v, int count)
+{
+    vf low = v[0], high = v[0];
+    for (int i = 1; i < count; i++) {
+        low = vf_min(v[i], low);
+        high = vf_max(v[i], high);
+    }
+    return kernel_interest_meets_lanes(interest, low, high);
 }
 
 SIMD_INLINE bool kernel_node_shows(const kernel_interest *interest, const mmbvh_ranges *ranges, int64_t node)

@@ -168,6 +168,38 @@ SIMD_INLINE void kernel_tile_traverse(kernel_tile_trace *t, const mmbvh *tree, c
 
 /* ---- lanes that are pixels of several cells ---- */
 
+enum { KERNEL_HEX_RAYS = 512, KERNEL_HEX_ROOM = KERNEL_HEX_RAYS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
+
+/* A ray: its pixel in the tile, row by row, and its cell's lane. */
+typedef struct kernel_hex_rays {
+    int count;
+    uint8_t pixel[KERNEL_HEX_ROOM], lane[KERNEL_HEX_ROOM];
+} kernel_hex_rays;
+
+/* The pixels of a box, row by row, of the cell in the lane. */
+SIMD_INLINE void kernel_hex_rays_of(kernel_hex_rays *rays, unsigned box, int lane)
+{
+    static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    typedef uint8_t kernel_row_bytes __attribute__((vector_size(KERNEL_TILE)));
+    const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
+    const kernel_row_bytes lanes = (kernel_row_bytes){0} + (uint8_t)lane;
+    kernel_row_bytes row;
+    memcpy(&row, ramp, sizeof row);
+    row += (uint8_t)((box & 15) | (box >> 8 & 15) << 4);
+    for (unsigned y = box >> 8 & 15; y <= box >> 12; y++, row += KERNEL_TILE) {
+        memcpy(rays->pixel + rays->count, &row, sizeof row);
+        memcpy(rays->lane + rays->count, &lanes, sizeof lanes);
+        rays->count += columns;
+    }
+}
+
+/* So that whole vectors may be read. */
+SIMD_INLINE void kernel_hex_rays_close(kernel_hex_rays *rays)
+{
+    memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
+    memset(rays->lane + rays->count, 0, SIMD_WIDTH);
+}
+
 SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
 {
     typedef uint8_t kernel_byte_lanes __attribute__((vector_size(SIMD_WIDTH)));

@@ -14,18 +14,10 @@
 #include "kernel_types.h"
 #include "simd.h"
 
-enum { KERNEL_HEX_RAYS = 512, KERNEL_HEX_ROOM = KERNEL_HEX_RAYS + KERNEL_TILE * KERNEL_TILE + SIMD_WIDTH };
-
 /* Rays between two faces of their cells. */
 typedef struct kernel_hex_ends {
     float t[2][KERNEL_HEX_ROOM], v[2][KERNEL_HEX_ROOM], r[2][3][KERNEL_HEX_ROOM];
 } kernel_hex_ends;
-
-/* A ray: its pixel in the tile, row by row, and its cell's lane. */
-typedef struct kernel_hex_rays {
-    int count;
-    uint8_t pixel[KERNEL_HEX_ROOM], lane[KERNEL_HEX_ROOM];
-} kernel_hex_rays;
 
 /* A face's edges around, and whether they are the other way. */
 static const signed char kernel_hex_around[KERNEL_HEX_FACES][4][2] = {
@@ -66,30 +58,6 @@ SIMD_INLINE void kernel_hex_ray_add(kernel_hex_rays *to, const kernel_hex_rays *
     to->pixel[to->count] = from->pixel[i];
     to->lane[to->count] = from->lane[i];
     to->count++;
-}
-
-/* The pixels of a box, row by row, of the cell in the lane. */
-SIMD_INLINE void kernel_hex_rays_of(kernel_hex_rays *rays, unsigned box, int lane)
-{
-    static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    typedef uint8_t kernel_row_bytes __attribute__((vector_size(KERNEL_TILE)));
-    const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
-    const kernel_row_bytes lanes = (kernel_row_bytes){0} + (uint8_t)lane;
-    kernel_row_bytes row;
-    memcpy(&row, ramp, sizeof row);
-    row += (uint8_t)((box & 15) | (box >> 8 & 15) << 4);
-    for (unsigned y = box >> 8 & 15; y <= box >> 12; y++, row += KERNEL_TILE) {
-        memcpy(rays->pixel + rays->count, &row, sizeof row);
-        memcpy(rays->lane + rays->count, &lanes, sizeof lanes);
-        rays->count += columns;
-    }
-}
-
-/* Pads the list with zeros, so that whole vectors may be read. */
-SIMD_INLINE void kernel_hex_rays_close(kernel_hex_rays *rays)
-{
-    memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
-    memset(rays->lane + rays->count, 0, SIMD_WIDTH);
 }
 
 /* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more, among rays on the

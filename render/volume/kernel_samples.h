@@ -100,14 +100,11 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     kernel_emit(p, mask, kind, &sample);
 }
 
-/* A sample that another cell owns too stays the other's. */
-SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
-                             const kernel_interval *i)
+/* Of the window's samples begin .. end - 1 those of the interval. One that another cell owns too stays the other's. */
+SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
+                                  const kernel_interval *i, int begin, int end)
 {
     kernel_samples *s = state->samples;
-    int begin, end;
-    kernel_sample_span(p, s, i, &begin, &end);
-    if (begin >= end) return;
     const vf length = i->t_out - i->t_in;
     const vf slope = vf_select(vf_lt(vf_set(0), length), (i->v_out - i->v_in) / length, vf_set(0));
     const vf base = p->sample_base, step = p->sample_step;
@@ -133,6 +130,14 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
             s->t_out[n] = vf_select(own, i->t_out, s->t_out[n]);
         }
     }
+}
+
+SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
+                             const kernel_interval *i)
+{
+    int begin, end;
+    kernel_sample_span(p, state->samples, i, &begin, &end);
+    if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
 }
 
 /* A fragment under way on each ray. */

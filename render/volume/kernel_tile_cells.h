@@ -108,7 +108,7 @@ SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const ker
     const vf *z = placed->at[2], *v = placed->values;
     vm is_finite = vm_all_lanes();
     for (int i = 0; i < 4; i++) is_finite = vm_and(is_finite, vf_lt(vf_abs(v[i]), vf_set(INFINITY)));
-    const vm shows = kernel_interest_meets_values(interest, v);
+    const vm shows = kernel_interest_meets_values(interest, v, 4);
     const vf front = vf_min(vf_min(z[0], z[1]), vf_min(z[2], z[3]));
     const vf back = vf_max(vf_max(z[0], z[1]), vf_max(z[2], z[3]));
     const vf pad = KERNEL_OUTLINE_PAD * vf_max(vf_abs(front), vf_abs(back));

@@ -1,6 +1,7 @@
-/* Samples of volumes for a whole tile: a window of samples at a time, for all the tile's blocks. A cell is fetched,
- * placed and given its lines once a window (kernel_tile_cells.h), and goes to the packets of the blocks that it may
- * meet, whose samples it owns it fills. A window is so many samples that most rays have one or two:
+/* Samples of volumes for a whole tile: a window of samples at a time, for all the tile's blocks. Hexes, wedges and
+ * pyramids are taken many at once, with a sample a lane (kernel_local_samples.h). Other cells are fetched, placed and
+ * given their lines once a window (kernel_tile_cells.h), and go to the packets of the blocks that they may meet, where
+ * they fill the samples that they own. A window is so many samples that most rays have one or two:
  *
  *     block 0  |--s--s--s--s--s--s--|--s--s--s--s--s--...
  *     block 1  |--s--s--s--s--s--s--|--s--s--x  opaque hit: its far ends here
@@ -20,24 +21,21 @@
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
 #include "kernel_crossings.h"
+#include "kernel_local_samples.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_samples.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
+#include "mmbvh.h"
 #include "render.h"
 #include "simd.h"
-
-typedef struct kernel_tile_ray_samples {
-    kernel_samples samples;
-    kernel_blend blend;
-    vm active; /* of the packet, whose own is narrowed to the rays that are lit */
-} kernel_tile_ray_samples;
 
 typedef struct kernel_tile_volume {
     kernel_tile_ray_samples packets[KERNEL_TILE_PACKETS];
     int volume; /* under way */
+    kernel_local_batch batch;
 } kernel_tile_volume;
 
 /* ---- cells ---- */
@@ -78,9 +76,40 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
     }
 }
 
+/* A leaf's cells, those that fit into lanes and others. */
 static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_tile_meet_leaf(t, t->thread->tile_volume->volume, part, cells, count, true, blocks, kernel_tile_samples);
+    kernel_tile_volume *v = t->thread->tile_volume;
+    const grid *g = t->frame->job->parts[part].cells;
+    uint32_t others[MMBVH_MAX_LEAF];
+    int left = 0;
+    for (int n = 0; n < count; n++) {
+        const int type = grid_cell_type(g, cells[n]);
+        if (kernel_local_fits(t->frame, type))
+            kernel_local_wait(t, &v->batch, part, type, cells[n], blocks, kernel_local_box(blocks));
+        else
+            others[left++] = cells[n];
+    }
+    if (left) kernel_tile_meet_leaf(t, v->volume, part, others, left, true, blocks, kernel_tile_samples);
+}
+
+/* The window's cells that are known. */
+SIMD_INLINE void kernel_tile_volume_candidates(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks)
+{
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_tile_cells_open(t, cells);
+    for (int n = 0; n < cells->open_count; n++) {
+        const kernel_tile_candidate *item = &cells->items[n];
+        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
+        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
+        if (!met) continue;
+        const int part = (int)item->source, type = grid_cell_type(t->frame->job->parts[part].cells, item->cell);
+        if (kernel_local_fits(t->frame, type))
+            kernel_local_wait(t, &v->batch, part, type, item->cell, met, item->box);
+        else
+            kernel_tile_meet_item(t, cells, item, true, met, kernel_tile_samples);
+    }
+    kernel_tile_take_pending(t, cells, kernel_tile_samples);
 }
 
 static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
@@ -142,10 +171,12 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     }
     if (!is_lit) return false;
     for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
+        kernel_local_begin(t, &v->batch, v->packets, blocks, v->volume, kernel_tile_samples);
         if (t->frame->volume_candidates)
-            kernel_tile_meet_candidate(t, true, blocks, kernel_tile_samples);
+            kernel_tile_volume_candidates(t, v, blocks);
         else
             kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts, kernel_tile_samples);
+        kernel_local_end(t, &v->batch);
     }
     return true;
 }

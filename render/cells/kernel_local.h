@@ -1,0 +1,369 @@
+/* Cells in coordinates of their own, one a lane: where in its cell is a point?
+ *
+ * A cell's map takes its own coordinates r to X(r). About the cell's middle the map is linear but for what bends it:
+ *
+ *     X(r) = X0 + M r + (bent terms)      and so with A = 1 / M      y = A (X - X0) = r + n(r)
+ *
+ * n is small where the cell is not far from a parallelepiped, has few terms, and with y known, r is found by one step
+ * of Newton's method and one that keeps its derivatives. Hexes have the terms ρσ, ρκ, σκ and ρσκ, wedges ρκ and σκ, a
+ * pyramid αβ / k, and tets none:
+ *
+ *              r                              inside
+ *     hex      (ρ, σ, κ) from the middle      |ρ|, |σ|, |κ| <= 1/2
+ *     wedge    ρ, σ from the triangle's       ρ, σ >= -1/3, ρ + σ <= 1/3, |κ| <= 1/2
+ *     pyramid  α, β from the axis; k is 0     |α|, |β| <= k / 2, k <= 1
+ *              at the apex
+ *     tet      from the middle                ρ, σ, κ >= -1/4, ρ + σ + κ <= 1/4
+ *
+ * The derivative of n at every corner is less than 0.78 by Frobenius' norm, or the cell is not for lanes: the norm is
+ * convex along each coordinate, so it is nowhere in the cell more, and so r -> r + n(r) takes no two points of the cell
+ * to one. Where the middle's coordinates are counted from does not matter to a point's place. */
+#ifndef RENDER_KERNEL_LOCAL_H
+#define RENDER_KERNEL_LOCAL_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "simd.h"
+
+enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
+
+/* The square of 0.78. */
+#define KERNEL_LOCAL_BENT 0.6f
+
+/* Lane by lane. The field's terms are its value in the middle, its slopes along r, and its bent terms. */
+typedef struct kernel_local_cells {
+    /* y = inverse (X - origin) + offset */
+    float origin[3][SIMD_WIDTH], inverse[3][3][SIMD_WIDTH], offset[3][SIMD_WIDTH];
+    float bent[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
+    float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
+    float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH]; /* y of no point inside is beyond */
+    float blur[SIMD_WIDTH]; /* a point nearer than that to the border may be on either side of it */
+} kernel_local_cells;
+
+SIMD_INLINE int kernel_bent_terms(int type)
+{
+    return type == GRID_HEX ? 4 : type == GRID_WEDGE ? 2 : type == GRID_PYRAMID ? 1 : 0;
+}
+
+/* A number at the vertices as the terms' factors: in the middle, along r, bent. */
+SIMD_INLINE void kernel_hex_terms(const vf v[8], vf out[8])
+{
+    const vf p0 = v[0] + v[1], p1 = v[3] + v[2], p2 = v[4] + v[5], p3 = v[7] + v[6];
+    const vf m0 = v[1] - v[0], m1 = v[2] - v[3], m2 = v[5] - v[4], m3 = v[6] - v[7];
+    const vf pp0 = p0 + p1, pp1 = p2 + p3, pm0 = p1 - p0, pm1 = p3 - p2;
+    const vf mp0 = m0 + m1, mp1 = m2 + m3, mm0 = m1 - m0, mm1 = m3 - m2;
+    out[0] = 0.125f * (pp0 + pp1);
+    out[1] = 0.25f * (mp0 + mp1);
+    out[2] = 0.25f * (pm0 + pm1);
+    out[3] = 0.25f * (pp1 - pp0);
+    out[4] = 0.5f * (mm0 + mm1);
+    out[5] = 0.5f * (mp1 - mp0);
+    out[6] = 0.5f * (pm1 - pm0);
+    out[7] = mm1 - mm0;
+}
+
+SIMD_INLINE void kernel_wedge_terms(const vf v[6], vf out[8])
+{
+    const vf low = (v[0] + v[1]) + v[2], high = (v[3] + v[4]) + v[5];
+    out[0] = (low + high) * (1.0f / 6);
+    out[1] = 0.5f * ((v[1] - v[0]) + (v[4] - v[3]));
+    out[2] = 0.5f * ((v[2] - v[0]) + (v[5] - v[3]));
+    out[3] = (high - low) * (1.0f / 3);
+    out[4] = (v[4] - v[3]) - (v[1] - v[0]);
+    out[5] = (v[5] - v[3]) - (v[2] - v[0]);
+}
+
+SIMD_INLINE void kernel_pyramid_terms(const vf v[5], vf out[8])
+{
+    const vf along = v[1] - v[0], across = v[3] - v[0], bent = (v[0] - v[1]) + (v[2] - v[3]);
+    out[0] = v[4];
+    out[1] = along + 0.5f * bent;
+    out[2] = across + 0.5f * bent;
+    out[3] = 0.25f * ((v[0] + v[1]) + (v[2] + v[3])) - v[4];
+    out[4] = bent;
+}
+
+SIMD_INLINE void kernel_tet_terms(const vf v[4], vf out[8])
+{
+    out[0] = 0.25f * ((v[0] + v[1]) + (v[2] + v[3]));
+    for (int i = 1; i < 4; i++) out[i] = v[i] - v[0];
+}
+
+SIMD_INLINE void kernel_local_terms(int type, const vf *v, vf out[8])
+{
+    if (type == GRID_HEX)
+        kernel_hex_terms(v, out);
+    else if (type == GRID_WEDGE)
+        kernel_wedge_terms(v, out);
+    else if (type == GRID_PYRAMID)
+        kernel_pyramid_terms(v, out);
+    else
+        kernel_tet_terms(v, out);
+}
+
+/* The bent terms at r, and what they change by along each of r. */
+typedef struct kernel_bend {
+    vf term[KERNEL_BENT_TERMS], along[KERNEL_BENT_TERMS][3];
+} kernel_bend;
+
+SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
+{
+    const vf zero = vf_set(0);
+    if (type == GRID_HEX) {
+        b->term[0] = r[0] * r[1];
+        b->term[1] = r[0] * r[2];
+        b->term[2] = r[1] * r[2];
+        b->term[3] = b->term[0] * r[2];
+        const vf along[4][3] = {
+            {r[1], r[0], zero}, {r[2], zero, r[0]}, {zero, r[2], r[1]}, {b->term[2], b->term[1], b->term[0]}};
+        memcpy(b->along, along, sizeof along);
+    } else if (type == GRID_WEDGE) {
+        b->term[0] = r[0] * r[2];
+        b->term[1] = r[1] * r[2];
+        const vf along[2][3] = {{r[2], zero, r[0]}, {zero, r[2], r[1]}};
+        memcpy(b->along, along, sizeof along);
+    } else if (type == GRID_PYRAMID) {
+        /* Within the cell α / k and β / k are half at most; a step beyond the apex must not blow up. */
+        const vf half = vf_set(0.75f), inverse = 1.0f / vf_max(r[2], vf_set(1e-6f));
+        const vf a = vf_clamp(r[0] * inverse, -half, half), c = vf_clamp(r[1] * inverse, -half, half);
+        b->term[0] = a * r[1];
+        const vf along[1][3] = {{c, a, -(a * c)}};
+        memcpy(b->along, along, sizeof along);
+    }
+}
+
+/* How far r is inside of the cell's border; less than 0 outside. */
+SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
+{
+    if (type == GRID_HEX) return 0.5f - vf_max(vf_max(vf_abs(r[0]), vf_abs(r[1])), vf_abs(r[2]));
+    if (type == GRID_WEDGE) {
+        const vf within = vf_min(vf_min(r[0], r[1]) + 1.0f / 3, 1.0f / 3 - (r[0] + r[1]));
+        return vf_min(within, 0.5f - vf_abs(r[2]));
+    }
+    if (type == GRID_PYRAMID) return vf_min(0.5f * r[2] - vf_max(vf_abs(r[0]), vf_abs(r[1])), 1.0f - r[2]);
+    return vf_min(vf_min(vf_min(r[0], r[1]), r[2]) + 0.25f, 0.25f - ((r[0] + r[1]) + r[2]));
+}
+
+/* ---- cells ---- */
+
+/* The largest derivative's norm, squared, over the corners. */
+SIMD_INLINE vf kernel_local_bent(int type, const vf bent[KERNEL_BENT_TERMS][3])
+{
+    static const float corners[2][8][3] = {
+        {{-0.5f, -0.5f, -0.5f},
+         {0.5f, -0.5f, -0.5f},
+         {0.5f, 0.5f, -0.5f},
+         {-0.5f, 0.5f, -0.5f},
+         {-0.5f, -0.5f, 0.5f},
+         {0.5f, -0.5f, 0.5f},
+         {0.5f, 0.5f, 0.5f},
+         {-0.5f, 0.5f, 0.5f}},
+        {{-1.0f / 3, -1.0f / 3, -0.5f},
+         {2.0f / 3, -1.0f / 3, -0.5f},
+         {-1.0f / 3, 2.0f / 3, -0.5f},
+         {-1.0f / 3, -1.0f / 3, 0.5f},
+         {2.0f / 3, -1.0f / 3, 0.5f},
+         {-1.0f / 3, 2.0f / 3, 0.5f}}};
+    const vf *b0 = bent[0];
+    vf most = vf_set(0);
+    /* Along k, α and β: 1/4, 1/2 and 1/2 at most. */
+    if (type == GRID_PYRAMID) return 0.5625f * ((b0[0] * b0[0] + b0[1] * b0[1]) + b0[2] * b0[2]);
+    for (int n = 0; n < (type == GRID_HEX ? 8 : type == GRID_WEDGE ? 6 : 0); n++) {
+        const float *corner = corners[type == GRID_HEX ? 0 : 1][n];
+        const vf r[3] = {vf_set(corner[0]), vf_set(corner[1]), vf_set(corner[2])};
+        kernel_bend b;
+        vf sum = vf_set(0);
+        kernel_bend_at(type, r, &b);
+        for (int i = 0; i < 3; i++)
+            for (int a = 0; a < 3; a++) {
+                vf slope = vf_set(0);
+                for (int k = 0; k < kernel_bent_terms(type); k++) slope += bent[k][a] * b.along[k][i];
+                sum += slope * slope;
+            }
+        most = vf_max(sum, most);
+    }
+    return most;
+}
+
+/* The inverse of the matrix whose columns are m[1] to m[3]. */
+SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
+{
+    for (int i = 0; i < 3; i++) {
+        const int u = 1 + (i + 1) % 3, v = 1 + (i + 2) % 3;
+        for (int a = 0; a < 3; a++) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            inverse[i][a] = m[b][u] * m[c][v] - m[c][u] * m[b][v];
+        }
+    }
+    const vf det = (m[0][1] * inverse[0][0] + m[1][1] * inverse[0][1]) + m[2][1] * inverse[0][2], one = 1.0f / det;
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++) inverse[i][a] *= one;
+}
+
+/* y of all vertices: no point inside is beyond, as each is a mean of them with weights that are not negative. */
+SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
+                                    kernel_local_cells *out)
+{
+    for (int i = 0; i < 3; i++) {
+        vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
+        for (int n = 0; n < count; n++) {
+            const vf y = ((inverse[i][0] * at[0][n] + inverse[i][1] * at[1][n]) + inverse[i][2] * at[2][n]) + offset[i];
+            low = vf_min(y, low);
+            high = vf_max(y, high);
+        }
+        vf_store(out->low[i], low - 1e-3f);
+        vf_store(out->high[i], high + 1e-3f);
+    }
+}
+
+/* How near to the border is too near: crossings of faces (kernel_quad.h) are off by 3e-7 of the cell's size and by half
+ * a unit in the last place of their depth, projected vertices by some units of their places across the ray, and r here
+ * by 2e-6 that Newton's method leaves and by as many units of a place. */
+SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf inverse[3][3], kernel_local_cells *out)
+{
+    vf size[3], most = vf_set(0);
+    for (int a = 0; a < 3; a++) {
+        size[a] = vf_set(0);
+        for (int n = 0; n < count; n++) size[a] = vf_max(vf_abs(places[a][n]), size[a]);
+    }
+    for (int i = 0; i < 3; i++)
+        most = vf_max((vf_abs(inverse[i][0]) * size[0] + vf_abs(inverse[i][1]) * size[1]) * 4.0f +
+                          vf_abs(inverse[i][2]) * size[2],
+                      most);
+    vf_store(out->blur, 4e-6f + 1.2e-7f * most);
+}
+
+/* Cells of one type with vertices placed in tile space and the field at them. Returns the lanes that are not bent too
+ * much; what other lanes have is not to be used. */
+SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], kernel_local_cells *out)
+{
+    const int count = grid_type_vertices(type), bends = kernel_bent_terms(type);
+    vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], bent[KERNEL_BENT_TERMS][3];
+    for (int a = 0; a < 3; a++) {
+        for (int n = 0; n < count; n++) at[a][n] = places[a][n] - places[a][0];
+        kernel_local_terms(type, at[a], terms[a]);
+        vf_store(out->origin[a], places[a][0]);
+    }
+    kernel_local_terms(type, values, field);
+    for (int n = 0; n < 4 + bends; n++) vf_store(out->field[n], field[n]);
+    kernel_local_invert((const vf(*)[8])terms, inverse);
+    for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 3; a++) vf_store(out->inverse[i][a], inverse[i][a]);
+        offset[i] = -((inverse[i][0] * terms[0][0] + inverse[i][1] * terms[1][0]) + inverse[i][2] * terms[2][0]);
+        vf_store(out->offset[i], offset[i]);
+        for (int k = 0; k < bends; k++) {
+            bent[k][i] = inverse[i][0] * terms[0][4 + k] + inverse[i][1] * terms[1][4 + k];
+            bent[k][i] += inverse[i][2] * terms[2][4 + k];
+            vf_store(out->bent[k][i], bent[k][i]);
+        }
+    }
+    kernel_local_reach(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
+    kernel_local_blur(count, places, (const vf(*)[3])inverse, out);
+    const vm sharp = vf_lt(vf_load(out->blur), vf_set(0.05f));
+    if (!bends) return sharp;
+    return vm_and(sharp, vf_lt(kernel_local_bent(type, (const vf(*)[3])bent), vf_set(KERNEL_LOCAL_BENT)));
+}
+
+/* ---- points ---- */
+
+SIMD_INLINE vf kernel_local_take(const float *of, vi lane)
+{
+    return vf_permute(vf_load(of), lane);
+}
+
+/* Where points are: each lane's in the cell of a lane. */
+typedef struct kernel_local_points {
+    vf y[3], r[3], bent[KERNEL_BENT_TERMS][3];
+    kernel_bend bend;     /* at r */
+    vf column[3][3], det; /* of the derivatives' inverse, times their determinant's inverse in det */
+} kernel_local_points;
+
+/* y - (r + n(r)) */
+SIMD_INLINE void kernel_local_left(int type, const kernel_local_points *p, vf out[3])
+{
+    for (int a = 0; a < 3; a++) {
+        out[a] = p->y[a] - p->r[a];
+        for (int k = 0; k < kernel_bent_terms(type); k++) out[a] = vf_muladd(-p->bent[k][a], p->bend.term[k], out[a]);
+    }
+}
+
+SIMD_INLINE void kernel_local_derive(int type, kernel_local_points *p)
+{
+    vf j[3][3]; /* what r + n(r) changes by along each of r */
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++) {
+            j[i][a] = vf_set(i == a);
+            for (int k = 0; k < kernel_bent_terms(type); k++)
+                j[i][a] = vf_muladd(p->bent[k][a], p->bend.along[k][i], j[i][a]);
+        }
+    for (int i = 0; i < 3; i++) {
+        const vf *u = j[(i + 1) % 3], *v = j[(i + 2) % 3];
+        for (int a = 0; a < 3; a++) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            p->column[i][a] = vf_muladd(u[b], v[c], -(u[c] * v[b]));
+        }
+    }
+    const vf *c = p->column[0];
+    p->det = 1.0f / vf_muladd(j[0][0], c[0], vf_muladd(j[0][1], c[1], j[0][2] * c[2]));
+}
+
+/* A step in the given lanes; returns the largest move. */
+SIMD_INLINE vf kernel_local_step(int type, kernel_local_points *p, vm lanes)
+{
+    const vf most = vf_set(1), far = vf_set(1.25f);
+    vf left[3], largest = vf_set(0);
+    kernel_local_left(type, p, left);
+    for (int i = 0; i < 3; i++) {
+        const vf *c = p->column[i];
+        const vf sum = vf_muladd(c[0], left[0], vf_muladd(c[1], left[1], c[2] * left[2]));
+        const vf move = vf_clamp(sum * p->det, -most, most);
+        largest = vf_max(largest, vf_abs(move));
+        p->r[i] = vf_select(lanes, vf_clamp(p->r[i] + move, -far, far), p->r[i]);
+    }
+    kernel_bend_at(type, p->r, &p->bend);
+    return largest;
+}
+
+/* Finds r of the points at these places; returns the lanes whose r is known to 1e-6. A lane's is the same whatever the
+ * others are. */
+SIMD_INLINE vm kernel_local_find(int type, const kernel_local_cells *cells, vi lane, const vf at[3],
+                                 kernel_local_points *p)
+{
+    vf d[3];
+    for (int a = 0; a < 3; a++) d[a] = at[a] - kernel_local_take(cells->origin[a], lane);
+    for (int i = 0; i < 3; i++) {
+        p->y[i] = kernel_local_take(cells->offset[i], lane);
+        for (int a = 0; a < 3; a++) p->y[i] = vf_muladd(kernel_local_take(cells->inverse[i][a], lane), d[a], p->y[i]);
+        p->r[i] = p->y[i];
+    }
+    if (type == GRID_TET) return vm_all_lanes();
+    for (int k = 0; k < kernel_bent_terms(type); k++)
+        for (int a = 0; a < 3; a++) p->bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
+    vf left[3];
+    kernel_bend_at(type, p->r, &p->bend);
+    kernel_local_left(type, p, left);
+    for (int i = 0; i < 3; i++) p->r[i] += left[i];
+    kernel_bend_at(type, p->r, &p->bend);
+    kernel_local_derive(type, p);
+    const vf first = kernel_local_step(type, p, vm_all_lanes()), second = kernel_local_step(type, p, vm_all_lanes());
+    vm open = vm_not(vf_le(first * second, vf_set(5e-7f)));
+    for (int step = 0; step < KERNEL_LOCAL_STEPS && __builtin_expect(vm_any(open), 0); step++) {
+        kernel_local_derive(type, p);
+        open = vm_andnot(open, vf_le(kernel_local_step(type, p, open), vf_set(7e-4f)));
+    }
+    return vm_not(open);
+}
+
+/* The field at r. */
+SIMD_INLINE vf kernel_local_value(int type, const kernel_local_cells *cells, vi lane, const kernel_local_points *p)
+{
+    vf v = kernel_local_take(cells->field[0], lane);
+    for (int i = 0; i < 3; i++) v = vf_muladd(kernel_local_take(cells->field[1 + i], lane), p->r[i], v);
+    for (int k = 0; k < kernel_bent_terms(type); k++)
+        v = vf_muladd(kernel_local_take(cells->field[4 + k], lane), p->bend.term[k], v);
+    return v;
+}
+
+#endif
