@@ -59,6 +59,7 @@ typedef struct kernel_local_batch {
     kernel_local_queue queues[KERNEL_LOCAL_TYPES];
     double world[3][8][SIMD_WIDTH], scalars[8][SIMD_WIDTH]; /* as the caller has them */
     kernel_local_cells cells;
+    int32_t ends[4][SIMD_WIDTH]; /* kernel_local_pixels() */
     kernel_hex_rays rays;
     int sample_count;
     float t[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH], bits[KERNEL_LOCAL_SAMPLES + SIMD_WIDTH];
@@ -350,6 +351,50 @@ SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scal
     return vm_and(finite, kernel_interest_meets_values(&t->interest, plain, count));
 }
 
+/* The tile's first and last columns and rows in which cells may be seen. A hundredth of a pixel is more than the
+ * roundings of vertices that lie a thousandth of the scene's distance or more before the eye. */
+SIMD_INLINE void kernel_local_pixels(const kernel_tile_trace *t, int count, const vf places[3][8],
+                                     int32_t ends[4][SIMD_WIDTH])
+{
+    const bool flat = t->frame->job->camera.is_orthographic;
+    const kernel_tile *tile = &t->tile;
+    const float *rays[2] = {flat ? tile->origin_x : tile->slope_x, flat ? tile->origin_y : tile->slope_y};
+    const float shift = (float)t->frame->depth_shift, pad = 0.01f;
+    vf low[2] = {vf_set(INFINITY), vf_set(INFINITY)}, high[2] = {vf_set(-INFINITY), vf_set(-INFINITY)};
+    vm anywhere = vm_none();
+    for (int n = 0; n < count; n++) {
+        vf depth = vf_set(1);
+        if (!flat) depth = places[2][n] + shift;
+        anywhere = vm_or(anywhere, vm_not(vf_lt(vf_set(flat ? 0 : 1e-3f * fabsf(shift)), depth)));
+        for (int a = 0; a < 2; a++) {
+            const vf at = (places[a][n] / depth - rays[a][0]) * (1 / (rays[a][1] - rays[a][0]));
+            low[a] = vf_min(at, low[a]);
+            high[a] = vf_max(at, high[a]);
+        }
+    }
+    for (int a = 0; a < 2; a++) {
+        const vf first = vf_clamp(-vf_floor(pad - low[a]), vf_set(0), vf_set(KERNEL_TILE));
+        const vf last = vf_clamp(vf_floor(high[a] + pad), vf_set(-1), vf_set(KERNEL_TILE - 1));
+        const vi from = vi_from_vf(vf_select(anywhere, vf_set(0), first));
+        const vi to = vi_from_vf(vf_select(anywhere, vf_set(KERNEL_TILE - 1), last));
+        memcpy(ends[2 * a], &from, sizeof from);
+        memcpy(ends[2 * a + 1], &to, sizeof to);
+    }
+}
+
+/* What of a box of pixels (kernel_types.h) lies between the lane's ends; false where nothing does. */
+SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigned *box)
+{
+    int end[4];
+    for (int a = 0; a < 2; a++) {
+        const int from = (int)(*box >> 8 * a & 15), to = (int)(*box >> (8 * a + 4) & 15);
+        end[2 * a] = from > ends[2 * a][lane] ? from : ends[2 * a][lane];
+        end[2 * a + 1] = to < ends[2 * a + 1][lane] ? to : ends[2 * a + 1][lane];
+    }
+    *box = (unsigned)(end[0] | end[1] << 4 | end[2] << 8 | end[3] << 12);
+    return end[0] <= end[1] && end[2] <= end[3];
+}
+
 /* Places the cells that are fetched; returns those that show, and in lanes those of them that are for lanes. */
 SIMD_INLINE unsigned kernel_local_place(kernel_tile_trace *t, kernel_local_batch *b, int type, unsigned *lanes)
 {
@@ -365,6 +410,7 @@ SIMD_INLINE unsigned kernel_local_place(kernel_tile_trace *t, kernel_local_batch
         }
         for (int a = 0; a < 3; a++) places[a][i] = at[a];
     }
+    kernel_local_pixels(t, count, (const vf(*)[8])places, b->ends);
     *lanes = vm_bits(vm_and(shows, kernel_local_setup(type, (const vf(*)[8])places, values, &b->cells)));
     return vm_bits(shows);
 }
@@ -391,7 +437,9 @@ static __attribute__((noinline)) void kernel_local_run(kernel_tile_trace *t, ker
     b->sample_count = b->rays.count = 0;
     for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
-        kernel_hex_rays_of(&b->rays, q->box[n], n);
+        unsigned box = q->box[n];
+        if (!kernel_local_cut(b->ends, n, &box)) continue;
+        kernel_hex_rays_of(&b->rays, box, n);
         if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_cast(t, b, types[queue]);
     }
     kernel_local_cast(t, b, types[queue]);
