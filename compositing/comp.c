@@ -133,10 +133,13 @@ static insitu_status begin(composition *c, int threads, base_error *error)
 static insitu_status gather_deep(composition *c, insitu_status status, base_error *error)
 {
     comp_deep_list *const lists = c->merged.deep;
-    if (!status)
-        status = comp_deep_gather(c->group->comm, lists, c->layout.threads, c->out->deep, &c->statistics->sent_bytes, error);
-    else if (lists)
+    if (!status) {
+        status = comp_deep_gather(c->group->comm, lists, c->layout.threads, c->out->deep, &c->statistics->sent_bytes,
+                                  error);
+        c->statistics->has_failed = status != INSITU_OK; /* what *error says of it is to be told */
+    } else if (lists) {
         comp_deep_free(lists, c->layout.threads);
+    }
     base_free(lists);
     return status;
 }
