@@ -1,4 +1,5 @@
-/* What the wave goes through, and what makes it. Lengths in half box sides, speeds so that the slowest layer has 0.8.
+/* The medium that the wave goes through, and its source. Lengths in half box sides, speeds so that the slowest layer
+ * has 0.8.
  */
 #ifndef WAVE_MEDIUM_H
 #define WAVE_MEDIUM_H

@@ -167,7 +167,7 @@ static bool read_option(const option_row *row, raw_options *raw, char *message, 
     return true;
 }
 
-/* What is wrong with an option that getopt_long() does not take; optopt is its row where it knows that. */
+/* Describes the fault of an option that getopt_long() does not take; optopt is its row where it knows that. */
 static void tell_fault(int found, const char *argument, char *message, size_t size)
 {
     if (optopt > ROW_COUNT) /* a letter of "-abc" */

@@ -1,4 +1,4 @@
-/* What is in a file, for a person: insitu-render --info. */
+/* Describes a file's content for a person: insitu-render --info. */
 #ifndef DATA_INFO_H
 #define DATA_INFO_H
 

@@ -138,7 +138,7 @@ struct help_formatter : CLI::Formatter {
 
 using value_reader = void (*)(const std::string &text, options &o);
 
-/* Of an option that is given twice the last value counts. */
+/* The last value of an option that is given twice counts. */
 void add_value(CLI::App &app, options &o, const char *name, const char *type, value_reader read, const char *meaning)
 {
     app.add_option_function<std::string>(

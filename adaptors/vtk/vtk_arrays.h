@@ -18,8 +18,8 @@ class vtkObject;
 namespace insitu_vtk
 {
 
-/* What one mesh keeps alive while the session may read it: VTK's arrays by reference, and conversions. Moving a hold
- * leaves the memory where it is. */
+/* Objects that one mesh keeps alive while the session may read it: VTK's arrays by reference, and conversions. Moving a
+ * hold leaves the memory where it is. */
 struct hold {
     std::vector<vtkSmartPointer<vtkObject>> objects;
     std::vector<std::unique_ptr<std::byte[]>> copies;
@@ -27,7 +27,7 @@ struct hold {
     std::byte *allocate(size_t bytes);
 };
 
-/* What was borrowed, copied and worth a warning, over one insitu_vtk_set(). */
+/* Counts of what was borrowed and copied, and warnings, over one insitu_vtk_set(). */
 struct tally {
     int64_t bytes_borrowed = 0;
     int64_t bytes_copied = 0;

@@ -8,7 +8,7 @@
 #include "session_field_input.h"
 #include "session_mesh_input.h"
 
-/* What insitu_error(NULL) tells: there is no session to ask after a failed insitu_create(). */
+/* The message of insitu_error(NULL): there is no session to ask after a failed insitu_create(). */
 static _Thread_local base_error thread_error;
 
 const char *insitu_error(const insitu_session *session)

@@ -1,4 +1,4 @@
-/* What has changed anywhere since the last step, and whether the ranks' input fits together. */
+/* Finds what has changed on any rank since the last step, and whether the ranks' input fits together. */
 #ifndef SESSION_CHANGES_H
 #define SESSION_CHANGES_H
 

@@ -16,7 +16,7 @@ typedef struct session_scene_file {
     struct stat stamp;
 } session_scene_file;
 
-/* What messages call a scene given as text, in place of a file's path. */
+/* The name of a scene given as text in messages, in place of a file's path. */
 #define SESSION_SCENE_TEXT "scene text"
 
 /* Where a scene comes from. Rank 0's counts. */

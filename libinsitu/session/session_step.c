@@ -28,7 +28,7 @@ static double milliseconds_since(double start)
     return 1e3 * (MPI_Wtime() - start);
 }
 
-/* What was made for images of the old scene goes. */
+/* Drops everything that was made for images of the old scene. */
 static void reload_scene(insitu_session *s)
 {
     session_writer_drain(&s->writer);
@@ -78,12 +78,23 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     const double start = MPI_Wtime();
     const session_team *team = &s->team;
     const session_extent *extent = &s->space.extent;
-    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment,           0,
-                                &s->catalogue,        extent,             changes->is_filled};
+    session_plan_basis basis = {&s->scene_file.scene, s->scene_file.path, moment, 0, &s->catalogue, extent,
+                                changes->is_filled};
     base_error of_events = {.status = INSITU_OK};
-    const session_drawing drawing = {team,       s->scene_file.path, changes->cycle, &s->meshes, &s->trees.parent,
-                                     &s->space,  &s->run_ranges,     &s->report,     &s->kept,   basis.scene,
-                                     &s->cinema, &s->writer,         &s->catalogue, changes->writes_behind};
+    const session_drawing drawing = {team,
+                                     s->scene_file.path,
+                                     changes->cycle,
+                                     &s->meshes,
+                                     &s->trees.parent,
+                                     &s->space,
+                                     &s->run_ranges,
+                                     &s->report,
+                                     &s->kept,
+                                     basis.scene,
+                                     &s->cinema,
+                                     &s->writer,
+                                     &s->catalogue,
+                                     changes->writes_behind};
     session_plan plan = {0};
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);

@@ -1,4 +1,4 @@
-/* What a file's own text says of how much there should be, for formats whose readers take a cut end for zeros. */
+/* Reads from a file's own text how long it should be, for formats whose readers take a cut end for zeros. */
 #ifndef FILE_LENGTH_H
 #define FILE_LENGTH_H
 

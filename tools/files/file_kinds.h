@@ -1,4 +1,4 @@
-/* What is known of each ending: which of VTK's readers reads it, made ready to load everything. */
+/* Knows for each ending which of VTK's readers reads it, and makes it ready to load everything. */
 #ifndef FILE_KINDS_H
 #define FILE_KINDS_H
 

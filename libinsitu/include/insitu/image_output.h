@@ -15,9 +15,9 @@ extern "C" {
 #endif
 
 typedef enum insitu_image_format {
-    INSITU_PNG8 = 0,  /* sRGB, 8 bits a channel, straight alpha; no alpha channel where all is opaque */
-    INSITU_PNG16 = 1, /* the same with 16 bits */
-    INSITU_EXR = 2,   /* linear premultiplied float RGBA, the channel Z where depth is given, and channels */
+    INSITU_PNG8 = 0,    /* sRGB, 8 bits a channel, straight alpha; no alpha channel where all is opaque */
+    INSITU_PNG16 = 1,   /* the same with 16 bits */
+    INSITU_EXR = 2,     /* linear premultiplied float RGBA, the channel Z where depth is given, and channels */
     INSITU_DEEP_EXR = 3 /* deep: any number of samples a pixel, each float R, G, B, A, Z and ZBack */
 } insitu_image_format;
 
@@ -78,7 +78,7 @@ typedef struct insitu_scale_bar {
     char text[300];
 } insitu_scale_bar;
 
-/* What is drawn over a picture, and its background, over which the picture is put first. Borrowed, all of it. */
+/* Decorations drawn over a picture, and the background over which the picture is put first. Borrowed, all of it. */
 typedef struct insitu_decorations {
     float background[4]; /* linear, premultiplied */
     float colour[3];     /* of words and lines; linear */
@@ -109,7 +109,7 @@ typedef struct insitu_deep_sample {
     float z, z_back; /* depths as insitu_image has them */
 } insitu_deep_sample;
 
-/* What lies behind each other in the pixels of an image, rising with depth and not overlapping. Without background. */
+/* Samples behind each other in the pixels of an image, rising with depth and not overlapping. Without background. */
 typedef struct insitu_deep {
     const insitu_deep_sample *samples;
     const int64_t *first;   /* row-major, height × width: of a pixel's samples, where they begin */

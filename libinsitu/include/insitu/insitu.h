@@ -79,10 +79,10 @@ typedef enum insitu_vertex_order {
                                        opposite ways. That of PETSc's DMPlex. */
 } insitu_vertex_order;
 
-/* What of a mesh or a field differs from the last time it was set. The safe default is everything. Whatever is said,
- * what the description alone tells counts too: other counts or another cell_type are another mesh (ALL); arrays at
- * other addresses, of other types or strides are looked at again, as TOPOLOGY (but fields stay), GEOMETRY (vertex_ids
- * too) or VALUES. What was written into the same arrays only the caller knows. */
+/* The parts of a mesh or a field that differ from the last time it was set. The safe default is everything. Whatever is
+ * said, what the description alone tells counts too: other counts or another cell_type are another mesh (ALL); arrays
+ * at other addresses, of other types or strides are looked at again, as TOPOLOGY (but fields stay), GEOMETRY
+ * (vertex_ids too) or VALUES. What was written into the same arrays only the caller knows. */
 enum {
     INSITU_CHANGED_NOTHING = 0,
     INSITU_CHANGED_TOPOLOGY = 1, /* cells, their types and faces, ghost flags: the tree is built again */
@@ -253,7 +253,7 @@ typedef struct insitu_field {
     const insitu_patch *patches;
 } insitu_field;
 
-/* What the last step did, on this rank unless said otherwise. Times are wall-clock milliseconds. */
+/* Report of the last step, of this rank unless said otherwise. Times are wall-clock milliseconds. */
 typedef struct insitu_report {
     int64_t cycle;
     double time;
@@ -359,7 +359,7 @@ INSITU_API insitu_status insitu_set_field(insitu_session *session, const char *m
  * of them, here and in insitu_create(). */
 INSITU_API insitu_status insitu_step(insitu_session *session, int64_t cycle, double time);
 
-/* What the last step did. Local. Valid until the next step; all zero before the first; NULL for a NULL session. */
+/* The report of the last step. Local. Valid until the next step; all zero before the first; NULL for a NULL session. */
 INSITU_API const insitu_report *insitu_last_report(const insitu_session *session);
 
 /* From now on keep (keep is not 0), or no longer keep, each step's pictures in memory on rank 0: 20 bytes a pixel of

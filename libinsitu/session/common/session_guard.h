@@ -1,4 +1,4 @@
-/* What of the caller's settings a call of the library must not work under, and must not change: the floating-point
+/* Settings of the caller that the library must neither work under nor change: the floating-point
  * environment, and OpenMP's leave to give teams of any size (OMP_DYNAMIC). */
 #ifndef SESSION_GUARD_H
 #define SESSION_GUARD_H

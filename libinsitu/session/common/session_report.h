@@ -52,7 +52,7 @@ typedef enum session_warning_kind {
     WARNING_ISA       /* INSITU_ISA of this rank's environment is not taken */
 } session_warning_kind;
 
-/* What a warning is about. Two warnings are the same if all of this is. */
+/* The subject of a warning. Two warnings are the same if all of this is. */
 typedef struct session_warning {
     session_warning_kind kind;
     const char *image, *mesh; /* NULL: of none */

@@ -295,7 +295,7 @@ static void fill_axes(session_decorations *d, const render_camera *c)
     }
 }
 
-/* What tells how long things are. */
+/* The decorations that tell lengths. */
 static void fill_lengths(session_decorations *d, const scene_decorations *scene, const session_extent *extent,
                          const render_camera *camera)
 {

@@ -1,4 +1,4 @@
-/* What is written and drawn beside an image's data, as the image library takes it. */
+/* Makes the words and lines beside an image's data, as the image library takes them. */
 #ifndef SESSION_DECORATIONS_H
 #define SESSION_DECORATIONS_H
 
@@ -25,7 +25,7 @@ typedef struct session_decorations {
     insitu_label ruler_labels[SESSION_RULER_LABELS];
 } session_decorations;
 
-/* What decorations are made of. */
+/* Input that decorations are made from. */
 typedef struct session_decoration_basis {
     const scene_moment *moment;
     const session_extent *extent;

@@ -28,7 +28,7 @@ bool session_is_reordered(const insitu_mesh *given)
     return has_gaps || turn_of(given->vertex_order, type);
 }
 
-/* Of mixed cells. */
+/* The walk over mixed cells. */
 static bool has_turned_cells(const session_mesh *mesh)
 {
     const grid *g = &mesh->cells;
@@ -60,7 +60,8 @@ static cell_rows rows_of(const session_mesh *mesh)
     return rows;
 }
 
-/* What does not fit into 4 bytes is no index of a vertex unless there are so many, and is to be told as it is. */
+/* A number that does not fit into 4 bytes is no index of a vertex unless there are so many, and is reported as it is.
+ */
 static bool fit_narrow(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;

@@ -228,7 +228,7 @@ static cell_fault check_polyhedron(const session_mesh *mesh, int64_t cell, face_
     return place->fault_of_faces ? BAD_FACES : CELL_GOOD;
 }
 
-/* Of the cells whose number of vertices is their own. */
+/* Checks a polygon, the type whose number of vertices differs from cell to cell. */
 static cell_fault check_polygon(const session_mesh *mesh, int64_t cell, fault_place *place)
 {
     const grid *g = &mesh->cells;

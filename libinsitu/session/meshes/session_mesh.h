@@ -18,7 +18,7 @@ typedef struct session_field {
     bool is_filled;     /* in this step, where given.fill makes the values; or it failed: */
     base_error fill_problem;
     insitu_patch *patches; /* given.patches, a table of ours */
-    char *copy; /* NULL until made; packed tuples, components interleaved */
+    char *copy;            /* NULL until made; packed tuples, components interleaved */
     int64_t copy_bytes;
 } session_field;
 
@@ -154,7 +154,7 @@ typedef struct session_mesh {
     bool is_needed; /* by an image of this step */
     bool has_tree;
     mmbvh tree;
-    bool is_partial; /* the tree is over the candidates of candidates_key, while nothing changes */
+    bool is_partial;         /* the tree is over the candidates of candidates_key, while nothing changes */
     bool are_bounds_partial; /* the full tree's bounds are of the candidates, likewise */
     double built_surface;    /* half the surface of the mesh's bounds when the tree was built */
     uint64_t candidates_key;
@@ -207,18 +207,18 @@ void session_drop_fields(session_mesh *mesh);
 void session_drop_copy(session_field *field);
 /* Free the mesh of outer faces, and with faces what is known of them as well; its threshold stays. */
 void session_drop_outer(session_outer *outer, bool with_faces);
-/* Of all of a mesh; where cells are new, thresholds go too. */
+/* Drops all outer surfaces of a mesh; where cells are new, thresholds go too. */
 void session_drop_outers(session_mesh *mesh, bool are_cells_new);
 void session_drop_contents(session_mesh *mesh);
 void session_meshes_free(session_meshes *meshes);
 
-/* What may become parts of a picture: the meshes, then the meshes of their outer faces, some NULL. */
+/* Slots of meshes that may become parts of a picture: the meshes, then the meshes of their outer faces, some NULL. */
 int session_part_slots(const session_meshes *meshes);
 /* whole: set to the mesh whose outer faces they are, NULL where it is a mesh itself. */
 session_mesh *session_part_of(const session_meshes *meshes, int slot, session_mesh **whole, session_outer **outer);
 session_mesh *session_part(const session_meshes *meshes, int slot);
 
-/* Of the vertices that scalars have values of. */
+/* The number of vertices that scalars have values at. */
 static inline int64_t session_vertex_count(const session_mesh *mesh)
 {
     return mesh->torn.is_torn ? mesh->torn.corner_count : mesh->cells.vertex_count;

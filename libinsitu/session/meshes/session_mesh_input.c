@@ -275,7 +275,7 @@ bool session_is_same_array(const insitu_array *a, const insitu_array *b)
     return x.data == y.data && x.stride == y.stride && (!x.data || a->type == b->type);
 }
 
-/* What must have changed by the looks of two descriptions of as many cells and vertices: arrays that lie elsewhere, or
+/* Changes that two descriptions show by themselves of as many cells and vertices: arrays that lie elsewhere, or
  * are read otherwise, hold what nobody has looked at. */
 static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
 {

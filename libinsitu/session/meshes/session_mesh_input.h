@@ -1,4 +1,4 @@
-/* What the caller says of meshes: checked, and put into the table of meshes. */
+/* Checks the caller's descriptions of meshes and puts them into the table of meshes. */
 #ifndef SESSION_MESH_INPUT_H
 #define SESSION_MESH_INPUT_H
 
@@ -9,7 +9,7 @@ insitu_status session_set_mesh(session_meshes *meshes, const char *name, const i
 
 enum { SESSION_ALLOW_FLOATS = 1, SESSION_ALLOW_INTEGERS = 2, SESSION_ALLOW_BYTES = 4 };
 
-/* What an array may be. */
+/* The types that an array may have. */
 typedef struct session_array_rule {
     const char *name;
     int64_t count;

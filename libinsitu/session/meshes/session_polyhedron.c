@@ -73,7 +73,7 @@ static void corner_from(const grid *g, int64_t entry, const double mean[3], doub
     for (int axis = 0; axis < 3; axis++) out[axis] -= mean[axis];
 }
 
-/* Of the tet on a triangle with a corner of the cell, all relative to the mean. */
+/* Adds the tet on a triangle with a corner of the cell, all relative to the mean. */
 static double volume_from(const double origin[3], double corners[3][3])
 {
     double d[3][3];
@@ -98,7 +98,7 @@ static int64_t least_entry(const grid *g, int64_t from, int64_t to)
     return least;
 }
 
-/* Of tets: all with the mean, and all with a corner of the cell. */
+/* Sums over tets: those with the mean, and those with a corner of the cell. */
 typedef struct volume_sums {
     int64_t triangles;
     double from_mean, from_corner;
@@ -120,10 +120,10 @@ static void add_fan(const grid *g, int64_t face, const double mean[3], const dou
     }
 }
 
-/* What rounding may leave of a triangle's tet with a corner of the same plane, of the cell's box. With u = 2^-53: an
- * edge is of three differences, each off by u of the box's side (the mean, whatever it is, drops out), a determinant's
- * six products of three edges by 9 u more, 2 u and 3 u of sums and products: 6 times 14 u, over 6. 32 u leaves room for
- * the sum over triangles, which are few beside 1 / u, the box's own roundings and squares of u. */
+/* The share of the cell's box that rounding may leave of a triangle's tet with a corner in the same plane. With u =
+ * 2^-53: an edge is of three differences, each off by u of the box's side (the mean, whatever it is, drops out), a
+ * determinant's six products of three edges by 9 u more, 2 u and 3 u of sums and products: 6 times 14 u, over 6. 32 u
+ * leaves room for the sum over triangles, which are few beside 1 / u, the box's own roundings and squares of u. */
 static const double flat_share = 0x1p-48;
 
 double session_polyhedron_volume(const grid *g, int64_t cell, bool *is_flat)

@@ -42,7 +42,7 @@ static insitu_status reduce_extent(const session_meshes *meshes, MPI_Comm comm, 
         status = session_mpi(error, MPI_Allreduce(&sizes, &all_sizes, 1, MPI_DOUBLE, MPI_SUM, comm), "MPI_Allreduce");
     if (status) return status;
     *out = (session_extent){.cell_count = totals[0], .rank_count = (int)totals[1]};
-    /* Of the cells that have one: flat ones change no sample. */
+    /* The mean is over cells that have a size: flat ones change no sample. */
     if (totals[2] > 0) out->cell_size = rounded_size(all_sizes / (double)totals[2]);
     for (int axis = 0; axis < 3 && totals[0] > 0; axis++) {
         out->lower[axis] = all[axis];

@@ -73,11 +73,11 @@ double tally_signed_volume(int type, double points[][3])
     return signed_volume(type, points);
 }
 
-/* What rounding may leave of a cell without volume, of its box's volume ex ey ez. With u = 2^-53: a determinant is six
- * products of one component along each axis, none longer than the box, and each passes at most 8 roundings (3 of edges,
- * 2 of products, 3 of sums), so it is off by 48 u of the box at most. n of them sum with n - 1 roundings more of 6 of
- * the box each, and count over shares: (8 + n - 1) 6 n / shares, 8 u of a tet, 90 u of a hex, 39 u of a wedge, 22 u of
- * a pyramid. 128 u leaves room for the division's rounding, the box's own and squares of u. */
+/* The share of its box's volume ex ey ez that rounding may leave of a cell without volume. With u = 2^-53: a
+ * determinant is six products of one component along each axis, none longer than the box, and each passes at most 8
+ * roundings (3 of edges, 2 of products, 3 of sums), so it is off by 48 u of the box at most. n of them sum with n - 1
+ * roundings more of 6 of the box each, and count over shares: (8 + n - 1) 6 n / shares, 8 u of a tet, 90 u of a hex, 39
+ * u of a wedge, 22 u of a pyramid. 128 u leaves room for the division's rounding, the box's own and squares of u. */
 static const double flat_share = 0x1p-46;
 
 MMBVH_INLINE bool is_flat(double volume, double box)
@@ -391,7 +391,7 @@ MMBVH_INLINE void grow_lanes(lane_bounds *b, lanes (*const at)[3], const int cou
             }
 }
 
-/* Of volumes with usual roots. */
+/* Takes volumes with usual roots only. */
 MMBVH_INLINE void tally_volumes(mesh_tally *t, lanes least, const lanes volume)
 {
     lanes size, root;

@@ -1,4 +1,4 @@
-/* What a check of a mesh adds up over its cells: bounds, counts and sizes. */
+/* Sums that a check of a mesh takes over its cells: bounds, counts and sizes. */
 #ifndef SESSION_TALLY_H
 #define SESSION_TALLY_H
 
@@ -16,9 +16,9 @@ void tally_merge(mesh_tally *sum, const mesh_tally *part);
 /* One good cell of any type. */
 void tally_cell(const grid *g, int64_t cell, mesh_tally *tally);
 
-/* Of some hexes and pyramids, spread over the mesh: how many were looked at, and how many of them would have more than
- * twice the volume if two neighbours in each quad changed places. Those with quads numbered row by row do: their quads
- * cross themselves, which takes their volume. */
+/* Samples hexes and pyramids, spread over the mesh, and tells how many were looked at, and how many of them would have
+ * more than twice the volume if two neighbours in each quad changed places. Those with quads numbered row by row do:
+ * their quads cross themselves, which takes their volume. */
 void tally_crossed(const session_mesh *mesh, int64_t *looked_at, int64_t *crossed);
 
 /* The volume of a cell of the four types, by its vertices' places; negative where it is left-handed. */
@@ -28,7 +28,7 @@ double tally_signed_volume(int type, double points[][3]);
  */
 double tally_cell_volume(const grid *g, int64_t cell);
 
-/* Of a good cell: has it no volume but what rounding leaves, as shells have none? Never of a ghost. */
+/* Tells whether a good cell has no volume but what rounding leaves, as shells have none. A ghost never counts. */
 bool tally_is_flat(const grid *g, int64_t cell);
 
 /* Check and tally cells begin .. end; returns the first that is not good, or end. */

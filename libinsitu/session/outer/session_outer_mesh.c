@@ -308,7 +308,7 @@ static bool work_create(const grid *g, session_outer *out, outer_work *w)
            (out->loops || !loops) && out->cell_origins && w->heights && w->places;
 }
 
-/* Of one type no types nor offsets are told, so that kernels for many cells at once take them. */
+/* Cells of one type are handed over without types and offsets, so that kernels for many cells at once take them. */
 static grid describe(const outer_work *w)
 {
     const session_outer *out = w->out;

@@ -1,4 +1,4 @@
-/* What an EXR may hold beside colours and depth: the nearest surface's normal, value and numbers. */
+/* Channels that an EXR may hold beside colours and depth: the nearest surface's normal, value and numbers. */
 #ifndef SESSION_CHANNELS_H
 #define SESSION_CHANNELS_H
 

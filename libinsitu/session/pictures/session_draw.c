@@ -17,7 +17,7 @@
 #include "session_layers.h"
 #include "session_view.h"
 
-/* Of pixels where cells overlap, on all ranks together, at once: 128 MiB. */
+/* Fragments that all ranks together hold at once for pixels in which cells overlap: 128 MiB. */
 enum { overlap_fragments = 1 << 22 };
 
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
@@ -196,7 +196,7 @@ static void warn_of_overlaps(session_report *report, const scene_image *image, i
         image->name, (long long)pixels);
 }
 
-/* What the frames of an image share. */
+/* State that the frames of an image share. */
 typedef struct frames_basis {
     const session_drawing *drawing;
     session_frame_target target;
@@ -273,7 +273,10 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     const float *background = image->decorations.is_given ? no_background : image->background;
     const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
     const comp_group compositing = {d->team->compositing_comm, nodes, COMP_AUTOMATIC, 0};
-    frames_basis basis = {d, {d->team->comm, compositing, background, overlap_fragments}, canvas, 0,
+    frames_basis basis = {d,
+                          {d->team->comm, compositing, background, overlap_fragments},
+                          canvas,
+                          0,
                           session_wants_deep(image) ? &canvas->deep : NULL};
     render_job job = make_job(d, image, view, layers);
     const insitu_status status = draw_all(&basis, image, &job, error);
@@ -447,7 +450,7 @@ static render_active_cells *active_cells_for(const session_plan *plan, const sce
     return *active;
 }
 
-/* Of databases, on rank 0, with the lines of all pictures of the step. Collective. */
+/* Writes the tables of databases on rank 0, with the lines of all pictures of the step. Collective. */
 static void write_tables(const session_drawing *d, base_error *first)
 {
     base_error reason = {.status = INSITU_OK};

@@ -13,7 +13,7 @@
 #include "session_team.h"
 #include "session_writer.h"
 
-/* What images are drawn of. */
+/* Input that images are drawn from. */
 typedef struct session_drawing {
     const session_team *team;
     const char *scene_path; /* for messages */

@@ -5,7 +5,7 @@
 #include "comp.h"
 #include "render.h"
 
-/* What a frame took on this rank, but for overlaps, which is the same on every rank. */
+/* Cost of a frame on this rank; overlaps alone are the same number on every rank. */
 typedef struct session_frame {
     int64_t rays, map_failures, fragments;
     double surface_ms, volume_ms, composite_ms;
@@ -16,9 +16,9 @@ typedef struct session_frame {
 typedef struct session_frame_target {
     MPI_Comm comm;
     comp_group compositing;
-    const float *background;   /* 4; borrowed */
-    int64_t fragment_limit;    /* for all ranks together: more pixels in which cells overlap than make so many fragments
-                                  are drawn in turns; the same on every rank */
+    const float *background; /* 4; borrowed */
+    int64_t fragment_limit;  /* for all ranks together: more pixels in which cells overlap than make so many fragments
+                                are drawn in turns; the same on every rank */
 } session_frame_target;
 
 /* Draw one frame of the job, which differs between ranks in its parts alone, into out (comp.h). Collective; returns the

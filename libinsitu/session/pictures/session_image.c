@@ -86,7 +86,7 @@ static void *open_anywhere(char *why, size_t size)
     return handle;
 }
 
-/* What the libraries take as they are loaded, rounded up: 430 MiB of addresses, of them 100 MiB of memory. */
+/* Memory that the libraries take when they are loaded, rounded up: 430 MiB of addresses, of them 100 MiB of memory. */
 static bool has_memory_to_load(void)
 {
     const size_t addresses = (size_t)512 << 20, memory = (size_t)128 << 20;

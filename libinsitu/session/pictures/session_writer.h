@@ -21,7 +21,7 @@
 
 enum { SESSION_FREE_PICTURES = 4 };
 
-/* What the thread touches is between lock and unlock, but for the files at hand. */
+/* The thread touches these between lock and unlock, but for the files at hand. */
 typedef struct session_writer {
     pthread_mutex_t mutex;
     pthread_cond_t has_changed; /* the queue, or is_ending, or is_loading */

@@ -18,7 +18,7 @@
 
 enum { NAMES_SIZE = 700 };
 
-/* What there is, for a message. */
+/* Lists the names there are, for a message. */
 static void list_fields(const session_catalogue *catalogue, char names[NAMES_SIZE])
 {
     size_t size = 0;

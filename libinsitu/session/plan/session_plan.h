@@ -32,7 +32,7 @@ typedef struct session_moment {
     bool is_first; /* there is no step before */
 } session_moment;
 
-/* What a plan is made of; the same on every rank. */
+/* Input that a plan is made from; the same on every rank. */
 typedef struct session_plan_basis {
     const scene *scene;
     const char *scene_path; /* for messages */

@@ -7,7 +7,8 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* What extremes are of: a field, or, where a plane is given, the distances from it on the meshes that have the field.
+/* The scalar that extremes are taken of: a field, or, where a plane is given, the distances from it on the meshes that
+ * have the field.
  */
 typedef struct session_range_subject {
     const scene_field *field;

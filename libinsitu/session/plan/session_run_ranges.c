@@ -107,7 +107,7 @@ static insitu_status read_lines(session_image_ranges *ranges, FILE *file, base_e
     return ferror(file) ? fail(ranges, "read", errno, error) : INSITU_OK;
 }
 
-/* What is there; nothing where there is no file. */
+/* Reads the file; finds nothing where there is none. */
 static insitu_status read_ranges(session_image_ranges *ranges, base_error *error)
 {
     c_numbers numbers;
@@ -188,7 +188,7 @@ static bool prepare_ranges(session_run_ranges *all, const scene_image *image, ba
     return false;
 }
 
-/* What rank 0 has read, to all. Collective. */
+/* Sends what rank 0 has read to all. Collective. */
 static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, base_error *error)
 {
     insitu_status status = INSITU_OK;

@@ -148,7 +148,7 @@ static insitu_status find_own_keys(const smooth_item *item, int threads, smooth_
     return error->status;
 }
 
-/* What is this rank's of the item. */
+/* This rank's share of the item. */
 static insitu_status begin_work(const smooth_item *item, const session_meshes *meshes, int threads, smooth_work *work,
                                 base_error *error)
 {

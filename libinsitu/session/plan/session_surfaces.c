@@ -36,7 +36,8 @@ static int add_wish(surface_wish *wishes, int count, const surface_wish *wish)
     return count + 1;
 }
 
-/* Of all layers and the meshes that they are on, in an order that is the same on all ranks. Returns how many. */
+/* Lists the outer surfaces of all layers and the meshes that they are on, in the same order on all ranks. Returns how
+ * many. */
 static int list_wishes(const session_plan *plan, const session_catalogue *catalogue, surface_wish *wishes)
 {
     int count = 0;

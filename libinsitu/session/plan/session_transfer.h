@@ -14,9 +14,9 @@ typedef struct session_transfer {
     float *table;     /* of its own; NULL: the map's */
 } session_transfer;
 
-/* Of a colour map over [low, high] (low > high: there are no values), and the opacity of the volume, NULL: of a
- * surface. half_diagonal: of the global bounds. Points into the map. False where memory ran out, with nothing to free.
- * Local. */
+/* Makes the transfer function of a colour map over [low, high] (low > high: there are no values), and the opacity of
+ * the volume, NULL: of a surface. half_diagonal: of the global bounds. Points into the map. False where memory ran out,
+ * with nothing to free. Local. */
 bool session_make_transfer(double half_diagonal, const scene_colour_map *map, double low, double high,
                            const scene_volume *volume, session_transfer *out);
 /* Whether it may run out: the same on all ranks. */

@@ -1,7 +1,7 @@
-/* What is up to date is left alone: new cells build a tree, moved vertices refit its bounds (until its cost has grown
- * by half, then it is built again), new values refit ranges. The first scalar that a mesh is drawn with has the nodes'
- * own ranges, further ones have pairs beside the tree. Where values tell what can be seen, vertices that move in every
- * step have bounds refitted where something can be seen, and no further: a fifth of the nodes for an isosurface.
+/* Trees that are up to date are left alone: new cells build a tree, moved vertices refit its bounds (until its cost has
+ * grown by half, then it is built again), new values refit ranges. The first scalar that a mesh is drawn with has the
+ * nodes' own ranges, further ones have pairs beside the tree. Where values tell what can be seen, vertices that move in
+ * every step have bounds refitted where something can be seen, and no further: a fifth of the nodes for an isosurface.
  *
  * A full tree is dear to build and cheap to keep; a partial one, over the cells that the images can show, is cheap to
  * build where they show little, but ends with the values. Which serves better depends on how long the cells will stay,
@@ -23,7 +23,7 @@ static const double worst_cost = 1.5; /* of a refitted tree, in costs when built
 
 /* Seconds a cell on one thread, before anything was measured. */
 static const session_rates first_rates = {.build = 3e-7, .select = 2e-8, .refit = 1e-8};
-/* What takes no longer than so many cells' work says little about more. */
+/* A measurement over fewer cells than this says little about more. */
 enum { MEASURED_CELLS = 10000 };
 
 static double rate_of(double measured, double first, int threads)
@@ -38,7 +38,7 @@ static void measure(double *rate, double seconds, int64_t cells)
     *rate = *rate > 0 ? 0.5 * (*rate + now) : now;
 }
 
-/* What an update works on beside the meshes. */
+/* State of an update beside the meshes. */
 typedef struct tree_update {
     session_trees *trees;
     const session_space *space;

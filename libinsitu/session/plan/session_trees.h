@@ -12,7 +12,7 @@ typedef struct session_rates {
     double build, select, refit;
 } session_rates;
 
-/* What there is beside the meshes' own trees. */
+/* State beside the meshes' own trees. */
 typedef struct session_trees {
     session_rates rates;
     mmbvh parent; /* over the trees of parent_key; none where that is one tree or none */

@@ -1,4 +1,4 @@
-/* What depends on a scalar's values is stale only where they are other values than before. */
+/* Results that depend on a scalar's values are stale only where the values differ from those before. */
 #include "session_checksums.h"
 
 #include <string.h>

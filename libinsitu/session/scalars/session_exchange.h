@@ -8,7 +8,7 @@
 
 #include "error.h"
 
-/* What makes two vertices one: a global id, or the bits of three coordinates. */
+/* The key by which two vertices are the same one: a global id, or the bits of three coordinates. */
 typedef struct session_key {
     uint64_t words[3];
 } session_key;

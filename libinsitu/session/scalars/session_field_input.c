@@ -301,7 +301,7 @@ insitu_status session_set_field(session_meshes *meshes, const char *name, const 
     return error->status;
 }
 
-/* What scalars and statistics are of is as it was promised. */
+/* Checks that the fields of scalars and statistics are as they were promised. */
 static insitu_status check_filled(const session_mesh *mesh, const insitu_field *promised, const insitu_field *filled,
                                   base_error *error)
 {

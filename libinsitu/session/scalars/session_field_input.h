@@ -1,4 +1,4 @@
-/* What the caller says of fields: checked, and put into the table of meshes. */
+/* Checks the caller's descriptions of fields and puts them into the table of meshes. */
 #ifndef SESSION_FIELD_INPUT_H
 #define SESSION_FIELD_INPUT_H
 
@@ -7,7 +7,7 @@
 /* insitu_set_field(). *error is cleared first. Local. */
 insitu_status session_set_field(session_meshes *meshes, const char *name, const insitu_field *field, base_error *error);
 
-/* What fill has made of a field's description, which lacked values: checked and taken. The error names the mesh and the
+/* Checks and takes a field's description after fill has given it its values. The error names the mesh and the
  * field. Local. */
 insitu_status session_take_filled(session_mesh *mesh, int index, const insitu_field *filled, base_error *error);
 

@@ -27,7 +27,7 @@ typedef struct node {
     int64_t vertex;
 } node;
 
-/* What corners are given to: the largest is looked for where there are no sums. */
+/* The receiver of corners: the largest is looked for where there are no sums. */
 typedef struct target {
     const session_gradient_basis *basis;
     session_gradient_sum *sums;

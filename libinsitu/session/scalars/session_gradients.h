@@ -13,7 +13,7 @@ typedef struct session_gradient_sum {
     int64_t words[SESSION_SUM_WORDS];
 } session_gradient_sum;
 
-/* What sums are made of. The values are at the vertices. */
+/* Input that sums are made from. The values are at the vertices. */
 typedef struct session_gradient_basis {
     const grid *cells;
     const grid_field *field;

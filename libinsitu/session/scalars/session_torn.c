@@ -103,7 +103,7 @@ static insitu_status tear(session_mesh *mesh, int threads, base_error *error)
     return INSITU_OK;
 }
 
-/* What was made for other vertices goes. */
+/* Drops arrays that were made for other vertices. */
 static void forget_vertices(session_mesh *mesh)
 {
     session_drop_outers(mesh, true);

@@ -153,7 +153,7 @@ typedef enum scene_keep { SCENE_KEEP_INSIDE, SCENE_KEEP_OUTSIDE } scene_keep;
 
 enum { SCENE_MAX_CLIPS = 32 };
 
-/* What is not within the half space, box or sphere is cut away; where is_outside, what is. */
+/* Everything outside the half space, box or sphere is cut away; with is_outside, everything inside. */
 typedef struct scene_clip {
     scene_clip_kind kind;
     bool is_outside;
@@ -232,7 +232,7 @@ typedef struct scene_words {
     scene_anchor at;
 } scene_words;
 
-/* What is written and drawn beside the data. */
+/* Words, bars and lines drawn beside the data. */
 /* Boxes around all data, around each mesh, or around what each rank holds. */
 typedef enum scene_boxes { SCENE_NO_BOX, SCENE_BOX_OF_DATA, SCENE_BOXES_OF_MESHES, SCENE_BOXES_OF_RANKS } scene_boxes;
 
@@ -328,9 +328,9 @@ typedef struct scene_image {
     uint32_t clips_of_all; /* a set of them, a bit each: those that cut all layers */
     int light_count;       /* 1 .. 8; a default head light and fill light where none is given */
     scene_light *lights;
-    uint32_t shadows;        /* lights that cast some, a bit each; 0 by default */
-    int occlusion_samples;   /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
-    double occlusion_radius; /* how far they go, in scene units; 0: by the bounds */
+    uint32_t shadows;             /* lights that cast some, a bit each; 0 by default */
+    int occlusion_samples;        /* rays of ambient occlusion, 1 .. 64; 0 (default): none */
+    double occlusion_radius;      /* how far they go, in scene units; 0: by the bounds */
     scene_sampling_method method; /* of volumes; by default segments of one volume, samples of several */
     double max_error;             /* of segments: of a channel, linear; 0: by step; 0.01 by default, of one volume */
     double step;                  /* sample distance in scene units; 0: by step_cells */
@@ -349,13 +349,13 @@ typedef struct scene_image {
     bool once; /* of the steps in which it is due, draw the first alone */
 } scene_image;
 
-/* What is the same of all variants of an image is found for the first. */
+/* Results that all variants of an image share are found for the first of them. */
 static inline bool scene_is_first_variant(const scene_image *image)
 {
     return image->variant.layers == 0 && image->variant.view == 0;
 }
 
-/* What trees are built over: all cells, those that the images can show, or what costs less. */
+/* The cells that trees are built over: all cells, those that the images can show, or what costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
 /* When pictures are written: by a thread while the simulation goes on, or before the step is over. */
@@ -384,7 +384,7 @@ insitu_status scene_parse(const char *text, size_t size, const char *file_name, 
 
 void scene_free(scene *s);
 
-/* What placeholders stand for. */
+/* The values that placeholders stand for. */
 typedef struct scene_moment {
     const char *name; /* of the image */
     long long cycle;

@@ -1,5 +1,5 @@
-/* What is cut away of an image's layers: half spaces, boxes and spheres. An image has one list of them all, in which
- * what is there twice stands once; each layer has a set of its entries. */
+/* Reads the regions that are cut away from an image's layers: half spaces, boxes and spheres. An image has one list of
+ * them all, in which what is there twice stands once; each layer has a set of its entries. */
 #include <stdio.h>
 #include <string.h>
 

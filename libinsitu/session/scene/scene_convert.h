@@ -18,7 +18,7 @@ typedef struct scene_colour_points {
 
 /* To unit length; false for a zero vector. */
 bool scene_normalize(double v[3]);
-/* Of unit vectors: within a millionth of a radian. */
+/* Unit vectors count as parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
 /* How many pictures an image makes in a step: their product. */
@@ -29,13 +29,13 @@ typedef struct scene_series {
 /* Checks the image's sweep. path: of the image. */
 insitu_status scene_find_series(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_series *out);
-/* Of all images together; too many are an error. */
+/* Counted over all images together; too many are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
 /* Leave what the variant shows in the layers, which are those of the file. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
-/* Of a camera, whose path is given: its orbit, its places, and how many views it has. */
+/* Reads the series of a camera, whose path is given: its orbit, its places, and how many views it has. */
 insitu_status scene_convert_orbit(const scene_document *d, const char *path, const scene_file_camera *in,
                                   scene_camera *out);
 insitu_status scene_convert_path(const scene_document *d, const char *path, const scene_file_camera *in,

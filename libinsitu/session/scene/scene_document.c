@@ -151,7 +151,7 @@ static const char *text_of(const yaml_node_t *scalar)
     return (const char *)scalar->data.scalar.value;
 }
 
-/* What stands in the file, short enough for a message. */
+/* The file's own text, short enough for a message. */
 static void quote(const yaml_node_t *node, char quoted[quote_size])
 {
     if (node->type == YAML_SEQUENCE_NODE) {

@@ -37,7 +37,7 @@ int scene_document_line(const scene_document *d, const char *path);
  * at most `most` are filled in. 0: nothing stands there. */
 int scene_document_texts(const scene_document *d, const char *path, const char **texts, int most);
 
-/* What stands at a path, and a number of it; a node that passed the check is what its key asks for. */
+/* The text at a path, and a number of it; a node that passed the check is what its key asks for. */
 typedef enum scene_node { SCENE_NOTHING, SCENE_SCALAR, SCENE_LIST, SCENE_MAPPING } scene_node;
 scene_node scene_document_kind(const scene_document *d, const char *path);
 int scene_document_length(const scene_document *d, const char *path); /* of a list; 0: there is none */
@@ -50,7 +50,8 @@ insitu_status scene_bad(const scene_document *d, const char *parent, const char 
 /* Records that memory ran out while the scene was read; returns INSITU_ERROR_MEMORY. */
 insitu_status scene_no_memory(const scene_document *d);
 
-/* What may stand at a key, in words: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1". */
+/* Describes in words the values that a key takes: "a number above 0 and below 180", "a list of 3 numbers from 0 to 1".
+ */
 enum { SCENE_WORDS_SIZE = 640 };
 void scene_value_words(const cyaml_schema_value_t *value, const scene_key *key, char words[SCENE_WORDS_SIZE]);
 

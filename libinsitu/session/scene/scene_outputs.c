@@ -78,7 +78,7 @@ static int write_number(const placeholder *p, double value, int fewest, char *ou
     return snprintf(out, size, "%.*g", p->digits < 0 ? fewest : p->digits, value);
 }
 
-/* What the placeholder becomes, into out (size bytes; NULL and 0 to measure); returns its length. */
+/* Writes the placeholder's value to out (size bytes; NULL and 0 to measure); returns its length. */
 static int write_value(const placeholder *p, const scene_moment *moment, char *out, size_t size)
 {
     switch (p->kind) {
@@ -121,7 +121,7 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
     return text;
 }
 
-/* What the image lacks for the placeholder; NULL where it has it. image: its path. */
+/* Names what the image lacks for the placeholder; NULL where it has it. image: its path. */
 static const char *what_lacks(const scene_document *d, const char *image, placeholder_kind kind)
 {
     const bool is_view = kind == PLACEHOLDER_VIEW, is_value = kind == PLACEHOLDER_ISOVALUE;
@@ -241,7 +241,7 @@ static int compare_files(const void *a, const void *b)
     return order ? order : first->number - second->number;
 }
 
-/* What two pictures of one image differ in. */
+/* Placeholders by which two pictures of one image differ. */
 static const char *missing_placeholder(const scene_variant *a, const scene_variant *b)
 {
     if (a->view != b->view) return "view";

@@ -257,7 +257,7 @@ typedef struct scene_file {
 
 struct scene_mapping;
 
-/* What stands beside one cyaml field. */
+/* Description that stands beside one cyaml field. */
 typedef struct scene_key {
     const char *help;
     const char *by_default; /* as the reference shows it; NULL: the key is required */

@@ -145,7 +145,7 @@ DEFINE_MAPPING(sphere, "sphere", SPHERE_KEYS);
       .by_default = "`inside`")
 EXPORT_MAPPING(clip, "clip", CLIP_KEYS);
 
-/* Of a layer of the type. */
+/* The keys of a layer of the type. */
 #define CLIP_KEY(X, type, more)                                                                                        \
     X(CYAML_FIELD_MAPPING_PTR("clip", OPTIONAL, type, clip, scene_clip_fields),                                        \
       .help = "Cuts parts of this layer away, beside what the image's `clip` cuts of all." more, .by_default = "none", \

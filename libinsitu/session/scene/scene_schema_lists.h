@@ -43,10 +43,10 @@ SHARED colour = {CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number,
 #define COMPONENT_HELP "Which scalar of the field: `magnitude`, `x`, `y`, `z`, or a component's number from 0 to 999."
 #define COMPONENT_DEFAULT "`0` of a field of one component, else `magnitude`"
 
-/* Of scene_schema_layers.c. */
+/* Defined in scene_schema_layers.c. */
 extern const cyaml_schema_field_t scene_layer_fields[], scene_clip_fields[];
 extern const scene_mapping scene_layer_mapping, scene_clip_mapping;
-/* Of series/scene_schema_series.c. */
+/* Defined in series/scene_schema_series.c. */
 extern const cyaml_schema_field_t scene_camera_fields[], scene_sweep_fields[];
 extern const scene_mapping scene_camera_mapping, scene_sweep_mapping;
 

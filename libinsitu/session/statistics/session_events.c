@@ -20,7 +20,7 @@ bool session_has_events(const scene *scene, int64_t cycle, bool images)
     return false;
 }
 
-/* What is found in a step: the statistics that are due, then those of conditions. */
+/* The statistics found in a step: those that are due, then those of conditions. */
 typedef struct event_work {
     int count;
     session_statistics_wish *wishes;

@@ -1,4 +1,4 @@
-/* What is due in a step by values: the scene's statistics, and images that wait for a field to cross a bound. */
+/* Finds what is due in a step by values: the scene's statistics, and images that wait for a field to cross a bound. */
 #ifndef SESSION_EVENTS_H
 #define SESSION_EVENTS_H
 
@@ -10,7 +10,7 @@ typedef struct session_event_time {
     double time;
 } session_event_time;
 
-/* What a session knows of past steps and this one: a bit for each of the statistics or images of the scene's file,
+/* A session's knowledge of past steps and this one: a bit for each of the statistics or images of the scene's file,
  * which the schema lets be no more than 64 each. All variants of an image have one bit. */
 typedef struct session_events {
     uint64_t begun; /* statistics whose file has a line of this session's */

@@ -54,7 +54,7 @@ static double sum_of(const int64_t sum[2])
     return ((double)sum[0] * (1 << LOW_BITS) + (double)sum[1]) * 0x1p-52;
 }
 
-/* What a pass needs of those before it. */
+/* Results of earlier passes that a pass needs. */
 typedef struct sum_basis {
     const session_statistics *known;
     double largest; /* volume */
@@ -100,7 +100,7 @@ static void add_cells(const grid *g, const grid_field *field, const sum_basis *b
     }
 }
 
-/* Of least and most: least, -most, -largest volume. */
+/* Entries of the reduction by minimum: least, -most, -largest volume. */
 static void find_ends(const grid *g, const grid_field *field, int threads, double ends[3])
 {
     double least = ends[0], most = -ends[1], largest = -ends[2];

@@ -25,7 +25,8 @@ typedef struct session_statistics {
     double shares[SESSION_MAX_BINS]; /* of the volume, by cells' values; the ends count to the outer bins */
 } session_statistics;
 
-/* Of the fields on all meshes that have them and that they are for: three reductions. Collective. */
+/* Finds the statistics of fields over all meshes that have them and are named for them, by three reductions.
+ * Collective. */
 insitu_status session_find_statistics(const session_meshes *meshes, const session_team *team,
                                       const session_statistics_wish *wishes, int count, session_statistics *out,
                                       base_error *error);

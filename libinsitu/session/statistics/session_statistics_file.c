@@ -20,7 +20,7 @@ static char *make_header(int bin_count)
     return out;
 }
 
-/* What a file is written from. */
+/* Input that a file is written from. */
 typedef struct new_lines {
     char *old; /* the lines that stay */
     size_t old_size;

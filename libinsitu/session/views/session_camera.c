@@ -10,7 +10,7 @@
 
 #include <math.h>
 
-/* Of the half frame, that the data fills at most. */
+/* The share of the half frame that the data fills at most. */
 static const double filled = 0.95;
 
 static double length(const double v[3])
@@ -81,7 +81,7 @@ static double less_room(double words, double pixels)
     return fmax(filled - 2 * words / pixels, 0.5);
 }
 
-/* What decorations leave free. */
+/* The part of the frame that decorations leave free. */
 static camera_frame free_frame(const scene_image *image)
 {
     const scene_decorations *d = &image->decorations;
@@ -129,7 +129,7 @@ static camera_stand fit_box(const session_extent *e, const render_camera *axes, 
                           .up_share = 0.5 * (share.down - share.up)};
 }
 
-/* Of an orthographic picture. */
+/* The camera of an orthographic picture. */
 static double half_height_of(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;

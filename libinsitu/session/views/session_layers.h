@@ -26,7 +26,7 @@ typedef struct session_layers {
     render_active_cells *active;        /* the step's (session_draw.h), for the caller to set; NULL: none are stored */
 } session_layers;
 
-/* What layers are made of. */
+/* Input that layers are made from. */
 typedef struct session_layer_basis {
     const session_meshes *meshes;
     const session_team *team;
@@ -36,8 +36,9 @@ typedef struct session_layer_basis {
     const scene_image *image;
 } session_layer_basis;
 
-/* Collective: ranges from the data are over all ranks. All agree first on what *error holds of each, and on an error nothing
- * is left to free. Where all is well but this rank lacks memory for colours, *error says so for the next agreement. */
+/* Collective: ranges from the data are over all ranks. All agree first on what *error holds of each, and on an error
+ * nothing is left to free. Where all is well but this rank lacks memory for colours, *error says so for the next
+ * agreement. */
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 

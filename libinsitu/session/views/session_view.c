@@ -66,8 +66,8 @@ static void fill_view(const session_space *space, const scene_image *image, sess
 
 /* ---- time ---------------------------------------------------------------------------------------------------- */
 
-/* What a sample takes on one thread: 27 to 240 ns as measured, on all types of cells, where there are many rays and
- * few. */
+/* Nanoseconds that a sample takes on one thread: 27 to 240 ns as measured, on all types of cells, where there are many
+ * rays and few. */
 static const double sample_seconds = 1e-7;
 
 /* The length of the pixel's ray within the bounds. */
@@ -84,7 +84,7 @@ static double chord_of_bounds(const session_extent *e, const render_camera *came
     return end > begin ? (end - begin) * length(direction) : 0;
 }
 
-/* Of all rays, on all ranks, as if the bounds were full of cells and nothing hid a sample. */
+/* Counts the samples of all rays on all ranks as if the bounds were full of cells and nothing hid a sample. */
 static double estimate_samples(const session_extent *e, const scene_image *image, const session_view *view)
 {
     enum { PROBES = 16 };
@@ -174,7 +174,7 @@ static void warn_of_view(const session_extent *e, const scene_image *image, cons
 
 /* ---- clipping ------------------------------------------------------------------------------------------------ */
 
-/* What is kept reaches further by twice what a slice's plane may be from its place, so that a slice in it is seen. */
+/* The kept region is widened by twice what a slice's plane may be from its place, so that a slice in it is seen. */
 static render_clip make_clip(const session_extent *e, const scene_clip *clip)
 {
     const double reach = 2 * SESSION_BORDER_SHARE * e->half_diagonal, grown = clip->is_outside ? -reach : reach;

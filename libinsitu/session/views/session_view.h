@@ -1,4 +1,4 @@
-/* What of an image depends on the global bounds: camera, lights, sample distance. */
+/* The parts of an image that depend on the global bounds: camera, lights, sample distance. */
 #ifndef SESSION_VIEW_H
 #define SESSION_VIEW_H
 

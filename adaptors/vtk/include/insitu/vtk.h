@@ -44,7 +44,7 @@ extern "C" {
 
 typedef struct insitu_vtk_adaptor insitu_vtk_adaptor;
 
-/* What insitu_vtk_set() did with one data set, on this rank. */
+/* Report of insitu_vtk_set() on one data set, of this rank. */
 typedef struct insitu_vtk_report {
     int meshes;              /* handed over: 1, or the leaves with cells to draw */
     int fields;              /* handed over, over all meshes */

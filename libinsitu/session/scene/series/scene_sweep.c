@@ -1,4 +1,4 @@
-/* What makes several pictures of an image: its sweep's fields and isovalues, and its orbit's views. */
+/* Reads the keys that make several pictures of an image: its sweep's fields and isovalues, and its orbit's views. */
 #include <stdio.h>
 #include <string.h>
 
