@@ -117,7 +117,8 @@ static void make_picture(const fragment_list *list, bool is_surface, int width, 
     for (int64_t p = 0; p < pixels; p++) depth[p] = 1;
     for (int64_t i = 0, next; i < list->count; i = next) {
         for (next = i + 1; next < list->count && sorted[next].pixel == sorted[i].pixel;) next++;
-        const int64_t x = sorted[i].pixel % (uint32_t)width, y = height - 1 - (int64_t)(sorted[i].pixel / (uint32_t)width);
+        const int64_t x = sorted[i].pixel % (uint32_t)width,
+                      y = height - 1 - (int64_t)(sorted[i].pixel / (uint32_t)width);
         float t;
         comp_merge_pixel(sorted + i, next - i, background, rgba + 4 * (y * width + x), &t);
         depth[y * width + x] = isfinite(t) ? 0.25f + 0.2f * t : 1;
@@ -136,7 +137,7 @@ static void make_picture(const fragment_list *list, bool is_surface, int width, 
 /* What one way of compositing takes. */
 typedef struct measure {
     char name[32];
-    bench_series series, cpu; /* of the slowest rank; of all ranks, waiting included */
+    bench_series series, cpu;     /* of the slowest rank; of all ranks, waiting included */
     double bytes, messages, peak; /* of all ranks, of all, of the greatest */
     bool can;
 } measure;
@@ -222,8 +223,9 @@ static void print(const bench *b, const char *layer, measure *m)
     const bench_stats time = bench_stats_of(m->series.seconds, m->series.count);
     const bench_stats cpu = bench_stats_of(m->cpu.seconds, m->cpu.count);
     if (own_rank || !m->can) return;
-    printf("%s,%s,%d,%s,%.2f,%.2f,%.2f,%.2f,%.3f,%.0f,%.2f\n", layer, b->options->is_random ? "random" : "block", rank_count,
-           m->name, 1e3 * time.median, 1e3 * time.low, 1e3 * time.high, 1e3 * cpu.median, 1e-6 * m->bytes, m->messages, 1e-6 * m->peak);
+    printf("%s,%s,%d,%s,%.2f,%.2f,%.2f,%.2f,%.3f,%.0f,%.2f\n", layer, b->options->is_random ? "random" : "block",
+           rank_count, m->name, 1e3 * time.median, 1e3 * time.low, 1e3 * time.high, 1e3 * cpu.median, 1e-6 * m->bytes,
+           m->messages, 1e-6 * m->peak);
     fflush(stdout);
 }
 
@@ -238,8 +240,7 @@ static void measure_layer(bench *b, const char *layer, bool is_surface)
     b->picture.order = order;
     memset(b->measures, 0, sizeof b->measures);
     for (int run = 0; run <= b->options->runs; run++) {
-        for (int s = COMP_AUTOMATIC; s < COMP_SCHEDULE_COUNT; s++)
-            run_own(b, (comp_schedule)s, run, &b->measures[s]);
+        for (int s = COMP_AUTOMATIC; s < COMP_SCHEDULE_COUNT; s++) run_own(b, (comp_schedule)s, run, &b->measures[s]);
         for (int s = 0; s < BENCH_ICET_STRATEGIES && has_peer; s++)
             run_icet(b, s, run, &b->measures[COMP_SCHEDULE_COUNT + s]);
     }

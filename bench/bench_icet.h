@@ -1,5 +1,5 @@
-/* IceT's compositing (Debian's paraview-dev) of the same pictures: one RGBA image of floats a rank, with a depth or in an
- * order. */
+/* IceT's compositing (Debian's paraview-dev) of the same pictures: one RGBA image of floats a rank, with a depth or in
+ * an order. */
 #ifndef BENCH_ICET_H
 #define BENCH_ICET_H
 
@@ -10,7 +10,8 @@ enum { BENCH_ICET_STRATEGIES = 5 };
 
 typedef struct bench_icet bench_icet;
 
-/* What one rank has: height × width × 4 premultiplied colours and, of surfaces, depths from 0 to 1, bottom row first. */
+/* What one rank has: height × width × 4 premultiplied colours and, of surfaces, depths from 0 to 1, bottom row first.
+ */
 typedef struct bench_icet_picture {
     int width, height;
     const float *rgba, *depth; /* depth NULL: blended in order */

@@ -1,5 +1,5 @@
-/* Schedules of compositing by arithmetic (comp_cost.h), for any number of ranks: messages, bytes and time of the rank that
- * has most to send, of a picture that a block partition cuts into P^(1/3) layers. Prints CSV; takes no MPI.
+/* Schedules of compositing by arithmetic (comp_cost.h), for any number of ranks: messages, bytes and time of the rank
+ * that has most to send, of a picture that a block partition cuts into P^(1/3) layers. Prints CSV; takes no MPI.
  *
  *     bench_schedules [RANKS_PER_NODE] */
 #include <math.h>

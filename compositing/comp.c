@@ -1,8 +1,9 @@
-/* The three phases of compositing: fragments to the owners of their pixels, merging there, pixels to rank 0. Before them
- * all ranks agree that everyone has what it takes to see them through, and after them whether they did: a rank that runs
- * out of memory on the way goes on without what it lacks, so that nobody waits for it, and tells in the end. Memory
- * is given back as soon as its phase is over: at the peak a rank holds its own fragments twice, or those of the pixels it
- * owns and the bytes that they came in. One rank alone merges its list where it lies (or has none: comp_tiles.h). */
+/* The three phases of compositing: fragments to the owners of their pixels, merging there, pixels to rank 0. Before
+ * them all ranks agree that everyone has what it takes to see them through, and after them whether they did: a rank
+ * that runs out of memory on the way goes on without what it lacks, so that nobody waits for it, and tells in the end.
+ * Memory is given back as soon as its phase is over: at the peak a rank holds its own fragments twice, or those of the
+ * pixels it owns and the bytes that they came in. One rank alone merges its list where it lies (or has none:
+ * comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>
@@ -188,7 +189,8 @@ static insitu_status share_overlaps(const composition *c, comp_overlaps *overlap
     const MPI_Comm comm = c->group->comm;
     const insitu_status status =
         comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, c->merged.overlaps, bytes, MPI_BYTE, MPI_BOR, comm), error);
-    if (!status) *overlaps = (comp_overlaps){pixel_set_count(c->merged.overlaps, c->layout.pixel_count), c->merged.overlaps};
+    if (!status)
+        *overlaps = (comp_overlaps){pixel_set_count(c->merged.overlaps, c->layout.pixel_count), c->merged.overlaps};
     return status;
 }
 

@@ -1,9 +1,9 @@
 /* Compositing: fragments of many ranks to one image on rank 0. Knows no cells, no trees, no scene.
  *
  * Pixels are owned in turn by ranks (comp_owner: plain arithmetic). Every rank sends each pixel owner its fragments
- * (comp_route.h: by which ranks), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels. Fragments
- * need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The result is a function
- * of the set of fragments alone: not of ranks, of order of arrival, nor of threads.
+ * (comp_route.h: by which ranks), owners sort them by t and blend front to back, and rank 0 gathers the finished
+ * pixels. Fragments need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The
+ * result is a function of the set of fragments alone: not of ranks, of order of arrival, nor of threads.
  *
  * Sorting by t makes the picture where fragments do not overlap. Volume fragments that do, because cells do, can be put
  * right only by who made them: comp_composite_overlaps() tells the pixels in which they overlap. Volume fragments of no
@@ -30,8 +30,8 @@ typedef struct comp_group {
     int longest_dense;      /* rounds of more partners are sparse (comp_mail.h); 0: as comp_route.h has it */
 } comp_group;
 
-/* Which rank of ranks owns pixel (of pixel_count pixels) where all ranks are owners? Runs of consecutive pixels go round, so that an object
- * in the middle of the image is shared out. */
+/* Which rank of ranks owns pixel (of pixel_count pixels) where all ranks are owners? Runs of consecutive pixels go
+ * round, so that an object in the middle of the image is shared out. */
 int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
 
 /* Blend one pixel's fragments in place: sorted by (t_in, surface before volume, then bits), blended front to back
@@ -60,11 +60,12 @@ typedef struct comp_statistics {
 } comp_statistics;
 
 /* Collective over group->comm: two reductions, and a barrier where a round is sparse (comp_mail.h). out->rgba must be
- * allocated on rank 0, out->depth may be (width and height set on all ranks), and are filled there; elsewhere they are not
- * touched. out->deep may be given, on all ranks: rank 0's, whose first and counts are allocated, gets the samples of the
- * pixels that have fragments (comp_deep.h), with t for their depths. Where out->is_folded, the same on all ranks, pixels
- * are merged by comp_merge_folded_pixel(). The list is emptied, and its memory given back, whatever comes. An error on one rank (memory) is an error on all, and so is one that *error holds before
- * the call: whoever could make no fragments says so here. threads: of this rank, 0: as many as OpenMP would take.
+ * allocated on rank 0, out->depth may be (width and height set on all ranks), and are filled there; elsewhere they are
+ * not touched. out->deep may be given, on all ranks: rank 0's, whose first and counts are allocated, gets the samples
+ * of the pixels that have fragments (comp_deep.h), with t for their depths. Where out->is_folded, the same on all
+ * ranks, pixels are merged by comp_merge_folded_pixel(). The list is emptied, and its memory given back, whatever comes.
+ * An error on one rank (memory) is an error on all, and so is one that *error holds before the call: whoever could make
+ * no fragments says so here. threads: of this rank, 0: as many as OpenMP would take.
  * statistics may be NULL. */
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error);
@@ -77,8 +78,8 @@ typedef struct comp_overlaps {
 
 /* The same, and tells every rank the overlaps. Costs a reduction of a bit a pixel where there are any. On an error
  * overlaps is empty. */
-insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4], int threads,
-                                      image *out, comp_overlaps *overlaps, comp_statistics *statistics,
+insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4],
+                                      int threads, image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error);
 
 #endif

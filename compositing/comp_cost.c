@@ -42,7 +42,8 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
     static const struct {
         comp_schedule schedule;
         int radix;
-    } tried[] = {{COMP_NODES, 0}, {COMP_RADIX, 4}, {COMP_RADIX, 8}, {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
+    } tried[] = {{COMP_NODES, 0},  {COMP_RADIX, 4},  {COMP_RADIX, 8},
+                 {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
     if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all are as near as each other */
     comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
     double least = comp_cost_of(&best, load, machine).seconds;

@@ -1,8 +1,9 @@
-/* Which schedule takes least, by arithmetic: LogGP (Alexandrov, Ionescu, Schauser, Scheiman, 1995), in which a message costs
- * its sender and its receiver an overhead each, the network a latency, and every byte a gap.
+/* Which schedule takes least, by arithmetic: LogGP (Alexandrov, Ionescu, Schauser, Scheiman, 1995), in which a message
+ * costs its sender and its receiver an overhead each, the network a latency, and every byte a gap.
  *
- * A rank's fragments are its own to pack and an owner's to unpack whatever the schedule, so rounds alone are counted: how
- * many messages a rank sends, and how often its bytes travel. What is empty is a message too where a round is dense. */
+ * A rank's fragments are its own to pack and an owner's to unpack whatever the schedule, so rounds alone are counted:
+ * how many messages a rank sends, and how often its bytes travel. What is empty is a message too where a round is
+ * dense. */
 #ifndef COMP_COMP_COST_H
 #define COMP_COMP_COST_H
 

@@ -1,5 +1,5 @@
-/* What a rank alone has may be most of its memory, in no order, and longer than any cache. So the list is cut into blocks
- * that fit in one, and pixels into slices. Threads first sort each block by slice where it lies; then they take
+/* What a rank alone has may be most of its memory, in no order, and longer than any cache. So the list is cut into
+ * blocks that fit in one, and pixels into slices. Threads first sort each block by slice where it lies; then they take
  * slices, collect a slice's pieces from all blocks by pixel in a scratch list, and blend:
  *
  *     block 0 | s0 | s1  | s2 |     block 1 | s0  | s1 | s2 |     block 2 ...

@@ -38,7 +38,8 @@ void comp_pixels_clear(const comp_layout *layout, image *out, const float backgr
 /* Writes pixel from->pixel of the image. */
 void comp_pixels_store(image *out, const comp_pixel *from);
 
-/* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned index. */
+/* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned
+ * index. */
 typedef struct comp_merged {
     const float *background; /* 4 */
     bool is_folded;          /* by comp_merge_folded_pixel() */
@@ -48,8 +49,8 @@ typedef struct comp_merged {
     comp_deep_list *deep;    /* as many as the layout has threads: what they hold is added. NULL: not wanted */
 } comp_merged;
 
-/* One rank alone: merge the pixels that have fragments, which are reordered, into merged->out. Local. On an error out and
- * deep may hold some pixels. */
+/* One rank alone: merge the pixels that have fragments, which are reordered, into merged->out. Local. On an error out
+ * and deep may hold some pixels. */
 insitu_status comp_pixels_merge(const comp_layout *layout, fragment_list *fragments, const comp_merged *merged,
                                 base_error *error);
 

@@ -29,7 +29,8 @@ typedef enum comp_schedule {
     COMP_SCHEDULE_COUNT
 } comp_schedule;
 
-/* How ranks lie on nodes: the same number on each, one node after the other or round the nodes. 1 where it is neither. */
+/* How ranks lie on nodes: the same number on each, one node after the other or round the nodes. 1 where it is neither.
+ */
 typedef struct comp_nodes {
     int ranks; /* of each node */
     bool is_cyclic;
@@ -44,8 +45,8 @@ typedef struct comp_route {
     int longest_dense; /* at most COMP_LONGEST_DENSE, which comp_route_of() gives */
 } comp_route;
 
-/* The route of a schedule, COMP_AUTOMATIC not among them. radix is the most partners of a round of COMP_RADIX, itself among
- * them. */
+/* The route of a schedule, COMP_AUTOMATIC not among them. radix is the most partners of a round of COMP_RADIX, itself
+ * among them. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
 /* A rank's place, and back. */

@@ -140,7 +140,8 @@ static void free_setting(setting *s)
     free_image(&s->out);
 }
 
-/* Every schedule in turn, by dense rounds and sparse ones. Nodes are made up: any two, three ... ranks that divide all may stand for one. */
+/* Every schedule in turn, by dense rounds and sparse ones. Nodes are made up: any two, three ... ranks that divide all
+ * may stand for one. */
 static void set_schedule(uint32_t turn)
 {
     group.schedule = (comp_schedule)(COMP_DIRECT + turn % (COMP_SCHEDULE_COUNT - 1));
@@ -260,8 +261,8 @@ static fragment smooth_fragment(uint32_t pixel, int width)
     return f;
 }
 
-/* A hit is 32 bytes and a finished pixel 24 in memory. Depth and three colours, of which each leaves one or two bytes and two
- * bits, and no other word, are at most 9; a message has a head and blocks have theirs. */
+/* A hit is 32 bytes and a finished pixel 24 in memory. Depth and three colours, of which each leaves one or two bytes
+ * and two bits, and no other word, are at most 9; a message has a head and blocks have theirs. */
 static void smooth_surfaces_travel_in_a_third(void **context)
 {
     (void)context;
@@ -270,20 +271,23 @@ static void smooth_surfaces_travel_in_a_third(void **context)
     if (own_rank == 0) s.out = make_image(WIDTH, HEIGHT);
     s.own = (fragment_list){base_alloc(WIDTH * HEIGHT * sizeof(fragment)), 0, WIDTH * HEIGHT};
     for (uint32_t p = 0; p < WIDTH * HEIGHT; p++)
-        if ((int)(p / WIDTH * (uint32_t)rank_count / HEIGHT) == own_rank) s.own.items[s.own.count++] = smooth_fragment(p, WIDTH);
+        if ((int)(p / WIDTH * (uint32_t)rank_count / HEIGHT) == own_rank)
+            s.own.items[s.own.count++] = smooth_fragment(p, WIDTH);
     comp_statistics statistics;
-    assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK, "composite succeeds");
+    assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK,
+                      "composite succeeds");
     int64_t own[2] = {statistics.sent_bytes, statistics.sent_messages}, all[2];
     MPI_Allreduce(own, all, 2, MPI_INT64_T, MPI_SUM, comm);
     const double travelled = (double)WIDTH * HEIGHT * (rank_count - 1) / rank_count; /* to owners, and to rank 0 */
-    assert_everywhere(rank_count == 1 ? all[0] == 0 : (double)all[0] < 2 * MOST_BYTES * travelled + 64.0 * (double)all[1],
+    assert_everywhere(rank_count == 1 ? all[0] == 0
+                                      : (double)all[0] < 2 * MOST_BYTES * travelled + 64.0 * (double)all[1],
                       "smooth surfaces travel in few bytes");
     base_free(s.own.items);
     if (own_rank == 0) free_image(&s.out);
 }
 
-/* The arithmetic of the schedules against what is sent: with no fragment, a message a partner and round, and up the tree one
- * of each owner but rank 0. */
+/* The arithmetic of the schedules against what is sent: with no fragment, a message a partner and round, and up the
+ * tree one of each owner but rank 0. */
 static void messages_are_as_counted(void **context)
 {
     (void)context;
@@ -292,7 +296,8 @@ static void messages_are_as_counted(void **context)
         set_schedule(turn);
         if (group.longest_dense) continue;
         setting s = make_setting(16, 16, 0, deal_random, 1);
-        assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK, "all is well");
+        assert_everywhere(comp_composite(&group, &s.own, background, 0, &s.out, &statistics, NULL) == INSITU_OK,
+                          "all is well");
         const comp_route route = comp_route_of(group.schedule, rank_count, group.nodes, 8);
         const int place = comp_route_place(&route, own_rank);
         const int64_t up = place > 0 && place < route.owners;
@@ -307,7 +312,7 @@ static void messages_are_as_counted(void **context)
 static void failed_allocation_is_an_error_on_all(void **context)
 {
     (void)context;
-    for (int victim = 0; victim < rank_count; victim += rank_count > 8 ? 5 : 1) {
+    for (int victim = 0; victim<rank_count; victim += rank_count> 8 ? 5 : 1) {
         set_schedule((uint32_t)victim + 8 + 4 * (uint32_t)(victim / 4 % 2));
         setting s = make_setting(65, 33, 3000, deal_random, 21);
         const int64_t held = base_memory_held();
@@ -356,8 +361,10 @@ static void image_without_pixels_is_refused(void **context)
     (void)context;
     image none = {.height = 4}, huge = {.width = 65536, .height = 65536};
     fragment_list items = {NULL, 0, 0};
-    assert_everywhere(comp_composite(&group, &items, background, 0, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT, "0 x 4");
-    assert_everywhere(comp_composite(&group, &items, background, 0, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT, "2^32");
+    assert_everywhere(comp_composite(&group, &items, background, 0, &none, NULL, NULL) == INSITU_ERROR_ARGUMENT,
+                      "0 x 4");
+    assert_everywhere(comp_composite(&group, &items, background, 0, &huge, NULL, NULL) == INSITU_ERROR_ARGUMENT,
+                      "2^32");
 }
 
 int main(int argc, char **argv)

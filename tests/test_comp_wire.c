@@ -1,5 +1,6 @@
-/* What travels, without MPI: whole numbers and blocks come back bit for bit, whatever they hold; the ways of a route lead
- * every fragment from every rank to its owner, and every pixel to rank 0, for as many ranks as no machine at hand has. */
+/* What travels, without MPI: whole numbers and blocks come back bit for bit, whatever they hold; the ways of a route
+ * lead every fragment from every rank to its owner, and every pixel to rank 0, for as many ranks as no machine at hand
+ * has. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -135,7 +136,8 @@ static void straight_lines_are_a_byte_a_word(void **context)
     block->count = 1 << COMP_RUN_SHIFT;
     for (int i = 0; i < block->count; i++) {
         block->records[i][0] = (uint32_t)i;
-        for (int k = 1; k < COMP_RECORD_WORDS; k++) block->records[i][k] = bits_of(1 + (float)k * 0x1p-10f * (float)(i + k));
+        for (int k = 1; k < COMP_RECORD_WORDS; k++)
+            block->records[i][k] = bits_of(1 + (float)k * 0x1p-10f * (float)(i + k));
     }
     const int64_t length = comp_block_write(block, bytes) - bytes;
     const int64_t words = (COMP_RECORD_WORDS - 1) * block->count;
@@ -223,8 +225,8 @@ static void gathering_is_a_tree(void **context)
                 check_gather(counts[i], (comp_nodes){node, false}, s);
 }
 
-/* What is chosen is as cheap as each schedule on its own; few ranks send directly; and at no number of ranks up to 100,000,
- * of a picture's share each, does one send more than a few hundred messages. */
+/* What is chosen is as cheap as each schedule on its own; few ranks send directly; and at no number of ranks up to
+ * 100,000, of a picture's share each, does one send more than a few hundred messages. */
 static void the_cheapest_route_is_chosen(void **context)
 {
     (void)context;

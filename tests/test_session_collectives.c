@@ -63,7 +63,8 @@ typedef struct counted_scene {
 static const counted_scene scenes[] = {
     {"isosurface", "      - isosurface: {field: f, values: [0.1]}\n"},
     {"transparent isosurfaces", "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n"},
-    {"volume", "      - volume: {field: f, map: viridis, range: [-1, 1], opacity: [[0, 0], [1, 0.5]], unit_distance: 1}\n"},
+    {"volume",
+     "      - volume: {field: f, map: viridis, range: [-1, 1], opacity: [[0, 0], [1, 0.5]], unit_distance: 1}\n"},
 };
 
 static const char *scene_of(const counted_scene *s)
@@ -77,7 +78,8 @@ static const char *scene_of(const counted_scene *s)
     return write_scene(text);
 }
 
-/* The third and the fourth step, when all is known of meshes that stay as they are. The writer's thread calls no MPI. */
+/* The third and the fourth step, when all is known of meshes that stay as they are. The writer's thread calls no MPI.
+ */
 static void count_steps(const counted_scene *s)
 {
     session_input in;

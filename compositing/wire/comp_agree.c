@@ -23,6 +23,6 @@ insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, ba
     const insitu_status worst = (insitu_status)((all[0] + INT32_MAX) >> 32);
     if (worst == INSITU_OK || worst == own) return worst;
     const char *what = worst == INSITU_ERROR_MEMORY ? "ran out of memory" : "failed";
-    return base_fail(error, worst, "compositing: rank %lld %s (status %d)", (long long)(((int64_t)worst << 32) - all[0]),
-                     what, (int)worst);
+    return base_fail(error, worst, "compositing: rank %lld %s (status %d)",
+                     (long long)(((int64_t)worst << 32) - all[0]), what, (int)worst);
 }

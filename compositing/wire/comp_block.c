@@ -8,7 +8,7 @@
 enum word_kind { WORD_CODED, WORD_SAME, WORD_AS_BEFORE };
 enum { MOST_RUN_BYTES = 6 }; /* of one record: 5 of the gap, 1 of the length */
 
-_Static_assert(COMP_BLOCK_RECORDS * (MOST_RUN_BYTES + 5 * (COMP_RECORD_WORDS - 1)) < 1 << 16, "bytes fit in 16 bits");
+_Static_assert(COMP_BLOCK_RECORDS *(MOST_RUN_BYTES + 5 * (COMP_RECORD_WORDS - 1)) < 1 << 16, "bytes fit in 16 bits");
 
 typedef uint32_t quad __attribute__((vector_size(16)));
 typedef int32_t signed_quad __attribute__((vector_size(16)));
@@ -120,8 +120,8 @@ static void write_head(const comp_block *block, size_t bytes, size_t run_bytes, 
 
 /* ---- values -------------------------------------------------------------------------------------------------- */
 
-/* The run's remains: of the first record from the one before it, of the second from the first, then from a straight line
- * through the two before. *last is the record before. */
+/* The run's remains: of the first record from the one before it, of the second from the first, then from a straight
+ * line through the two before. *last is the record before. */
 static void foretell(comp_block *block, int first, int length, const pair *origin, pair *last, differences *d)
 {
     pair slope = {{0}, {0}};

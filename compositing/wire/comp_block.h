@@ -6,7 +6,8 @@
  * (comp_words.h). The pixels are runs of consecutive indices. A word that is the same in all records of a block is
  * written once, one that is always that before it (t_out of hits, the colours of grey) not at all:
  *
- *     bytes | records | bytes of runs | words' kinds | runs | words that are the same | remains of word 1 | of word 2 ...
+ *     bytes | records | bytes of runs | words' kinds | runs | words that are the same | remains of word 1 | of word 2
+ * ...
  *
  * The remains are of bit patterns, as whole numbers modulo 2^32: no float is rounded, and NaN passes as it is. */
 #ifndef COMP_COMP_BLOCK_H
@@ -18,7 +19,8 @@
 enum {
     COMP_BLOCK_RECORDS = 1024,
     COMP_RECORD_WORDS = 8,
-    COMP_RUN_SHIFT = 6, /* runs end where the index is a multiple of 2^COMP_RUN_SHIFT: there the image goes on elsewhere */
+    COMP_RUN_SHIFT =
+        6, /* runs end where the index is a multiple of 2^COMP_RUN_SHIFT: there the image goes on elsewhere */
     COMP_BLOCK_HEAD = 8
 };
 

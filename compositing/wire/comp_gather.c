@@ -1,7 +1,7 @@
 /* Pixels travel as fragments do, in blocks (comp_block.h): only those that something was blended in, the rest are
  * background, which rank 0 knows. Whoever has children passes their messages on as they come, in a buffer that was made
- * before, and ends with one that says that no more follow: so rank 0 need not know how many there are, hears from so many
- * ranks as it has children, and its memory grows with neither the image nor the ranks. */
+ * before, and ends with one that says that no more follow: so rank 0 need not know how many there are, hears from so
+ * many ranks as it has children, and its memory grows with neither the image nor the ranks. */
 #include "comp_gather.h"
 
 #include <string.h>
@@ -68,8 +68,8 @@ static void close_message(upward *up, uint32_t owner)
 static void put_block(upward *up, uint32_t owner)
 {
     comp_block *const block = up->room->block;
-    if (up->parcel && (size_t)(up->end - up->room->outgoing[up->which]) + comp_block_bound(block->count) >
-                          COMP_MESSAGE_BYTES)
+    if (up->parcel &&
+        (size_t)(up->end - up->room->outgoing[up->which]) + comp_block_bound(block->count) > COMP_MESSAGE_BYTES)
         close_message(up, owner);
     if (!up->parcel) {
         wait_for(up, &up->requests[up->which]);

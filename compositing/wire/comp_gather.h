@@ -6,7 +6,8 @@
 #include "comp_pixels.h"
 #include "comp_schedule.h"
 
-/* Owners send up a tree of places: of a node to its first place, of nodes in a heap of COMP_GATHER_FAN children each. */
+/* Owners send up a tree of places: of a node to its first place, of nodes in a heap of COMP_GATHER_FAN children each.
+ */
 enum { COMP_GATHER_FAN = 64 };
 
 /* The place that a place sends to, of 1 and more; and how many send to a place. */

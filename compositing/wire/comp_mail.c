@@ -1,8 +1,8 @@
 /* A dense round is one in which every partner sends to every other, if only that there is nothing: nothing else need be
  * said. In a sparse one only who has something sends, and nobody knows how many that are. So sends are synchronous,
  * which end when they are received; a rank whose sends have ended enters a barrier, and receives on until all have
- * entered it: then nothing is under way (Hoefler, Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse
- * Data Exchange, 2010). No count is exchanged, and a rank alone costs the rounds of a barrier. */
+ * entered it: then nothing is under way (Hoefler, Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic
+ * Sparse Data Exchange, 2010). No count is exchanged, and a rank alone costs the rounds of a barrier. */
 #include "comp_mail.h"
 
 #include <string.h>

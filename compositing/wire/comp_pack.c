@@ -61,8 +61,9 @@ static bool pack_digits(const comp_windows *w, const comp_route *route, int plac
 #pragma omp for schedule(dynamic, 1)
         for (int i = 0; i < radix; i++) {
             const int digit = is_beyond ? i : (own + i) % radix;
-            comp_writer writer = {.rank = comp_route_rank(route, is_beyond ? place - route->owners
-                                                                           : comp_route_partner(route, 0, 1, place, digit))};
+            comp_writer writer = {.rank = comp_route_rank(route, is_beyond
+                                                                     ? place - route->owners
+                                                                     : comp_route_partner(route, 0, 1, place, digit))};
             if (is_well) is_well = pack_digit(w, radix, digit, place, block, &writer);
 #pragma omp critical(comp_pack)
             comp_messages_append(digit == own ? kept : out, &writer.messages);
@@ -123,9 +124,9 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
 
 /* ---- out of messages -----------------------------------------------------------------------------------------
  *
- * A counting sort by pixel: the blocks' runs tell how many fragments each pixel has before any is unpacked, so each goes
- * straight to its place. starts[k] is first the count of pixel k, then where its fragments end, and falls to where they
- * begin as they are placed. */
+ * A counting sort by pixel: the blocks' runs tell how many fragments each pixel has before any is unpacked, so each
+ * goes straight to its place. starts[k] is first the count of pixel k, then where its fragments end, and falls to where
+ * they begin as they are placed. */
 
 typedef struct unpacking {
     const comp_layout *layout;
@@ -168,8 +169,7 @@ static void count_all(const unpacking *u, const fragment *own, int64_t own_count
 /* is_shared: other threads place fragments of the same pixels. */
 static inline void place(comp_owned *out, const void *item, uint32_t index, bool is_shared)
 {
-    const uint32_t to =
-        is_shared ? __atomic_sub_fetch(&out->starts[index], 1, __ATOMIC_RELAXED) : --out->starts[index];
+    const uint32_t to = is_shared ? __atomic_sub_fetch(&out->starts[index], 1, __ATOMIC_RELAXED) : --out->starts[index];
     memcpy(&out->items[to], item, sizeof *out->items);
     out->items[to].pixel = index;
 }

@@ -7,9 +7,9 @@
 #include "comp_route.h"
 #include "comp_windows.h"
 
-/* Writes what the rank has for other owners into messages: *out gets those to the partners of the first round, or, where
- * the rank is beyond the owners, to the partner that takes all; *kept gets those that a later round sends on. Both are empty
- * at first, and on an error. Local. */
+/* Writes what the rank has for other owners into messages: *out gets those to the partners of the first round, or,
+ * where the rank is beyond the owners, to the partner that takes all; *kept gets those that a later round sends on.
+ * Both are empty at first, and on an error. Local. */
 insitu_status comp_pack(const comp_windows *windows, const comp_route *route, int rank, comp_messages *out,
                         comp_messages *kept, base_error *error);
 

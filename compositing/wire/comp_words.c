@@ -1,5 +1,5 @@
-/* The shuffles are tables by the byte of lengths, made by the preprocessor: length of number k, where its bytes begin, and
- * from which byte of four whole numbers the byte at a place comes, and back. */
+/* The shuffles are tables by the byte of lengths, made by the preprocessor: length of number k, where its bytes begin,
+ * and from which byte of four whole numbers the byte at a place comes, and back. */
 #include "comp_words.h"
 
 #include <string.h>
@@ -46,7 +46,7 @@ static void read_four(const unsigned char *in, unsigned lengths, uint32_t words[
 
 #if defined(__x86_64__)
 
-#define LENGTH(c, k) (((c) >> 2 * (k) & 3) + 1)
+#define LENGTH(c, k) (((c) >> 2 * (k)&3) + 1)
 #define END1(c) LENGTH(c, 0)
 #define END2(c) (END1(c) + LENGTH(c, 1))
 #define END3(c) (END2(c) + LENGTH(c, 2))
@@ -60,8 +60,14 @@ static void read_four(const unsigned char *in, unsigned lengths, uint32_t words[
 #define IN(c, k, begin, j) ((j) < LENGTH(c, k) ? (begin) + (j) : 0x80)
 #define OUT4(c, p) OUT(c, p), OUT(c, (p) + 1), OUT(c, (p) + 2), OUT(c, (p) + 3)
 #define IN4(c, k, begin) IN(c, k, begin, 0), IN(c, k, begin, 1), IN(c, k, begin, 2), IN(c, k, begin, 3)
-#define OUT_ROW(c) {OUT4(c, 0), OUT4(c, 4), OUT4(c, 8), OUT4(c, 12)}
-#define IN_ROW(c) {IN4(c, 0, 0), IN4(c, 1, END1(c)), IN4(c, 2, END2(c)), IN4(c, 3, END3(c))}
+#define OUT_ROW(c)                                                                                                     \
+    {                                                                                                                  \
+        OUT4(c, 0), OUT4(c, 4), OUT4(c, 8), OUT4(c, 12)                                                                \
+    }
+#define IN_ROW(c)                                                                                                      \
+    {                                                                                                                  \
+        IN4(c, 0, 0), IN4(c, 1, END1(c)), IN4(c, 2, END2(c)), IN4(c, 3, END3(c))                                       \
+    }
 #define ROWS4(ROW, c) ROW(c), ROW((c) + 1), ROW((c) + 2), ROW((c) + 3)
 #define ROWS16(ROW, c) ROWS4(ROW, c), ROWS4(ROW, (c) + 4), ROWS4(ROW, (c) + 8), ROWS4(ROW, (c) + 12)
 #define ROWS64(ROW, c) ROWS16(ROW, c), ROWS16(ROW, (c) + 16), ROWS16(ROW, (c) + 32), ROWS16(ROW, (c) + 48)
@@ -97,9 +103,8 @@ __attribute__((target("ssse3"))) static unsigned char *write_by_shuffles(const u
     return out;
 }
 
-__attribute__((target("ssse3"))) static const unsigned char *read_by_shuffles(const unsigned char *in, size_t fours,
-                                                                              const unsigned char *lengths,
-                                                                              uint32_t *words)
+__attribute__((target("ssse3"))) static const unsigned char *
+read_by_shuffles(const unsigned char *in, size_t fours, const unsigned char *lengths, uint32_t *words)
 {
     for (size_t i = 0; i < fours; i++) {
         const __m128i shuffle = _mm_loadu_si128((const __m128i *)(const void *)inward[lengths[i]]);

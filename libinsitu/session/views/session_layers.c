@@ -346,7 +346,8 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     if (!error->status && !allocate_layers(basis->meshes, image, &layers))
         session_no_memory(error, 1 << 10, "an image's layers");
     /* What the scene asks too much of is no one rank's. */
-    insitu_status status = (error->status == INSITU_ERROR_SCENE ? session_agree_as_is : session_agree)(basis->team->comm, error);
+    insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_as_is(basis->team->comm, error)
+                                                               : session_agree(basis->team->comm, error);
     if (!status) fill_parts(basis->meshes, &layers);
     for (int i = 0; i < image->isosurface_count && !status; i++)
         status = fill_surface(basis, &image->isosurfaces[i], i, &layers, error);
