@@ -131,11 +131,11 @@ static __attribute__((noinline)) void kernel_occlusion_poly(kernel_packet *p, co
     }
 }
 
-static void kernel_occlusion_stay(kernel_packet *p, const kernel_occlusion *o, const polyhedron *c, vm rays, vm wanted,
-                                  kernel_passage *r, kernel_stay *stay)
+static void kernel_occlusion_stay(kernel_packet *p, const kernel_occlusion *o, vm wanted, kernel_passage *r,
+                                  kernel_stay *stay)
 {
     kernel_walk walk;
-    kernel_passage_profile(p, c, rays, false, r, stay);
+    kernel_passage_profile(r, stay);
     kernel_walk_begin(stay, wanted, &walk);
     do {
         const vm found = kernel_walk_next(r, stay, &walk);
@@ -147,12 +147,12 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
 {
     kernel_passage r;
     kernel_stay stay;
-    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(p, c, rays, false, &r)) return;
+    if (!kernel_passage_open(p, c, &r) || !kernel_passage_cross(&r, rays, false)) return;
     while (kernel_passage_next(&r, &stay)) {
         const vm changes = kernel_changes_sign(&stay.interval);
         const vm wanted =
             vm_and(kernel_is_near(p, &stay.interval), vm_or(changes, kernel_polyhedron_turns(p, c, &r, &stay)));
-        if (vm_any(wanted)) kernel_occlusion_stay(p, o, c, rays, wanted, &r, &stay);
+        if (vm_any(wanted)) kernel_occlusion_stay(p, o, wanted, &r, &stay);
     }
 }
 
