@@ -134,6 +134,110 @@ SIMD_INLINE void kernel_bend_at(int type, const vf r[3], kernel_bend *b)
     }
 }
 
+/* ---- the order of vertices ----
+ *
+ * Terms round by the order of a cell's vertices, which differs between codes and ranks. So they are turned to begin at
+ * the vertex that is least by its place, then along its edges in the order of places, as kernel_cell_turn() does by
+ * coordinates. Places are the same on all ranks. Vertices in one place keep their order: such cells are not for lanes. */
+
+SIMD_INLINE vm kernel_local_before(const vf a[3], const vf b[3])
+{
+    vm before = vf_lt(a[2], b[2]);
+    for (int k = 1; k >= 0; k--) before = vm_or(vf_lt(a[k], b[k]), vm_and(vf_eq(a[k], b[k]), before));
+    return before;
+}
+
+SIMD_INLINE vm kernel_local_is_before(vf (*const at)[8], int i, int j)
+{
+    const vf a[3] = {at[0][i], at[1][i], at[2][i]}, b[3] = {at[0][j], at[1][j], at[2][j]};
+    return kernel_local_before(a, b);
+}
+
+SIMD_INLINE void kernel_local_swap(vf (*at)[8], vf *value, vm lanes, int i, int j)
+{
+    for (int a = 0; a < 4; a++) {
+        vf *list = a < 3 ? at[a] : value;
+        const vf was = list[i];
+        list[i] = vf_select(lanes, list[j], was);
+        list[j] = vf_select(lanes, was, list[j]);
+    }
+}
+
+/* Tells for each of count vertices, in the given order, the lanes in which it is the least of them. */
+SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertices, int count, vm is_least[8])
+{
+    vf least[3] = {at[0][(int)vertices[0]], at[1][(int)vertices[0]], at[2][(int)vertices[0]]};
+    is_least[0] = vm_all_lanes();
+    for (int n = 1; n < count; n++) {
+        const int i = vertices[n];
+        const vf place[3] = {at[0][i], at[1][i], at[2][i]};
+        is_least[n] = kernel_local_before(place, least);
+        for (int a = 0; a < 3; a++) least[a] = vf_select(is_least[n], place[a], least[a]);
+        for (int k = 0; k < n; k++) is_least[k] = vm_andnot(is_least[k], is_least[n]);
+    }
+}
+
+SIMD_INLINE void kernel_hex_turn(vf (*at)[8], vf *value)
+{
+    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
+    vm is_least[8];
+    kernel_local_least(at, vertex, 8, is_least);
+    for (int a = 0; a < 3; a++) {
+        vm turn = vm_none();
+        for (int b = 0; b < 8; b++)
+            if (b >> a & 1) turn = vm_or(turn, is_least[b]);
+        for (int b = 0; b < 8; b++)
+            if (!(b >> a & 1)) kernel_local_swap(at, value, turn, vertex[b], vertex[b | 1 << a]);
+    }
+    for (int k = 0; k < 3; k++) {
+        const int low = k == 1 ? 2 : 1, high = 2 * low, other = 7 & ~(low | high); /* axes 0 and 1, 1 and 2, 0 and 1 */
+        const vm swap = kernel_local_is_before(at, vertex[high], vertex[low]);
+        kernel_local_swap(at, value, swap, vertex[low], vertex[high]);
+        kernel_local_swap(at, value, swap, vertex[low | other], vertex[high | other]);
+    }
+}
+
+SIMD_INLINE void kernel_wedge_turn(vf (*at)[8], vf *value)
+{
+    static const signed char vertex[6] = {0, 1, 2, 3, 4, 5};
+    vm is_least[8];
+    kernel_local_least(at, vertex, 6, is_least);
+    const vm over = vm_or(vm_or(is_least[3], is_least[4]), is_least[5]);
+    for (int i = 0; i < 3; i++) kernel_local_swap(at, value, over, i, i + 3);
+    for (int i = 1; i < 3; i++) {
+        const vm first = vm_or(is_least[i], is_least[i + 3]);
+        kernel_local_swap(at, value, first, 0, i);
+        kernel_local_swap(at, value, first, 3, i + 3);
+    }
+    const vm swap = kernel_local_is_before(at, 2, 1);
+    kernel_local_swap(at, value, swap, 1, 2);
+    kernel_local_swap(at, value, swap, 4, 5);
+}
+
+SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], vf *value)
+{
+    static const signed char vertex[4] = {0, 1, 2, 3};
+    vm is_least[8];
+    kernel_local_least(at, vertex, 4, is_least);
+    kernel_local_swap(at, value, is_least[1], 0, 1);
+    kernel_local_swap(at, value, is_least[1], 3, 2);
+    kernel_local_swap(at, value, is_least[2], 0, 2);
+    kernel_local_swap(at, value, is_least[3], 0, 3);
+    kernel_local_swap(at, value, is_least[3], 1, 2);
+    kernel_local_swap(at, value, kernel_local_is_before(at, 3, 1), 1, 3);
+}
+
+/* Turns the vertices of a hex, wedge or pyramid in each lane, with their values, into the order of places. */
+SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], vf *value)
+{
+    if (type == GRID_HEX)
+        kernel_hex_turn(at, value);
+    else if (type == GRID_WEDGE)
+        kernel_wedge_turn(at, value);
+    else
+        kernel_pyramid_turn(at, value);
+}
+
 /* How far r is inside of the cell's border; less than 0 outside. */
 SIMD_INLINE vf kernel_local_inside(int type, const vf r[3])
 {

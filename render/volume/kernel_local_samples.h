@@ -410,6 +410,7 @@ SIMD_INLINE unsigned kernel_local_place(kernel_tile_trace *t, kernel_local_batch
         }
         for (int a = 0; a < 3; a++) places[a][i] = at[a];
     }
+    kernel_local_turn(type, places, values);
     kernel_local_pixels(t, count, (const vf(*)[8])places, b->ends);
     *lanes = vm_bits(vm_and(shows, kernel_local_setup(type, (const vf(*)[8])places, values, &b->cells)));
     return vm_bits(shows);
