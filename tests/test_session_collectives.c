@@ -2,6 +2,7 @@
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "session_image.h"
 #include "test_session_fixture.h"
@@ -112,9 +113,43 @@ static void a_step_waits_few_times(void **state)
     session_writes_behind = false;
 }
 
+/* Whichever way fragments go, the picture is the same, and the report has the way and its bytes. */
+static void schedules_change_no_bit_and_are_told(void **context)
+{
+    static const char *const names[] = {"auto", "direct", "nodes", "radix", "binary"};
+    enum { BYTES = 64 * 48 * 4 * sizeof(float) };
+    static char first[BYTES];
+    session_input in;
+    (void)context;
+    input_create(&in, TEST_MIXED, 6, TEST_RANDOM, own_rank, rank_count);
+    for (int i = 0; i < 5; i++) {
+        char text[900];
+        snprintf(text, sizeof text, "schedule: %s\n%s", names[i],
+                 "images:\n  - name: a\n    size: [64, 48]\n    layers:\n"
+                 "      - isosurface: {field: f, values: [-0.2, 0.1], opacity: 0.5}\n"
+                 "    outputs: [{path: a.exr}]\n");
+        insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(text));
+        everywhere(hand_over(session, &in) == INSITU_OK);
+        told_everywhere(session, insitu_step(session, 0, 0), INSITU_OK, "");
+        const insitu_report *report = insitu_last_report(session);
+        int64_t sent = 0;
+        MPI_Allreduce(&report->bytes_sent, &sent, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+        everywhere((sent > 0) == (rank_count > 1));
+        everywhere(rank_count == 1 ? !*report->schedule
+                   : i == 0        ? *report->schedule != 0
+                                   : !strcmp(report->schedule, names[i]));
+        if (own_rank == 0 && i == 0) memcpy(first, caught[0].rgba, BYTES);
+        everywhere(own_rank != 0 || memcmp(first, caught[0].rgba, BYTES) == 0);
+        forget_pictures();
+        insitu_destroy(&session);
+    }
+    input_free(&in);
+}
+
 static int run(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_waits_few_times)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_step_waits_few_times),
+                                       cmocka_unit_test(schedules_change_no_bit_and_are_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

@@ -114,9 +114,10 @@ module insitu
         integer(c_int) :: pictures_waiting = 0
         integer(c_int64_t) :: cells = 0, cells_ghost = 0, cells_unusable = 0, cells_inverted = 0, cells_flat = 0, &
             cells_shell = 0, cells_recognised = 0
-        integer(c_int64_t) :: rays = 0, fragments = 0, map_failures = 0
+        integer(c_int64_t) :: rays = 0, fragments = 0, bytes_sent = 0, map_failures = 0
         integer(c_int64_t) :: bytes_borrowed = 0, bytes_copied = 0, bytes_trees = 0, bytes_pictures = 0, bytes_peak = 0
-        type(c_ptr) :: copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr ! texts: insitu_text()
+        ! texts: insitu_text()
+        type(c_ptr) :: schedule = c_null_ptr, copied_why = c_null_ptr, left_out = c_null_ptr, warnings = c_null_ptr
     end type insitu_report
 
     type, bind(C) :: c_picture

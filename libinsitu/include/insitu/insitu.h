@@ -280,6 +280,8 @@ typedef struct insitu_report {
     int64_t cells_recognised; /* polyhedra drawn as the tets, hexes, wedges or pyramids that their faces make */
     int64_t rays;             /* primary rays traced */
     int64_t fragments;        /* sent to pixel owners, own ones included */
+    int64_t bytes_sent;       /* by this rank to others, for pictures: fragments and finished pixels, what it passed on
+                                 included */
     int64_t map_failures;     /* inverse maps that did not converge and fell back to linear interpolation */
     int64_t bytes_borrowed;   /* of the caller's arrays in use */
     int64_t bytes_copied;     /* of the caller's data held in copies, with reasons in copied_why */
@@ -287,8 +289,10 @@ typedef struct insitu_report {
     int64_t bytes_pictures;   /* on rank 0: of pictures that wait to be written, at most 128 MiB or one, and kept for
                                  those to come, at most 64 MiB */
     int64_t bytes_peak;       /* most bytes the library held at once in this step */
-    const char *copied_why;   /* "" or a list of what was copied and why; valid until the next step */
-    const char *left_out;     /* "" or a list of what the scene does not need and was not computed; as above */
+    const char *schedule;   /* "" where none was sent, else by which ranks fragments went, as the scene's key names it:
+                               "direct", "nodes", "radix" or "binary"; of the last frame */
+    const char *copied_why; /* "" or a list of what was copied and why; valid until the next step */
+    const char *left_out;   /* "" or a list of what the scene does not need and was not computed; as above */
     const char *warnings; /* "" or one warning a line; as above. Told where it begins to be true, and again when it has
                              ceased to be in between; but the scene file's broken edit, and counts of this rank's
                              cells with values that are not finite, at every step. Others than these are the same on

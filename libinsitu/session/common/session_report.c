@@ -57,12 +57,12 @@ static const char *text_of(const session_text *text)
 
 void session_report_create(session_report *report)
 {
-    *report = (session_report){.numbers = {.copied_why = "", .left_out = "", .warnings = ""}};
+    *report = (session_report){.numbers = {.schedule = "", .copied_why = "", .left_out = "", .warnings = ""}};
 }
 
 void session_report_begin(session_report *report, int64_t cycle, double time)
 {
-    report->numbers = (insitu_report){.cycle = cycle, .time = time};
+    report->numbers = (insitu_report){.cycle = cycle, .time = time, .schedule = ""};
     clear_text(&report->copied_why);
     clear_text(&report->left_out);
     clear_text(&report->warnings);

@@ -29,6 +29,8 @@ static void add_frame(session_frame *sum, const session_frame *frame)
     sum->fragments += frame->fragments;
     sum->surface_ms += frame->surface_ms;
     sum->composite_ms += frame->composite_ms;
+    sum->sent_bytes += frame->sent_bytes;
+    sum->schedule = frame->schedule;
 }
 
 static insitu_status draw_numbers(const session_frame_target *target, const render_job *job, render_paint paint,

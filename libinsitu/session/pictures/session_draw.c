@@ -185,6 +185,8 @@ static void report_frame(insitu_report *report, const session_frame *frame)
     report->volume_ms += frame->volume_ms;
     report->fragments += frame->fragments;
     report->composite_ms += frame->composite_ms;
+    report->bytes_sent += frame->sent_bytes;
+    if (frame->schedule != COMP_AUTOMATIC) report->schedule = comp_schedule_name(frame->schedule);
 }
 
 static void warn_of_overlaps(session_report *report, const scene_image *image, int64_t pixels)
@@ -272,7 +274,8 @@ static insitu_status draw_frames(const session_drawing *d, const scene_image *im
     static const float no_background[4] = {0, 0, 0, 0}; /* edges may go between it and the picture */
     const float *background = image->decorations.is_given ? no_background : image->background;
     const comp_nodes nodes = {d->team->each_node_ranks, d->team->is_round_nodes};
-    const comp_group compositing = {d->team->compositing_comm, nodes, COMP_AUTOMATIC, 0};
+    _Static_assert((int)SCENE_SCHEDULE_BINARY == (int)COMP_BINARY, "a scene's schedules are those of compositing");
+    const comp_group compositing = {d->team->compositing_comm, nodes, (comp_schedule)d->scene->schedule, 0};
     frames_basis basis = {d,
                           {d->team->comm, compositing, background, overlap_fragments},
                           canvas,

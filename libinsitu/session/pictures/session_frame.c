@@ -75,6 +75,8 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
     if (status) status = session_agree(t->comm, error); /* compositing agrees on the status alone */
     base_free(fragments.items);
     add_to_frame(frame, &rendered, composited.sent_fragments, 1e3 * (MPI_Wtime() - start));
+    frame->sent_bytes += composited.sent_bytes;
+    if (ranks > 1) frame->schedule = composited.schedule;
     return status;
 }
 

@@ -10,6 +10,8 @@ typedef struct session_frame {
     int64_t rays, map_failures, fragments;
     double surface_ms, volume_ms, composite_ms;
     int64_t overlaps; /* pixels in which cells overlap */
+    int64_t sent_bytes;
+    comp_schedule schedule; /* COMP_AUTOMATIC: nothing went to other ranks */
 } session_frame;
 
 /* Where and how a frame is drawn. */

@@ -170,6 +170,7 @@ static insitu_status convert_file(const scene_document *d, const scene_file *in,
 {
     out->threads = in->threads ? *in->threads : 0;
     out->tree = in->tree ? (scene_tree)*in->tree : SCENE_TREE_AUTO;
+    out->schedule = in->schedule ? (scene_schedule)*in->schedule : SCENE_SCHEDULE_AUTO;
     out->writing = in->writing ? (scene_writing)*in->writing : SCENE_WRITE_BEHIND;
     insitu_status status = convert_images(d, in, out);
     if (status == INSITU_OK) status = scene_convert_statistics(d, in, out);

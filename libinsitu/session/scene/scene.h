@@ -358,6 +358,15 @@ static inline bool scene_is_first_variant(const scene_image *image)
 /* The cells that trees are built over: all cells, those that the images can show, or what costs less. */
 typedef enum scene_tree { SCENE_TREE_AUTO, SCENE_TREE_FULL, SCENE_TREE_PARTIAL } scene_tree;
 
+/* By which ranks fragments go to those that blend them, in the order of comp_schedule. */
+typedef enum scene_schedule {
+    SCENE_SCHEDULE_AUTO,
+    SCENE_SCHEDULE_DIRECT,
+    SCENE_SCHEDULE_NODES,
+    SCENE_SCHEDULE_RADIX,
+    SCENE_SCHEDULE_BINARY
+} scene_schedule;
+
 /* When pictures are written: by a thread while the simulation goes on, or before the step is over. */
 typedef enum scene_writing { SCENE_WRITE_BEHIND, SCENE_WRITE_IN_STEP } scene_writing;
 
@@ -367,6 +376,7 @@ enum { SCENE_MAX_IMAGES = 64, SCENE_MAX_PICTURES = 1024 };
 typedef struct scene {
     int threads; /* per rank; 0: the cores there are, shared by the ranks of a node */
     scene_tree tree;
+    scene_schedule schedule;
     scene_writing writing;
     int image_count; /* 1 .. SCENE_MAX_PICTURES, variants counted */
     scene_image *images;

@@ -7,6 +7,11 @@ static const cyaml_strval_t statistic_words[] = {
     {"minimum", SCENE_MINIMUM}, {"maximum", SCENE_MAXIMUM}, {"mean", SCENE_MEAN}};
 static const cyaml_strval_t tree_words[] = {
     {"auto", SCENE_TREE_AUTO}, {"full", SCENE_TREE_FULL}, {"partial", SCENE_TREE_PARTIAL}};
+static const cyaml_strval_t schedule_words[] = {{"auto", SCENE_SCHEDULE_AUTO},
+                                                {"direct", SCENE_SCHEDULE_DIRECT},
+                                                {"nodes", SCENE_SCHEDULE_NODES},
+                                                {"radix", SCENE_SCHEDULE_RADIX},
+                                                {"binary", SCENE_SCHEDULE_BINARY}};
 static const cyaml_strval_t writing_words[] = {{"background", SCENE_WRITE_BEHIND}, {"step", SCENE_WRITE_IN_STEP}};
 static const cyaml_strval_t anchor_words[] = {{"top_left", SCENE_TOP_LEFT},   {"top", SCENE_TOP},
                                               {"top_right", SCENE_TOP_RIGHT}, {"left", SCENE_LEFT},
@@ -73,9 +78,12 @@ DEFINE_MAPPING(occlusion, "ambient_occlusion", OCCLUSION_KEYS);
       .help = "Frames of different jitter that are averaged into the image.", .by_default = "`1`", .low = 1,           \
       .high = 4096)                                                                                                    \
     X(CYAML_FIELD_BOOL_PTR("reproducible", OPTIONAL, scene_file_sampling, reproducible),                               \
-      .help = "Volumes are the same to the last bit on any number of ranks and any partition, where no cells overlap; " \
-              "else to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank, and twice on eight, where five fragments go " \
-              "from rank to rank in the place of one; several volumes are drawn sample by sample or segment by segment, slower by far.",        \
+      .help =                                                                                                          \
+          "Volumes are the same to the last bit on any number of ranks and any partition, where no cells overlap; "    \
+          "else to 1e-6. A volume takes 1.1 to 1.6 times the time on one rank, and twice on eight, where five "        \
+          "fragments go "                                                                                              \
+          "from rank to rank in the place of one; several volumes are drawn sample by sample or segment by segment, "  \
+          "slower by far.",                                                                                            \
       .by_default = "`false`")                                                                                         \
     X(CYAML_FIELD_FLOAT_PTR("max_seconds", OPTIONAL, scene_file_sampling, max_seconds),                                \
       .help = "An image whose samples would take longer, as estimated before it is drawn, is refused with the "        \
@@ -322,6 +330,12 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
     X(CHOICE("tree", scene_file, tree, tree_words),                                                                    \
       .help = "What the trees are built over: all cells (`full`), those that the images can show (`partial`), or "     \
               "whichever has cost less so far (`auto`). Changes the speed, not the images.",                           \
+      .by_default = "`auto`")                                                                                          \
+    X(CHOICE("schedule", scene_file, schedule, schedule_words),                                                        \
+      .help =                                                                                                          \
+          "By which ranks what they have traced goes to those that blend it: at once (`direct`), within nodes "        \
+          "first (`nodes`), in rounds of at most 8 (`radix`) or of two (`binary`), or what a model of the network "    \
+          "finds cheapest (`auto`). Changes the speed, not the images; the report tells which.",                       \
       .by_default = "`auto`")                                                                                          \
     X(CHOICE("writing", scene_file, writing, writing_words),                                                           \
       .help =                                                                                                          \

@@ -247,8 +247,9 @@ typedef struct scene_file_image {
 
 typedef struct scene_file {
     int *threads;
-    int *tree;    /* scene_tree */
-    int *writing; /* scene_writing */
+    int *tree;     /* scene_tree */
+    int *schedule; /* scene_schedule */
+    int *writing;  /* scene_writing */
     scene_file_image *images;
     int images_count;
     scene_file_statistics *statistics;
