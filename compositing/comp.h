@@ -50,6 +50,9 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
  * face. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
+/* The same of fragments as comp_merge_folded_pixel() left them: none counts behind where it stops. Local. */
+bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
+
 typedef struct comp_statistics {
     int64_t sent_fragments; /* by this rank, own ones included */
     int64_t sent_bytes;     /* by this rank to others: fragments and finished pixels, what it passed on included */

@@ -119,7 +119,8 @@ static bool are_of_overlaps(const fragment *samples, int64_t count)
  * of it, or of 1: KERNEL_FACE_ERROR in render/volume/kernel_samples.h. */
 static const float face_error = 4e-6f;
 
-/* Goes on to the first that begins within rounding of t, or behind; returns how far the volumes in front of it reach. */
+/* Goes on to the first that begins within rounding of t, or behind; returns how far the volumes in front of it reach.
+ */
 static float reach_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -332,8 +333,8 @@ static int64_t folded_together(const fragment *sorted, int64_t count)
 /* Is no light left for the fragment behind another? A rank may have left out what is of a later stretch. */
 static bool is_dark(float transmittance, const fragment *before, const fragment *next)
 {
-    return transmittance == 0 || (transmittance <= FRAGMENT_DARK &&
-                                  fragment_stretch(before->t_in) != fragment_stretch(next->t_in));
+    return transmittance == 0 ||
+           (transmittance <= FRAGMENT_DARK && fragment_stretch(before->t_in) != fragment_stretch(next->t_in));
 }
 
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
@@ -388,4 +389,16 @@ void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_stretch_t
         take(state, &f);
         transmittance *= f.transmittance;
     }
+}
+
+/* What lies behind darkness is made by some partitions and not by others. */
+bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
+{
+    float transmittance = 1;
+    int64_t lit = 0;
+    for (int64_t n; lit < count && !(lit > 0 && is_dark(transmittance, &sorted[lit - 1], &sorted[lit])); lit += n) {
+        n = folded_together(sorted + lit, count - lit);
+        transmittance *= fragment_fold(sorted + lit, n).transmittance;
+    }
+    return comp_pixel_overlaps(sorted, lit);
 }

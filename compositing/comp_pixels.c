@@ -124,7 +124,8 @@ static comp_pixel blend(const comp_merged *merged, fragment *items, int64_t coun
     comp_pixel blended = {.pixel = pixel};
     (merged->is_folded ? comp_merge_folded_pixel : comp_merge_pixel)(items, count, merged->background, blended.rgba,
                                                                      &blended.depth);
-    if (merged->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(merged->overlaps, pixel);
+    if (merged->overlaps && (merged->is_folded ? comp_folded_pixel_overlaps : comp_pixel_overlaps)(items, count))
+        comp_add_overlap(merged->overlaps, pixel);
     if (merged->deep) {
         for (int64_t i = 0; i < count; i++) items[i].pixel = pixel;
         comp_deep_add(&merged->deep[omp_get_thread_num()], items, count, merged->is_folded);

@@ -162,7 +162,8 @@ static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64
     (tiles->out->is_folded ? comp_merge_folded_pixel : comp_merge_pixel)(items, count, tiles->background,
                                                                          tiles->out->rgba + 4 * pixel, &depth);
     if (tiles->out->depth) tiles->out->depth[pixel] = depth;
-    if (tiles->overlaps && comp_pixel_overlaps(items, count)) comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
+    if (tiles->overlaps && (tiles->out->is_folded ? comp_folded_pixel_overlaps : comp_pixel_overlaps)(items, count))
+        comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
 }
 
 /* Stores a tile whose pixels have one fragment each. Returns false where a pixel has two: all must be stored anew. */

@@ -105,6 +105,7 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
 {
     double n[3];
     if (f->kind < FRAGMENT_SURFACE || !takes_light(&layer_of(job, f)->material)) return false;
+    if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false; /* a gradient that is no number */
     *hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     *rays = (render_hit_rays){all_samples(job->occlusion->samples), 0, 0};
     unfold_normal(hit->normal, n);
@@ -365,6 +366,7 @@ insitu_status render_occlude(const render_job *job, const render_hit *hits, rend
     kernel_frame frame;
     render_job surfaces = *job;
     surfaces.volume_count = 0;
+    surfaces.separate_samples = surfaces.reproducible = false;
     if (!count || !job->part_count) return INSITU_OK;
     insitu_status status = render_prepare(&surfaces, &frame, error);
     if (status != INSITU_OK) return status;

@@ -67,8 +67,11 @@ int64_t ratio_to_next(vtkOverlappingAMR *amr, unsigned level)
         double coarse[3], fine[3];
         information->GetSpacing(level, coarse);
         information->GetSpacing(level + 1, fine);
+        int64_t ratio = 0; /* an axis of flat data may have one spacing on all levels */
         for (int axis = 0; axis < 3; axis++)
-            if (fine[axis] > 0 && coarse[axis] >= fine[axis]) return std::llround(coarse[axis] / fine[axis]);
+            if (fine[axis] > 0 && coarse[axis] >= fine[axis])
+                ratio = std::max<int64_t>(ratio, std::llround(coarse[axis] / fine[axis]));
+        if (ratio > 0) return ratio;
     }
     return information->HasRefinementRatio() ? information->GetRefinementRatio(level) : 0;
 }

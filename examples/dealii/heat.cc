@@ -63,7 +63,7 @@ struct Pictures {
     {
         const std::vector<Point<3>> &vertices = dofs.get_triangulation().get_vertices();
         corners.clear();
-        unknowns.assign(vertices.size(), 0); // vertices of none of the cells keep 0, which is not looked at
+        unknowns.assign(vertices.size(), 0); // vertices of none of the cells keep 0, any value that there is
         for (const auto &cell : dofs.active_cell_iterators() | IteratorFilters::LocallyOwnedCell())
             for (const unsigned i : cell->vertex_indices()) {
                 const unsigned v = cell->reference_cell().exodusii_vertex_to_deal_vertex(i); // and so VTK's order
@@ -72,14 +72,14 @@ struct Pictures {
             }
         insitu_mesh mesh;
         insitu_mesh_defaults(&mesh);
-        mesh.vertex_count = vertices.size();
+        mesh.vertex_count = corners.empty() ? 0 : vertices.size(); // a rank without cells has no values either
         insitu_mesh_interleaved(&mesh, vertices.data(), INSITU_FLOAT64);
         mesh.cell_type = INSITU_HEX;
         mesh.connectivity = {corners.data(), INSITU_INT32, 0};
         mesh.connectivity_count = corners.size();
         mesh.cell_count = corners.size() / 8;
         insitu_set_mesh(session, "ball", &mesh);
-        set_field("height", &vertices[0][2], vertices.size(), sizeof(Point<3>), false);
+        set_field("height", &vertices[0][2], mesh.vertex_count, sizeof(Point<3>), false);
     }
     void set_field(const char *name, const double *values, int64_t count, int64_t stride, bool by_unknowns)
     {

@@ -4,6 +4,9 @@
  *     {
  *         pictures { type insituPictures; libs (insituPictures); scene "system/pictures.yaml"; fields (p U); }
  *     }
+ *
+ * It is to be executed at every step, as it is by default, for the mesh tells what changed in the last one alone; the
+ * scene says when to draw.
  */
 #include <insitu/insitu.h>
 
@@ -23,7 +26,7 @@ struct insituPictures : functionObjects::fvMeshFunctionObject {
     insituPictures(const word &name, const Time &time, const dictionary &dict)
         : fvMeshFunctionObject(name, time, dict), fields_(dict.get<wordList>("fields"))
     {
-        if (!Pstream::parRun()) MPI_Init(nullptr, nullptr);
+        [[gnu::unused]] static const int up = Pstream::parRun() ? 0 : MPI_Init(0, 0) + atexit([] { MPI_Finalize(); });
         tell(insitu_create(MPI_COMM_WORLD, dict.get<fileName>("scene").c_str(), &session_));
     }
 

@@ -204,7 +204,7 @@ def _view(what, given, dimensions):
         raise TypeError(f"{what}: a {type(given).__name__} cannot be borrowed, expected a numpy array")
     array = numpy.asarray(given)
     if array.ndim not in dimensions:
-        hint = "; reshape(-1) makes a list of an array without gaps, and no copy" if array.ndim > max(dimensions) else ""
+        hint = "; reshape(-1) makes a list of a C-contiguous array, and no copy" if array.ndim > max(dimensions) else ""
         raise ValueError(f"{what}: has {array.ndim} dimensions, expected {' or '.join(map(str, dimensions))}{hint}")
     if array.dtype.name not in _TYPES or not array.dtype.isnative or not array.flags.aligned:
         raise TypeError(f"{what}: is of type {array.dtype}, expected one of {', '.join(_TYPES)}, native and aligned")

@@ -68,6 +68,7 @@ SIMD_INLINE void kernel_cuts_find(const kernel_packet *p, int64_t first, kernel_
     cuts->last = p->thread->out->count;
     for (int64_t i = first; p->frame->has_transparent && i < cuts->last; i++) {
         const fragment *hit = &p->thread->out->items[i];
+        if (hit->kind < FRAGMENT_SURFACE) continue; /* a volume's, of an earlier stretch between clips */
         const int lane = kernel_lane_of(p, hit->pixel);
         int at = count[lane];
         if (at == KERNEL_LANE_CUTS) {
@@ -92,6 +93,7 @@ static vf kernel_next_cut_slowly(const kernel_packet *p, const kernel_cuts *cuts
     vf_store(next, vf_set(INFINITY));
     for (int64_t i = cuts->first; i < cuts->last; i++) {
         const fragment *hit = &p->thread->out->items[i];
+        if (hit->kind < FRAGMENT_SURFACE) continue;
         const int lane = kernel_lane_of(p, hit->pixel);
         if ((beyond ? hit->t_in > start[lane] : hit->t_in >= start[lane]) && hit->t_in < next[lane])
             next[lane] = hit->t_in;

@@ -47,7 +47,7 @@ SIMD_INLINE vm kernel_segment_breaks(const kernel_packet *p, const kernel_blend 
                                      vf t_out)
 {
     vm broken = vm_not(vf_eq(t_in, b->t_last));
-    if (p->frame->job->is_alone) broken = vf_lt(t_in, kernel_segment_end(vf_min(t_out, b->t_last)));
+    if (p->frame->job->is_alone) broken = vf_le(t_in, kernel_segment_end(vf_min(t_out, b->t_last)));
     if (cuts->row_count) broken = vm_or(broken, vf_le(kernel_next_cut(p, cuts, b->t_last, false), t_in));
     return broken;
 }

@@ -164,8 +164,8 @@ typedef struct insitu_mesh {
 
 /* Whether a field has one value a vertex, one a cell, or one at each corner of each cell. Of cells, volumes and colours
  * show each value as it is, unless the scene says `interpolate: vertex`; then, and for isosurfaces, a vertex gets the
- * mean of its cells on all ranks, ghosts left out: on the boundary that of the cells within, or of the boundary's own
- * values, where the field has such (insitu_patch).
+ * mean of its cells on all ranks, ghosts left out. On the boundary it gets the mean of the boundary's own values
+ * instead, where the field has such (insitu_patch).
  *
  * Corners are for fields that differ from cell to cell at the vertex they share, as those of discontinuous Galerkin
  * methods: there is one for each entry of connectivity that is a vertex of a cell, in the order of the caller's
@@ -184,14 +184,15 @@ typedef enum insitu_centring { INSITU_VERTEX = 0, INSITU_CELL = 1, INSITU_CORNER
  * Where cells' values are taken to the vertices, a vertex of such a face gets the mean of the values of all its faces
  * that have one, of all patches and on all ranks, in place of the mean of its cells: so a wall at which the flow rests
  * is drawn at rest. Along an edge where patches meet both count, by their faces there. The same bits on any partition.
- * A field that is linear in space is so hit exactly inside of a flat stretch of equal faces, up to rounding; no mean
- * can be exact at the edges and corners of a domain, which lie beyond all faces' centres. Values that are not finite do
- * not count, nor do faces of ghost cells, and all else that is drawn by cells' values as they are knows nothing of
- * patches.
+ * Amid a flat wall of equal faces a field that is linear in space is exact, up to rounding; at edges and corners of the
+ * domain no mean is, for they lie beyond all faces' centres. Values that are not finite and faces of ghost cells do not
+ * count. Pictures that show cells' values as they are do not use patches.
  *
  * The faces are those between a cell and the outside. Faces between ranks, and others that are coupled in pairs, have
  * cells on both sides and are left out. Faces are told in one of three ways; a face that two cells of this rank share,
- * that no cell has, or that is given twice is an error, told on all ranks by the step that needs the values. */
+ * that no cell has, or that is given twice is an error, told on all ranks by the step that needs the values. Faces told
+ * by their vertices may be given once for each of two cells, as the two sides of a baffle or a crack are, and then must
+ * be given for both, where one rank has both. */
 typedef struct insitu_patch {
     int64_t count;      /* faces, and tuples of values */
     int64_t first_face; /* where neither of the next two is given: the faces of the mesh that follow one another from
@@ -200,7 +201,7 @@ typedef struct insitu_patch {
     /* For meshes whose cells have no faces given, as hexes, but of use with any: the faces' vertices. */
     int64_t connectivity_count; /* elements in connectivity */
     insitu_array connectivity;  /* int32 or int64, connectivity_count: vertex indices from index_base, around each face
-                                   in either direction */
+                                   in either direction, as many as the cell's face has, repeated ones too */
     insitu_array offsets; /* int32 or int64, count + 1, from index_base: where each face begins in connectivity. Not
                              needed where all have as many vertices: connectivity_count / count. */
     insitu_array values;  /* float32, float64, int32 or int64, count tuples of the field's component_count. stride_bytes
@@ -281,7 +282,7 @@ typedef struct insitu_report {
     int64_t rays;             /* primary rays traced */
     int64_t fragments;        /* sent to pixel owners, own ones included */
     int64_t bytes_sent;       /* by this rank to others, for pictures: fragments and finished pixels, what it passed on
-                                 included */
+                                 included; not the rays of shadows */
     int64_t map_failures;     /* inverse maps that did not converge and fell back to linear interpolation */
     int64_t bytes_borrowed;   /* of the caller's arrays in use */
     int64_t bytes_copied;     /* of the caller's data held in copies, with reasons in copied_why */

@@ -36,12 +36,12 @@ static insitu_status no_memory(int64_t entries, base_error *error)
     return session_no_memory(error, entries * (int64_t)sizeof(int64_t), "faces of patches");
 }
 
-/* "mesh ...: field ...: patch 2: face 17" (or "its face 3", from 0), and what is wrong with it. */
+/* "mesh ...: field ...: patch 2: face 17" (or "its face 3"), and what is wrong with it. */
 static insitu_status tell(const patch_faces *p, int patch, int64_t face, const char *what, base_error *error)
 {
     const insitu_patch *given = &p->field->given.patches[patch];
     const grid_array faces = session_grid_array(&given->faces);
-    const long long number = given->connectivity.data ? face
+    const long long number = given->connectivity.data ? face + p->mesh->given.index_base
                              : given->faces.data      ? grid_array_index(&faces, face)
                                                       : given->first_face + face;
     return base_fail(error, INSITU_ERROR_FIELD, "mesh \"%s\": field \"%s\": patch %d: %sface %lld %s", p->mesh->name,

@@ -148,7 +148,7 @@ static void canvas_finish(canvas *c, int frames, const render_space *space, int 
 static render_job make_job(const session_drawing *d, const scene_image *image, const session_view *view,
                            const session_layers *layers)
 {
-    const bool is_occluded = view->occlusion.lights || view->occlusion.samples;
+    const bool is_occluded = layers->surface_count > 0 && (view->occlusion.lights || view->occlusion.samples);
     return (render_job){.camera = view->camera,
                         .space = view->space,
                         .paint = is_occluded ? RENDER_UNLIT : RENDER_LIGHT,

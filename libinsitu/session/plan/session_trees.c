@@ -211,8 +211,9 @@ static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, boo
     const bool is_told = session_find_candidates(mesh, &key);
     const bool is_other = !is_told || are_values_new || key != mesh->candidates_key;
     if (!mesh->is_geometry_stale && !(mesh->are_bounds_partial && is_other)) return INSITU_OK;
-    mesh->candidates_key = key;
-    return refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
+    const insitu_status status = refit_bounds(u, mesh, !is_told || !mesh->is_geometry_stale, error);
+    mesh->candidates_key = status ? ~key : key; /* after a failure the bounds are no key's */
+    return status;
 }
 
 /* ---- the parent tree ----------------------------------------------------------------------------------------- */

@@ -99,10 +99,10 @@ static insitu_status prepare_in(const session_mail *out, session_mail *in, mail_
     int64_t out_total = 0;
     if (!fill_places(out->counts, ranks, places->out_counts, places->out_starts, &out_total) ||
         !fill_places(in->counts, ranks, places->in_counts, places->in_starts, &in->total))
-        return base_fail(error, INSITU_ERROR_MEMORY, "more than 16 GiB of vertex values to exchange at once");
+        return base_fail(error, INSITU_ERROR_MEMORY, "more than 16 GiB of data between ranks at once");
     in->words = base_alloc((size_t)in->total * sizeof *in->words);
     if (!in->words)
-        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of vertex values",
+        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks",
                          (long long)in->total * 8);
     return INSITU_OK;
 }

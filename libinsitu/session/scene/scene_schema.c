@@ -334,8 +334,9 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
     X(CHOICE("schedule", scene_file, schedule, schedule_words),                                                        \
       .help =                                                                                                          \
           "By which ranks what they have traced goes to those that blend it: at once (`direct`), within nodes "        \
-          "first (`nodes`), in rounds of at most 8 (`radix`) or of two (`binary`), or what a model of the network "    \
-          "finds cheapest (`auto`). Changes the speed, not the images; the report tells which.",                       \
+          "first (`nodes`), within nodes and then in rounds of at most 8 (`radix`), in rounds of two (`binary`), or "  \
+          "what a model of the network finds cheapest (`auto`). Changes the speed, not the images; the report tells "  \
+          "which.",                                                                                                    \
       .by_default = "`auto`")                                                                                          \
     X(CHOICE("writing", scene_file, writing, writing_words),                                                           \
       .help =                                                                                                          \

@@ -17,9 +17,9 @@
  *  - Points: float or double borrowed, whether interleaved (AOS) or a component apart (SOA); others copied to double.
  *  - Cells 10, 12, 13, 14, and the shells 5, 7, 9: borrowed, with 32- or 64-bit storage.
  *  - Points of curvilinear grids and of polygonal data: borrowed; so are polygons where there are no lines, points and
- *    strips beside them. The library has coordinates in arrays alone: the points of images and rectilinear grids are
- *    listed anew in each call, and so are the cells of all grids of rows and columns (insitu/vtk_grids.h). The report
- *    has the bytes of both.
+ *    strips beside them. The library reads coordinates from arrays only, so the points of images and rectilinear grids
+ *    are listed anew in each call; so are the cells of images, rectilinear and curvilinear grids (insitu/vtk_grids.h).
+ *    The report has the bytes of both.
  *  - Voxels (11) and pixels (8): drawn as hexahedra and quads; a copy of the connectivity.
  *  - Polyhedra (42): their face streams become faces shared between cells; a copy. Pentagonal and hexagonal prisms
  *    (15, 16) come as polyhedra too.
