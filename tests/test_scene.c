@@ -162,7 +162,8 @@ static const char every_key[] =
     "  - {field: p, mesh: air, component: x, path: out/p.csv, every: 3, histogram: {bins: 8, range: [-1, 1]}}\n"
     "  - {field: q, path: q.CSV, histogram: {}}\n"
     "  - {field: r, path: r.csv}\n"
-    "writing: step\n";
+    "writing: step\n"
+    "schedule: radix\n";
 
 static const char fewest_keys[] = "images:\n"
                                   "- name: a\n"
@@ -204,6 +205,7 @@ static void scene_image_keys_are_read(void **state)
     assert_int_equal(s.threads, 3);
     assert_int_equal(s.tree, SCENE_TREE_PARTIAL);
     assert_int_equal(s.writing, SCENE_WRITE_IN_STEP);
+    assert_int_equal(s.schedule, SCENE_SCHEDULE_RADIX);
     assert_int_equal(s.image_count, 3 + 4 * 2 * 3 * 2 + 2);
     const scene_image *image = &s.images[0];
     assert_string_equal(image->name, "wave");
@@ -630,7 +632,7 @@ static const struct bad_file {
     int told; /* the line in the message */
     const char *words[3];
 } bad_files[] = {
-    {1, "thread: 1", 1, {"the key \"thread\" is unknown", "threads, tree, writing, images"}},
+    {1, "thread: 1", 1, {"the key \"thread\" is unknown", "threads, tree, schedule, writing, images"}},
     {1, "threads: many", 1, {"threads: \"many\"", "a whole number from 0 to 4096"}},
     {1, "threads: -1", 1, {"threads: \"-1\"", "from 0 to 4096"}},
     {1, "threads: 010", 1, {"threads: \"010\"", "a whole number"}},
@@ -997,7 +999,8 @@ static void scene_whole_file_faults_are_told(void **state)
     static const char *const files[][2] = {
         {"", "scene.yaml:1: the file is empty"},
         {"# nothing\n", "scene.yaml:1: the file is empty"},
-        {"- a\n", "scene.yaml:1: a list is not allowed, expected a mapping with the keys threads, tree, writing, images"},
+        {"- a\n", "scene.yaml:1: a list is not allowed, expected a mapping with the keys threads, tree, schedule, "
+                  "writing, images"},
         {"hello", "scene.yaml:1: \"hello\" is not allowed"},
         {"threads: 1\n", "scene.yaml:1: images: missing, expected a list of 1 to 64 mappings"},
         {"threads: 1\nimages: \xff\n", "scene.yaml:2: not valid YAML: invalid leading UTF-8"},
