@@ -5,11 +5,13 @@ set(insitu_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/insitu)
 
 # The names users link by, for those too who add this tree to theirs.
 add_library(insitu::insitu ALIAS insitu)
+add_library(insitu::static ALIAS insitu_static)
 set_target_properties(insitu_headers PROPERTIES EXPORT_NAME headers)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/libinsitu/include/insitu
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.h")
-install(TARGETS insitu insitu_headers EXPORT insituTargets
+install(TARGETS insitu insitu_static insitu_headers EXPORT insituTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(EXPORT insituTargets NAMESPACE insitu:: DESTINATION ${insitu_package_dir} COMPONENT dev)
 

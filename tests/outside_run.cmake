@@ -20,6 +20,7 @@ run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE} -B ${FOLDER}/project -DCMAKE_P
 run(${CMAKE_COMMAND} --build ${FOLDER}/project)
 run(${FOLDER}/project/outside_user)
 run(${FOLDER}/project/outside_user_cpp)
+run(${FOLDER}/project/outside_user_static)
 if(WITH_VTK)
   run(${FOLDER}/project/outside_vtk)
 endif()
@@ -64,6 +65,12 @@ execute_process(COMMAND ${PKG_CONFIG} --cflags --libs insitu
 separate_arguments(flags UNIX_COMMAND "${flags} ${FLAGS}")
 run(${MPICC} ${SOURCE}/outside_user.c -o ${FOLDER}/by_pkg_config ${flags} -Wl,-rpath,${prefix}/${LIBDIR})
 run(${FOLDER}/by_pkg_config)
+execute_process(COMMAND ${PKG_CONFIG} --static --cflags --libs insitu
+  OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+string(REPLACE "-linsitu" "-l:libinsitu.a" flags "${flags} ${FLAGS}")
+separate_arguments(flags UNIX_COMMAND "${flags}")
+run(${MPICC} ${SOURCE}/outside_user.c -o ${FOLDER}/static_by_pkg_config ${flags})
+run(${FOLDER}/static_by_pkg_config)
 
 # What is installed can be taken away.
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${FOLDER}/again)

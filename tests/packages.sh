@@ -29,6 +29,7 @@ needs() {
 holds libinsitu0 'lib/libinsitu\.so\.0$\|lib/libinsitu\.so\.0 '
 holds libinsitu-image 'libinsitu_image\.so'
 holds libinsitu-dev 'include/insitu/insitu\.h'
+holds libinsitu-dev 'lib/.*libinsitu\.a'
 holds libinsitu-dev 'insitu\.f90'
 holds libinsitu-dev 'insituConfig\.cmake'
 holds libinsitu-dev 'insitu\.pc'
