@@ -116,7 +116,7 @@ static bool are_of_overlaps(const fragment *samples, int64_t count)
 }
 
 /* Two cells find the depth of a face that both have, or that one has and small ones of the other lie on, within so much
- * of it, or of 1: KERNEL_FACE_ERROR in render/volume/kernel_samples.h. */
+ * of it, or of 1: RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not include. */
 static const float face_error = 4e-6f;
 
 /* Goes on to the first that begins within rounding of t, or behind; returns how far the volumes in front of it reach.

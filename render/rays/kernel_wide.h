@@ -1,5 +1,5 @@
-/* Vectors of doubles: a lane for each of a vf's, or for each of its half. A half fills a register; more than that
- * compilers take apart, and comparisons lane by lane. */
+/* Vectors of doubles, a lane for each of a vf's half: they fill a register. Vectors of more are taken apart by compilers,
+ * and their comparisons lane by lane. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 
@@ -7,18 +7,6 @@
 #include <string.h>
 
 #include "simd.h"
-
-typedef double kernel_wide __attribute__((vector_size(8 * SIMD_WIDTH)));
-
-SIMD_INLINE kernel_wide kernel_widen(vf v)
-{
-    return __builtin_convertvector(v, kernel_wide);
-}
-
-SIMD_INLINE vf kernel_narrow(kernel_wide v)
-{
-    return __builtin_convertvector(v, vf);
-}
 
 enum { KERNEL_HALF = SIMD_WIDTH / 2 };
 typedef double kernel_half __attribute__((vector_size(8 * KERNEL_HALF)));
