@@ -91,6 +91,7 @@ void bench_scene_create(bench_scene *s, const char *program, test_mesh_kind kind
 {
     test_mesh mesh;
     memset(s, 0, sizeof *s);
+    s->kind = kind;
     bench_scene_mesh(kind, n, &mesh);
     test_view_create(&mesh, (test_layout){0}, &s->view);
     s->view.cells.ghosts = NULL;

@@ -27,6 +27,7 @@ void bench_scene_mesh(test_mesh_kind kind, int n, test_mesh *out);
 
 typedef struct bench_scene {
     bench_subject subject;
+    test_mesh_kind kind;
     test_view view;
     mmbvh_options how; /* the tree is built; all 0 at first */
     mmbvh tree;

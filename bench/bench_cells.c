@@ -1,0 +1,213 @@
+/* What a frame costs by the cells that a code hands over: their type, the layout of their arrays, and how small they are
+ * beside a pixel. Frames of the renderer alone; those that are compared are drawn in turns. Prints CSV. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench_command.h"
+#include "bench_scene.h"
+
+enum { PICTURES = 5, LAYOUTS = 7, AWAY_PIXELS = 130 };
+
+static const double everything_values[2] = {-2.2, 2.2};
+static const float everything_opacities[2] = {0.05f, 0.3f};
+
+typedef struct picture {
+    const char *name;
+    bool is_surface, shows_everything;
+    double max_error; /* 0: samples */
+    double step;      /* of the bench's step, half a cube's side */
+} picture;
+
+static const picture pictures[PICTURES] = {{"isosurface", .is_surface = true},
+                                           {"volume", .step = 1},
+                                           {"volume everywhere", .shows_everything = true, .step = 1},
+                                           {"volume quarter step", .step = 0.5},
+                                           {"volume max_error 1e-2", .max_error = 1e-2, .step = 1}};
+
+static const struct {
+    const char *name;
+    test_layout layout;
+} layouts[LAYOUTS] = {{"float32", {0}},
+                      {"float64", {.wide_coordinates = true, .wide_values = true}},
+                      {"float64 values", {.wide_values = true}},
+                      {"int64", {.wide_indices = true}},
+                      {"interleaved", {.is_interleaved = true}},
+                      {"mixed types given", {.with_types = true}},
+                      {"float64 int64 types", {true, true, true, true, true}}};
+
+static void show(bench_scene *s, const picture *p)
+{
+    if (p->is_surface) {
+        bench_scene_show_surfaces(s, 1);
+        return;
+    }
+    bench_scene_show_volume(s);
+    s->job.step = p->step / s->subject.n;
+    s->job.integration = p->max_error > 0 ? RENDER_SEGMENTS : RENDER_SAMPLES;
+    s->job.max_error = p->max_error;
+    if (!p->shows_everything) return;
+    s->transfer.low = everything_values[0], s->transfer.high = everything_values[1];
+    s->transfer.opacity_count = 2;
+    s->transfer.opacity_values = everything_values;
+    s->transfer.opacities = everything_opacities;
+}
+
+/* As show() found it. */
+static void show_band(bench_scene *s)
+{
+    s->transfer.low = bench_knots[0], s->transfer.high = bench_knots[BENCH_KNOTS - 1];
+    s->transfer.opacity_count = BENCH_KNOTS;
+    s->transfer.opacity_values = bench_knots;
+    s->transfer.opacities = bench_opacities;
+}
+
+static void time_frame(bench_scene *s, int number, bench_series *series)
+{
+    const double began = bench_begin();
+    bench_scene_frame(s);
+    bench_end(began, number, series);
+}
+
+static void measure_types(bench_scene *s, const bench_command *command)
+{
+    bench_scene_build(s);
+    for (int i = 0; i < PICTURES; i++) {
+        bench_series series = {0};
+        show(s, &pictures[i]);
+        for (int number = 0; number <= command->runs; number++) time_frame(s, number, &series);
+        bench_print_series(&s->subject, pictures[i].name, &series);
+        if (pictures[i].is_surface)
+            bench_scene_surface_error(s, pictures[i].name);
+        else if (!pictures[i].shows_everything)
+            bench_scene_integral_error(s, pictures[i].name);
+        show_band(s);
+    }
+}
+
+static void print_ratio(const bench_scene *s, const char *measure, const bench_series *series, const bench_series *base)
+{
+    char name[112];
+    double ratios[BENCH_MAX_RUNS];
+    for (int i = 0; i < series->count; i++) ratios[i] = series->seconds[i] / base->seconds[i];
+    snprintf(name, sizeof name, "%s ratio", measure);
+    bench_print(&s->subject, name, "of float32", bench_stats_of(ratios, series->count));
+}
+
+static void measure_layouts(bench_scene *first, const bench_command *command)
+{
+    static bench_scene scenes[LAYOUTS];
+    test_mesh mesh;
+    bench_scene_mesh(first->kind, first->subject.n, &mesh);
+    for (int l = 0; l < LAYOUTS; l++) {
+        bench_scene_create(&scenes[l], first->subject.program, first->kind, 1);
+        scenes[l].subject = first->subject;
+        scenes[l].job.step = first->job.step;
+        test_view_free(&scenes[l].view);
+        test_view_create(&mesh, layouts[l].layout, &scenes[l].view);
+        scenes[l].view.cells.ghosts = NULL;
+        bench_scene_resize(&scenes[l], first->job.camera.width, first->job.camera.height);
+        bench_scene_build(&scenes[l]);
+    }
+    test_mesh_free(&mesh);
+    for (int i = 0; i < 2; i++) {
+        bench_series series[LAYOUTS] = {0};
+        char name[96];
+        for (int l = 0; l < LAYOUTS; l++) show(&scenes[l], &pictures[i]);
+        for (int number = 0; number <= command->runs; number++)
+            for (int l = 0; l < LAYOUTS; l++) time_frame(&scenes[l], number, &series[l]);
+        const bench_series base = series[0];
+        for (int l = 0; l < LAYOUTS; l++) {
+            snprintf(name, sizeof name, "%s %s", pictures[i].name, layouts[l].name);
+            print_ratio(first, name, &series[l], &base);
+            bench_print_series(&first->subject, name, &series[l]);
+        }
+    }
+    for (int l = 0; l < LAYOUTS; l++) bench_scene_free(&scenes[l]);
+}
+
+/* Cells whose values reach a range: those that a picture shows. */
+static double count_shown(const bench_scene *s, double low, double high)
+{
+    const grid *g = &s->view.cells;
+    int64_t count = 0;
+#pragma omp parallel for reduction(+ : count)
+    for (int64_t c = 0; c < g->cell_count; c++) {
+        double least = INFINITY, most = -INFINITY;
+        int64_t vertices[8];
+        const int corners = grid_cell_vertices(g, c, vertices);
+        for (int i = 0; i < corners; i++) {
+            const double value = grid_field_value(&s->view.field, vertices[i]);
+            least = fmin(least, value), most = fmax(most, value);
+        }
+        count += least <= high && most >= low;
+    }
+    return (double)count;
+}
+
+/* The share of a rank among a thousand: all of the mesh within AWAY_PIXELS pixels' width. */
+static void measure_thousand(bench_scene *s, const bench_command *command)
+{
+    const double half = tan(bench_degrees * acos(-1) / 360), wide = sqrt(3);
+    const double distance = wide * s->job.camera.height / (half * AWAY_PIXELS);
+    const double now = sqrt(bench_eye[0] * bench_eye[0] + bench_eye[1] * bench_eye[1] + bench_eye[2] * bench_eye[2]);
+    double eye[3];
+    for (int axis = 0; axis < 3; axis++) eye[axis] = bench_eye[axis] * distance / now;
+    render_camera_look_at(&s->job.camera, eye, bench_focal, bench_up, bench_degrees, s->job.camera.width,
+                          s->job.camera.height);
+    s->job.space.depth_origin = distance;
+    bench_scene_build(s);
+    for (int i = 0; i < 3; i++) {
+        const bool is_surface = pictures[i].is_surface;
+        const double low = is_surface ? bench_isovalues[0] : pictures[i].shows_everything ? -9 : bench_knots[0],
+                     high = is_surface ? bench_isovalues[0] : pictures[i].shows_everything ? 9 : bench_knots[2];
+        const double shown = count_shown(s, low, high);
+        bench_series series = {0};
+        char name[96];
+        show(s, &pictures[i]);
+        for (int number = 0; number <= command->runs; number++) time_frame(s, number, &series);
+        double costs[BENCH_MAX_RUNS];
+        for (int k = 0; k < series.count; k++) costs[k] = 1e9 * series.seconds[k] * s->subject.threads / shown;
+        bench_print_series(&s->subject, pictures[i].name, &series);
+        snprintf(name, sizeof name, "%s shown", pictures[i].name);
+        bench_print_number(&s->subject, name, "cells", shown);
+        snprintf(name, sizeof name, "%s cost", pictures[i].name);
+        bench_print(&s->subject, name, "ns/shown cell", bench_stats_of(costs, series.count));
+        show_band(s);
+    }
+}
+
+static const struct {
+    const char *name;
+    void (*measure)(bench_scene *scene, const bench_command *command);
+} tables[] = {{"types", measure_types}, {"layouts", measure_layouts}, {"thousand", measure_thousand}};
+
+enum { TABLES = sizeof tables / sizeof *tables };
+
+static void measure(const bench_command *command, int table, test_mesh_kind kind, int n)
+{
+    char program[64];
+    bench_scene scene;
+    snprintf(program, sizeof program, "bench_cells %s", tables[table].name);
+    bench_scene_create(&scene, program, kind, n);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
+    tables[table].measure(&scene, command);
+    bench_scene_free(&scene);
+}
+
+int main(int argc, char **argv)
+{
+    bench_command command;
+    int table = 0;
+    while (argc > 1 && table < TABLES && strcmp(argv[1], tables[table].name) != 0) table++;
+    const bool is_named = argc > 1 && table < TABLES;
+    if (!bench_command_parse(
+            argc - is_named, argv + is_named,
+            "Before all else stands a table's name: types, layouts, or thousand (a rank of a thousand: the\n"
+            "mesh is a tenth of the picture's width). Measures it on each MESH of N^3 cubes.",
+            TEST_MIXED, &command))
+        return command.status;
+    if (!is_named) return fprintf(stderr, "bench_cells: no table of that name\n"), 2;
+    for (int i = 0; i < command.mesh_count; i++) measure(&command, table, command.meshes[i].kind, command.meshes[i].n);
+    return 0;
+}
