@@ -1,9 +1,9 @@
-/* The three phases of compositing: fragments to the owners of their pixels, merging there, pixels to rank 0. Before
- * them all ranks agree that everyone has what it takes to see them through, and after them whether they did: a rank
- * that runs out of memory on the way goes on without what it lacks, so that nobody waits for it, and tells in the end.
- * Memory is given back as soon as its phase is over: at the peak a rank holds its own fragments twice, or those of the
- * pixels it owns and the bytes that they came in. One rank alone merges its list where it lies (or has none:
- * comp_tiles.h). */
+/* The three phases of compositing: fragments go to the owners of their pixels, are merged there, and pixels go to rank
+ * 0. Before these phases all ranks agree that everyone has the memory for them, and afterwards whether they succeeded:
+ * a rank that runs out of memory on the way takes part to the end without it, so that nobody waits, and then reports
+ * the error. Memory is given back as soon as its phase is over: at the peak a rank holds its own fragments twice, or
+ * those of the pixels it owns and the bytes that they came in. One rank alone merges its list where it lies (or has
+ * none: comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>
@@ -51,10 +51,10 @@ static insitu_status merge_alone(composition *c, fragment_list *items, base_erro
     return status;
 }
 
-/* Bytes that a fragment takes on its way: 10 of a hit in most pictures, 11 of a stretch of volume. */
+/* Bytes that a fragment takes on its way: in most pictures 10 for a hit, 11 for a stretch of volume. */
 static const double usual_bytes = 11;
 
-/* The same on all ranks: fragments is the most that any of them has. */
+/* Gives the same on all ranks. fragments is the most that any of them has. */
 static void choose_route(composition *c, int64_t fragments)
 {
     enum { USUAL_RADIX = 8 };
@@ -69,7 +69,7 @@ static void choose_route(composition *c, int64_t fragments)
     c->statistics->schedule = c->route.schedule;
 }
 
-/* What it takes to see the phases through. */
+/* Allocates what the three phases need. */
 static insitu_status prepare(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
@@ -130,14 +130,14 @@ static insitu_status begin(composition *c, int threads, base_error *error)
     return INSITU_OK;
 }
 
-/* The samples of deep pixels, where all went well; or they are forgotten. Allocated lists are freed. */
+/* Gathers the samples of deep pixels, or drops them where something failed. The lists are freed. */
 static insitu_status gather_deep(composition *c, insitu_status status, base_error *error)
 {
     comp_deep_list *const lists = c->merged.deep;
     if (!status) {
         status = comp_deep_gather(c->group->comm, lists, c->layout.threads, c->out->deep, &c->statistics->sent_bytes,
                                   error);
-        c->statistics->has_failed = status != INSITU_OK; /* what *error says of it is to be told */
+        c->statistics->has_failed = status != INSITU_OK; /* *error says why, to be reported */
     } else if (lists) {
         comp_deep_free(lists, c->layout.threads);
     }
@@ -145,7 +145,7 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
     return status;
 }
 
-/* *has_overlaps: on any rank. */
+/* *has_overlaps becomes the same on all ranks: nonzero where any found overlaps. */
 static insitu_status composite(composition *c, fragment_list *items, int64_t *has_overlaps, base_error *error)
 {
     comp_statistics *const statistics = c->statistics;

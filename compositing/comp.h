@@ -1,15 +1,15 @@
 /* Compositing: fragments of many ranks to one image on rank 0. Knows no cells, no trees, no scene.
  *
- * Pixels are owned in turn by ranks (comp_owner: plain arithmetic). Every rank sends each pixel owner its fragments
- * (comp_route.h: by which ranks), owners sort them by t and blend front to back, and rank 0 gathers the finished
- * pixels. Fragments need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The
- * result is a function of the set of fragments alone: not of ranks, of order of arrival, nor of threads.
+ * Pixels are owned in turn by ranks (comp_owner: plain arithmetic). Every rank sends each pixel owner its fragments (on
+ * the ways of comp_route.h), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels.
+ * Fragments need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The result
+ * depends on the set of fragments alone, not on ranks, order of arrival or threads.
  *
- * Sorting by t makes the picture where fragments do not overlap. Volume fragments that do, because cells do, can be put
- * right only by who made them: comp_composite_overlaps() tells the pixels in which they overlap. Volume fragments of no
- * length at one t are samples of one place and may be any number: they share what all of them absorb in proportion to
- * what each would, in whatever order. Volume fragments that overlap over a length are mixed, each as a medium that is
- * the same throughout: the picture where they are short enough for that to be so. */
+ * Sorting by t makes the right picture where fragments do not overlap. Volume fragments that overlap, because cells do,
+ * can be put right only by the room that made them: comp_composite_overlaps() tells the pixels in which they do. Any
+ * number of volume fragments of no length may be at one t: they are samples of one place, and share what all absorb
+ * together in proportion to what each would, in any order. Volume fragments that overlap over a length are mixed, each
+ * as a homogeneous medium: that is the right picture where they are short enough to be homogeneous. */
 #ifndef COMP_COMP_H
 #define COMP_COMP_H
 
@@ -24,22 +24,22 @@
 
 /* Who composites, and how. */
 typedef struct comp_group {
-    MPI_Comm comm; /* on which only compositing talks */
+    MPI_Comm comm; /* used by compositing alone */
     comp_nodes nodes;
-    comp_schedule schedule; /* COMP_AUTOMATIC: chosen each time */
+    comp_schedule schedule; /* COMP_AUTOMATIC: chosen for each picture */
     int longest_dense;      /* rounds of more partners are sparse (comp_mail.h); 0: as comp_route.h has it */
 } comp_group;
 
-/* Which rank of ranks owns pixel (of pixel_count pixels) where all ranks are owners? Runs of consecutive pixels go
- * round, so that an object in the middle of the image is shared out. */
+/* Returns which of the ranks owns pixel (of pixel_count pixels) where all ranks are owners. Ranks own runs of
+ * consecutive pixels in turn, so that an object in the middle of the image is shared by all. */
 int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
 
-/* Blend one pixel's fragments in place: sorted by (t_in, surface before volume, then bits), blended front to back
- * over background (linear premultiplied RGBA). out_rgba gets 4 floats, out_depth the nearest surface's t_in or
- * +infinity. Local; the whole rule of merging is here. */
+/* Blend one pixel's fragments in place: sorted by (t_in, surface before volume, then bits), blended front to back over
+ * background (linear premultiplied RGBA). out_rgba gets 4 floats, out_depth the nearest surface's t_in or +infinity.
+ * Local. This is the whole rule of merging. */
 void comp_merge_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4], float *out_depth);
 
-/* The same where a volume's fragments are what folds on the ranks left (fragment_fold.h): the rest is folded here. */
+/* The same for volume fragments that ranks have partly folded (fragment_fold.h): here they are folded to the end. */
 void comp_merge_folded_pixel(fragment *items, int64_t count, const float background[4], float out_rgba[4],
                              float *out_depth);
 
@@ -50,26 +50,27 @@ void comp_merge_folded_pixel(fragment *items, int64_t count, const float backgro
  * face. Local. */
 bool comp_pixel_overlaps(const fragment *sorted, int64_t count);
 
-/* The same of fragments as comp_merge_folded_pixel() left them: none counts behind where it stops. Local. */
+/* The same for fragments as comp_merge_folded_pixel() left them; those behind the place where it stops do not count.
+ * Local. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count);
 
 typedef struct comp_statistics {
     int64_t sent_fragments; /* by this rank, own ones included */
-    int64_t sent_bytes;     /* by this rank to others: fragments and finished pixels, what it passed on included */
+    int64_t sent_bytes;     /* by this rank to others: fragments and finished pixels, passed-on ones included */
     int64_t sent_messages;
     double exchange_ms, merge_ms, gather_ms;
     comp_schedule schedule;
-    bool has_failed; /* here: the error is this rank's own */
+    bool has_failed; /* the error is this rank's own */
 } comp_statistics;
 
-/* Collective over group->comm: two reductions, and a barrier where a round is sparse (comp_mail.h). out->rgba must be
- * allocated on rank 0, out->depth may be (width and height set on all ranks), and are filled there; elsewhere they are
- * not touched. out->deep may be given, on all ranks: rank 0's, whose first and counts are allocated, gets the samples
- * of the pixels that have fragments (comp_deep.h), with t for their depths. Where out->is_folded, the same on all
- * ranks, pixels are merged by comp_merge_folded_pixel(). The list is emptied, and its memory given back, whatever comes.
- * An error on one rank (memory) is an error on all, and so is one that *error holds before the call: whoever could make
- * no fragments says so here. threads: of this rank, 0: as many as OpenMP would take.
- * statistics may be NULL. */
+/* Collective over group->comm: two reductions, and a barrier where a round is sparse (comp_mail.h). out's width and
+ * height are set on all ranks; on rank 0 out->rgba must be allocated, out->depth may be, and both are filled; elsewhere
+ * they are not touched. out->deep may be given, on all ranks: rank 0's, whose first and counts are allocated, gets the
+ * samples of the pixels that have fragments (comp_deep.h), with t as depth. Where out->is_folded, the same on all
+ * ranks, pixels are merged by comp_merge_folded_pixel(). The list is always emptied and its memory given back. An error
+ * on one rank (memory) is an error on all, and so is one that *error holds before the call: so a rank that could make
+ * no fragments reports it here. threads is this rank's number; 0: as many as OpenMP would take. statistics may be NULL.
+ * */
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error);
 
@@ -79,8 +80,8 @@ typedef struct comp_overlaps {
     unsigned char *pixels; /* pixel_set.h, of the whole image; the caller's to base_free(). NULL where count is 0 */
 } comp_overlaps;
 
-/* The same, and tells every rank the overlaps. Costs a reduction of a bit a pixel where there are any. On an error
- * overlaps is empty. */
+/* The same, and tells every rank the overlaps. Where there are any, it costs one more reduction, of a bit a pixel. On
+ * an error overlaps is empty. */
 insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *items, const float background[4],
                                       int threads, image *out, comp_overlaps *overlaps, comp_statistics *statistics,
                                       base_error *error);

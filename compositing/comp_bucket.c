@@ -7,8 +7,8 @@
  *                                                                              ^ ends[k]
  *
  * Left of i all is placed. A fragment met at i >= ends[its key] lies in the filled part of its bucket: were it beyond
- * the bucket, the bucket would lie left of i and be full, so nothing of that key would be left to meet. So one array
- * of counters does, and in the end it holds each bucket's start.
+ * the bucket, the bucket would lie left of i and be full, so nothing of that key would be left to meet. So one array of
+ * counters suffices, and in the end it holds each bucket's start.
  *
  * Order within a bucket is arbitrary; comp_merge_pixel() orders a pixel's fragments totally. */
 #include "comp_bucket.h"

@@ -1,4 +1,4 @@
-/* Fragments put in order by a small whole number, where they lie. */
+/* Sorts fragments in place by a small whole number. */
 #ifndef COMP_COMP_BUCKET_H
 #define COMP_COMP_BUCKET_H
 

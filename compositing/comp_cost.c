@@ -4,10 +4,10 @@
 
 const comp_machine comp_usual_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
-/* Fragments that go to one owner together: a row of one of the renderer's tiles. */
+/* Number of fragments that go to one owner together: a row of one of the renderer's tiles. */
 enum { TOGETHER = 16 };
 
-/* Partners of a round that a rank has something for. */
+/* Number of partners in a round for which a rank has fragments. */
 static double partners_of(const comp_route *route, int round, const comp_load *load)
 {
     const double all = route->radix[round] - 1, own = ceil((double)load->fragments / TOGETHER);
@@ -44,7 +44,7 @@ comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *loa
         int radix;
     } tried[] = {{COMP_NODES, 0},  {COMP_RADIX, 4},  {COMP_RADIX, 8},
                  {COMP_RADIX, 16}, {COMP_RADIX, 32}, {COMP_BINARY, 2}};
-    if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all are as near as each other */
+    if (nodes.ranks >= ranks) nodes = (comp_nodes){1, false}; /* all ranks are equally near */
     comp_route best = comp_route_of(COMP_DIRECT, ranks, nodes, 0);
     double least = comp_cost_of(&best, load, machine).seconds;
     for (unsigned i = 0; i < sizeof tried / sizeof *tried; i++) {

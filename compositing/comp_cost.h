@@ -1,9 +1,8 @@
-/* Which schedule takes least, by arithmetic: LogGP (Alexandrov, Ionescu, Schauser, Scheiman, 1995), in which a message
- * costs its sender and its receiver an overhead each, the network a latency, and every byte a gap.
+/* Estimates which schedule takes least time by LogGP (Alexandrov, Ionescu, Schauser, Scheiman, 1995): a message costs
+ * its sender and its receiver an overhead each, the network a latency, and every byte a gap.
  *
- * A rank's fragments are its own to pack and an owner's to unpack whatever the schedule, so rounds alone are counted:
- * how many messages a rank sends, and how often its bytes travel. What is empty is a message too where a round is
- * dense. */
+ * In any schedule each fragment is packed once and unpacked once, so only rounds are counted: how many messages a rank
+ * sends, and how often its bytes travel. In a dense round empty messages count too. */
 #ifndef COMP_COMP_COST_H
 #define COMP_COMP_COST_H
 
@@ -15,19 +14,20 @@ typedef struct comp_machine {
     double node_latency, node_overhead, node_gap; /* within one */
 } comp_machine;
 
-/* Of a present-day cluster: 10 GB/s a rank, a microsecond of overhead, two of latency; half of that within a node. */
+/* A present-day cluster: 10 GB/s a rank, a microsecond of overhead, two of latency; half of these times within a node.
+ * */
 extern const comp_machine comp_usual_machine;
 
-/* What the busiest rank has to send. */
+/* What the busiest rank has to send: its load. */
 typedef struct comp_load {
     int64_t fragments;
-    double bytes; /* that each of them takes on its way (comp_block.h) */
+    double bytes; /* that a fragment takes on its way (comp_block.h) */
 } comp_load;
 
-/* What the busiest rank's fragments take on a route. */
+/* The cost of a route for the busiest rank. */
 typedef struct comp_cost {
-    double messages; /* that it sends, those that say no more than that there is nothing included */
-    double bytes;    /* of them all */
+    double messages; /* that it sends, empty ones included */
+    double bytes;    /* of all messages */
     double seconds;
 } comp_cost;
 
@@ -36,7 +36,8 @@ comp_cost comp_cost_of(const comp_route *route, const comp_load *load, const com
 /* The route that takes least. radix: as comp_route_of(). */
 comp_route comp_cheapest_route(int ranks, comp_nodes nodes, const comp_load *load, const comp_machine *machine);
 
-/* Messages that a place sends in the rounds of a route where all are dense and none is cut: exactly. */
+/* The exact number of messages that a place sends in the rounds of a route, where all rounds are dense and no message
+ * has to be cut. */
 int64_t comp_route_messages(const comp_route *route, int place);
 
 #endif

@@ -1,5 +1,6 @@
-/* Samples are cut by the rule of merging (comp_merge_cut()), so that flat and deep pictures cannot differ in it. Of each
- * owner rank 0 takes first which pixels have how many samples, and then the samples, into the place where they stay. */
+/* Samples are cut by the rule of merging (comp_merge_cut()), so flat and deep pictures follow one rule. From each
+ * owner, rank 0 first receives which pixels have how many samples, and then the samples, right into their final place.
+ * */
 #include "comp_deep.h"
 
 #include <string.h>
@@ -12,7 +13,7 @@ enum { tag_deep_pixels = 17, tag_deep_samples = 18, message_samples = 1 << 20 };
 
 /* ---- on the owner --------------------------------------------------------------------------------------------- */
 
-/* Room for one more of these; false: no memory. */
+/* Makes room for one more item; false: no memory. */
 static bool make_room(void **items, int64_t count, int64_t *capacity, size_t size)
 {
     if (count < *capacity) return true;
@@ -24,7 +25,7 @@ static bool make_room(void **items, int64_t count, int64_t *capacity, size_t siz
     return true;
 }
 
-/* A stretch that shows nothing is none. */
+/* Takes a stretch, unless it shows nothing. */
 static void take_stretch(void *of_list, const fragment *f)
 {
     comp_deep_list *list = of_list;
@@ -89,7 +90,7 @@ static int send_lists(MPI_Comm comm, const comp_deep_list *lists, int count)
     return code;
 }
 
-/* Messages of any length until there are count items. */
+/* Receives messages of any length until there are count items. */
 static int receive_items(MPI_Comm comm, int rank, int tag, void *items, int64_t count, size_t size)
 {
     char *bytes = items;
@@ -126,7 +127,7 @@ static void take_own(deep_image *out, const comp_deep_list *lists, int count)
     }
 }
 
-/* How much all ranks have: on rank 0, pixels and samples by rank. */
+/* The numbers of pixels and samples of each rank, on rank 0. */
 typedef struct deep_inbox {
     int ranks;
     int64_t (*counts)[2];
@@ -147,7 +148,7 @@ static int receive_all(MPI_Comm comm, const deep_inbox *in, deep_image *out)
     return code;
 }
 
-/* Rank 0: room for all that comes. */
+/* On rank 0: allocates room for all that the ranks send. */
 static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *error)
 {
     int64_t pixels = 0, samples = out->count;
@@ -157,7 +158,8 @@ static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *err
     }
     in->pixels = base_alloc((size_t)pixels * sizeof *in->pixels);
     if (samples > out->capacity) {
-        const int64_t capacity = out->count ? samples + samples / 2 : samples; /* turns (session_frame.c) grow it */
+        const int64_t capacity = out->count ? samples + samples / 2 : samples; /* where a frame is composited in turns
+                                                                                  (session_frame.c), it grows again */
         insitu_deep_sample *grown = base_realloc(out->samples, (size_t)capacity * sizeof *grown);
         if (grown) {
             out->samples = grown;

@@ -1,7 +1,7 @@
-/* Deep images: what lies behind each other in every pixel, kept beside the flat picture.
+/* Deep images keep the samples of every pixel, one behind the other, beside the flat picture.
  *
- * The owner of a pixel makes samples of its fragments, sorted and cut until none overlaps another, and rank 0 takes them
- * all. Blended front to back they are the picture without its background. */
+ * The owner of a pixel makes samples of its fragments, sorted and cut until none overlaps another, and sends them to
+ * rank 0. Blended front to back they give the picture without its background. */
 #ifndef COMP_COMP_DEEP_H
 #define COMP_COMP_DEEP_H
 
@@ -23,15 +23,15 @@ typedef struct comp_deep_list {
     bool lacks_memory; /* something was left out */
 } comp_deep_list;
 
-/* One pixel's fragments, as comp_merge_pixel(), or where is_folded comp_merge_folded_pixel(), left them. z and z_back are
- * t. Local. */
+/* Adds one pixel's fragments as comp_merge_pixel() left them, or where is_folded comp_merge_folded_pixel(). z and
+ * z_back are t. Where memory runs out it sets lacks_memory. Local. */
 void comp_deep_add(comp_deep_list *list, fragment *sorted, int64_t count, bool is_folded);
 
 /* NULL items are fine. */
 void comp_deep_free(comp_deep_list *lists, int count);
 
-/* Every rank's lists to rank 0's out, where they take the place of what these pixels had. The lists are freed.
- * Collective; returns the same on all ranks. *sent_bytes grows by what went to rank 0. */
+/* Sends every rank's lists to rank 0's out, where they replace the samples that these pixels had. The lists are freed.
+ * Collective; returns the same on all ranks. *sent_bytes grows by the bytes sent to rank 0. */
 insitu_status comp_deep_gather(MPI_Comm comm, comp_deep_list *lists, int list_count, deep_image *out,
                                int64_t *sent_bytes, base_error *error);
 

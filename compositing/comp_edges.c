@@ -4,18 +4,19 @@
 
 #include "memory.h"
 
-/* Rows that a thread takes at a time. It marks pixels of the row after them too, the first of another's. */
+/* Number of rows that a thread takes at a time. It also marks pixels of the row after them, which is another thread's
+ * first. */
 enum { ROWS = 32 };
 
-/* A byte a channel: do two rows of pixels differ there? Codes go nearly by the root of the light: |root a - root b| > c
- * wherever (a - b)^2 > 2 c^2 (a + b), which takes no root. */
+/* Tells for each channel, a byte each, whether two rows of pixels differ. sRGB codes are nearly the square root of the
+ * light, and |root a - root b| > c wherever (a - b)^2 > 2 c^2 (a + b), which needs no root. */
 static void compare(const float *restrict a, const float *restrict b, int64_t pixels, unsigned char *restrict out)
 {
     const float limit = 0.0018f;
     for (int64_t i = 0; i < 4 * pixels; i++) out[i] = (a[i] - b[i]) * (a[i] - b[i]) > limit * (a[i] + b[i]);
 }
 
-/* A byte a pixel; of a row that two threads may mark, both atomically. */
+/* Marks a pixel, which has a byte. In rows that two threads may mark, both do so atomically. */
 static void mark(unsigned char *pixel, bool is_shared)
 {
     if (is_shared) {
@@ -38,7 +39,8 @@ static void mark_pairs(const unsigned char *differ, int64_t pixels, unsigned cha
     }
 }
 
-/* The row's pixels beside each other, and those below: straight, to the left, to the right. differ: 4 bytes a pixel. */
+/* Compares the row's pixels with their neighbours to the right and below: straight, left and right. differ has 4 bytes
+ * a pixel. */
 static void mark_row(const image *picture, int64_t y, unsigned char *differ, unsigned char *marks)
 {
     const int64_t width = picture->width;

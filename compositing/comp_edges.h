@@ -1,4 +1,4 @@
-/* Where a picture has edges. */
+/* Finds the edges of a picture. */
 #ifndef COMP_EDGES_H
 #define COMP_EDGES_H
 
@@ -7,9 +7,9 @@
 #include "image.h"
 #include "pixel_set.h"
 
-/* Add to the set (pixel_set.h, of the whole picture) both of each two neighbours, of eight around a pixel, that differ
- * by more than some 6 of 255 sRGB codes in a channel of the colour, or as much of the opacity. False: no memory. Local.
- */
+/* A pixel is at an edge if one of its eight neighbours differs from it by more than some 6 of 255 sRGB codes in a
+ * channel of the colour, or by as much in opacity. Adds these pixels to the set (pixel_set.h, of the whole picture).
+ * False: no memory. Local. */
 bool comp_find_edges(const image *picture, int threads, unsigned char *pixels);
 
 #endif

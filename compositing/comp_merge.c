@@ -1,21 +1,22 @@
-/* The whole rule of merging: one pixel's fragments, whoever made them and in whatever order they came, to one colour.
+/* The whole rule of merging: how one pixel's fragments, from any ranks and in any order, become one colour.
  *
- * The order is total, down to the last bit of a fragment: what compares equal is the same. So the blend, whose
- * rounding depends on the order, is a function of the set alone. Depth alone decides wherever depths differ;
- * where a surface and a volume begin at the same depth the surface is in front, being the nearer end of a stretch.
+ * The order is total, down to the last bit of a fragment: fragments that compare equal are the same. So the blend,
+ * whose rounding depends on the order, depends on the set of fragments alone. Depth alone decides wherever depths
+ * differ; where a surface and a volume begin at the same depth the surface is in front, being the nearer end of a
+ * stretch.
  *
- * Samples of one place have no order: their media are mixed there. What each absorbs adds up to more than what they
- * absorb together, 1 - T1 T2 ... Tn, which they share in proportion. In double, so that the shares are no less exact
- * than the samples.
+ * Samples of one place have no order: their media are mixed there. Together they absorb 1 - T1 T2 ... Tn, less than the
+ * sum of what each would alone, and share it in proportion. This is computed in double, so that the shares are no less
+ * exact than the samples.
  *
  * Stretches that overlap are mixed where they do. The ray is cut wherever one begins or ends; between cuts each counts
- * as a medium that is the same throughout, whose depths and light add:
+ * as a homogeneous medium, and their optical depths and light add up:
  *
  *     |-- a ------------|            -ln T  = sum of the shares of -ln Ta, -ln Tb ... in the cut
  *            |-- b -------------|    colour = (1 - T) times the mean of theirs, weighed by these
  *     |  a   |  a and b |   b   |
  *
- * Whoever makes them sees to it that they are short enough for that (render/kernel_segments.h). */
+ * The renderer makes them short enough for that (render/volume/kernel_segments.h). */
 #include "comp_merge.h"
 
 #include "comp.h"
@@ -76,7 +77,7 @@ static bool is_sample(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_in == f->t_out;
 }
 
-/* Counts the samples that follow each other at the place of the first; 1 where that is no sample. */
+/* Counts the samples at the place of the first; 1 where the first is no sample. */
 static int64_t samples_at(const fragment *sorted, int64_t count)
 {
     int64_t n = 1;
@@ -84,12 +85,12 @@ static int64_t samples_at(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Goes through the samples at one place, sorted, that count. Where one of a volume stands at its cell's end and the
- * next of that volume at its cell's begin, the cells are neighbours, and rounding has put their common face in two
- * places: the first is left out. */
+/* A pass through the sorted samples of one place, to find which count. Where a volume has one sample at its cell's end
+ * and another at its cell's begin, the cells are neighbours, and rounding has put their common face in two places: one
+ * of the two is left out. */
 typedef struct sample_pass {
     uint32_t layer;
-    int64_t begun; /* at their cells' begin, and no other left out for them yet */
+    int64_t begun; /* samples at their cells' begin for which none has been left out yet */
     int64_t counted;
 } sample_pass;
 
@@ -115,12 +116,12 @@ static bool are_of_overlaps(const fragment *samples, int64_t count)
     return false;
 }
 
-/* Two cells find the depth of a face that both have, or that one has and small ones of the other lie on, within so much
- * of it, or of 1: RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not include. */
+/* Two cells that meet in a face find its depth to within this, relative to the depth or to 1 if that is more. It is
+ * RENDER_FACE_ERROR of render/rays/render_face_error.h, which compositing may not include. */
 static const float face_error = 4e-6f;
 
-/* Goes on to the first that begins within rounding of t, or behind; returns how far the volumes in front of it reach.
- */
+/* Advances *next to the first fragment that begins within rounding of t or behind; returns how far the volumes in front
+ * of it reach. */
 static float reach_before(const fragment *sorted, int64_t *next, float t, float reach)
 {
     const float begin = t - face_error * fmaxf(fabsf(t), 1);
@@ -180,10 +181,10 @@ static bool has_length(const fragment *f)
     return f->kind < FRAGMENT_SURFACE && f->t_out > f->t_in;
 }
 
-/* The depth of what lets nothing through. */
+/* The optical depth that stands for a medium that lets nothing through. */
 static const double opaque_depth = 1e6;
 
-/* Blends the stretches, which all begin at from or before and end at to or behind, from the one depth to the other. */
+/* Blends the stretches between the depths from and to; all of them span that range. */
 static void blend_mixed(blend *b, const fragment *items, int64_t count, float from, float to)
 {
     double colour[3] = {0, 0, 0}, depth = 0;
@@ -209,7 +210,7 @@ static void exchange(fragment *items, int64_t a, int64_t b)
     items[b] = kept;
 }
 
-/* Moves those that go on behind the depth to the front, in their order; returns how many there are. */
+/* Moves the stretches that go on behind the depth to the front, in their order; returns how many there are. */
 static int64_t keep_open(fragment *items, int64_t count, float depth)
 {
     int64_t open = 0;
@@ -232,7 +233,7 @@ static bool is_overlapped(const fragment *sorted, int64_t count)
     return count > 1 && has_length(&sorted[0]) && sorted[1].t_in < sorted[0].t_out;
 }
 
-/* Who takes the stretches that are blended. take NULL: nobody. */
+/* Receives the stretches that are blended, unless take is NULL. */
 typedef struct stretch_sink {
     comp_stretch_taker *take;
     void *state;
@@ -248,7 +249,7 @@ static void hand_over(const stretch_sink *sink, const blend *b, const fragment *
     sink->take(sink->state, &stretch);
 }
 
-/* As blend_mixed(), and for the sink what is mixed. */
+/* As blend_mixed(), and hands the mixture to the sink. */
 static void blend_cut(blend *b, const fragment *items, int64_t count, float from, float to, const stretch_sink *sink)
 {
     blend own = {{0, 0, 0}, 1};
@@ -259,9 +260,9 @@ static void blend_cut(blend *b, const fragment *items, int64_t count, float from
     blend_mixed(b, items, count, from, to);
 }
 
-/* The fragments from the first on to where none goes on; returns how many they are. Stretches under way are kept at the
- * front, so that a cut costs no more than what is mixed in it: a thousand short ones behind each other beside a long
- * one are a thousand cuts of two. The fragments are in order again in the end. */
+/* Blends the fragments from the first to where none is open; returns how many they are. Open stretches are kept at the
+ * front, so that a cut costs only the stretches mixed in it: a thousand short ones in a row beside a long one make a
+ * thousand cuts of two. In the end the fragments are in order again. */
 static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const stretch_sink *sink)
 {
     float at = sorted[0].t_in;
@@ -286,7 +287,7 @@ static int64_t blend_run(blend *b, fragment *sorted, int64_t count, const stretc
     return end;
 }
 
-/* As below, for a pixel of one fragment, which most pixels are. */
+/* As below, for a pixel of one fragment, the most frequent case. */
 static void blend_single(const fragment *f, const float background[4], float out_rgba[4], float *out_depth)
 {
     for (int c = 0; c < 3; c++) out_rgba[c] = 0 + f->colour[c] + f->transmittance * background[c];
@@ -294,7 +295,7 @@ static void blend_single(const fragment *f, const float background[4], float out
     *out_depth = nearest_surface(f, 1);
 }
 
-/* Apart, so that single fragments pay for none of it. */
+/* Not inlined, so that single fragments pay for none of it. */
 static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t count, const float background[4],
                                                    float out_rgba[4], float *out_depth)
 {
@@ -320,7 +321,7 @@ static __attribute__((noinline)) void blend_sorted(fragment *items, int64_t coun
     *out_depth = nearest_surface(items, count);
 }
 
-/* Those from the first on that a fold makes one of: of a volume, in one stretch. */
+/* Counts the fragments, from the first on, that a fold makes into one: those of volumes in one stretch. */
 static int64_t folded_together(const fragment *sorted, int64_t count)
 {
     const int32_t stretch = fragment_stretch(sorted[0].t_in);
@@ -330,7 +331,8 @@ static int64_t folded_together(const fragment *sorted, int64_t count)
     return n;
 }
 
-/* Is no light left for the fragment behind another? A rank may have left out what is of a later stretch. */
+/* Tells whether no light is left for next. In a later stretch than before's, FRAGMENT_DARK is as good as none, for
+ * ranks may have left out fragments there. */
 static bool is_dark(float transmittance, const fragment *before, const fragment *next)
 {
     return transmittance == 0 ||
@@ -391,7 +393,7 @@ void comp_merge_folded_cut(const fragment *sorted, int64_t count, comp_stretch_t
     }
 }
 
-/* What lies behind darkness is made by some partitions and not by others. */
+/* Fragments behind darkness do not count: only some partitions make them. */
 bool comp_folded_pixel_overlaps(const fragment *sorted, int64_t count)
 {
     float transmittance = 1;

@@ -1,13 +1,13 @@
-/* What a rank alone has may be most of its memory, in no order, and longer than any cache. So the list is cut into
- * blocks that fit in one, and pixels into slices. Threads first sort each block by slice where it lies; then they take
- * slices, collect a slice's pieces from all blocks by pixel in a scratch list, and blend:
+/* A single rank's list of fragments may fill most of its memory, unordered, and is longer than any cache. So the list
+ * is cut into blocks that fit a cache, and pixels into slices. Threads first sort each block by slice in place; then
+ * they take slices, collect a slice's pieces from all blocks by pixel in a scratch list, and blend:
  *
  *     block 0 | s0 | s1  | s2 |     block 1 | s0  | s1 | s2 |     block 2 ...
  *                 \______________________________/_____________________
  *                                                 slice 1 by pixel: blended, and forgotten
  *
- * Nothing is walked at random but what lies in cache, all of it runs in parallel, and beyond the list itself there is a
- * table of starts and one slice a thread. Nothing of the result depends on which thread took what. */
+ * Random access stays within the cache, all of it runs in parallel, and beyond the list itself it needs a table of
+ * starts and one slice a thread. The result does not depend on which thread took what. */
 #include "comp_pixels.h"
 
 #include <math.h>
@@ -30,7 +30,7 @@ typedef struct merging {
     int64_t *starts; /* row-major, blocks × (slices + 1), within the block */
 } merging;
 
-/* One thread's. */
+/* One thread's memory. */
 typedef struct scratch {
     fragment *items;
     int64_t capacity;
@@ -84,7 +84,7 @@ static bool make_scratch(scratch *own, const merging *m, int64_t count)
     return own->starts && own->capacity >= count;
 }
 
-/* The slice's fragments in own->items, those of its k-th pixel at own->starts[k] .. own->starts[k + 1]. */
+/* Copies the slice's fragments to own->items, those of its k-th pixel to own->starts[k] .. own->starts[k + 1]. */
 static void collect_slice(const merging *m, int64_t slice, int64_t count, scratch *own)
 {
     const uint32_t slice_pixels = 1u << m->slice_shift;
@@ -118,7 +118,7 @@ void comp_add_overlap(unsigned char *overlaps, uint32_t pixel)
     __atomic_fetch_or(&overlaps[pixel >> 3], (unsigned char)(1u << (pixel & 7)), __ATOMIC_RELAXED);
 }
 
-/* Merges a pixel. pixel: of the image. */
+/* Merges the image's pixel. */
 static comp_pixel blend(const comp_merged *merged, fragment *items, int64_t count, uint32_t pixel)
 {
     comp_pixel blended = {.pixel = pixel};
@@ -188,7 +188,7 @@ insitu_status comp_pixels_merge(const comp_layout *layout, fragment_list *fragme
 
 /* ---- an owner's ---------------------------------------------------------------------------------------------- */
 
-/* Owned indices that a thread takes at a time. */
+/* Number of owned indices that a thread takes at a time. */
 enum { STRETCH = 256 };
 
 typedef struct blending {
@@ -197,7 +197,7 @@ typedef struct blending {
     const comp_owned *owned;
     const comp_merged *merged;
     comp_pixel *finished;
-    int64_t *first; /* of each stretch: where its pixels begin in finished */
+    int64_t *first; /* where each stretch's pixels begin in finished */
 } blending;
 
 static uint32_t stretch_end(const blending *b, int64_t stretch)

@@ -26,7 +26,7 @@ typedef struct comp_owned {
     uint32_t *starts; /* where those of each owned index begin, and one more */
 } comp_owned;
 
-/* Has the image pixels, as many as fragments can name? */
+/* An error unless the image has pixels, and no more than fragments can name. */
 insitu_status comp_check_size(const image *out, base_error *error);
 
 /* Adds the pixel to a set that other threads add to at the same time. */
@@ -38,23 +38,22 @@ void comp_pixels_clear(const comp_layout *layout, image *out, const float backgr
 /* Writes pixel from->pixel of the image. */
 void comp_pixels_store(image *out, const comp_pixel *from);
 
-/* What becomes of merged pixels: they are written to out, or where that is NULL become *finished, rising by owned
- * index. */
+/* Where merged pixels go: to out, or, where that is NULL, to *finished, by rising owned index. */
 typedef struct comp_merged {
     const float *background; /* 4 */
     bool is_folded;          /* by comp_merge_folded_pixel() */
     image *out;
     comp_pixel_list *finished;
-    unsigned char *overlaps; /* pixel_set.h: those whose fragments overlap are added. NULL: not wanted */
-    comp_deep_list *deep;    /* as many as the layout has threads: what they hold is added. NULL: not wanted */
+    unsigned char *overlaps; /* pixel_set.h: pixels whose fragments overlap are added. NULL: not wanted */
+    comp_deep_list *deep;    /* one for each of the layout's threads: samples are added. NULL: not wanted */
 } comp_merged;
 
-/* One rank alone: merge the pixels that have fragments, which are reordered, into merged->out. Local. On an error out
- * and deep may hold some pixels. */
+/* For a single rank: merge the pixels that have fragments into merged->out; the fragments are reordered. Local. On an
+ * error out and deep may hold some pixels. */
 insitu_status comp_pixels_merge(const comp_layout *layout, fragment_list *fragments, const comp_merged *merged,
                                 base_error *error);
 
-/* Merge what owner has, which is reordered within pixels. Local; on an error *finished is empty. */
+/* Merge owner's fragments, which are reordered within pixels. Local; on an error *finished is empty. */
 insitu_status comp_pixels_blend(const comp_layout *layout, uint32_t owner, const comp_owned *owned,
                                 const comp_merged *merged, base_error *error);
 

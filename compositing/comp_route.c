@@ -1,6 +1,6 @@
 #include "comp_route.h"
 
-/* The largest radix that divides the number, at most so large: 1 where only 1 does. */
+/* The largest divisor of the number up to most. */
 static int largest_divisor(int number, int most)
 {
     for (int k = most; k > 1; k--)
@@ -15,7 +15,7 @@ static bool has_radices(int number, int most)
     return number == 1;
 }
 
-/* The largest product of radices up to the number: more than half of it, as the largest power of two is. */
+/* The largest product of radices up to the number. It is more than half of it, since the largest power of two is. */
 static int largest_product(int number, int most)
 {
     while (!has_radices(number, most)) number--;

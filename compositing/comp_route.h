@@ -1,17 +1,18 @@
-/* By which ranks a fragment goes to the owner of its pixel, in plain arithmetic: no MPI, no memory, so that it can be
- * tried for any number of ranks.
+/* The ranks by which a fragment goes to the owner of its pixel, in plain arithmetic without MPI and memory, so that
+ * tests can try any number of ranks.
  *
- * Ranks are numbered by place: one rank of a node after the other, then the next node's. Owners are the first so many
- * places, as many as a product of radices. A place is a number of as many digits as there are radices, the first the
- * least: in round i, places that differ in digit i alone are partners, and each hands over what is for owners with the
- * partner's digit. After the last round all is where it belongs:
+ * Ranks are numbered by place: one rank of a node after the other, then the next node's. The first places are owners;
+ * their number is a product of radices. A place is written with one digit a radix, the least one first: in round i,
+ * places that differ only in digit i are partners, and each hands over the fragments for owners with the partner's
+ * digit. After the last round all fragments are at their owners:
  *
  *     direct send   one round, of all ranks
  *     by nodes      a round within each node, then one among the ranks that have the same number on their nodes
  *     radix-k       a round within each node, then rounds of at most k
  *     binary swap   rounds of two, whatever the nodes
  *
- * Ranks beyond the owners give all they have to a partner before the first round: a rank has one at most. */
+ * Ranks beyond the owners give all they have to a partner before the first round; an owner has at most one such
+ * partner. */
 #ifndef COMP_COMP_ROUTE_H
 #define COMP_COMP_ROUTE_H
 
@@ -29,8 +30,8 @@ typedef enum comp_schedule {
     COMP_SCHEDULE_COUNT
 } comp_schedule;
 
-/* How ranks lie on nodes: the same number on each, one node after the other or round the nodes. 1 where it is neither.
- */
+/* How ranks lie on nodes: the same number on each, either one node after the other or in turn. ranks is 1 where neither
+ * is so. */
 typedef struct comp_nodes {
     int ranks; /* of each node */
     bool is_cyclic;
@@ -45,15 +46,14 @@ typedef struct comp_route {
     int longest_dense; /* at most COMP_LONGEST_DENSE, which comp_route_of() gives */
 } comp_route;
 
-/* The route of a schedule, COMP_AUTOMATIC not among them. radix is the most partners of a round of COMP_RADIX, itself
- * among them. */
+/* The route of a schedule other than COMP_AUTOMATIC. radix is the most ranks that exchange in a round of COMP_RADIX. */
 comp_route comp_route_of(comp_schedule schedule, int ranks, comp_nodes nodes, int radix);
 
 /* A rank's place, and back. */
 int comp_route_place(const comp_route *route, int rank);
 int comp_route_rank(const comp_route *route, int place);
 
-/* How far apart partners of the round are: the product of the radices before. */
+/* The distance between partners of the round: the product of the radices before. */
 int comp_route_stride(const comp_route *route, int round);
 
 static inline int comp_route_digit(const comp_route *route, int round, int stride, int place)
@@ -67,7 +67,7 @@ static inline int comp_route_partner(const comp_route *route, int round, int str
     return place + (digit - comp_route_digit(route, round, stride, place)) * stride;
 }
 
-/* Does every partner of the round send to every other, or only who has something? */
+/* Tells whether every partner of the round sends to every other, or only those that have something do. */
 static inline bool comp_route_is_dense(const comp_route *route, int round)
 {
     return route->radix[round] <= route->longest_dense;

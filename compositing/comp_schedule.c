@@ -1,9 +1,9 @@
-/* Why runs, and why this long: a run keeps the pixels that one packet of rays made on one owner. 64 pixels are some
- * packets wide. Where a rank would have fewer than a thousand runs they shrink, so that what is seen falls to all ranks
- * alike: a rank's share of it goes by how many of its runs are there.
+/* Runs keep the pixels of one packet of rays on one owner: 64 pixels are a few packets wide. Where a rank would have
+ * fewer than a thousand runs they shrink, so that the visible part of the image is shared evenly: a rank's share is the
+ * number of its runs there.
  *
- * Why rounds are turned: where the width is a multiple of a round, or a round of the width, a rank would own columns of
- * the picture, and what stands in the middle would fall to a few. */
+ * Rounds are turned because a rank would otherwise own columns of the picture where the width is a multiple of a round,
+ * or a round of the width, and an object in the middle would fall to a few ranks. */
 #include "comp_schedule.h"
 
 #include "comp.h"
@@ -24,7 +24,7 @@ uint32_t comp_layout_owned(const comp_layout *layout, int rank)
     const uint32_t run = 1u << layout->run_shift, ranks = layout->ranks;
     const uint32_t runs = (uint32_t)(((uint64_t)layout->pixel_count + run - 1) >> layout->run_shift);
     const uint32_t rounds = runs / ranks, left = runs % ranks;
-    /* Which run of the last round is the rank's, were it whole. */
+    /* The rank's run in the last round, if that were whole. */
     const uint32_t own = ((uint32_t)rank + ranks - comp_layout_turn(layout, rounds)) % ranks;
     const uint64_t pixels = ((uint64_t)rounds + (own < left)) * run;
     const bool has_last = runs && comp_layout_owner(layout, layout->pixel_count - 1) == (uint32_t)rank;

@@ -1,4 +1,4 @@
-/* Who owns which pixel, in plain arithmetic: no MPI, no memory, so that it can be tried for any number of ranks.
+/* Which rank owns a pixel, in plain arithmetic without MPI and memory, so that tests can try any number of ranks.
  *
  * Pixels are cut into runs of 2^run_shift consecutive ones, and runs go round the ranks: in each round every rank has
  * one, and rounds begin at different ranks. An owner counts its pixels from 0, run after run: the owned index. */
@@ -12,7 +12,8 @@ typedef struct comp_layout {
     uint32_t pixel_count;
     uint32_t ranks; /* >= 1 */
     uint32_t run_shift;
-    uint64_t inverse; /* 2^64 / ranks, rounded up; 0 for one rank: the high word of a product divides 32 bits by ranks */
+    uint64_t inverse; /* 2^64 / ranks, rounded up, 0 for one rank: the high word of its product with a 32-bit number is
+                         that divided by ranks */
     int threads; /* that work on an owner's pixels; 1 from comp_layout_of() */
 } comp_layout;
 
@@ -24,8 +25,8 @@ static inline uint32_t comp_layout_round(const comp_layout *layout, uint32_t run
     return layout->inverse ? (uint32_t)((unsigned __int128)run * layout->inverse >> 64) : run;
 }
 
-/* The rank at which a round begins: multiples of the golden ratio, whose parts behind the point fall evenly everywhere
- * (Knuth, The Art of Computer Programming 3, 6.4). */
+/* The rank at which a round begins: multiples of the golden ratio, whose fractional parts are spread evenly (Knuth, The
+ * Art of Computer Programming 3, 6.4). */
 static inline uint32_t comp_layout_turn(const comp_layout *layout, uint32_t round)
 {
     return (uint32_t)((uint64_t)(round * 2654435769u) * layout->ranks >> 32);

@@ -1,9 +1,9 @@
-/* A rank alone owns all pixels, and whoever traces a tile has all of its fragments in cache. So nobody collects them:
- * the tile's pixels are blended at once and stored, background where nothing is, and the fragments are forgotten. The
- * image is written once, there is no list of fragments, and nothing waits for the last tile.
+/* A single rank owns all pixels, and the thread that traces a tile has all of its fragments in cache. So nothing is
+ * collected: the tile's pixels are blended at once and stored, background where there is nothing, and the fragments are
+ * forgotten. The image is written once, there is no list of fragments, and nothing waits for the last tile.
  *
- * A pixel's fragments need not follow each other. They are counted, and numbered pixel by pixel; a pixel of one
- * fragment, as most are, is blended where that lies, the others are copied to a pile first. */
+ * A pixel's fragments need not follow each other. They are counted, and numbered pixel by pixel. A pixel of one
+ * fragment, as most are, is blended in place; the fragments of others are copied to a pile first. */
 #include "comp_tiles.h"
 
 #include <assert.h>
@@ -17,7 +17,7 @@
 #include "comp_pixels.h"
 #include "memory.h"
 
-/* The renderer's tiles have this size; larger ones are right too, but slower. */
+/* The renderer's tiles have this size; larger ones work too, but slower. */
 enum { ROW_PIXELS = 16, MOST_PIXELS = ROW_PIXELS * ROW_PIXELS };
 
 /* A block that grows and forgets what it held. */
@@ -32,7 +32,7 @@ struct comp_tile_scratch {
     room pile;   /* fragments of one pixel */
     int64_t fragments;
     double seconds;
-    char apart[64]; /* threads write to no common line */
+    char apart[64]; /* padding: threads write to no common cache line */
 };
 
 static void *make_room(room *r, int64_t count, size_t size)
@@ -103,8 +103,8 @@ static void clear(const comp_tiles *tiles, const pixel_area *area)
         }
 }
 
-/* Fills a tile in which there is nothing. The stores go past the caches: these need not read what is written over, nor
- * drop for it what later tiles want. */
+/* Fills a tile in which there is nothing. The stores bypass the caches, which then neither read the overwritten lines
+ * nor drop lines that later tiles need. */
 static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
 {
 #if defined(__SSE2__)
@@ -125,7 +125,8 @@ static void clear_empty(const comp_tiles *tiles, const pixel_area *area)
     clear(tiles, area);
 }
 
-/* The pixel's number in the area, row by row. The division is exact: half a pixel is far from where it would round. */
+/* The pixel's number in the area, row by row. The division gives the right integer: half a pixel keeps it far from the
+ * next one. */
 static uint32_t place_in(const comp_tiles *tiles, const pixel_area *area, uint32_t pixel)
 {
     const uint32_t width = (uint32_t)tiles->out->width;
@@ -147,7 +148,7 @@ static void number(const comp_tiles *tiles, const pixel_area *area, const fragme
     starts[pixels] = count;
 }
 
-/* One pixel's in one piece; NULL where memory ran out. */
+/* Copies one pixel's fragments to the pile; NULL where memory ran out. */
 static fragment *collect(comp_tile_scratch *own, fragment *items, const int64_t *order, int64_t count)
 {
     if (count == 1) return &items[*order];
@@ -166,7 +167,8 @@ static void blend(const comp_tiles *tiles, int64_t pixel, fragment *items, int64
         comp_add_overlap(tiles->overlaps, (uint32_t)pixel);
 }
 
-/* Stores a tile whose pixels have one fragment each. Returns false where a pixel has two: all must be stored anew. */
+/* Stores a tile whose pixels have one fragment each. Returns false where a pixel has two; then all must be stored
+ * again. */
 static bool blend_singles(const comp_tiles *tiles, const pixel_area *area, fragment *items, int64_t count)
 {
     const int64_t pixels = (int64_t)area->width * area->height;

@@ -1,5 +1,6 @@
-/* Statuses rise with no gravity, but any fixed choice among several failures will do: the largest, and of its ranks the
- * lowest, is the greatest of one number, which leaves room for another question in the same reduction. */
+/* The numbers of statuses do not say which is worse, but any fixed choice among several failures will do. The largest
+ * status, from the lowest rank that has it, is the maximum of one number: so the same reduction has room for another.
+ * */
 #include "comp_agree.h"
 
 insitu_status comp_mpi_status(int code, base_error *error)

@@ -7,8 +7,8 @@
 
 #include "error.h"
 
-/* Collective, one reduction. The worst status of all ranks, with a message that names the rank on those that were well.
- * *greatest (may be NULL) becomes the greatest of all ranks'. */
+/* Returns the largest status of all ranks; ranks whose own is another get a message that names the rank. *greatest (may
+ * be NULL) becomes the maximum over all ranks. Collective: one reduction. */
 insitu_status comp_agree(MPI_Comm comm, insitu_status own, int64_t *greatest, base_error *error);
 
 /* INSITU_OK, or INSITU_ERROR_MPI with MPI's own words. Local. */

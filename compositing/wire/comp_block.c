@@ -6,14 +6,14 @@
 #include "comp_words.h"
 
 enum word_kind { WORD_CODED, WORD_SAME, WORD_AS_BEFORE };
-enum { MOST_RUN_BYTES = 6 }; /* of one record: 5 of the gap, 1 of the length */
+enum { MOST_RUN_BYTES = 6 }; /* of one record: 5 for the gap, 1 for the length */
 
 _Static_assert(COMP_BLOCK_RECORDS *(MOST_RUN_BYTES + 5 * (COMP_RECORD_WORDS - 1)) < 1 << 16, "bytes fit in 16 bits");
 
 typedef uint32_t quad __attribute__((vector_size(16)));
 typedef int32_t signed_quad __attribute__((vector_size(16)));
 
-/* A record's words. */
+/* The eight words of a record. */
 typedef struct pair {
     quad low, high;
 } pair;
@@ -30,7 +30,7 @@ static inline void store(uint32_t *words, pair p)
     memcpy(words, &p, sizeof p);
 }
 
-/* Small where the value is near 0 on either side. */
+/* Maps values near 0, of either sign, to small ones. */
 static inline quad folded(quad value)
 {
     return value << 1 ^ (quad)((signed_quad)value >> 31);
@@ -74,7 +74,7 @@ static inline const unsigned char *read_number(const unsigned char *in, uint32_t
     return in;
 }
 
-/* The records from the first on that are a run. */
+/* Counts the records, from the first on, that make a run. */
 static int run_length(const comp_block *block, int first)
 {
     const uint32_t begin = block->records[first][0], most = (1u << COMP_RUN_SHIFT) - begin % (1u << COMP_RUN_SHIFT);
@@ -93,7 +93,7 @@ typedef struct differences {
 
 static inline void find_differences(const uint32_t *record, const pair *own, const pair *first, differences *d)
 {
-    const pair next = load(record + 1); /* beyond the last word is the next record, of which nothing is asked */
+    const pair next = load(record + 1); /* its last word is the next record's first, whose difference is not used */
     d->from_first.low |= own->low ^ first->low;
     d->from_first.high |= own->high ^ first->high;
     d->from_next.low |= own->low ^ next.low;
@@ -120,8 +120,8 @@ static void write_head(const comp_block *block, size_t bytes, size_t run_bytes, 
 
 /* ---- values -------------------------------------------------------------------------------------------------- */
 
-/* The run's remains: of the first record from the one before it, of the second from the first, then from a straight
- * line through the two before. *last is the record before. */
+/* Computes the run's remains: the first record is predicted from the one before the run (*last), the second from the
+ * first, and each other from a straight line through the two before it. */
 static void foretell(comp_block *block, int first, int length, const pair *origin, pair *last, differences *d)
 {
     pair slope = {{0}, {0}};
@@ -136,7 +136,7 @@ static void foretell(comp_block *block, int first, int length, const pair *origi
     }
 }
 
-/* Runs, each as the gap to the end of the one before, on either side, and the length less one; and all remains. */
+/* Writes each run as its signed gap to the end of the one before, and its length less one; computes all remains. */
 static unsigned char *write_runs(comp_block *block, unsigned char *out, differences *d)
 {
     const pair origin = load(block->records[0]);
@@ -164,7 +164,7 @@ static inline void transpose(const quad in[4], quad out[4])
     out[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-/* Whole fours: what is behind the last record is scratch. */
+/* Works on groups of four; beyond the last record it writes to scratch. */
 static void to_columns(comp_block *block)
 {
     for (int i = 0; i < block->count; i += 4)
@@ -213,7 +213,7 @@ unsigned char *comp_block_write(comp_block *block, unsigned char *out)
 
 /* ---- reading ------------------------------------------------------------------------------------------------- */
 
-/* The remains of all words; *same gets those that are the same in all records, 0 elsewhere. */
+/* Reads the remains of all words; *same gets the words that are the same in all records, 0 elsewhere. */
 static void read_words(const unsigned char *in, unsigned kinds, comp_block *block, pair *same)
 {
     uint32_t words[COMP_RECORD_WORDS] = {0};
@@ -252,7 +252,7 @@ static void add_up(comp_block *block, const unsigned char *runs, const unsigned 
     }
 }
 
-/* t_out of hits and two of three colours are what this is for. */
+/* Serves t_out of hits, and two of three channels of grey. */
 static void copy_from_before(comp_block *block, unsigned kinds)
 {
     for (int k = 2; k < COMP_RECORD_WORDS; k++)

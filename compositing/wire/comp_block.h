@@ -1,15 +1,16 @@
-/* Records of neighbouring pixels in few bytes, every bit of them kept.
+/* Lossless compression for records of neighbouring pixels.
  *
  * A record is eight words: a pixel's owned index (comp_schedule.h) and up to seven that a fragment or a finished pixel
- * has. Along a row of pixels these are floats that rise and fall smoothly, so each is foretold from the two before it,
- * as if it went on in a straight line, and what remains is small: its last one or two bytes are written
- * (comp_words.h). The pixels are runs of consecutive indices. A word that is the same in all records of a block is
- * written once, one that is always that before it (t_out of hits, the colours of grey) not at all:
+ * has. Along a row of pixels these floats rise and fall smoothly, so each is predicted from the two before it by a
+ * straight line, and only the small remainder is written, mostly one or two bytes (comp_words.h). Pixels come in runs
+ * of consecutive indices. A word that is the same in all records of a block is written once; one that always equals the
+ * word before it (t_out of hits, the channels of grey) is not written:
  *
  *     bytes | records | bytes of runs | words' kinds | runs | words that are the same | remains of word 1 | of word 2
  * ...
  *
- * The remains are of bit patterns, as whole numbers modulo 2^32: no float is rounded, and NaN passes as it is. */
+ * The remainders are those of bit patterns, as whole numbers modulo 2^32: no float is rounded, and NaN keeps its bits.
+ * */
 #ifndef COMP_COMP_BLOCK_H
 #define COMP_COMP_BLOCK_H
 
@@ -41,10 +42,10 @@ unsigned char *comp_block_write(comp_block *block, unsigned char *out);
 /* Takes a run: so many pixels from an owned index on. */
 typedef void comp_run_taker(void *state, uint32_t index, uint32_t length);
 
-/* Hands over the runs of a block that comp_block_write() wrote, and reads nothing else of it; returns its end. */
+/* Hands over the runs of a block that comp_block_write() wrote, without reading the rest; returns the block's end. */
 const unsigned char *comp_block_runs(const unsigned char *in, comp_run_taker *take, void *state);
 
-/* Reads one block, of bytes that comp_block_write() wrote and slack behind them; returns the end. */
+/* Reads one block that comp_block_write() wrote, with slack behind it; returns the end. */
 const unsigned char *comp_block_read(const unsigned char *in, comp_block *block);
 
 #endif

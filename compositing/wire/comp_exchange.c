@@ -1,14 +1,14 @@
-/* Round by round. What a rank passes on is parcels as they came: nothing on the way is unpacked, and no fragment is
- * merged before all of its pixel's are together, because over rounds, and its rounding would be that of the schedule.
+/* A rank passes parcels on as they came: nothing is unpacked on the way, and fragments are merged only when all of
+ * their pixel's are together. For "over" rounds, and merging on the way would make the picture depend on the schedule.
  *
- * What fails on one rank does not stop it: it goes on in the rounds with nothing to send, so that nobody waits for it,
- * and tells in the end. */
+ * A rank on which something fails goes on in the rounds with nothing to send, so that nobody waits for it, and returns
+ * its error in the end. */
 #include "comp_exchange.h"
 
 #include "comp_pack.h"
 #include "memory.h"
 
-/* The rounds after the first take up what came in those before. */
+/* Each round after the first forwards what came in those before. */
 static insitu_status run_rounds(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *held,
                                 insitu_status status, base_error *error)
 {

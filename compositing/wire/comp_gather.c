@@ -1,7 +1,7 @@
-/* Pixels travel as fragments do, in blocks (comp_block.h): only those that something was blended in, the rest are
- * background, which rank 0 knows. Whoever has children passes their messages on as they come, in a buffer that was made
- * before, and ends with one that says that no more follow: so rank 0 need not know how many there are, hears from so
- * many ranks as it has children, and its memory grows with neither the image nor the ranks. */
+/* Pixels travel as fragments do, in blocks (comp_block.h). Only those with fragments are sent; the rest are background,
+ * which rank 0 knows. A rank with children passes their messages on as they come, in a buffer allocated before, and
+ * ends with a message that says that no more follow. So rank 0 need not know how many there are, hears only from its
+ * own children, and its memory grows with neither the image nor the ranks. */
 #include "comp_gather.h"
 
 #include <string.h>
@@ -29,7 +29,7 @@ int comp_gather_children(const comp_route *route, int place)
 
 /* ---- to the parent ------------------------------------------------------------------------------------------- */
 
-/* A message is written while the one before is under way. */
+/* The way to the parent: one message is written while the one before is being sent. */
 typedef struct upward {
     comp_mailroom *room;
     int parent; /* its rank */

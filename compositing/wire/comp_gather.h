@@ -1,4 +1,4 @@
-/* Finished pixels of all owners to rank 0. */
+/* Sends the finished pixels of all owners to rank 0. */
 #ifndef COMP_COMP_GATHER_H
 #define COMP_COMP_GATHER_H
 
@@ -6,16 +6,16 @@
 #include "comp_pixels.h"
 #include "comp_schedule.h"
 
-/* Owners send up a tree of places: of a node to its first place, of nodes in a heap of COMP_GATHER_FAN children each.
- */
+/* Owners send up a tree of places: within a node to its first place, among nodes in a heap of COMP_GATHER_FAN children
+ * each. */
 enum { COMP_GATHER_FAN = 64 };
 
-/* The place that a place sends to, of 1 and more; and how many send to a place. */
+/* The place to which a place >= 1 sends, and how many places send to one. */
 int comp_gather_parent(const comp_route *route, int place);
 int comp_gather_children(const comp_route *route, int place);
 
-/* Collective. Rank 0 stores what the others send in out; its own pixels are there already. status: of this rank so far;
- * where it is none of success the rank's pixels stay away. Allocates nothing. Returns the status of this rank alone. */
+/* Collective. Rank 0 stores what the others send in out; its own pixels are there already. status is this rank's so
+ * far; if it is an error, the rank sends no pixels of its own. Allocates nothing. Returns this rank's own status. */
 insitu_status comp_gather(comp_mailroom *room, const comp_route *route, const comp_layout *layout,
                           const comp_pixel_list *finished, image *out, insitu_status status, base_error *error);
 

@@ -1,8 +1,8 @@
-/* A dense round is one in which every partner sends to every other, if only that there is nothing: nothing else need be
- * said. In a sparse one only who has something sends, and nobody knows how many that are. So sends are synchronous,
- * which end when they are received; a rank whose sends have ended enters a barrier, and receives on until all have
- * entered it: then nothing is under way (Hoefler, Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic
- * Sparse Data Exchange, 2010). No count is exchanged, and a rank alone costs the rounds of a barrier. */
+/* In a dense round every partner sends to every other, be it an empty message, so all know how many to expect. In a
+ * sparse round only partners that have something send, and nobody knows how many do. So sends are synchronous: they end
+ * when they are received. A rank whose sends have ended enters a barrier, and goes on receiving until all have entered
+ * it: then no message is under way (Hoefler, Siebert, Lumsdaine, Scalable Communication Protocols for Dynamic Sparse
+ * Data Exchange, 2010). No counts are exchanged; the price is one barrier. */
 #include "comp_mail.h"
 
 #include <string.h>
@@ -120,12 +120,12 @@ void comp_mailroom_close(comp_mailroom *room)
     *room = (comp_mailroom){0};
 }
 
-/* A round under way. */
+/* The state of a round. */
 typedef struct round {
     comp_mailroom *room;
     int tag;
     bool is_sparse;
-    int open; /* partners that have more to send; of a sparse round 0 */
+    int open; /* partners that have more to send; 0 in a sparse round */
     comp_messages *in;
     MPI_Request *requests;
     int request_count;
@@ -153,7 +153,8 @@ static void send(round *r, const unsigned char *data, int bytes, int rank)
     r->room->sent_messages++;
 }
 
-/* Makes room for the requests, where there is none for all of them for those that end each partner's wait. */
+/* Makes room for all requests; without memory it uses the reserve, which suffices for the empty messages that end each
+ * partner's wait. */
 static void make_requests(round *r, comp_messages *out, int partners)
 {
     int count = r->is_sparse ? 0 : partners;
@@ -219,7 +220,7 @@ static void receive_sparse(round *r)
     check(r, code);
 }
 
-/* The last message to the rank says that no more follow. False: there is none. */
+/* Marks the last message to the rank: no more follow. False: there is none. */
 static bool mark_last(const comp_messages *out, int rank)
 {
     comp_message *last = NULL;

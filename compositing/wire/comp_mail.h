@@ -2,8 +2,8 @@
  *
  *     message | are there more? | parcel | parcel | ...          parcel | owner, records, bytes | block | block | ...
  *
- * A message is at most COMP_MESSAGE_BYTES long, so that one that there is no memory for can still be received, into
- * room that was made before, and thrown away: a rank that runs out of memory keeps nobody waiting. */
+ * A message is at most COMP_MESSAGE_BYTES long. So a rank that runs out of memory can still receive it, in room that
+ * was made before, and throw it away: nobody waits for that rank. */
 #ifndef COMP_COMP_MAIL_H
 #define COMP_COMP_MAIL_H
 
@@ -20,7 +20,7 @@ enum { COMP_MESSAGE_BYTES = 1 << 17, COMP_MESSAGE_HEAD = 4, COMP_PARCEL_HEAD = 1
 typedef struct comp_message {
     struct comp_message *next;
     int rank;  /* that it comes from or goes to */
-    int bytes; /* of data; there is slack behind them */
+    int bytes; /* of data, without the slack behind them */
     unsigned char data[];
 } comp_message;
 
@@ -38,7 +38,8 @@ typedef struct comp_parcel {
     const unsigned char *data;
 } comp_parcel;
 
-/* The message's parcel at *offset (COMP_MESSAGE_HEAD: the first), which moves behind it. False: there are no more. */
+/* Gets the message's parcel at *offset (COMP_MESSAGE_HEAD: the first) and moves *offset behind it. False: there are no
+ * more. */
 bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *out);
 
 /* Writes messages to one rank. */
@@ -49,29 +50,30 @@ typedef struct comp_writer {
     size_t parcel; /* where the last parcel begins; 0: there is none */
 } comp_writer;
 
-/* Room for so many bytes of a parcel for the owner, or NULL: no memory. expected: bytes that may follow in all. */
+/* Room for so many bytes of a parcel for the owner, or NULL: no memory. expected is how many bytes may follow in all.
+ * */
 unsigned char *comp_writer_room(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
-/* What was written there ends at end, and holds so many records. */
+/* Ends what was written there at end; it holds so many records. */
 void comp_writer_commit(comp_writer *writer, unsigned char *end, uint32_t records);
 
-/* What a rank needs to take part in the rounds, whatever runs out of memory then. */
+/* Memory that a rank needs to take part in the rounds even when it runs out of other memory. */
 typedef struct comp_mailroom {
     MPI_Comm comm;
     int rank;
-    unsigned char *waste; /* COMP_MESSAGE_BYTES: for what there is no room for */
+    unsigned char *waste; /* COMP_MESSAGE_BYTES: receives messages that there is no memory for */
     MPI_Request *reserve; /* a request for each partner of the longest dense round */
     comp_block *block;
-    unsigned char *outgoing[2]; /* COMP_MESSAGE_BYTES each: of pixels on their way to rank 0 */
+    unsigned char *outgoing[2]; /* COMP_MESSAGE_BYTES each: for pixels on their way to rank 0 */
     int64_t sent_bytes, sent_messages;
 } comp_mailroom;
 
 insitu_status comp_mailroom_open(MPI_Comm comm, comp_mailroom *out, base_error *error);
 void comp_mailroom_close(comp_mailroom *room);
 
-/* One round: messages go out, *in gets what comes, in memory of its own. status: of this rank so far; where it is none
- * of success nothing is sent, and all that comes is thrown away. All ranks of comm call it. Returns the status of this
- * rank alone. */
+/* One round: sends the messages of out; *in gets those received, in memory of its own. status is this rank's so far; if
+ * it is an error, nothing is sent and all that comes is thrown away. All ranks of comm call it. Returns this rank's own
+ * status. */
 insitu_status comp_mail_round(comp_mailroom *room, const comp_route *route, int round, comp_messages *out,
                               comp_messages *in, insitu_status status, base_error *error);
 

@@ -5,7 +5,7 @@
 #include "comp_block.h"
 #include "memory.h"
 
-/* Of bytes that fragments turned out to take, most pictures have less: the room for a message is a first guess. */
+/* Bytes of a fragment, from which the room for a message is first guessed. In most pictures fragments take fewer. */
 enum { EXPECTED_BYTES = 16 };
 
 static insitu_status no_memory(base_error *error, const char *what)
@@ -38,7 +38,7 @@ static bool pack_owner(const comp_windows *w, uint32_t owner, comp_block *block,
     return p.left == 0 || comp_windows_walk(w, owner, block, take_block, &p);
 }
 
-/* What goes to the partner with a digit: of every owner that has it, but for this place itself. */
+/* Packs what goes to the partner with the digit: the fragments of all owners with it, except this place. */
 static bool pack_digit(const comp_windows *w, int radix, int digit, int place, comp_block *block, comp_writer *writer)
 {
     bool is_well = true;
@@ -85,7 +85,8 @@ insitu_status comp_pack(const comp_windows *windows, const comp_route *route, in
 
 /* ---- parcels on their way ------------------------------------------------------------------------------------ */
 
-/* Of what is at its place but for this digit and those of later rounds: the rest has been passed on. */
+/* Forwards the parcels for owners that have this digit, and this place's digits of the rounds before. All others have
+ * been sent in those rounds. */
 static bool forward_to(const comp_messages *in, const comp_route *route, int round, int place, int digit,
                        comp_writer *writer)
 {
@@ -125,8 +126,8 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
 /* ---- out of messages -----------------------------------------------------------------------------------------
  *
  * A counting sort by pixel: the blocks' runs tell how many fragments each pixel has before any is unpacked, so each
- * goes straight to its place. starts[k] is first the count of pixel k, then where its fragments end, and falls to where
- * they begin as they are placed. */
+ * goes straight to its place. starts[k] is at first the count of pixel k, then the end of its fragments, and falls to
+ * their begin as they are placed. */
 
 typedef struct unpacking {
     const comp_layout *layout;
@@ -166,7 +167,7 @@ static void count_all(const unpacking *u, const fragment *own, int64_t own_count
     starts[pixels] = sum;
 }
 
-/* is_shared: other threads place fragments of the same pixels. */
+/* is_shared tells that other threads place fragments of the same pixels. */
 static inline void place(comp_owned *out, const void *item, uint32_t index, bool is_shared)
 {
     const uint32_t to = is_shared ? __atomic_sub_fetch(&out->starts[index], 1, __ATOMIC_RELAXED) : --out->starts[index];

@@ -1,6 +1,6 @@
-/* The renderer makes fragments tile by tile, so those of a window are near each other in the list, and the windows that
- * are filled at one time are few: a counting sort into a second list goes through both nearly in order. Each thread has
- * a part of the list and counts of its own. */
+/* The renderer makes fragments tile by tile, so those of a window are near each other in the list, and few windows are
+ * filled at a time: a counting sort into a second list goes through both nearly in order. Each thread has a part of the
+ * list and its own counts. */
 #include "comp_windows.h"
 
 #include <string.h>
@@ -17,7 +17,7 @@ static inline uint64_t window_of(const comp_windows *w, uint32_t pixel)
            (comp_layout_index(w->layout, pixel) >> COMP_RUN_SHIFT);
 }
 
-/* Where each thread's part of each window begins; *total gets how many there are. */
+/* Computes where each thread's part of each window begins; *total gets the number of fragments. */
 static void add_counts(uint32_t *counts, uint64_t windows, int parts, uint32_t *starts)
 {
     uint32_t at = 0;
@@ -107,7 +107,8 @@ static inline void put(walk *to, const fragment *item, uint32_t index)
     to->block->count = 0;
 }
 
-/* From front to back where they are few: neighbours' first ones are then of one surface. */
+/* Sorts a pixel's fragments front to back if they are few: then the first ones of neighbours are of one surface, and
+ * compress well. */
 static void sort_pixel(fragment *items, uint32_t count)
 {
     if (count > LONGEST_SORTED) return;
@@ -119,7 +120,7 @@ static void sort_pixel(fragment *items, uint32_t count)
     }
 }
 
-/* Sorts the window's fragments by pixel where they lie. ends[k] becomes the begin of pixel k (comp_bucket.c). */
+/* Sorts the window's fragments by pixel where they lie. ends[k] becomes the start of pixel k (comp_bucket.c). */
 static void sort_window(const comp_layout *layout, fragment *items, uint32_t count, uint32_t ends[WINDOW + 1])
 {
     memset(ends, 0, WINDOW * sizeof *ends);
@@ -139,7 +140,7 @@ static void sort_window(const comp_layout *layout, fragment *items, uint32_t cou
     for (int k = 0; k < WINDOW; k++) sort_pixel(items + ends[k], ends[k + 1] - ends[k]);
 }
 
-/* A fragment a pixel, and these in order: as most windows are. */
+/* Tells whether the window has one fragment a pixel, by rising pixel. Most windows are so. */
 static bool is_in_order(const fragment *items, uint32_t count)
 {
     if (count > WINDOW) return false;

@@ -14,8 +14,8 @@ typedef struct comp_windows {
     uint32_t per_owner; /* windows that an owner has at most */
 } comp_windows;
 
-/* Sorts the fragments. The list is emptied and its memory given back, but on an error, which leaves it as it was.
- * layout must outlive out. Local. */
+/* Sorts the fragments. The list is emptied and its memory given back; on an error it stays as it was. layout must
+ * outlive out. Local. */
 insitu_status comp_windows_make(const comp_layout *layout, fragment_list *items, comp_windows *out, base_error *error);
 
 void comp_windows_free(comp_windows *windows);

@@ -1,5 +1,5 @@
-/* The shuffles are tables by the byte of lengths, made by the preprocessor: length of number k, where its bytes begin,
- * and from which byte of four whole numbers the byte at a place comes, and back. */
+/* The shuffles stand in tables by the byte of lengths, made by the preprocessor from the length of number k, where its
+ * bytes begin, and which byte of four whole numbers comes to which place, and back. */
 #include "comp_words.h"
 
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "cpu.h"
 #endif
 
-/* Bytes of four numbers by their byte of lengths. */
+/* The bytes that four numbers take, by their byte of lengths. */
 static inline size_t bytes_of(unsigned lengths)
 {
     return 4 + (lengths & 3) + (lengths >> 2 & 3) + (lengths >> 4 & 3) + (lengths >> 6);
@@ -122,7 +122,7 @@ static int has_shuffles(void)
 
 #endif
 
-/* Words behind the last are 0, and take a byte each that nobody needs. */
+/* Fills up to a multiple of four with words of 0, which take a byte each. */
 static size_t pad(uint32_t *words, size_t count)
 {
     const size_t beyond = (4 - count % 4) % 4;

@@ -1,7 +1,7 @@
-/* Whole numbers in as many bytes as they need: stream vbyte (Lemire, Kurz, Rupp, 2018).
+/* Writes whole numbers in as many bytes as they need, by stream vbyte (Lemire, Kurz, Rupp, 2018).
  *
- * Two bits a number say whether 1, 2, 3 or 4 bytes of it follow. Those of four numbers are a byte, and all such bytes
- * stand in front, so that four numbers are put together by one shuffle. */
+ * Two bits a number say whether it takes 1, 2, 3 or 4 bytes. These bits of four numbers make a byte, and all such bytes
+ * stand in front, so that four numbers are unpacked by one shuffle. */
 #ifndef COMP_COMP_WORDS_H
 #define COMP_COMP_WORDS_H
 

@@ -1,4 +1,5 @@
-/* How a room says what went wrong: a status and one message, filled by whoever decides, passed up unchanged. */
+/* How a room reports an error: a status and one message, filled by the function that decides and passed up unchanged.
+ * */
 #ifndef BASE_ERROR_H
 #define BASE_ERROR_H
 

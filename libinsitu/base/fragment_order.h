@@ -1,5 +1,5 @@
-/* The order of a pixel's fragments: by depth, where a surface and a volume begin at one in front the surface, and then
- * down to the last bit, so that what compares equal is the same. */
+/* The order of a pixel's fragments: by depth, at equal depth surfaces before volumes, and then by all other bits, so
+ * that fragments that compare equal are the same. */
 #ifndef BASE_FRAGMENT_ORDER_H
 #define BASE_FRAGMENT_ORDER_H
 
@@ -8,7 +8,7 @@
 
 #include "fragment.h"
 
-/* Bits that rise with the value, for all floats: NaN too has its place. */
+/* Bits that rise with the value, for all floats; NaN has its place too. */
 static inline uint32_t fragment_rising_bits(float value)
 {
     uint32_t bits;

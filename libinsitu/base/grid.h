@@ -1,8 +1,8 @@
-/* A rank's cells and values as the rooms below the session see them: the caller's own arrays behind inline
- * accessors that know each array's element type and stride. Nothing is copied.
+/* A rank's cells and values as the rooms below the session see them: the caller's own arrays behind inline accessors
+ * that know each array's element type and stride. Nothing is copied.
  *
- * A grid has been validated (indices in range, types known, coordinates finite) by whoever made it; the accessors
- * check nothing. All geometry leaves here in double: rooms go to float32 only after subtracting an origin. */
+ * Whoever makes a grid has validated it (indices in range, types known, coordinates finite); the accessors check
+ * nothing. They return all geometry in double: rooms go to float32 only after subtracting an origin. */
 #ifndef BASE_GRID_H
 #define BASE_GRID_H
 
@@ -29,7 +29,7 @@ typedef struct grid_array {
     int64_t stride; /* bytes, never 0 */
     bool is_wide;
     bool is_integer;
-    int64_t base; /* of indices and offsets: what counts as 0 */
+    int64_t base; /* for indices and offsets: the entry that counts as 0 */
 } grid_array;
 
 typedef struct grid {
@@ -44,7 +44,7 @@ typedef struct grid {
     int cell_type;
     const char *ghosts; /* NULL: none */
     int64_t ghosts_stride;
-    const uint64_t *flat; /* NULL: none known; a bit for each cell, set where it has no volume and is not drawn */
+    const uint64_t *flat; /* NULL, or a bit for each cell, set where it has no volume and is not drawn */
     /* Faces of polyhedra, shared between them; no data: there are no polyhedra. */
     int64_t face_count;
     grid_array face_offsets;      /* face_count + 1 */
@@ -58,7 +58,7 @@ typedef struct grid_field {
     int component_count;
     int component; /* 0 .. component_count - 1, or -1 for the magnitude */
     bool is_cell_centred;
-    const struct grid_field *own; /* NULL, or the cells' own values, of which these at vertices were made: a cell whose
+    const struct grid_field *own; /* NULL, or the cells' own values from which those at vertices were made: a cell whose
                                      own is not finite has none */
 } grid_field;
 
@@ -75,7 +75,7 @@ static inline int64_t grid_array_index(const grid_array *a, int64_t i)
     return (a->is_wide ? *(const int64_t *)(const void *)p : (int64_t) * (const int32_t *)(const void *)p) - a->base;
 }
 
-/* 0 for polyhedra and polygons, whose numbers are their own, and for what is no type. */
+/* 0 for polyhedra and polygons, whose cells differ in it, and for numbers that are no type. */
 static inline int grid_type_vertices(int cell_type)
 {
     switch (cell_type) {
@@ -89,7 +89,7 @@ static inline int grid_type_vertices(int cell_type)
     }
 }
 
-/* Of two dimensions: such cells are faces, which outer surfaces show. They are flat. */
+/* Tells whether cells of the type are two-dimensional: outer surfaces show them. They have no volume. */
 static inline bool grid_is_shell_type(int cell_type)
 {
     return cell_type == GRID_TRIANGLE || cell_type == GRID_QUAD || cell_type == GRID_POLYGON;
@@ -105,7 +105,8 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
     return type == (int)type ? (int)type : GRID_NO_TYPE;
 }
 
-/* The cell's vertex indices, in VTK's order; returns how many. None of polyhedra and polygons: see grid_walk. */
+/* The cell's vertex indices, in VTK's order; returns how many. It has none for polyhedra and polygons: see grid_walk.
+ * */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int count = grid_type_vertices(grid_cell_type(g, cell));
@@ -193,13 +194,13 @@ static inline bool grid_is_shell(const grid *g, int64_t cell)
     return grid_is_flat(g, cell) && grid_is_shell_type(grid_cell_type(g, cell));
 }
 
-/* Neither a ghost nor flat: what trees hold. */
+/* Neither a ghost nor flat: trees hold such cells. */
 static inline bool grid_is_drawn(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && !grid_is_flat(g, cell);
 }
 
-/* The same, and shells: what pictures may show. */
+/* The same or a shell: pictures may show such cells. */
 static inline bool grid_is_seen(const grid *g, int64_t cell)
 {
     return !grid_is_ghost(g, cell) && (!grid_is_flat(g, cell) || grid_is_shell(g, cell));

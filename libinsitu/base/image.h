@@ -7,9 +7,9 @@
 
 #include "insitu/image_output.h"
 
-/* What lies behind each other in an image's pixels, as insitu_deep has it, on rank 0. All zero elsewhere. */
+/* The samples of an image's pixels by depth, as in insitu_deep, on rank 0. All zero elsewhere. */
 typedef struct deep_image {
-    insitu_deep_sample *samples; /* some may be of no pixel any more */
+    insitu_deep_sample *samples; /* some may no longer belong to a pixel */
     int64_t count, capacity;
     int64_t *first;   /* a pixel's first sample */
     uint32_t *counts; /* a pixel's number of samples; 0: it has none */
@@ -22,7 +22,7 @@ typedef struct image {
     float *depth; /* row-major, height × width: fragment.t_in of the nearest
                      surface hit; +infinity where there is none. NULL: not wanted */
     deep_image *deep; /* NULL on every rank: not wanted */
-    bool is_folded;   /* of fragments that ranks have folded (fragment_fold.h) */
+    bool is_folded;   /* made of fragments that ranks have folded (fragment_fold.h) */
 } image;
 
 #endif

@@ -13,8 +13,8 @@ void *base_alloc(size_t bytes);
 /* The same, zeroed. */
 void *base_calloc(size_t count, size_t size);
 
-/* Room for so many bytes, which count only from base_use() on, that says how many of them are in use: memory that is
- * not written to is none. base_realloc() before that keeps nothing of it. */
+/* base_reserve() gives room for bytes that are not counted yet, since memory that is not written to takes none.
+ * base_use() says how many of them are in use and counts them. base_realloc() before base_use() keeps no contents. */
 void *base_reserve(size_t bytes);
 void base_use(void *block, size_t bytes);
 

@@ -37,7 +37,7 @@ typedef __mmask16 vm;
 typedef vi vm;
 #endif
 
-/* Not (vf){0} + x: no compiler may leave out that addition, which makes -0 to 0. */
+/* (vf){0} + x would not do: no compiler may leave out that addition, which makes -0 to 0. */
 SIMD_INLINE vf vf_set(float x)
 {
 #if defined(SIMD_AVX512)
@@ -371,7 +371,7 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
-/* The lanes of m one after the other, to where there is room for all; returns how many. */
+/* Stores the lanes of m one after the other at to, which has room for a whole vector; returns how many. */
 SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 {
 #if defined(SIMD_AVX512)
@@ -384,8 +384,8 @@ SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 #endif
 }
 
-/* a b - c d to 1.5 units in the last place, zero only where it is zero, and of the right sign: Kahan's two fused
- * steps where there are such, else in double, where the products of floats are exact. */
+/* a b - c d to 1.5 units in the last place, zero only where the exact value is, and of the right sign: by Kahan's two
+ * fused steps where the hardware has them, else in double, where the products of floats are exact. */
 SIMD_INLINE vf vf_diff_of_products(vf a, vf b, vf c, vf d)
 {
 #if defined(SIMD_AVX512)
@@ -426,8 +426,8 @@ SIMD_INLINE vm vm_sign(vi a)
 #endif
 }
 
-/* vf_min() and vf_max() of single numbers: the latter of the two where one is not a number. fminf() takes more than one
- * instruction, for it has another rule there. */
+/* vf_min() and vf_max() for single numbers: b where either is NaN. fminf() has another rule there and takes more than
+ * one instruction. */
 SIMD_INLINE float simd_min(float a, float b)
 {
     return a < b ? a : b;

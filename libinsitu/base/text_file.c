@@ -45,7 +45,7 @@ static bool write_file(const char *path, const char *temporary, text_writer *wri
 bool text_file_replace(const char *path, text_writer *write, const void *what)
 {
     c_numbers numbers;
-    const size_t size = strlen(path) + 24; /* . and a process */
+    const size_t size = strlen(path) + 24; /* room for "." and the number of a process */
     char *temporary = base_alloc(size);
     if (!temporary || !c_numbers_begin(&numbers)) {
         base_free(temporary);
@@ -83,7 +83,7 @@ FILE *text_file_open(const char *path)
     return open_stream(open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC), "r");
 }
 
-/* Until the end or an error; false where memory runs out. */
+/* Reads until the end or an error; false where memory runs out. */
 static bool read_stream(FILE *file, char **text)
 {
     size_t size = 0, capacity = 0;

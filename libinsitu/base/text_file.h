@@ -1,4 +1,4 @@
-/* Text files whose numbers have a point, whatever locale the simulation has set. */
+/* Text files whose numbers have a decimal point, whatever locale the simulation has set. */
 #ifndef BASE_TEXT_FILE_H
 #define BASE_TEXT_FILE_H
 
@@ -7,7 +7,8 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/* The calling thread's numbers are C's from begin to end. begin: false where memory runs out; then there is no end. */
+/* From begin to end, the calling thread writes and reads numbers as C's locale does. begin returns false where memory
+ * runs out; then end is not called. */
 typedef struct c_numbers {
     locale_t own, before;
 } c_numbers;
@@ -16,7 +17,7 @@ void c_numbers_end(c_numbers *numbers);
 
 typedef void text_writer(FILE *file, const void *what);
 
-/* Write a file anew: into a new one beside it, which then takes its place, so that no reader ever sees a part of it.
+/* Replace a file: the text goes to a new one beside it, which then takes its place, so that no reader ever sees a part.
  * False with errno where that cannot be done; the old file is then as it was. */
 bool text_file_replace(const char *path, text_writer *write, const void *what);
 
@@ -26,8 +27,8 @@ bool text_file_make_folders(const char *path);
 /* The whole file as text, from base_alloc(). False with errno where that cannot be done; *text is then NULL. */
 bool text_file_read(const char *path, char **text);
 
-/* Of lines that begin with a whole number, those of numbers below this move to the text's beginning; returns how many
- * bytes they are. A last line without an end, torn, goes. */
+/* Keeps only the lines that begin with a whole number below number: they move to the beginning of text. Returns how
+ * many bytes they are. A torn last line, without an end, is dropped. */
 size_t text_keep_below(char *text, long long number);
 
 /* Open a file to read it. NULL with errno where that cannot be done; a pipe does not make the caller wait. */

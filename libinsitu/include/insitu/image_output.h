@@ -21,7 +21,7 @@ typedef enum insitu_image_format {
     INSITU_DEEP_EXR = 3 /* deep: any number of samples a pixel, each float R, G, B, A, Z and ZBack */
 } insitu_image_format;
 
-/* Where in the picture a decoration stands. Those of one place stack, and none lies over another. */
+/* Where in the picture a decoration stands. Decorations of one place are stacked, and none covers another. */
 typedef enum insitu_anchor {
     INSITU_TOP_LEFT,
     INSITU_TOP,
@@ -36,7 +36,7 @@ typedef enum insitu_anchor {
 typedef struct insitu_words {
     const char *text; /* UTF-8, one line */
     insitu_anchor at;
-    float size; /* height, in those of the other decorations' words: 1, a title's 1.4 */
+    float size; /* height, as a multiple of the other decorations' words: 1, for a title 1.4 */
 } insitu_words;
 
 typedef struct insitu_tick {
@@ -48,10 +48,10 @@ typedef struct insitu_tick {
 typedef struct insitu_colour_bar {
     const char *label;
     const float *colours; /* row-major, colour_count × 3, linear, from the low end on, evenly spaced */
-    int colour_count;     /* >= 2; of bands >= 1 */
-    bool is_banded;       /* the colours are those of bands of equal width; else linear between entries */
-    const float *below;   /* 3, linear: of values below the low end; NULL: that end's */
-    const float *above;   /* as below, of the high end */
+    int colour_count;     /* >= 2; >= 1 where is_banded */
+    bool is_banded;       /* each colour fills a band, all of equal width; else colours are linear between entries */
+    const float *below;   /* 3, linear: colour of values below the low end; NULL: that of the low end */
+    const float *above;   /* the same for values above the high end */
     insitu_anchor at;     /* INSITU_LEFT or INSITU_RIGHT */
     int tick_count;
     const insitu_tick *ticks;
@@ -60,25 +60,25 @@ typedef struct insitu_colour_bar {
 /* A line of the picture in pixels: (0, 0) is its upper left corner, (width, height) its lower right one. */
 typedef struct insitu_stroke {
     double from[2], to[2];
-    bool is_behind; /* whatever is drawn hides it */
+    bool is_behind; /* surfaces and volumes of the picture hide it */
 } insitu_stroke;
 
 /* Words beside a point of the picture, left out where they would lie over others. */
 typedef struct insitu_label {
     double at[2];   /* pixels, as of a stroke */
-    double away[2]; /* of length 1: where from the point they are */
-    double gap;     /* between the two, in heights of words */
+    double away[2]; /* of length 1: the direction from the point to the words */
+    double gap;     /* between point and words, in heights of words */
     char text[32];
 } insitu_label;
 
-/* A bar whose length in the scene is told by its words. */
+/* A bar whose words tell its length in the scene. */
 typedef struct insitu_scale_bar {
     double length; /* pixels; 0: there is none */
     insitu_anchor at;
     char text[300];
 } insitu_scale_bar;
 
-/* Decorations drawn over a picture, and the background over which the picture is put first. Borrowed, all of it. */
+/* Decorations to draw over a picture, and the background that is put behind it first. All of it is borrowed. */
 typedef struct insitu_decorations {
     float background[4]; /* linear, premultiplied */
     float colour[3];     /* of words and lines; linear */
@@ -96,7 +96,7 @@ typedef struct insitu_decorations {
     double axes[3][3]; /* the scene's axes, seen from the camera: right, up, towards the eye; unit lengths */
 } insitu_decorations;
 
-/* Numbers of an image's pixels beside their colours, for EXR. */
+/* One more number for each pixel of an image, for EXR. */
 typedef struct insitu_channel {
     const char *name;
     const float *values; /* of the first pixel */
@@ -109,30 +109,31 @@ typedef struct insitu_deep_sample {
     float z, z_back; /* depths as insitu_image has them */
 } insitu_deep_sample;
 
-/* Samples behind each other in the pixels of an image, rising with depth and not overlapping. Without background. */
+/* The samples of each pixel of an image, by rising depth, without overlaps. They do not hold the background. */
 typedef struct insitu_deep {
     const insitu_deep_sample *samples;
-    const int64_t *first;   /* row-major, height × width: of a pixel's samples, where they begin */
-    const uint32_t *counts; /* row-major, height × width: and how many they are */
+    const int64_t *first;   /* row-major, height × width: index in samples of each pixel's first */
+    const uint32_t *counts; /* row-major, height × width: number of each pixel's samples */
 } insitu_deep;
 
 typedef struct insitu_image {
     int width, height;
     const float *rgba;  /* row-major, height × width × 4, top row first, linear, premultiplied */
-    const float *depth; /* NULL, or row-major, height × width: of the nearest surface, of any opacity and whatever
-                           volume is in front, the distance from the eye along the camera's axis (not along the pixel's
-                           ray) in scene units; +infinity where there is none */
+    const float *depth; /* NULL, or row-major, height × width: distance from the eye to the nearest surface along the
+                           camera's axis (not along the pixel's ray), in scene units. The surface may have any opacity,
+                           and volumes may lie in front of it. +infinity where there is none. */
     const insitu_decorations *decorations; /* NULL: none, and rgba has its background */
     int channel_count;
     const insitu_channel *channels; /* borrowed; passed over where the format has none */
-    const insitu_deep *deep;        /* NULL, or what a deep format holds, in place of all else but the size */
+    const insitu_deep *deep;        /* NULL, or the samples for a deep format, which then uses nothing else but the size
+                                     */
 } insitu_image;
 
-/* Write to a temporary file beside path and rename, so that path is never half a picture; missing folders are made. The
- * temporary file is named ".insitu-", 16 random digits and ".part", and is locked while it is written; the first
- * picture that a process writes to a folder removes those that killed runs of the same user left there. A pipe, device
- * or directory of the picture's name is an error. On an error message (size bytes) says what, with the path. Where all
- * is well it is empty, or a warning: no font was found, and the picture is without its words. Local. */
+/* Write to a temporary file beside path and rename it, so that path is never half a picture. Missing folders are made.
+ * The temporary file is named ".insitu-", 16 random digits and ".part", and is locked while it is written; the first
+ * picture that a process writes to a folder removes the temporary files that killed runs of the same user left there.
+ * It is an error if path is a pipe, a device or a directory. On an error, message (size bytes) says what went wrong,
+ * with the path. Otherwise message is empty, or warns that no font was found and the picture has no words. Local. */
 typedef insitu_status insitu_image_write_function(const insitu_image *image, insitu_image_format format,
                                                   const char *path, char *message, size_t size);
 

@@ -1,4 +1,4 @@
-/* What a call came to. Apart from insitu.h, so that what knows no MPI can say it too. */
+/* The status that a call returns. It stands apart from insitu.h so that code without MPI can use it. */
 #ifndef INSITU_STATUS_H
 #define INSITU_STATUS_H
 
