@@ -1,10 +1,10 @@
-/* The min-max bounding volume hierarchy: a binary tree over a grid's cells whose nodes hold the bounds of their
- * cells and the range of a scalar on them (thesis, section 4.2). Knows no MPI and no pixels.
+/* The min-max bounding volume hierarchy: a binary tree over a grid's cells whose nodes hold the bounds of their cells
+ * and the range of a scalar on them (thesis, section 4.2). Knows no MPI and no pixels.
  *
- * The nodes stand in one array, root first, siblings side by side, so that one reference finds both. A leaf holds
- * at most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32, rounded
- * outward from the double values; the compact layout rounds bounds further outward, to its grid. A cell that is a ghost
- * is not in the tree; one that has a value that is not finite has the empty range (+inf, -inf) and so is never met.
+ * The nodes stand in one array, root first, siblings side by side, so that one reference finds both. A leaf holds at
+ * most 7 cells. Bounds are float32, of (position - origin) * scale, rounded outward; ranges are float32, rounded
+ * outward from the double values; the compact layout rounds bounds further outward, to its grid. Ghost cells are not in
+ * the tree. A cell with a value that is not finite has the empty range (+inf, -inf) and so is never met.
  *
  * Nodes are numbered depth first by pairs: a pair of siblings, then all below the left one, then all below the right
  * one; the leaves' cells stand in the same order. So children come after parents, and all below a node is one run. */
@@ -17,7 +17,7 @@
 
 enum {
     MMBVH_MAX_LEAF = 7,
-    MMBVH_MAX_DEPTH = 80 /* of a leaf, the root's being 1: so many entries are enough for a traversal's stack */
+    MMBVH_MAX_DEPTH = 80 /* of a leaf, where the root has 1; so many entries are enough for a traversal's stack */
 };
 
 typedef struct mmbvh_node {
@@ -27,12 +27,12 @@ typedef struct mmbvh_node {
     float range_high;
     uint64_t count : 3; /* cells in a leaf; 0: an inner node */
     uint64_t ref : 61;  /* leaf: first entry in cells; inner: the left child's index, the right one follows */
-} mmbvh_node;           /* 40 bytes, as the thesis's figure 4.1 */
+} mmbvh_node;           /* 40 bytes, as in the thesis's figure 4.1 */
 
 typedef enum mmbvh_layout {
     MMBVH_COMPACT,  /* 24 bytes a node, bounds in steps of a grid (mmbvh_compact.h) */
-    MMBVH_REFERENCE /* 40 bytes a node, bounds in float32; the compact one falls back to it where it cannot hold the
-                       tree: beyond 2^29 cells, or bounds that are not finite */
+    MMBVH_REFERENCE /* 40 bytes a node, bounds in float32; also used where the compact layout cannot hold the tree: for
+                       more than 2^29 cells, or bounds that are not finite */
 } mmbvh_layout;
 
 typedef enum mmbvh_builder {
@@ -50,14 +50,14 @@ typedef struct mmbvh {
     double origin[3]; /* bounds are of (position - origin) * scale */
     double scale;
     double built_cost;      /* SAH cost when built */
-    double area;            /* over all nodes, half the box's surface times the tests in it (mmbvh_cost()), as refits of
-                               the bounds leave it */
-    double built_area;      /* as it was when built: what it has grown by beside the mesh's own surface is decay */
+    double area;            /* sum over all nodes: half the box's surface times the tests in it (mmbvh_cost()); refits
+                               of the bounds keep it up to date */
+    double built_area;      /* area when built: growth beyond that of the mesh's own surface is decay */
     int64_t unusable_cells; /* cells with the empty range in the nodes' own ranges */
 } mmbvh;
 
-/* Reading nodes, whatever their layout: what goes down a tree asks these and no array. The box is lower and upper in
- * lanes 0 to 2; lane 3 is scratch, so that a box can be written by whole vectors. */
+/* These functions read nodes of any layout; traversals use them instead of the arrays. The box is in lanes 0 to 2 of
+ * lower and upper; lane 3 is scratch, so that a box can be written by whole vectors. */
 static inline void mmbvh_node_box(const mmbvh *tree, int64_t index, float lower[4], float upper[4])
 {
     if (tree->compact) {
@@ -83,7 +83,7 @@ static inline int64_t mmbvh_node_ref(const mmbvh *tree, int64_t index)
     return tree->compact ? (int64_t)(tree->compact[index].link >> 3) : (int64_t)tree->nodes[index].ref;
 }
 
-/* Bytes of nodes and cell indices. */
+/* The bytes that nodes and cell indices take. */
 int64_t mmbvh_bytes(const mmbvh *tree);
 
 /* Ranges of one field: the nodes' own (stride 24 or 40) or an array of pairs beside the tree (stride 8). */
@@ -101,7 +101,7 @@ typedef struct mmbvh_selection {
 
 typedef struct mmbvh_options {
     int threads;                      /* >= 1; 0: as many as OpenMP would take */
-    const mmbvh_selection *selection; /* of a build: these cells alone; NULL: all. None may be a ghost, or flat. */
+    const mmbvh_selection *selection; /* for a build: only these cells; NULL: all. None may be a ghost or flat. */
     mmbvh_layout layout;
     mmbvh_builder builder;
 } mmbvh_options;
@@ -124,10 +124,10 @@ typedef struct mmbvh_wish {
     const mmbvh_interval *intervals;
 } mmbvh_wish;
 
-/* The cells that one of the wishes can show: no ghosts or flat cells, and none for a field of which it has a value that
- * is not finite; unusable gets the number of these for each wish. Parallel; reads each cell's values once a wish, at
- * about the speed of a refit of ranges. A tree over the selection (mmbvh_options) draws what the full tree does, for as
- * long as cells, values and wishes stay. */
+/* Selects the cells that can be seen by any of the wishes. Ghosts and flat cells are never selected, nor is a cell by a
+ * wish whose field is not finite there; unusable gets the number of such cells for each wish. Parallel; reads each
+ * cell's values once a wish, at about the speed of a refit of ranges. A tree over the selection (mmbvh_options) draws
+ * the same as the full tree, as long as cells, values and wishes stay. */
 insitu_status mmbvh_select(const grid *g, const mmbvh_wish *wishes, int wish_count, const mmbvh_options *options,
                            mmbvh_selection *out, int64_t *unusable, base_error *error);
 void mmbvh_selection_free(mmbvh_selection *selection);
@@ -138,22 +138,22 @@ insitu_status mmbvh_build_boxes(const float *lower, const float *upper, const fl
 
 void mmbvh_free(mmbvh *tree);
 
-/* New values, same cells: the nodes' own ranges again. Parallel, no allocation that lasts. */
+/* For new values on the same cells: computes the nodes' own ranges again. Parallel; keeps no new memory. */
 insitu_status mmbvh_refit_ranges(mmbvh *tree, const grid *g, const grid_field *field, const mmbvh_options *options);
 
-/* Moved vertices, same cells: the bounds again, ranges untouched. */
+/* For moved vertices of the same cells: computes the bounds again and leaves the ranges. */
 insitu_status mmbvh_refit_bounds(mmbvh *tree, const grid *g, const mmbvh_options *options);
 
 /* The part of a tree that can be seen: nodes whose range meets one of the intervals. */
 typedef struct mmbvh_visible {
-    mmbvh_ranges ranges; /* of the values as they are */
+    mmbvh_ranges ranges; /* of the current values */
     int interval_count;
     const mmbvh_interval *intervals;
 } mmbvh_visible;
 
-/* As above, but only nodes that one of so many parts shows need have their bounds again; *is_whole tells whether all
- * have. Otherwise, the bounds hold what can be seen below a node and no more, until values, intervals or vertices
- * change: a traversal that passes over nodes that show nothing finds what it would, mmbvh_check() would not agree. */
+/* As above, but may leave out nodes that none of the parts shows; *is_whole tells whether all nodes were done. If not,
+ * bounds hold only what can be seen below a node, until values, intervals or vertices change: a traversal that passes
+ * over nodes that show nothing finds the same cells, but mmbvh_check() would fail. */
 insitu_status mmbvh_refit_visible_bounds(mmbvh *tree, const grid *g, const mmbvh_visible *visible, int visible_count,
                                          const mmbvh_options *options, bool *is_whole);
 
@@ -179,8 +179,8 @@ static inline mmbvh_ranges mmbvh_pair_ranges(const float *pairs)
     return r;
 }
 
-/* SAH cost of the tree as it stands: the expected number of boxes and cells a random ray that meets the root tests
- * (each box 1, each cell 1). Of the options the threads count. */
+/* The tree's present SAH cost: the expected number of boxes and cells that a random ray tests if it meets the root
+ * (each box 1, each cell 1). Only the options' threads are used. */
 double mmbvh_cost(const mmbvh *tree, const mmbvh_options *options);
 
 typedef struct mmbvh_statistics {
@@ -192,9 +192,9 @@ typedef struct mmbvh_statistics {
     int64_t bytes;          /* nodes and cell indices */
 } mmbvh_statistics;
 
-/* Prove the tree: every cell that is drawn in exactly one leaf, counts within 1..7, every node's bounds and range
- * contain those of its children and its cells, siblings adjacent, every node reached once. The first violation is the
- * error. g, field may be NULL (a parent tree): then only the structure is proved. out may be NULL. */
+/* Prove the tree: every drawn cell is in exactly one leaf, counts are within 1..7, every node's bounds and range
+ * contain those of its children and its cells, siblings are adjacent, and every node is reached once. The first
+ * violation is the error. g, field may be NULL (a parent tree): then only the structure is proved. out may be NULL. */
 insitu_status mmbvh_check(const mmbvh *tree, const grid *g, const grid_field *field, mmbvh_statistics *out,
                           base_error *error);
 

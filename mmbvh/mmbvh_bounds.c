@@ -105,7 +105,7 @@ bounds_source bounds_source_make(const grid *g, const float *lower, const float 
     return s;
 }
 
-/* The span of the finite numbers of an array. */
+/* Finds the span of the finite numbers of an array. */
 static void span_of_any(const grid_array *a, int64_t count, int threads, double *least, double *most)
 {
     double low = INFINITY, high = -INFINITY;
@@ -200,7 +200,7 @@ item_grid item_grid_make(const double lower[3], const double upper[3])
         has_extent[axis] = extent > 0 && extent < INFINITY;
         longest = has_extent[axis] && extent > longest ? extent : longest;
         grid.origin[axis] = lower[axis];
-        /* Below the floats' own distances nodes cannot tell cells apart. */
+        /* Nodes cannot tell cells apart that are nearer than neighbouring floats. */
         if (extent > far * 0x1p-22) grid.is_finest = false;
     }
     grid.step = longest / ITEM_TOP;
@@ -215,8 +215,8 @@ static int list_block(const item *items, int64_t count, uint32_t cells[BOUNDS_BL
     return n;
 }
 
-/* Maps floats in the source's coordinates to steps. The origin is a float too: its difference from a coordinate near
- * it is exact, and from one far away off by a 2^24th of itself. */
+/* Maps floats in the source's coordinates to steps. The origin is a float too: its difference from a near coordinate is
+ * exact, and from a far one off by 2^-24 of itself. */
 typedef struct span_mapping {
     vec4 origin;
     vec4 factor;

@@ -6,13 +6,13 @@
 #include "mmbvh_item.h"
 #include "mmbvh_sweep.h"
 
-/* The boxes of so many cells, in the source's own coordinates. */
+/* Reads the boxes of so many cells, in the source's own coordinates. */
 typedef void bounds_read(const bounds_source *source, const uint32_t *cells, int count, fetch_box *boxes);
 
 /* As above, for coordinates that are floats. */
 typedef void bounds_read_spans(const bounds_source *source, const uint32_t *cells, int count, fetch_span *spans);
 
-/* box grows by so many cells. As many after soon, if not NULL, will be asked for later. */
+/* box grows by so many cells. As many from soon on, if not NULL, will be read later and may be prefetched. */
 typedef void bounds_unite(const bounds_source *source, const uint32_t *cells, int count, const uint32_t *soon,
                           fetch_box *box);
 
@@ -21,9 +21,9 @@ struct bounds_source {
     double origin[3];
     double scale;
     const float *lower, *upper; /* given boxes, count x 3 */
-    int64_t box_count;          /* ghosts too */
+    int64_t box_count;          /* with ghosts */
     bounds_read *read;
-    bounds_read_spans *read_spans; /* NULL: coordinates are not, or not all, floats */
+    bounds_read_spans *read_spans; /* NULL: not all coordinates are floats */
     bounds_unite *unite;
 };
 
@@ -42,12 +42,12 @@ static inline void bounds_transform(const bounds_source *source, fetch_box *box)
     }
 }
 
-/* A box, in the tree's coordinates, that holds all cells with coordinates that are numbers, cheap to find: that of all
- * vertices, whether cells have them or not. */
+/* Quickly finds a box, in the tree's coordinates, that holds all cells whose coordinates are numbers: the box of all
+ * vertices, used by cells or not. */
 fetch_box bounds_guess(const bounds_source *source, int threads);
 
-/* The boxes of the items that have only an index so far; set grows by them, and exact, if not NULL, by the boxes as
- * they are in the source's coordinates. */
+/* Gives boxes to items that have only an index. set grows by them, and exact, if not NULL, by the boxes in the source's
+ * coordinates. */
 void bounds_place(const bounds_source *source, const item_grid *grid, item *items, int64_t count, item_set *set,
                   fetch_box *exact);
 

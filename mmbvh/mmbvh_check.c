@@ -1,5 +1,6 @@
-/* The whole-tree proof. One walk in the order the nodes must be numbered in: what is not where the walk expects it is
- * a violation, so that every node and every entry is met exactly once, and no broken tree makes the walk endless. */
+/* The proof of a whole tree. One walk goes in the order in which the nodes must be numbered, and anything not where it
+ * is expected is a violation. So every node and entry is met exactly once, and no broken tree makes the walk endless.
+ * */
 #include "mmbvh.h"
 
 #include <inttypes.h>
@@ -58,7 +59,7 @@ static insitu_status check_cell_bounds(const walk *w, int64_t index, int64_t cel
     return INSITU_OK;
 }
 
-/* False where one of the cell's values is not finite; else their range. */
+/* Finds the range of the cell's values. False where one is not finite. */
 static bool cell_range(const walk *w, int64_t cell, double *low, double *high)
 {
     grid_walk vertices = grid_walk_cell(w->g, cell);
@@ -202,7 +203,7 @@ static insitu_status check_nodes(walk *w)
     return INSITU_OK;
 }
 
-/* Nothing left over when the walk is done. */
+/* Checks that nothing is left over when the walk is done. */
 static insitu_status check_complete(const walk *w)
 {
     if (w->next_pair != w->tree->node_count && w->tree->node_count) {

@@ -1,8 +1,8 @@
 /* The compact node: 24 bytes where the thesis's node has 40.
  *
- * The tree has a grid of 2^20 steps an axis, the steps powers of two. Of a box each axis has one 32-bit word: its lower
- * bound in whole steps, and above that its extent as a small floating-point number, so that a box is known to a
- * millionth of the tree and to 1/256 of itself, whichever is coarser, and a cell far smaller than the rest keeps its
+ * The tree has a grid of 2^20 steps an axis, whose size is a power of two. A box has one 32-bit word for each axis: its
+ * lower bound in whole steps, and above that its extent as a small floating-point number. So a box is known to a
+ * millionth of the tree or to 1/256 of itself, whichever is coarser, and a cell far smaller than the rest keeps its
  * shape:
  *
  *      31    28 27          20 19                                  0
@@ -10,7 +10,7 @@
  * - 16
  *
  * All three axes are read by one load and some ten operations on four floats, without a table and without denormals.
- * Steps being powers of two, products with them are exact: whether multiply and add are fused does not show. */
+ * Products with steps, which are powers of two, are exact, so fusing multiply and add makes no difference. */
 #ifndef MMBVH_COMPACT_H
 #define MMBVH_COMPACT_H
 

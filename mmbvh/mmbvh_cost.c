@@ -1,9 +1,9 @@
-/* A ray that meets a convex box meets one within it with the probability of their surface areas' ratio. */
+/* A ray that meets a convex box meets a box within it with a probability that is the ratio of their surface areas. */
 #include "mmbvh_cost.h"
 
 #include "mmbvh_sweep.h"
 
-/* Sums are of fixed parts of the nodes, so that no number of threads changes a bit. */
+/* The nodes are summed in a fixed number of parts, so that the sum has the same bits for any number of threads. */
 enum { PARTS = 64 };
 
 double cost_half_area(const float lower[3], const float upper[3])
@@ -41,7 +41,8 @@ double cost_area_of_tree(const mmbvh *tree, int threads)
     return area;
 }
 
-/* A ray that meets the root meets a node in the share of their surfaces. Where the root is flat all are met. */
+/* A ray that meets the root meets a node with the ratio of their surfaces as probability. If the root has no surface,
+ * all nodes are met. */
 double cost_of_area(const mmbvh *tree, double area)
 {
     if (!tree->node_count) return 0;

@@ -7,7 +7,7 @@
 /* Half the surface area of a node's box; 0 for an empty one. */
 double cost_half_area(const float lower[3], const float upper[3]);
 
-/* The nodes' boxes by the tests in them, mmbvh.area, by so many threads, to the same bits. */
+/* Computes mmbvh.area, the sum of boxes times tests in them, to the same bits for any number of threads. */
 double cost_area_of_tree(const mmbvh *tree, int threads);
 
 /* mmbvh_cost() of a tree of that area. */

@@ -48,8 +48,8 @@ MMBVH_INLINE int64_t fetch_first(const grid *g, int64_t cell, int count, const f
     return shape == FETCH_BY_CELL && g->offsets.data ? grid_array_index(&g->offsets, cell) : cell * count;
 }
 
-/* Prefetches, in a pass over cells in the mesh's order, the connectivity that later cells will ask for. The core's own
- * prefetching comes too late, regular as the pass is. */
+/* Prefetches the connectivity of later cells, in a pass over cells in the mesh's order. Though the pass is regular, the
+ * core's own prefetching comes too late. */
 MMBVH_INLINE void fetch_ahead(const grid *g, int64_t cell, const fetch_shape shape)
 {
     enum { AHEAD = 512 }; /* entries */
@@ -73,7 +73,7 @@ MMBVH_INLINE void fetch_values(const grid *g, const grid_array *values, int64_t 
         out[i] = values->data + fetch_index(&g->connectivity, first + (i < count ? i : count - 1), wide_index) * stride;
 }
 
-/* A cell's values that are floats. Are all finite? */
+/* Reads a cell's values, which are floats, and tells whether all are finite. */
 MMBVH_INLINE bool fetch_cell_floats(const grid *g, const grid_array *values, int64_t cell, const fetch_shape shape,
                                     const bool wide_index, const bool is_packed, vec4 out[2])
 {
@@ -231,8 +231,8 @@ MMBVH_INLINE void fetch_box_cell(fetch_box *box, const grid *g, int64_t cell, co
     }
 }
 
-/* The box grows by so many cells. Floats are compared as floats, and only the outcome is widened; two boxes of them
- * grow in turns, as each comparison waits for the last of its box. */
+/* The box grows by so many cells. Floats are compared as floats, and only the result is widened. Two boxes of floats
+ * grow in turns, because each comparison waits for the one before in its box. */
 MMBVH_INLINE void fetch_box_cells(fetch_box *box, const grid *g, const uint32_t *cells, int cell_count,
                                   const fetch_shape shape, const bool wide_index, const bool wide_number)
 {

@@ -4,9 +4,9 @@
  *           TOP - lower   index    upper      index           lower, upper: 0 .. TOP, in steps of an item_grid
  *                         (low)               (high)
  *
- * The box that holds two boxes is then the lanes' maximum; a vector less itself with its halves exchanged is twice the
- * centroid less TOP in the upper half and its negative in the lower one, so that bounds of centroids are a maximum too.
- * Only the choice of planes depends on these boxes, not the bounds that the nodes get. */
+ * The box that holds two boxes is then the lanes' maximum. A vector minus itself with its halves exchanged is twice the
+ * centroid minus TOP in the upper half, and the negative of that in the lower one, so that bounds of centroids are a
+ * maximum too. Only the choice of planes depends on these boxes, not the bounds that the nodes get. */
 #ifndef MMBVH_ITEM_H
 #define MMBVH_ITEM_H
 
@@ -18,12 +18,12 @@ enum { ITEM_TOP = 32767 };
 
 typedef lanes item;
 
-/* Steps in the tree's coordinates, as long on every axis: surface areas are then products of steps. */
+/* A grid in the tree's coordinates. Steps are equally long on all axes, so that surface areas are products of steps. */
 typedef struct item_grid {
     double origin[3];
     double step;       /* 0: no axis has a finite extent */
     double inverse[3]; /* of the step; 0 on an axis without a finite extent */
-    bool is_finest;    /* a finer one would not tell more cells apart */
+    bool is_finest;    /* a finer grid would not tell more cells apart */
 } item_grid;
 
 /* Bounds of items and of their centroids. */
@@ -37,7 +37,7 @@ static inline uint32_t item_index(item i)
     return (uint32_t)(uint16_t)i[3] | (uint32_t)(uint16_t)i[7] << 16;
 }
 
-/* Without a box yet. */
+/* An item without a box. */
 static inline item item_of_index(uint32_t index)
 {
     return (item){0, 0, 0, (int16_t)(uint16_t)(index & 0xffff), 0, 0, 0, (int16_t)(uint16_t)(index >> 16)};
@@ -84,8 +84,8 @@ static inline lanes item_extent(lanes box)
     return (lanes)((ulanes)box + (ulanes)lanes_swap(box) - (ulanes)lanes_set1(ITEM_TOP)); /* an empty one's wraps */
 }
 
-/* Half the surface area's terms, xy + yz and zx, of two boxes whose extents are lanes 0 to 2 and 4 to 6. Lanes 3
- * and 7 may hold anything. */
+/* The terms of half the surface area, xy + yz and zx, of two boxes whose extents are in lanes 0 to 2 and 4 to 6. Lanes
+ * 3 and 7 may hold anything. */
 static inline ivec4 item_area_terms(lanes extents)
 {
     const lanes turned = __builtin_shufflevector(extents, extents, 1, 2, 0, 3, 5, 6, 4, 7);
@@ -99,10 +99,10 @@ static inline float item_half_area(lanes box)
     return terms[0] + terms[1];
 }
 
-/* The grid that is laid over a box. */
+/* Makes the grid over a box. */
 item_grid item_grid_make(const double lower[3], const double upper[3]);
 
-/* A box of doubles to steps, to the nearest. */
+/* Rounds a box of doubles to the nearest steps. */
 static inline item item_make(const item_grid *grid, const double lower[3], const double upper[3], uint32_t index)
 {
     item made;

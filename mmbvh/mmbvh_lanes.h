@@ -1,4 +1,4 @@
-/* Eight 16-bit integers at a time, as every processor we build for has them without a flag. */
+/* Vectors of eight 16-bit integers. Every processor that the library is built for has them without a flag. */
 #ifndef MMBVH_LANES_H
 #define MMBVH_LANES_H
 

@@ -1,4 +1,4 @@
-/* Storing the boxes of nodes in a sweep of bounds, and what the tree's area grows by. */
+/* Stores the boxes of nodes in a sweep of bounds, and measures how much the tree's area grows. */
 #ifndef MMBVH_MEASURE_H
 #define MMBVH_MEASURE_H
 
@@ -30,7 +30,7 @@ static inline void store_measured(const sweep *s, int64_t node, vec4 lower, vec4
     }
 }
 
-/* Stores the box of those of the node's children that the sweep has been at: of both where it has been at neither. */
+/* Stores the union of the boxes of those children that the sweep has been to; of both where it has been to neither. */
 static inline void store_children(const sweep *s, int64_t node, int64_t pair, int64_t *misfits, double *grown)
 {
     vec4 lower[2], upper[2];

@@ -36,7 +36,7 @@ static int64_t right_begin(const sweep *s, int64_t first, int64_t end)
     return mmbvh_node_count(s->tree, first + 1) ? end : mmbvh_node_ref(s->tree, first + 1);
 }
 
-/* A pair and all below it is nodes[first .. end): in runs that are not too long for the sweep. */
+/* Sweeps a pair and all below it, nodes[first .. end), in runs that are not too long for the sweep. */
 static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
 {
     if (!s->run_max || end - first <= s->run_max) return run_all(s, first, end);
@@ -47,7 +47,7 @@ static sweep_sum sweep_runs(const sweep *s, int64_t first, int64_t end)
     return sweep_add(sweep_add(left, right), run_all(s, first, first + 2));
 }
 
-/* As above, by tasks of at most RUN_MAX nodes, and then the pair itself. */
+/* Sweeps all below the pair by tasks of at most RUN_MAX nodes, and then the pair itself. */
 static sweep_sum sweep_below(const sweep *s, int64_t first, int64_t end)
 {
     if (end - first <= RUN_MAX) return sweep_runs(s, first, end);
@@ -77,8 +77,8 @@ sweep_sum sweep_tree(const sweep *s, int threads)
     return sweep_add(sum, run_all(s, 0, 1)); /* the root after its children */
 }
 
-/* The sweep goes down through the cells too: fetch the connectivity that later leaves will ask for. What is longer than
- * a quarter of a cache line may lie across two. */
+/* Prefetches the connectivity of later leaves; the sweep goes down through the cells too. Entries longer than a quarter
+ * of a cache line may lie across two. */
 MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape shape, const bool wide_index)
 {
     const grid_array *connectivity = &s->g->connectivity;
@@ -92,13 +92,13 @@ MMBVH_INLINE void prefetch_cell(const sweep *s, int64_t entry, const fetch_shape
         __builtin_prefetch(connectivity->data + (first + count - 1) * connectivity->stride);
 }
 
-/* Outward; empty where there was no cell to grow by. */
+/* Rounds a range outward. It is empty where no cell was read. */
 static inline range rounded_range(const fetch_range *r)
 {
     return r->low <= r->high ? (range){round_down(r->low), round_up(r->high)} : range_empty();
 }
 
-/* Lanes grow by whole cells, and are one range at the end. */
+/* Lanes grow by whole cells, and become one range in the end. */
 MMBVH_INLINE range double_leaf(const sweep *s, int64_t ref, int64_t count, const fetch_shape shape,
                                const bool wide_index, const bool is_packed, int64_t *unusable)
 {
@@ -158,7 +158,7 @@ FETCH_INSTANCES(DEFINE_RUN, run_ranges)
 
 static const sweep_run run_ranges_table[FETCH_SHAPES][2][2] = FETCH_TABLE(run_ranges);
 
-/* For whatever the instances above do not read. */
+/* Serves all fields and cells that the instances above cannot read. */
 static range any_leaf(const sweep *s, int64_t ref, int64_t count, int64_t *unusable)
 {
     fetch_range leaf = {(double)INFINITY, -(double)INFINITY, true};
@@ -202,7 +202,7 @@ static sweep_sum run_box_ranges(const sweep *s, int64_t first, int64_t end)
     return (sweep_sum){0};
 }
 
-/* Can the instances read it? */
+/* Tells whether the instances can read the field. */
 static bool is_plain(const grid *g, const grid_field *field)
 {
     const bool is_float = !field->is_cell_centred && field->component >= 0 && !field->values.is_integer;

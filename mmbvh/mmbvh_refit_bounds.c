@@ -1,4 +1,4 @@
-/* Bounds of a tree's nodes, new or again. */
+/* Computes the bounds of a tree's nodes, first or again. */
 #include <string.h>
 
 #include "mmbvh_bounds.h"
@@ -7,7 +7,7 @@
 
 enum {
     PREFETCH_CELLS = 48,
-    VISIBLE_NODES = 16 /* of a run where not all are swept: those below that show nothing are too few to be sought */
+    VISIBLE_NODES = 16 /* of a run where not all are swept; looking for nodes that show nothing does not pay in fewer */
 };
 
 static void store_cells(const sweep *s, int64_t index, int64_t first, int count, int64_t *misfits, double *grown)
@@ -16,7 +16,7 @@ static void store_cells(const sweep *s, int64_t index, int64_t first, int count,
     fetch_box box;
     float lower[3], upper[3];
     fetch_box_empty(&box);
-    const uint32_t *cells = tree->cells + first; /* the sweep goes down through them */
+    const uint32_t *cells = tree->cells + first; /* the sweep goes down through the cells */
     s->source->unite(s->source, cells, count, first < PREFETCH_CELLS ? NULL : cells - PREFETCH_CELLS, &box);
     fetch_box_round(&box, tree->origin, tree->scale, lower, upper);
     store_measured(s, index, (vec4){lower[0], lower[1], lower[2], 0}, (vec4){upper[0], upper[1], upper[2], 0}, misfits,
@@ -65,7 +65,7 @@ static fetch_box exact_bounds(const mmbvh *tree, const bounds_source *source, in
     return all;
 }
 
-/* The mesh has left the tree's grid: a new one, with room for as much again of the same. */
+/* Makes a new grid for a mesh that has left the tree's, with a margin of an eighth on each side. */
 static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, int threads)
 {
     const fetch_box exact = exact_bounds(tree, source, threads);
@@ -78,7 +78,7 @@ static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, in
         upper[axis] += margin;
     }
     tree->grid = store_grid(lower, upper);
-    const sweep all = sweep_of_bounds(tree, source); /* boxes of the last grid are none of this one's */
+    const sweep all = sweep_of_bounds(tree, source); /* not measured: nodes still have boxes of the last grid */
     if (sweep_tree(&all, threads).count) return INSITU_ERROR_MESH;
     tree->area = cost_area_of_tree(tree, threads);
     return INSITU_OK;

@@ -1,6 +1,6 @@
-/* Bounds, and ranges with them if asked for, of meshes whose coordinates and values are floats, as most are: a vertex
- * is then one vector, its value in the lane that the coordinates leave, and each cell is read once, in one run with its
- * neighbours' whatever the leaves' sizes. */
+/* Computes bounds, and ranges with them if asked for, of meshes whose coordinates and values are floats, as most are. A
+ * vertex is then one vector, with its value in the fourth lane, and cells are read once, in one long run, whatever the
+ * leaves' sizes. */
 #include "mmbvh_bounds.h"
 #include "mmbvh_measure.h"
 
@@ -11,7 +11,7 @@ enum {
     PREFETCH_VERTICES = 24
 };
 
-/* The spans of the cells from first on in the tree's list, lane 3 the values'. */
+/* The spans of the cells from first on in the tree's list; lane 3 has the values'. */
 typedef struct part {
     int64_t first;
     int64_t unusable; /* cells */
@@ -20,7 +20,7 @@ typedef struct part {
     fetch_span spans[PART_CELLS];
 } part;
 
-/* Constants of a pass, but for the arrays. */
+/* Constants of a pass, except the arrays. */
 typedef struct reading {
     fetch_shape shape;
     bool wide_index, with_values, is_packed;
@@ -53,8 +53,8 @@ MMBVH_INLINE fetch_span read_cell(const sweep *s, int64_t cell, const reading ho
     return span;
 }
 
-/* Prefetches one vertex of a cell whose connectivity was asked for before; the others are near it. So many tets share a
- * vertex that theirs are in the cache already. */
+/* Prefetches one vertex of a cell whose connectivity was prefetched before; the others are near it. Tets do not need
+ * it: so many share a vertex that theirs are in the cache already. */
 MMBVH_INLINE void prefetch_vertex(const sweep *s, int64_t cell, const reading how)
 {
     const grid *g = s->source->g;
@@ -108,7 +108,7 @@ MMBVH_INLINE void store_nodes(const sweep *s, part *p, int64_t first, int64_t en
     }
 }
 
-/* A pair, or the root, whatever is below. */
+/* Sweeps a pair, or the root, whatever is below. */
 MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end, const reading how)
 {
     for (int64_t i = first; i < end; i++) {
@@ -119,7 +119,7 @@ MMBVH_INLINE void run_nodes(const sweep *s, part *p, int64_t first, int64_t end,
     }
 }
 
-/* The first cell below a node, and where its cells end. */
+/* The first cell below a node, and the end of its cells. */
 static int64_t first_cell(const mmbvh *tree, int64_t node)
 {
     while (!mmbvh_node_count(tree, node)) node = mmbvh_node_ref(tree, node);

@@ -1,8 +1,8 @@
-/* The cells that can show (thesis, section 4.2: a node whose range meets no isovalue is culled; here a cell is, before
- * there is a tree).
+/* Selects the cells that can be seen. In the thesis (section 4.2) a node whose range meets no isovalue is culled; here
+ * a cell is, before there is a tree.
  *
- * One pass a wish writes a bit a cell, a second one lists the cells whose bit is set: the first is bound by reading the
- * connectivity and the values, and the list is as long as it must be. */
+ * One pass for each wish writes a bit a cell, and another lists the cells whose bit is set. The first is bound by
+ * reading the connectivity and the values; two passes make the list as long as it must be. */
 #include <string.h>
 
 #include "memory.h"
@@ -14,7 +14,7 @@ enum { WORD_CELLS = 64, BLOCK_WORDS = 64 };
 
 typedef struct selector selector;
 
-/* Set the bits of cells begin .. end, a multiple of 64 apart but for the last; returns how many are unusable. */
+/* Sets the bits of cells begin .. end, a multiple of 64 except in the last run; returns how many are unusable. */
 typedef int64_t (*selector_run)(const selector *s, int64_t begin, int64_t end);
 
 struct selector {
@@ -144,7 +144,7 @@ static void list_bits(const uint64_t *bits, int64_t begin, int64_t end, uint32_t
             *out++ = (uint32_t)(WORD_CELLS * i + __builtin_ctzll(word));
 }
 
-/* One part of the words a thread: counted, then written where the parts before it end. */
+/* Each thread has a part of the words: it counts the cells, then writes them where the parts before it end. */
 static bool list_cells(const uint64_t *bits, int64_t words, int threads, mmbvh_selection *out)
 {
     int64_t *ends = base_calloc((size_t)threads + 1, sizeof *ends);

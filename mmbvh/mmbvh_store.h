@@ -1,4 +1,4 @@
-/* Writing nodes, whatever their layout. */
+/* Writes nodes of any layout. */
 #ifndef MMBVH_STORE_H
 #define MMBVH_STORE_H
 
@@ -17,18 +17,18 @@ static inline void store_link(const mmbvh *tree, int64_t index, int64_t ref, int
 /* The grid of a compact layout, over a box that must be finite. */
 mmbvh_grid store_grid(const float lower[3], const float upper[3]);
 
-/* Serves where the quick way rounds inward: goes outward one step at a time. Returns false where the grid ends before.
- */
+/* Serves where the quick way rounds inward, and goes outward one step at a time. Returns false where the grid ends
+ * before. */
 bool store_compact_slowly(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper);
 
-/* Lanes 0 to 2 to the nearest of what the grid has outside the box; lane 3 must be 0. False where it does not reach so
- * far. */
+/* Stores lanes 0 to 2 as the smallest box that the grid has around them; lane 3 must be 0. False where the grid does
+ * not reach so far. */
 static inline bool store_compact(const mmbvh *tree, int64_t index, vec4 lower, vec4 upper)
 {
     mmbvh_compact_node *node = &tree->compact[index];
     const vec4 origin = *(const compact_vec4 *)(const void *)tree->grid.origin;
     const vec4 step = *(const compact_vec4 *)(const void *)tree->grid.step;
-    const vec4 zero = {0}, inverse = (vec4)(0x7f000000 - (ivec4)step); /* of powers of two: by their exponents */
+    const vec4 zero = {0}, inverse = (vec4)(0x7f000000 - (ivec4)step); /* powers of two, inverted by their exponents */
     const ivec4 place =
         vec4_truncate(vec4_min(vec4_max((lower - origin) * inverse, zero), vec4_set1(COMPACT_LOWER_MAX)));
     const vec4 extent = vec4_max((upper - (vec4_from_int(place) * step + origin)) * inverse, zero) + 16.0f;
@@ -60,7 +60,7 @@ static inline bool store_box(const mmbvh *tree, int64_t index, vec4 lower, vec4 
     return true;
 }
 
-/* A node as a vector a corner, lane 3: 0. */
+/* Reads a node's box as two corners, with lane 3 zero. */
 static inline void store_decode(const mmbvh *tree, int64_t index, vec4 *lower, vec4 *upper)
 {
     if (tree->compact) {

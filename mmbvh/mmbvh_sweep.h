@@ -14,10 +14,10 @@ typedef struct bounds_source bounds_source;
 
 typedef struct sweep_sum {
     int64_t count; /* cells that were found unusable, or boxes that the nodes do not hold */
-    double grown;  /* what was added to the tree's area (mmbvh.area); of sweeps of bounds that measure it */
+    double grown;  /* growth of the tree's area (mmbvh.area), in sweeps of bounds that measure it */
 } sweep_sum;
 
-/* Nodes end - 1 down to first: the root, a pair, or a pair and all below it; nothing where there are none. */
+/* Sweeps nodes end - 1 down to first: the root, a pair, or a pair and all below it. There may be none. */
 typedef sweep_sum (*sweep_run)(const sweep *s, int64_t first, int64_t end);
 
 struct sweep {
@@ -29,15 +29,16 @@ struct sweep {
     const float *box_ranges;     /* of a parent tree */
     const bounds_source *source; /* of a sweep of bounds */
     mmbvh_ranges ranges;         /* written by a sweep of ranges */
-    int64_t run_max;             /* nodes of a run; 0: as many as are worth a task */
-    bool is_measured;            /* of a sweep of bounds: the nodes have bounds already, and grown is wanted */
+    int64_t run_max;             /* nodes in a run; 0: as many as are worth a task */
+    bool is_measured;            /* for a sweep of bounds: the nodes have bounds already, and grown is wanted */
     int visible_count;           /* 0: all nodes are swept; else those below nodes that one of these shows */
     const mmbvh_visible *visible;
-    const sweep *then; /* NULL, or one of the same tree that runs where this one has just been, in the cache */
+    const sweep *then; /* NULL, or another sweep of the same tree, which follows each run of this one while it is in the
+                          cache */
 };
 
-/* Over the whole tree; returns the sum of what the runs returned, of the last sweep's if one follows the other: to the
- * same bits for any number of threads. */
+/* Sweeps the whole tree. Returns the sum of what the runs returned (those of the last sweep, if one follows another),
+ * to the same bits for any number of threads. */
 sweep_sum sweep_tree(const sweep *s, int threads);
 
 /* The sweep that writes ranges of field (NULL: infinite ones). */
@@ -55,8 +56,8 @@ void sweep_bounds_as_floats(sweep *bounds);
 /* Tells whether the values are floats at the vertices. */
 bool sweep_reads_floats(const sweep *ranges);
 
-/* Both sweeps' work for a grid's cells in one, so that a cell is read once; ranges as sweep_of_ranges() made it for the
- * same tree. Where either cannot be read as floats it is one after the other. */
+/* Does both sweeps' work for a grid's cells in one, so that a cell is read once. ranges is from sweep_of_ranges() for
+ * the same tree. If either cannot be read as floats, they run one after the other. */
 sweep sweep_of_both(const mmbvh *tree, const bounds_source *source, const sweep *ranges);
 
 /* Returns how many threads options ask for. */

@@ -1,5 +1,6 @@
-/* Four floats at a time, three axes with one lane to spare or four values, and two doubles. Every processor we build
- * for has them without an instruction set flag, so trees are not made by kernels of several instruction sets. */
+/* Vectors of four floats (three axes and a spare lane, or four values) and of two doubles. Every processor that the
+ * library is built for has them without an instruction set flag, so trees need no kernels of several instruction sets.
+ * */
 #ifndef MMBVH_VEC4_H
 #define MMBVH_VEC4_H
 
@@ -81,7 +82,7 @@ static inline vec2 vec2_max(vec2 a, vec2 b)
 #endif
 }
 
-/* The spare lane to zero. */
+/* Sets the spare lane to zero. */
 static inline vec4 vec4_xyz(vec4 a)
 {
     return (vec4)((ivec4)a & (ivec4){-1, -1, -1, 0});
@@ -124,7 +125,7 @@ static inline float round_up(double x)
     return 0.0f - round_down(-x);
 }
 
-/* (a - origin) scale as doubles have it, then round_down(). */
+/* round_down() of (a - origin) scale, which is computed in double. */
 static inline vec4 vec4_place_down(vec4 a, const double origin[4], double scale)
 {
 #if defined(__SSE2__)

@@ -1,8 +1,8 @@
 /* Everything is drawn in linear light on premultiplied colours, so that edges of lines and letters are smooth on any
- * background. Order: the strokes that what is drawn hides go under the picture, the background under these, all else
- * over it. Sizes are shares of the picture's height: a picture of twice the size is the same picture, finer.
+ * background. Strokes that the picture hides are drawn under it, the background under these, and all else over it.
+ * Sizes are shares of the picture's height: a picture of twice the size looks the same, only finer.
  *
- * Text is OpenImageIO's, by FreeType. It looks fonts up by name in the system's folders and in those that
+ * OpenImageIO draws text by FreeType. It looks fonts up by name in the system's folders and in those that
  * OPENIMAGEIO_FONTS names. */
 #include "decorate.h"
 
@@ -38,7 +38,7 @@ float *pixel_at(sheet &s, int x, int y)
                         static_cast<std::size_t>(x))];
 }
 
-/* Colour of this opacity over the pixel, or under it. */
+/* Blends a colour of this opacity over the pixel, or under it. */
 void blend(float *pixel, const float colour[3], double opacity, bool is_behind)
 {
     const double seen = is_behind ? opacity * (1 - std::min(1.0, static_cast<double>(pixel[3]))) : opacity;
@@ -55,7 +55,7 @@ void put_background(sheet &s)
     }
 }
 
-/* How much of the pixel [x, x + 1) the interval covers. */
+/* Returns how much of the pixel [x, x + 1) the interval covers. */
 double covered(double low, double high, int x)
 {
     return std::clamp(std::min(high, x + 1.0) - std::max(low, static_cast<double>(x)), 0.0, 1.0);
@@ -79,7 +79,7 @@ double distance_to(const insitu_stroke &line, double x, double y)
     return std::hypot(x - (line.from[0] + at * dx), y - (line.from[1] + at * dy));
 }
 
-/* Row by row, the columns that the line may meet: long lines cost their length, not their box. */
+/* Goes row by row over the columns that the line may meet, so that lines cost their length, not their box. */
 void draw_stroke(sheet &s, const insitu_stroke &line, double width, const float colour[3])
 {
     const double reach = 0.5 * width + 1, dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
@@ -114,8 +114,8 @@ void draw_strokes(sheet &s, bool behind)
 
 /* ---- words --------------------------------------------------------------------------------------------------- */
 
-/* FreeType crashes where it finds no memory for a font, and OpenImageIO passes by letters for which there is none. So
- * there must be far more memory than words take before any are made. */
+/* FreeType crashes where it finds no memory for a font, and OpenImageIO leaves out letters for which there is none. So
+ * this checks, before any words are drawn, that there is far more memory than they take. */
 void check_memory()
 {
     enum { ENOUGH = 2 << 20 };
@@ -132,7 +132,7 @@ int width_of(const sheet &s, const std::string &text, int size)
     return box.defined() ? box.xend : 0;
 }
 
-/* How much of each pixel letters cover: they begin at `left`, on this baseline. */
+/* Letters, as the share of each pixel that they cover. They begin at `left`, on this baseline. */
 struct lettering {
     int width, height, left, baseline;
     std::vector<float> covered;
@@ -152,7 +152,7 @@ lettering make_lettering(const sheet &s, const std::string &text, int size)
     return out;
 }
 
-/* From the left end of its baseline. */
+/* Writes text from the left end of its baseline. */
 void write_text(sheet &s, const std::string &text, double x, double baseline, int size)
 {
     if (!s.font || text.empty()) return;
@@ -167,7 +167,7 @@ void write_text(sheet &s, const std::string &text, double x, double baseline, in
         }
 }
 
-/* A plate in the background's colour, so that words can be read on any picture. */
+/* Draws a plate in the background's colour, so that words can be read on any picture. */
 void put_plate(sheet &s, const area &block)
 {
     const float alpha = s.what.background[3];
@@ -194,7 +194,7 @@ void draw_words(sheet &s, const insitu_words &words)
 
 /* ---- colour bars --------------------------------------------------------------------------------------------- */
 
-/* Linear between the table's entries, as the renderer looks them up. */
+/* Looks a colour up, linear between the table's entries, as the renderer does. */
 void colour_at(const insitu_colour_bar &bar, double place, float out[3])
 {
     const int last = bar.colour_count - 1;
@@ -226,7 +226,7 @@ void draw_frame(sheet &s, const area &a)
     }
 }
 
-/* Small boxes beyond the ends, where values outside of the range have colours of their own. */
+/* Draws small boxes beyond the ends, where values outside the range have colours of their own. */
 void draw_outside(sheet &s, const insitu_colour_bar &bar, const area &where)
 {
     const double height = 0.45 * s.size;
@@ -252,8 +252,8 @@ double width_of_bar(sheet &s, const insitu_colour_bar &bar, double thickness)
     return std::max<double>(width_of(s, bar.label, s.size), thickness + 0.5 * s.size + words);
 }
 
-/* The label, a gap, and the bar with its ticks at its right. Bars of one side share its height and are as wide as the
- * widest, so that they stand in line. */
+/* Draws the label, a gap, and the bar with its ticks on the right. Bars of one side share its height and are as wide as
+ * the widest, so that they stand in line. */
 void draw_bar(sheet &s, const insitu_colour_bar &bar)
 {
     int sharing = 0, before = 0;
@@ -267,7 +267,7 @@ void draw_bar(sheet &s, const insitu_colour_bar &bar)
     }
     const double length = std::max(2.0 * s.size, 0.62 * s.image.height / sharing - head - foot);
     const double height = head + length + foot, gap = 0.5 * s.margin;
-    const double above = (before - 0.5 * (sharing - 1)) * (height + gap); /* of the middle of the side */
+    const double above = (before - 0.5 * (sharing - 1)) * (height + gap); /* from the middle of the side */
     const area block = place_block(s.image, {bar.at, above}, width, height, s.margin, s.taken);
     const area gradient = {block.x0, block.y0 + head, block.x0 + thickness, block.y0 + head + length};
     put_plate(s, block);
@@ -285,7 +285,7 @@ bool are_apart(const area &a, const area &b, double gap)
 
 /* ---- lengths ------------------------------------------------------------------------------------------------- */
 
-/* Words over the bar. */
+/* Draws the bar with its words above it. */
 void draw_scale_bar(sheet &s)
 {
     const insitu_scale_bar &bar = s.what.scale_bar;
@@ -301,7 +301,7 @@ void draw_scale_bar(sheet &s)
     draw_stroke(s, {{x1, y - tick}, {x1, y + tick}, false}, 1.5 * line_width(s), s.what.colour);
 }
 
-/* Numbers along edges: the middle of the words is so far away that their box is a gap from the point. */
+/* Draws a number at an edge. The middle of the words is placed so that their box is a gap away from the point. */
 void draw_label(sheet &s, const insitu_label &label)
 {
     const double width = width_of(s, label.text, s.size), height = 0.75 * s.size;
@@ -317,7 +317,7 @@ void draw_label(sheet &s, const insitu_label &label)
 
 /* ---- axes ---------------------------------------------------------------------------------------------------- */
 
-/* Red, green and blue for x, y and z, the one that points away from the eye first. */
+/* Draws x, y and z in red, green and blue, beginning with the one that points away from the eye most. */
 void draw_axes(sheet &s)
 {
     static const float colours[3][3] = {{0.8F, 0.05F, 0.05F}, {0.05F, 0.5F, 0.05F}, {0.08F, 0.2F, 0.9F}};
@@ -338,7 +338,7 @@ void draw_axes(sheet &s)
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
 
-/* By glob(), as the C++ library's walk through folders ends the process where it finds no memory. */
+/* Uses glob(), because the C++ library's walk through folders ends the process where it finds no memory. */
 bool is_in_folder(const std::string &folder)
 {
     bool is_found = false;
@@ -353,7 +353,7 @@ bool is_in_folder(const std::string &folder)
     return is_found;
 }
 
-/* Where OpenImageIO finds no font though there is one, there was no memory for it. */
+/* Tells whether a font is installed. If OpenImageIO finds none all the same, there was no memory for it. */
 bool is_installed()
 {
     const char *own = std::getenv("OPENIMAGEIO_FONTS");

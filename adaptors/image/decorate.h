@@ -23,8 +23,8 @@ struct spot {
 area place_block(const insitu_image &image, const spot &where, double width, double height, double margin,
                  std::vector<area> &taken);
 
-/* Puts the image's background under rgba, a copy of its pixels, and its decorations over it. warning says what had to be
- * left out. */
+/* Puts the image's background under rgba, a copy of its pixels, and its decorations over it. warning becomes a message
+ * about what was left out, or stays. */
 void decorate(const insitu_image &image, std::vector<float> &rgba, std::string &warning);
 
 #endif

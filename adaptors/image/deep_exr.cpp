@@ -1,4 +1,4 @@
-/* Samples are handed to OpenImageIO in bands of rows, so that no second copy of the picture is held. */
+/* Samples are handed to OpenImageIO in bands of rows, to avoid a second copy of the picture. */
 #include "deep_exr.h"
 
 #include <OpenImageIO/deepdata.h>
@@ -20,7 +20,7 @@ namespace
 
 enum { CHANNELS = 6, BAND_ROWS = 16 };
 
-/* The rows of an image from y on, as many as there are. */
+/* Some rows of an image, from y on. */
 struct band {
     int y, rows;
     std::size_t first, pixels;
@@ -40,7 +40,7 @@ std::size_t sample_count(const insitu_deep &deep, std::size_t first, std::size_t
     return count;
 }
 
-/* Of OpenEXR's compressions deep files may have those of single rows alone; the level is that of flat files. */
+/* Deep EXR files allow only compressions of single rows. The level is that of flat files. */
 OIIO::ImageSpec describe(int width, int height)
 {
     OIIO::ImageSpec spec(width, height, CHANNELS, OIIO::TypeDesc::FLOAT);
@@ -53,7 +53,7 @@ OIIO::ImageSpec describe(int width, int height)
     return spec;
 }
 
-/* The channels of a sample lie as those of the file's description do. */
+/* A sample's channels have the order of the file's description. */
 void fill(const insitu_deep &deep, const band &b, OIIO::DeepData &data)
 {
     static_assert(sizeof(insitu_deep_sample) == CHANNELS * sizeof(float), "samples have no gaps");
@@ -87,7 +87,7 @@ class memory_file
     {
         return "/proc/self/fd/" + std::to_string(descriptor_);
     }
-    /* What has been written, until the file is destroyed. */
+    /* The bytes written so far; valid until the file is destroyed. */
     const unsigned char *bytes()
     {
         const off_t end = lseek(descriptor_, 0, SEEK_END);
@@ -128,7 +128,7 @@ void encode(int width, int height, const insitu_deep &deep, const std::string &p
     file.finish();
 }
 
-/* A band's rows and pixels as they are handed over, and compressed. */
+/* Bytes that a band takes when it is handed over and compressed. */
 std::size_t largest_band_bytes(int width, int height, const insitu_deep &deep)
 {
     std::size_t most = 0;

@@ -11,7 +11,7 @@
 namespace
 {
 
-/* That a C library lacked memory is told by its words alone. */
+/* Only the words of a C library's message tell that it lacked memory. */
 [[noreturn]] void fail_with(std::string what)
 {
     for (const char *words : {"memory", "bad_alloc"})
@@ -34,8 +34,8 @@ std::uint64_t number_at(const file_bytes &file, std::size_t at, int bytes)
     return number;
 }
 
-/* In the table of blocks of rows, behind the attributes (name, type, size and value each), the place of a block that is
- * lost stays 0. Files of several parts have lists of attributes until an empty one; these have one. */
+/* The attributes (name, type, size and value each) are followed by a table of blocks of rows, in which the place of a
+ * lost block is 0. The files made here have one part, and so one list of attributes. */
 bool has_all_rows(const file_bytes &file, int height, int block_rows)
 {
     enum { VERSION = 4, VERSION_END = 8, SIZE_BYTES = 4, PLACE_BYTES = 8, HAS_PARTS = 0x1000 };
@@ -71,7 +71,7 @@ encoded_file::encoded_file(const char *name, const OIIO::ImageSpec &spec, const 
 void encoded_file::open(const char *name, const OIIO::ImageSpec &spec, const std::string &path)
 {
     OIIO::attribute("threads", 1);
-    OIIO::attribute("exr_threads", -1); /* none but the caller's */
+    OIIO::attribute("exr_threads", -1); /* the caller's thread only */
     output_ = OIIO::ImageOutput::create(name, memory_.get());
     if (!output_) fail_with(OIIO::geterror());
     output_->threads(1);

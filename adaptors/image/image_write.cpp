@@ -1,7 +1,7 @@
 /* insitu_image_write() by OpenImageIO: the one place that knows image formats.
  *
- * libinsitu loads this file by dlopen() inside someone's run, so nothing may be thrown out of it, it starts no threads,
- * and what goes wrong is said in a message. */
+ * libinsitu loads this file by dlopen() inside someone's run, so it throws nothing out, starts no threads, and returns
+ * errors as messages. */
 #include "insitu/image_output.h"
 
 #include <OpenImageIO/imageio.h>
@@ -53,8 +53,8 @@ bool is_opaque(const insitu_image &image)
     return true;
 }
 
-/* The codes of all linear values from 0 to 1 without a power for each. Between two of the bins the code rises by one at
- * most: a bin is 1/4096 wide, a code at least 1 / (255 * 12.92), 1/3295. */
+/* Looks up the codes of linear values from 0 to 1 without computing a power for each. From bin to bin the code rises by
+ * at most one: a bin is 1/4096 wide, a code at least 1 / (255 * 12.92) = 1/3295. */
 class srgb_codes
 {
   public:
@@ -78,7 +78,7 @@ class srgb_codes
   private:
     enum { CODES = 256, BINS = 4096 };
 
-    /* The least number that has the code, by halving until there is none between the two. */
+    /* The least number that has the code, by bisection until no number lies between. */
     static double least_of(int code)
     {
         double below = 0, least = 1;
@@ -87,7 +87,7 @@ class srgb_codes
         return least;
     }
 
-    std::array<double, CODES + 1> begin_{}; /* of each code */
+    std::array<double, CODES + 1> begin_{}; /* the least value of each code */
     std::array<std::uint8_t, BINS + 1> first_{};
 };
 
@@ -112,8 +112,8 @@ template <typename code> void encode_pixel(const float *pixel, std::size_t chann
     if (channels == 4) out[3] = code_of<code>(alpha);
 }
 
-/* Straight sRGB codes, with the alpha channel where channels is 4. Neighbours are often the same, those of the
- * background above all. */
+/* Encodes to straight sRGB codes, with alpha where channels is 4. Neighbouring pixels are often equal, above all in the
+ * background. */
 template <typename code> std::vector<code> encode(const insitu_image &image, std::size_t channels)
 {
     std::vector<code> codes(pixel_count(image) * channels);
@@ -149,12 +149,13 @@ std::vector<float> with_channels(const insitu_image &image)
 struct layout {
     int channels;
     OIIO::TypeDesc type;
-    const char *file_name; /* by whose ending OpenImageIO knows the format */
+    const char *file_name; /* its ending tells OpenImageIO the format */
     OIIO::ImageSpec (*describe)(const insitu_image &, const layout &);
 };
 
-/* The simulation waits while a picture is compressed. Differences to the pixel on the left (libpng's PNG_FILTER_SUB) at
- * the lowest level take a quarter to a tenth of the time of libpng's own choice; files are larger by 28 to 48 %. */
+/* The simulation waits while a picture is compressed. So PNG uses differences to the pixel on the left (libpng's
+ * PNG_FILTER_SUB) and the lowest level: a quarter to a tenth of the time of libpng's defaults, for files larger by 28
+ * to 48 %. */
 OIIO::ImageSpec describe_png(const insitu_image &image, const layout &l)
 {
     OIIO::ImageSpec spec(image.width, image.height, l.channels, l.type);
@@ -174,11 +175,11 @@ OIIO::ImageSpec describe_exr(const insitu_image &image, const layout &l)
     spec.alpha_channel = 3;
     spec.z_channel = image.depth ? 4 : -1;
     spec.attribute("oiio:ColorSpace", "Linear");
-    spec.attribute("compression", "zip:1"); /* 0.64 of the time of zlib's usual level, and 1.08 of the bytes */
+    spec.attribute("compression", "zip:1"); /* takes 0.64 of the time of zlib's usual level, and 1.08 of the bytes */
     return spec;
 }
 
-/* The file as OpenImageIO makes it, in memory: its PNG writer does not notice a full disk. */
+/* Makes the file by OpenImageIO, in memory because its PNG writer does not notice a full disk. */
 void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixels, std::vector<unsigned char> &bytes)
 {
     encoded_file file(name, spec, bytes);
@@ -186,8 +187,8 @@ void encode_file(const char *name, const OIIO::ImageSpec &spec, const void *pixe
     file.finish();
 }
 
-/* Large blocks are allocated first, so that the reserve is left to OpenImageIO and the libraries below it: for the
- * tables that they fill at the first picture, a few rows, and the compressors' room. */
+/* Large blocks are allocated first, so that the reserve is left to OpenImageIO and the libraries below it, for tables
+ * that they fill at the first picture, a few rows, and the compressors' room. */
 void write_pixels(const insitu_image &image, const layout &l, const void *pixels, const std::string &path)
 {
     enum { ROWS = 128, TABLES = 16 << 20, ADDED = 1 << 20 };

@@ -12,8 +12,8 @@ std::atomic<void *> reserve;
 std::atomic<std::new_handler> handler_before;
 std::mutex lock; /* one holds a reserve at a time */
 
-/* Left free beside the reserve for what does not come by operator new: the loader ends the process where it finds no
- * room for a thread's variables, and compressors give up. */
+/* Bytes left free beside the reserve for allocations without operator new: the loader ends the process where it finds
+ * no room for a thread's variables, and compressors give up. */
 enum { SPARE_BYTES = 4 << 20 };
 
 void give_back()

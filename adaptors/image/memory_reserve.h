@@ -1,13 +1,13 @@
-/* Memory set aside for code that cannot do without.
+/* Memory set aside for code that cannot cope with failed allocations.
  *
- * OpenImageIO, OpenEXR and the C++ library have functions that may not throw and yet allocate (of an image's channel
- * names, of an attribute, of the next name of a folder), and lists that they register once and leave half done where
- * that fails. There an allocation that fails ends the process or spoils all later pictures. They are all small and made
- * by operator new; so a reserve is held while such code runs, and given back to the heap when operator new first fails,
- * which then tries again. Where the reserve cannot be had there is no memory to begin with.
+ * OpenImageIO, OpenEXR and the C++ library have functions that may not throw and yet allocate (an image's channel
+ * names, an attribute, the next name in a folder), and lists that they register once and leave half done if that fails.
+ * A failed allocation there ends the process or spoils all later pictures. These allocations are small and made by
+ * operator new. So a reserve is held while such code runs; when operator new first fails, it is given back to the heap,
+ * and operator new tries again. Failing to get the reserve counts as lack of memory.
  *
- * The handler is the process's: for as long as a reserve is held another thread may spend it; what handler there was
- * before is called when it is gone. */
+ * The new-handler belongs to the process: another thread may spend the reserve while it is held. When the reserve is
+ * gone, the handler from before is called. */
 #ifndef ADAPTORS_MEMORY_RESERVE_H
 #define ADAPTORS_MEMORY_RESERVE_H
 

@@ -34,7 +34,7 @@ class descriptor
     descriptor &operator=(const descriptor &) = delete;
     ~descriptor() { close(); }
     int number() const { return number_; }
-    /* 0, or why not all has been written. */
+    /* Returns 0, or the errno that tells why not all was written. */
     int close()
     {
         const int number = std::exchange(number_, -1);
@@ -47,7 +47,7 @@ class descriptor
 
 /* ---- names ---- */
 
-/* Too short to be refused wherever the picture's own name is not. */
+/* A name so short that it is accepted wherever the picture's own name is. */
 std::string random_name()
 {
     static std::random_device source;
@@ -68,7 +68,7 @@ bool is_temporary(const char *name)
 
 /* ---- what killed runs left ---- */
 
-/* A file of this user's that nobody has locked, though each is locked by its writer. */
+/* Removes a temporary file of this user's if nobody has locked it, since its writer would have. */
 void remove_if_left(int folder, const char *name)
 {
     const descriptor file(openat(folder, name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
@@ -90,7 +90,7 @@ void remove_left_files(int folder)
     }
 }
 
-/* Once a folder and process: with many pictures a folder takes long to read. */
+/* Tidies each folder once a process: with many pictures a folder takes long to read. */
 void tidy(int folder)
 {
     static std::set<std::pair<dev_t, ino_t>> tidied;
@@ -112,7 +112,8 @@ class temporary_file
   public:
     explicit temporary_file(int folder) : folder_(folder), name_(random_name()), file_(make())
     {
-        /* Another process that tidies the folder may have come between. Without locks none removes anything. */
+        /* Another process that tidies the folder may have come first. On file systems without locks nobody removes
+         * anything. */
         struct stat made;
         is_lost_ = flock(file_.number(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
         is_lost_ = is_lost_ || fstat(file_.number(), &made) != 0 || made.st_nlink == 0;
@@ -152,8 +153,8 @@ void temporary_file::write(const unsigned char *bytes, std::size_t size)
     }
 }
 
-/* False where it is not there any more. The lock goes with the close: some file systems tell only then of a full disk.
- */
+/* False where the file is not there any more. Closing releases the lock; some file systems report a full disk only
+ * then. */
 bool temporary_file::keep(const std::string &name)
 {
     const int code = file_.close();
@@ -209,8 +210,8 @@ void write_picture_file(const std::string &path, const unsigned char *bytes, std
     const descriptor folder(open_folder(target.parent_path()));
     check_place(folder.number(), name);
     tidy(folder.number());
-    /* Another process that tidies the folder may take the file for one that was left: before it is locked, or where
-     * locks do not reach from node to node. */
+    /* Another process that tidies the folder may take the file for one that a killed run left: before it is locked, or
+     * where locks do not reach from node to node. */
     enum { TRIES = 8 };
     for (int i = 0; i < TRIES; i++)
         if (try_to_write(folder.number(), name, bytes, size)) return;

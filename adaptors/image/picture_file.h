@@ -1,8 +1,8 @@
 /* A picture's file: it appears whole or not at all.
  *
- * What is written goes to a temporary file in the picture's own folder, which then takes the picture's name at once.
- * The temporary file is one that nobody else can have made: of a random name, opened where there was nothing before. It
- * is locked for as long as its writer lives, and so those that killed runs left are told from those being written. */
+ * Bytes go to a temporary file in the picture's own folder, which is then renamed to the picture. Nobody else can have
+ * made the temporary file: it has a random name and is opened only if there was none. It is locked as long as its
+ * writer lives, and so files that killed runs left are told from those being written. */
 #ifndef ADAPTORS_PICTURE_FILE_H
 #define ADAPTORS_PICTURE_FILE_H
 
@@ -14,7 +14,8 @@ struct io_error : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/* Write size bytes to path; missing folders are made. Throws io_error, and then what path named before is untouched. */
+/* Write size bytes to path; missing folders are made. If it throws io_error, a file that path named before is
+ * untouched. */
 void write_picture_file(const std::string &path, const unsigned char *bytes, std::size_t size);
 
 #endif

@@ -1,4 +1,4 @@
-/* The face of the VTK adaptor: which meshes a data object is, what each is made of, and how long what was made must
+/* The face of the VTK adaptor: it decides which meshes a data object makes, from which arrays, and how long these must
  * live. A session reads borrowed arrays during a step, so everything a mesh was built from (references to VTK's arrays,
  * conversions) stays in one `part` under the mesh's name until the session has taken a new mesh of that name or has
  * been told that there is none. */
@@ -48,7 +48,7 @@ struct failure {
     std::string message;
 };
 
-/* Over all leaves of one insitu_vtk_set(). */
+/* The result over all leaves of one insitu_vtk_set(). */
 struct outcome {
     tally count;
     cell_counts cells;
@@ -73,7 +73,7 @@ constexpr unsigned char ghosts_not_drawn =
     vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
 
 /* Ghost flags: VTK's byte has bits that hide a cell and bits that only describe it. VTK's own array serves where it
- * holds nothing but the former, and none is needed where nothing is hidden. */
+ * holds only the former, and none is needed where nothing is hidden. */
 void set_ghosts(vtkUnstructuredGrid *grid, const cell_list &cells, const std::string &what, tally &count, part &p)
 {
     vtkUnsignedCharArray *ghosts = grid->GetCellGhostArray();
@@ -118,7 +118,8 @@ bool has_field(const part &p, const std::string &name)
     return false;
 }
 
-/* A numeric array with a name, of the right length, which is not a flag of VTK's own. */
+/* Tells whether an array becomes a field: it is numeric, has a name and the right length, and is no flag of VTK's own.
+ * */
 bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, tally &count)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";
@@ -216,7 +217,7 @@ void set_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, c
     }
 }
 
-/* Say what insitu_vtk_make_grid() made of data: its lists, and what is not data's own. */
+/* Count in bytes what insitu_vtk_make_grid() made for data: the lists that are not data's own. */
 void tell_what_was_made(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::string &what, tally &count)
 {
     if (grid->GetNumberOfCells() == 0) return;
@@ -237,7 +238,7 @@ void tell_what_was_made(vtkUnstructuredGrid *grid, vtkDataSet *data, const std::
         count.copied(what + " ghosts", "cells with hidden points, or refined, flagged", grid->GetNumberOfCells());
 }
 
-/* A data set of another class than an unstructured grid, as one; with other ghost flags than its own, if given. */
+/* Set a data set that is no unstructured grid as one, with other ghost flags than its own, if given. */
 void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
                vtkDataSet *data, vtkUnsignedCharArray *flags, outcome &out)
 {
@@ -252,7 +253,7 @@ void set_other(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, 
     set_leaf(adaptor, parts, name, grid, out);
 }
 
-/* A leaf of a composite, where the iterator stands. */
+/* Set the leaf of a composite at the iterator. */
 void set_other_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
                     vtkCompositeDataSet *composite, vtkCompositeDataIterator *it, outcome &out)
 {
@@ -266,7 +267,7 @@ void set_other_leaf(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &pa
     set_other(adaptor, parts, name, data, flags, out);
 }
 
-/* Every leaf, the empty ones too, so that a leaf has one number on all ranks. */
+/* Set every leaf. Empty ones are counted too, so that a leaf has the same number on all ranks. */
 void set_leaves(insitu_vtk_adaptor *adaptor, std::map<std::string, part> &parts, const std::string &name,
                 vtkCompositeDataSet *composite, outcome &out)
 {

@@ -20,7 +20,7 @@ namespace insitu_vtk
 namespace
 {
 
-/* Cells low to high - 1 along each axis; an axis that a flat AMR has not is of one cell. */
+/* Cells low to high - 1 along each axis. The axis that a flat AMR lacks has one cell. */
 struct box {
     std::array<int64_t, 3> low{}, high{};
 
@@ -88,7 +88,7 @@ vtkSmartPointer<vtkUnsignedCharArray> copied_flags(vtkDataSet *data)
     return flags;
 }
 
-/* The cells of `in` that lie within `part` of it; i runs fastest. */
+/* Flag the cells of `in` that lie within `part` of it; i runs fastest. */
 void mark(const box &in, const box &part, vtkUnsignedCharArray *flags)
 {
     for (int64_t k = part.low[2]; k < part.high[2]; k++)

@@ -1,13 +1,13 @@
-/* VTK keeps numbers in many array classes, and almost all data come in two of them: AOS (tuples one after another) and
- * SOA (one block a component). Both are pointers and strides to libinsitu, for the element types it knows:
+/* VTK has many array classes, but almost all data come in two of them: AOS (tuples one after another) and SOA (one
+ * block a component). libinsitu reads both by pointers and strides, for the element types it knows:
  *
  *     AOS   x0 y0 z0 x1 y1 z1 ...       tuple stride 3 elements, component stride 1
  *     SOA   x0 x1 ... | y0 y1 ... | z0 z1 ...    tuple stride 1, component stride the distance between blocks
  *
  * A field has one component stride, so the blocks of an SOA array must lie evenly in memory to be borrowed; coordinates
- * are three arrays of their own, and may lie anywhere. Whatever else there is (shorts, characters, unsigned integers,
- * bits, arrays computed on access) is copied: integers to an integer type that holds every value where there is one,
- * else to double. */
+ * are three arrays of their own, and may lie anywhere. All others (shorts, characters, unsigned integers, bits, arrays
+ * computed on access) are copied: integers to an integer type that holds every value, if there is one, else to double.
+ * */
 #include "vtk_arrays.h"
 
 #include <cstring>
@@ -23,7 +23,7 @@ namespace insitu_vtk
 namespace
 {
 
-/* long and long long are both 64 bits wide and different types to VTK. */
+/* long and long long are both 64 bits wide, but different types to VTK. */
 template <typename T> constexpr insitu_type element_type()
 {
     if constexpr (std::is_integral_v<T>)
@@ -97,7 +97,7 @@ template <typename From, typename To> bool convert(vtkDataArray *array, hold &he
     return true;
 }
 
-/* Any array at all, through VTK's own access by double. */
+/* Copies any array, through VTK's own access by double. */
 template <typename To> array_view convert_any(vtkDataArray *array, hold &held)
 {
     array_view view = shape_of(array, element_type<To>());

@@ -1,4 +1,4 @@
-/* VTK's data arrays as libinsitu sees them: borrowed where the layout allows, else copied. */
+/* Makes VTK's data arrays readable for libinsitu: borrowed where the layout allows, else copied. */
 #ifndef VTK_ARRAYS_H
 #define VTK_ARRAYS_H
 

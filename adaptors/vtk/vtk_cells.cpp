@@ -1,6 +1,6 @@
-/* A recipe says, for each type of cell that VTK has and libinsitu draws, which linear cells stand for it and which of
- * its points are their vertices. Where every cell of a grid is its own recipe (tets, hexes, wedges, pyramids) VTK's
- * arrays are handed over untouched; one cell that is not makes a new list of all.
+/* For each VTK cell type that libinsitu draws, a recipe says which linear cells stand for it and which of its points
+ * are their vertices. Where all cells of a grid stand for themselves (tets, hexes, wedges, pyramids), VTK's arrays are
+ * handed over untouched; a single other cell makes a new list of all.
  *
  * A voxel differs from a hexahedron by the order of its points. Polyhedra and prisms of five and six sides are
  * libinsitu's polyhedra, with a list of their faces (vtk_faces.h). Higher-order cells list their corners first, in the
@@ -95,7 +95,7 @@ const recipe_table &recipes()
     return table;
 }
 
-/* VTK's arrays of one grid, raw. */
+/* Pointers to VTK's arrays of one grid. */
 template <typename Id> struct raw_cells {
     const uint8_t *types;
     const Id *offsets;
@@ -103,21 +103,21 @@ template <typename Id> struct raw_cells {
     int64_t count;
 
     int64_t size(int64_t cell) const { return static_cast<int64_t>(offsets[cell + 1] - offsets[cell]); }
-    /* How many of its points the linear cell has that stands for it. */
+    /* How many of the cell's points its linear cell has. */
     int64_t linear_size(int64_t cell, const recipe &r) const
     {
         return r.what == kind::polygon ? size(cell) : r.part.vertex_count;
     }
 };
 
-/* Sizes of the new list, and what is said of it. */
+/* The sizes of the new list, and the reasons for it. */
 struct new_size {
     int64_t cells = 0;
     int64_t vertices = 0;
     bool is_one_to_one = true;
 };
 
-/* The cells with faces, in their order: has[i] where VTK's cell i is one that is whole. */
+/* The cells with faces, in their order: has[i] tells that VTK's cell i is one, with all its faces. */
 struct faced_cells {
     face_list faces;
     std::vector<bool> has;
@@ -182,7 +182,7 @@ void fill_new(const raw_cells<Id> &raw, const faced_cells &faced, uint8_t *types
     *offsets = at;
 }
 
-/* "voxels reordered, faces of polyhedra shared" of what is there. */
+/* Names the conversions of the cells there are, as in "voxels reordered, faces of polyhedra shared". */
 std::string why_converted(const std::array<int64_t, 256> &by_type)
 {
     const char *const reasons[] = {"some cells not drawn",
@@ -228,7 +228,8 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
                  size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) + face_bytes);
 }
 
-/* All cells are drawn as they are: VTK's arrays, and of one type in one size neither types nor offsets. */
+/* All cells are drawn as they are, from VTK's arrays; if all are of one type and size, neither types nor offsets are
+ * needed. */
 template <typename Id>
 void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::array<int64_t, 256> &by_type,
                   int64_t connectivity_count, hold &held, tally &count, insitu_mesh &mesh)

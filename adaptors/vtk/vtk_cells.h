@@ -25,12 +25,12 @@ struct cell_counts {
 
 struct cell_list {
     int64_t count = 0;
-    bool is_one_to_one = true;   // cell i is VTK's cell i
-    std::vector<int64_t> source; // else: VTK's cell of cell i
+    bool is_one_to_one = true;   // cell i is VTK's cell i; else see source
+    std::vector<int64_t> source; // VTK's cell for each cell i
 };
 
-/* Fill in the cells of mesh (count, types, connectivity, offsets) from grid. Every index of the connectivity is as VTK
- * has it: not checked here. False, with a message, where grid's arrays do not fit together. */
+/* Fill in the cells of mesh (count, types, connectivity, offsets) from grid. The indices of the connectivity are not
+ * checked here. False, with a message, where grid's arrays do not fit together. */
 bool view_cells(vtkUnstructuredGrid *grid, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
                 cell_list &cells, cell_counts &counts, std::string &error);
 

@@ -1,4 +1,5 @@
-/* Faces of neighbouring cells are matched by their set of points: each is made once, as the first cell has it. */
+/* Faces of neighbouring cells are matched by their set of points: each face is made once, from the first cell that has
+ * it. */
 #include "vtk_faces.h"
 
 #include <algorithm>
@@ -34,7 +35,8 @@ int64_t face_list::face(const int64_t *points, size_t count)
     return made;
 }
 
-/* [faces, points of the first, its points, points of the second, ...] from the cell's place on. */
+/* Reads VTK's stream of the cell: [number of faces, number of the first one's points, its points, number of the second
+ * one's points, ...]. */
 bool face_list::add_stream(vtkUnstructuredGrid *grid, int64_t cell)
 {
     vtkIdTypeArray *stream = grid->GetFaces(), *places = grid->GetFaceLocations();
@@ -54,7 +56,7 @@ bool face_list::add_stream(vtkUnstructuredGrid *grid, int64_t cell)
     return faces >= 4;
 }
 
-/* One base around, then the other. */
+/* Adds a prism whose points go around one base, then the other. */
 void face_list::add_prism(const int64_t *points, int sides)
 {
     cells.push_back(face(points, static_cast<size_t>(sides)));

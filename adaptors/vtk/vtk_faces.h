@@ -25,7 +25,7 @@ class face_list
     const int64_t *cell_faces(size_t number) const { return cells.data() + cell_starts[number]; }
     int64_t cell_size(size_t number) const { return cell_starts[number + 1] - cell_starts[number]; }
 
-    /* Into the mesh; the memory is held's. Returns its bytes. */
+    /* Hands the faces over to mesh, in memory that held owns. Returns its bytes. */
     int64_t hand_over(hold &held, insitu_mesh &mesh) const;
 
   private:

@@ -1,6 +1,6 @@
-/* The points of curvilinear grids, the polygons of polygonal data and all arrays are VTK's own, by reference. A list of
- * hexahedra and, for images and rectilinear grids, of points is what the way through unstructured grids costs: 37 bytes
- * a cell, offset and type included, and 24 a point. */
+/* The points of curvilinear grids, the polygons of polygonal data and all arrays are VTK's own, by reference. The way
+ * through unstructured grids costs a list of hexahedra, 37 bytes a cell with offset and type, and for images and
+ * rectilinear grids a list of points, 24 bytes each. */
 #include "insitu/vtk_grids.h"
 
 #include <array>
@@ -29,7 +29,7 @@
 namespace
 {
 
-/* The points of a grid along its axes of more than one point: three, or two of a flat grid. */
+/* The numbers of points along the axes with more than one: three axes, or two for a flat grid. */
 struct lattice {
     int64_t line = 1, rows = 1, layers = 1;
 
@@ -39,7 +39,7 @@ struct lattice {
     int64_t cells() const { return (line - 1) * (rows - 1) * (is_flat() ? 1 : layers - 1); }
 };
 
-/* False for data of no such axes, or of fewer than two of more than one point. */
+/* False for data without such axes, or with fewer than two of them. */
 bool get_lattice(vtkDataSet *data, lattice &l)
 {
     std::array<int, 3> d{};
@@ -59,7 +59,7 @@ bool get_lattice(vtkDataSet *data, lattice &l)
     return count > 1;
 }
 
-/* The cells in VTK's order, hidden ones too. */
+/* Lists the cells in VTK's order, hidden ones too. */
 template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice &l)
 {
     using id = typename Array::ValueType;
@@ -84,13 +84,13 @@ template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice
 
 void set_lattice(const lattice &l, vtkUnstructuredGrid *grid)
 {
-    /* The offsets go up to eight times the cells, of which there are fewer than points. */
+    /* Offsets go up to eight times the number of cells, which is less than that of points. */
     const bool is_small = l.points() < std::numeric_limits<int32_t>::max() / 8;
     grid->SetCells(l.is_flat() ? VTK_QUAD : VTK_HEXAHEDRON,
                    is_small ? list_cells<vtkTypeInt32Array>(l) : list_cells<vtkTypeInt64Array>(l));
 }
 
-/* Polygons as they are listed; false where there are other cells too. */
+/* Borrows the list of polygons; false where there are other cells too. */
 bool borrow_polygons(vtkPolyData *data, vtkUnstructuredGrid *grid)
 {
     if (!data || data->GetNumberOfVerts() > 0 || data->GetNumberOfLines() > 0 || data->GetNumberOfStrips() > 0)
@@ -106,7 +106,7 @@ bool borrow_polygons(vtkPolyData *data, vtkUnstructuredGrid *grid)
     return true;
 }
 
-/* Cells of any other data set, one by one. */
+/* Lists the cells of any other data set, one by one. */
 void set_cells(vtkDataSet *data, vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkIdList> points;

@@ -4,16 +4,16 @@
 
 enum { RUN_MAX = INT16_MAX }; /* items that a lane can count */
 
-/* Few items need few bins: the bins' own cost is most of a small node's. */
+/* Few items get few bins, whose own cost is most of a small node's. */
 bin_mapping bin_mapping_make(lanes centroids, int64_t item_count)
 {
     const int wanted = (int)(4 + (item_count < (int64_t)8 * BINS_MAX ? item_count / 8 : BINS_MAX));
     const int count = wanted < BINS_MAX ? wanted : BINS_MAX;
     const lanes used = centroids & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
     const ivec4 least = -lanes_lower(used), extent = lanes_upper(used) - least;
-    /* Below 2^15, where it matters, a quotient is further from the next integer than rounding goes. */
+    /* Below 2^15, where it matters, rounding cannot take a quotient to the next integer. */
     const vec4 quotient = vec4_set1((float)(count * 65536)) / vec4_from_int(extent + 1);
-    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* so that 2 steps part */
+    const ivec4 factor = vec4_truncate(vec4_min(quotient, vec4_set1(32768))); /* so that 2 steps are told apart */
     return (bin_mapping){(ulanes)lanes_pack(least, least),
                          lanes_pack(factor - 32768, factor - 32768) ^ lanes_set1(INT16_MIN), count};
 }
@@ -37,7 +37,7 @@ void bins_merge(bins *b, const bins *other, int count)
     }
 }
 
-/* Offsets of the bins on each axis: of one item in lanes 0 to 2, of another in lanes 4 to 6. */
+/* The bins' offsets on each axis: for one item in lanes 0 to 2, for another in lanes 4 to 6. */
 static inline ulanes offsets_of(const bin_mapping *m, item a, item b)
 {
     const lanes upper = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
@@ -46,7 +46,8 @@ static inline ulanes offsets_of(const bin_mapping *m, item a, item b)
     return places * (uint16_t)sizeof(bin);
 }
 
-/* In lane 3 of the boxes items are counted on the way, so that an item takes one load and one store a bin. */
+/* Adds an item to its bin of each axis. Lane 3 of the boxes counts the items, so that one load and one store a bin
+ * suffice. */
 static inline void add(bins *b, const uint16_t offsets[3], item i)
 {
     const lanes counted = i & (lanes){-1, -1, -1, 0, -1, -1, -1, 0};
@@ -68,8 +69,8 @@ static void keep_counts(bins *b, int count)
     }
 }
 
-/* Every stride-th of count items, two at a time: neighbours often go to the same bin, and would wait for each other's
- * store. */
+/* Adds every stride-th item, count of them, in pairs from the two halves of the list: neighbours often go to the same
+ * bin and would wait for each other's store. */
 static void fill_run(bins *b, const bin_mapping *mapping, const item *items, int64_t count, int64_t stride)
 {
     const int64_t half = count / 2;
@@ -107,7 +108,7 @@ static inline vec4 half_areas(const lanes boxes[3])
            vec4_from_int(__builtin_shufflevector(xy, zz, 1, 3, 5, 7));
 }
 
-/* An empty side's cost is not a number, whatever its box says, and so never the least. */
+/* The cost of an empty side is NaN, whatever its box, and so never the least. */
 static inline vec4 side_cost(const lanes boxes[3], ivec4 counts)
 {
     return (vec4)((ivec4)(half_areas(boxes) * vec4_from_int(counts)) | (ivec4)(counts == 0));
@@ -119,7 +120,7 @@ static inline void grow(lanes boxes[3], ivec4 *counts, const bins *b, int bin)
     *counts += *(const ivec4 *)b->of[bin].counts;
 }
 
-/* Takes the best of the three axes, without a branch, as nothing tells which it will be. */
+/* Takes the best of the three axes, without a branch that could not be predicted. */
 static bin_split least(vec4 costs, ivec4 borders)
 {
     float cost = costs[0];
@@ -157,7 +158,7 @@ bin_split bins_choose(const bins *b, const bin_mapping *m)
     return least(best, best_border);
 }
 
-/* A side's box is as large as each of its items' at least, so a plane costs as much as the items' own areas. */
+/* A side's box is at least as large as each of its items', so no plane costs less than the sum of the items' areas. */
 float bins_least_cost(const item *items, int64_t count)
 {
     vec4 terms = {0};
@@ -165,19 +166,19 @@ float bins_least_cost(const item *items, int64_t count)
     return terms[0] + terms[1];
 }
 
-/* Whichever side it is of, an item changes places with the first right one so far; only how far the left ones reach
- * depends on it. No branch is there to be mispredicted. */
+/* Each item, of either side, changes places with the first right one so far; then the left end moves if the item is a
+ * left one. So there is no branch to be mispredicted. */
 int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count)
 {
     enum { SIZE = sizeof(item), SIGN_TO_SIZE = 27 };
     const int factor = (uint16_t)m->factor[split.axis];
     const int first =
-        (int16_t)m->origin[split.axis] + (split.border * 65536 + factor - 1) / factor; /* of the right ones */
+        (int16_t)m->origin[split.axis] + (split.border * 65536 + factor - 1) / factor; /* the right side's first */
     const int16_t *lower = (const int16_t *)(const void *)items + split.axis, *upper = lower + 4;
     char *base = (char *)items;
     int64_t left = 0; /* bytes */
     for (int64_t i = 0; i < count; i++) {
-        const int before = upper[8 * i] - lower[8 * i] - first; /* negative: a left one */
+        const int before = upper[8 * i] - lower[8 * i] - first; /* negative for a left item */
         const item moved = items[i];
         item *place = (item *)(void *)(base + left);
         items[i] = *place;

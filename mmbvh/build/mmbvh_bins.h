@@ -1,8 +1,7 @@
-/* Binned surface area heuristic: what the parallel top of the tree and the serial subtrees share.
- *
- * Items are sorted by centroid into bins along all three axes at once; every border between two bins of an axis is a
- * candidate plane. Maxima and counts come out the same whatever order the items are met in, so bins filled by
- * different threads merge to the same bits. */
+/* Binned surface area heuristic, shared by the parallel top of the tree and the serial subtrees. Items are sorted by
+ * centroid into bins along all three axes at once; every border between two bins of an axis is a candidate plane.
+ * Maxima and counts do not depend on the order of the items, so bins filled by different threads merge to the same
+ * bits. */
 #ifndef MMBVH_BINS_H
 #define MMBVH_BINS_H
 
@@ -13,8 +12,8 @@
 
 enum {
     BINS_MAX = 16,
-    BINS_SAMPLED = 2048, /* from so many items on, */
-    BINS_STRIDE = 7      /* one of so many tells where to split as well as all of them */
+    BINS_SAMPLED = 2048, /* with so many items or more, */
+    BINS_STRIDE = 7      /* one item of so many tells as well where to split */
 };
 
 /* Maps twice the centroid, less TOP, to a bin on each axis. Lanes 4 to 6 repeat 0 to 2, for two items at a time. */
@@ -52,13 +51,13 @@ static inline int64_t bins_stride(int64_t count)
     return count < BINS_SAMPLED ? 1 : BINS_STRIDE;
 }
 
-/* Every stride-th of the items, from the first on. */
+/* Fills the bins with every stride-th item, from the first on. */
 void bins_fill(bins *b, const bin_mapping *m, const item *items, int64_t count, int64_t stride);
 
 /* The plane of least cost for the items in the bins; the first of equals. */
 bin_split bins_choose(const bins *b, const bin_mapping *m);
 
-/* No plane between the items costs less. */
+/* A lower bound of what any plane between the items costs. */
 float bins_least_cost(const item *items, int64_t count);
 
 /* Tells whether splitting count items at this cost, which adds two boxes to test, is better than a leaf. Items that do
@@ -68,7 +67,7 @@ static inline bool bins_worth_splitting(float cost, int64_t count, lanes bounds)
     return count > MMBVH_MAX_LEAF || cost < (float)(count - 2) * item_half_area(bounds);
 }
 
-/* Left items to the front; returns how many. The order depends on the order before alone. */
+/* Moves the left items to the front; returns how many they are. The result depends only on the order before. */
 int64_t bins_part(const bin_mapping *m, bin_split split, item *items, int64_t count);
 
 #endif

@@ -1,13 +1,13 @@
-/* Each node is a task. A large one runs over its items in chunks, themselves tasks: first the bins, which merge to the
- * same bits in any order; then, the plane chosen, every chunk is parted in place, and what stands on the wrong side of
- * the border that the sum of the left items makes is exchanged: there are as many right ones before it as left ones
- * behind it, and the first goes with the first.
+/* Each node is a task. A large one goes over its items in chunks, which are tasks too. First they fill bins, which
+ * merge to the same bits in any order. When the plane is chosen, each chunk is parted in place. The number of left
+ * items makes the border, before which as many right items are left as there are left ones behind it: these are
+ * exchanged, first with first.
  *
  *      chunk 0        chunk 1        chunk 2
  *     | l l l r r r | l l r r r r | l l l l r r |
  *                         border ^                    r r r (chunk 0) and one r of chunk 1 with l l l l of chunk 2
  *
- * Chunks depend on the number of items alone, so neither they nor who runs them shows in the tree. */
+ * Chunks depend on the number of items alone, so the tree does not depend on the threads that run them. */
 #include "mmbvh_branch.h"
 
 #include <omp.h>
@@ -15,13 +15,13 @@
 enum {
     CHUNK_MIN = 16384,
     CHUNKS_MAX = 64,
-    PARALLEL_MIN = 8 * CHUNK_MIN /* fewer items: a task of their own keeps a thread busy long enough */
+    PARALLEL_MIN = 8 * CHUNK_MIN /* fewer items make one task, which is long enough for a thread */
 };
 
 /* A node before it is split. */
 typedef struct branch_node {
     item_set set;
-    item_grid grid; /* that the items are in steps of */
+    item_grid grid; /* whose steps the items are in */
     int depth;
 } branch_node;
 
@@ -35,7 +35,7 @@ typedef struct splitting {
     int64_t left_count;
     branch_node node;
     bin_mapping mapping;
-    int64_t stride; /* of the items that fill bins */
+    int64_t stride; /* every so many-th item fills bins */
     bin_split split;
     bins total;
     item_set sides[2];
@@ -57,7 +57,7 @@ static int64_t chunk_end(const splitting *s, int chunk)
     return end < s->count ? end : s->count;
 }
 
-/* act() for every chunk, by tasks. */
+/* Calls act() for every chunk, by tasks. */
 static void for_chunks(splitting *s, const branch_builder *builder,
                        void (*act)(splitting *, const branch_builder *, int chunk, int64_t begin, int64_t end))
 {

@@ -1,8 +1,8 @@
-/* How a tree comes to be: all cells' boxes in 16 bytes a cell or their keys in 8, twice; the tree without bounds, 4
- * bytes a node; then the nodes, whose bounds and ranges come from the sweeps that refit them.
+/* A tree is built in three steps: the boxes of all cells in 16 bytes each, or their keys, twice 8 bytes; the tree
+ * without bounds, 4 bytes a node; then the nodes, whose bounds and ranges come from the sweeps that refit them.
  *
- * Memory at its most, bytes a cell: 16 for items or keys, 4 for a node (of which there are 0.35 a tet), 4 for the cell
- * indices of the result. The items are given back before the nodes are made. */
+ * Peak memory in bytes a cell: 16 for items or keys, 4 for each node (0.35 nodes a tet), 4 for the cell indices of the
+ * result. The items are given back before the nodes are made. */
 #include "mmbvh.h"
 
 #include <string.h>
@@ -19,11 +19,11 @@ enum { FILL_CHUNKS = 256, PARALLEL_MIN_CELLS = 4096, LIST_CELLS = 16384 };
 /* The memory and counters that a build holds until it ends. */
 typedef struct build {
     bounds_source source;
-    const uint32_t *selected; /* cells of the grid, none of them a ghost; NULL: all that are none */
-    int64_t listed;           /* as many, or all with ghosts */
+    const uint32_t *selected; /* cells of the grid, without ghosts; NULL: all that are not ghosts */
+    int64_t listed;           /* length of selected, or all cells with ghosts */
     mmbvh_options options;
     int threads;
-    int64_t starts[FILL_CHUNKS + 1]; /* where the chunks' cells begin: ghosts have no place */
+    int64_t starts[FILL_CHUNKS + 1]; /* where the chunks' cells begin; ghosts are not counted */
     int64_t count;
     item *items;
     uint64_t *keys, *other_keys;
@@ -92,7 +92,7 @@ static void fill_keys(const build *b, int chunk, fetch_box *exact)
     morton_place(&b->source, b->coder, keys, count, exact);
 }
 
-/* All cells by the grid over box, in the tree's coordinates. */
+/* Fills in all cells by the grid over box, in the tree's coordinates. */
 static void fill(build *b, const fetch_box *box)
 {
     b->grid = item_grid_make(box->lower, box->upper);
@@ -120,7 +120,7 @@ static void fill(build *b, const fetch_box *box)
     }
 }
 
-/* Vertices that no cell has, and ghosts', may lie far off. */
+/* The guess is loose where vertices of ghosts, or of no cell, lie far off. */
 static bool is_loose(const fetch_box *guess, const fetch_box *exact)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -236,7 +236,7 @@ static bool build_nodes(build *b)
     return is_built;
 }
 
-/* All but the bounds and ranges. */
+/* Makes the tree except its bounds and ranges. */
 static insitu_status make(build *b, base_error *error)
 {
     const int64_t count = b->source.box_count;

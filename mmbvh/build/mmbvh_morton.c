@@ -9,14 +9,14 @@
 
 enum {
     CODE_BITS_MAX = 3 * MORTON_AXIS_BITS,
-    DIGIT_BITS = 11, /* as many streams as a core's cache can hold the ends of */
+    DIGIT_BITS = 11, /* a core's cache can hold the ends of so many streams */
     DIGITS = 1 << DIGIT_BITS,
-    SORT_CHUNKS = 4, /* a thread: one that is held up leaves its own to others */
+    SORT_CHUNKS = 4, /* per thread, so that others can take those of a delayed one */
     SORT_CHUNKS_MAX = 64,
-    SORT_LARGE = 16, /* a part of all keys so large is sorted by all threads, */
+    SORT_LARGE = 16, /* parts above this fraction of all keys are sorted by all threads, */
     SORT_LARGE_MIN = 16384,
-    SORT_INSERTED = 24, /* and one so small by insertion */
-    SORT_LEFT_BITS = 2  /* a digit's keys: 2 to the power of these at most, where they are evenly spread */
+    SORT_INSERTED = 24, /* and parts of so few keys by insertion */
+    SORT_LEFT_BITS = 2  /* a digit has at most 2 to this power of keys, if they are spread evenly */
 };
 
 static int bits_of(uint64_t x)
@@ -24,7 +24,7 @@ static int bits_of(uint64_t x)
     return x ? 64 - __builtin_clzll(x) : 0;
 }
 
-/* Which axis each bit of the code halves, the highest first; counts how many an axis gets. */
+/* Chooses the axis that each bit of the code halves, the highest bit first; counts the bits of each axis. */
 static void choose_axes(const double lower[3], const double upper[3], int code_bits, int axes[], int counts[3])
 {
     double sides[3];
@@ -109,7 +109,7 @@ static sum_mapping sum_mapping_make(const bounds_source *source, const morton_co
     return m;
 }
 
-/* NaN goes to 0. */
+/* NaN becomes 0. */
 static inline uint64_t code_of_span(const sum_mapping *m, const morton_coder *coder, const fetch_span *span)
 {
     const vec4 place = ((span->lower + span->upper) * 0.5f - m->origin) * m->factor;
@@ -233,7 +233,8 @@ static void insert(uint64_t *keys, int64_t count)
     }
 }
 
-/* Keys at from, to there or to other, by a digit of as many values as leave a few keys each. No two are equal. */
+/* Sorts the keys at from, in place or to other, by a digit that leaves a few keys for each of its values. No two keys
+ * are equal. */
 static void sort_alone(uint64_t *from, uint64_t *other, int64_t count, bool to_other)
 {
     if (count <= SORT_INSERTED) {

@@ -15,13 +15,14 @@ typedef struct morton_coder {
     double most[3];   /* the last step */
     int index_bits;
     int code_bits;
-    uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* where so many bits of an axis go in a key */
+    uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* where the bits of an axis go in a key, so many at a time
+                                                             */
 } morton_coder;
 
-/* For cells below index_count, in a box in the tree's coordinates. */
+/* Prepares for cells below index_count, within a box in the tree's coordinates. */
 void morton_coder_init(morton_coder *coder, const double lower[3], const double upper[3], int64_t index_count);
 
-/* The keys of cells, whose indices keys hold so far; exact grows by the cells' boxes in the source's coordinates. */
+/* Makes the keys of the cells whose indices keys holds; exact grows by the cells' boxes in the source's coordinates. */
 void morton_place(const bounds_source *source, const morton_coder *coder, uint64_t *keys, int64_t count,
                   fetch_box *exact);
 

@@ -1,9 +1,9 @@
-/* Items are parted in place, so a node's items are always one contiguous run, and the order they end in depends on
- * nothing but the order they came in. Where a node is so small that the grid tells its items apart badly, as in meshes
- * whose cells differ by orders of magnitude, their boxes are read from the vertices again, in steps of a finer grid. */
+/* Items are parted in place, so a node's items are always one run, and their final order depends only on their first.
+ * Where a node is so small that the grid tells its items apart badly, as in meshes whose cells differ by orders of
+ * magnitude, their boxes are read from the vertices again, in steps of a finer grid. */
 #include "mmbvh_subtree.h"
 
-enum { COARSE = 64 }; /* steps of the longest side: an area is off by 3 percent */
+enum { COARSE = 64 }; /* steps of the longest side, at which an area is off by 3 percent */
 
 bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid)
 {

@@ -12,8 +12,8 @@ bool subtree_wants_finer_grid(lanes bounds, const item_grid *grid);
 /* The grid over the bounds, which are in steps of grid. */
 item_grid subtree_finer_grid(lanes bounds, const item_grid *grid);
 
-/* Links of a tree over at most TOPOLOGY_SUBTREE_CELLS items in steps of grid, which are left in the order of the
- * leaves. depth is of its root in the whole tree. */
+/* Builds a tree over at most TOPOLOGY_SUBTREE_CELLS items in steps of grid, and leaves the items in the order of the
+ * leaves. depth is that of its root in the whole tree. Returns the root's link. */
 topology_link subtree_build(topology_scratch *scratch, const bounds_source *source, item *items, int64_t count,
                             const item_grid *grid, int depth);
 

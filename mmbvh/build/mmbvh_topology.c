@@ -73,7 +73,7 @@ static void write_links(topology *t, const mmbvh *tree, int64_t below)
     t->links = NULL;
 }
 
-/* The root to its slot, all below it to nodes below and on; returns where they end. */
+/* Writes the root to its slot and all below it to the nodes from below on; returns where they end. */
 static int64_t write(topology *t, const mmbvh *tree, int64_t slot, int64_t below)
 {
     if (!t->children[0]) {

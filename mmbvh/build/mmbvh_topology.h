@@ -1,8 +1,7 @@
-/* A tree under construction, before it has bounds: only who is whose child, and which cells are in which leaf.
+/* A tree under construction, before it has bounds: only the nodes' children and the leaves' cells.
  *
- * The top is nodes of pointers, made by all threads; below each of its leaves hangs a subtree that one thread made
- * alone: 4 bytes a node, numbered as the tree will be. When all are there, they are numbered through and written out.
- */
+ * Its top has nodes with pointers, made by all threads. Below each of its leaves hangs a subtree that one thread made
+ * alone, of 4 bytes a node, numbered as the tree will be. In the end all nodes are numbered and written out. */
 #ifndef MMBVH_TOPOLOGY_H
 #define MMBVH_TOPOLOGY_H
 
@@ -12,11 +11,12 @@
 
 enum {
     TOPOLOGY_SUBTREE_CELLS = 16384,              /* at most: they and their nodes fit a core's cache */
-    TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32 /* from here on halves: 2^32 cells end within the depth allowed */
+    TOPOLOGY_MEDIAN_DEPTH = MMBVH_MAX_DEPTH - 32 /* from here on nodes are halved, so that 2^32 cells end within the
+                                                    depth allowed */
 };
 
-/* A subtree's node. The 3 low bits are a leaf's count; the others are its first cell, or an inner node's left child,
- * counted from where the subtree begins. */
+/* A subtree's node. The 3 low bits are a leaf's count, 0 for an inner node; the others are the leaf's first cell, or
+ * the inner node's left child, counted from the subtree's begin. */
 typedef uint32_t topology_link;
 
 static inline topology_link topology_leaf(int64_t first, int64_t count)
@@ -29,13 +29,13 @@ static inline topology_link topology_inner(int64_t left)
     return (topology_link)(left << 3);
 }
 
-/* The links of one subtree, as a thread makes them. */
+/* The memory in which a thread makes the links of a subtree. */
 typedef struct topology_scratch {
     topology_link *links; /* room for 2 TOPOLOGY_SUBTREE_CELLS: all below the root */
     int64_t count;
 } topology_scratch;
 
-/* A place for a pair of siblings. */
+/* Takes a place for a pair of siblings. */
 static inline int64_t topology_new_pair(topology_scratch *s)
 {
     s->count += 2;
@@ -57,11 +57,11 @@ typedef struct topology_build {
     atomic_bool failed;        /* an allocation */
 } topology_build;
 
-/* False: out of memory; topology_end() all the same. */
+/* False: out of memory. topology_end() must be called all the same. */
 bool topology_begin(topology_build *build, int64_t cells, int threads);
 void topology_end(topology_build *build);
 
-/* NULL: out of memory, and the build has failed. */
+/* NULL: out of memory; the build has then failed. */
 topology *topology_new(topology_build *build, int64_t first, int64_t count);
 
 /* Makes the contents of the thread's scratch the subtree under t. */
