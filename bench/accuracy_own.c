@@ -1,5 +1,5 @@
-/* libinsitu at each of its settings. A frame is timed from the trees to the finished pixels: what compositing on one
- * rank does is part of it. */
+/* The rows of libinsitu at each of its settings. A frame is timed from the trees to the finished pixels, including
+ * compositing on one rank. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 
 enum { MAX_RUNS = 64, FEW_RUNS = 3 };
 
-/* Pictures of one subject. */
+/* The pictures of one subject. */
 typedef struct studio {
     const accuracy_context *context;
     accuracy_scene scene;
@@ -74,7 +74,7 @@ static void close_studio(studio *s)
     free(s->depths);
 }
 
-/* One rank's fragments of a pixel stand together. */
+/* Merges each pixel's fragments, which one rank makes in one run. */
 static void finish(studio *s)
 {
     const float nothing[4] = {0, 0, 0, 0};
@@ -87,7 +87,7 @@ static void finish(studio *s)
     }
 }
 
-/* Seconds of a frame. */
+/* Draws a frame; returns its seconds. */
 static double draw(studio *s)
 {
     base_error error;
@@ -110,7 +110,7 @@ static bool is_worth_another(const accuracy_effort *effort, int runs, double tot
     return runs == 0 || total < effort->seconds || (runs < FEW_RUNS && total < 4 * effort->seconds);
 }
 
-/* Draw, and draw again for the time; then what was drawn is compared. */
+/* Draws once, then again for the times, and compares the picture with the truth. */
 static void measure(studio *s, accuracy_row *row)
 {
     double frames[MAX_RUNS], total = 0;
@@ -124,7 +124,7 @@ static void measure(studio *s, accuracy_row *row)
     accuracy_print(s->context, row);
 }
 
-/* How rays find the cells: the picture at once, or as the thesis has it. All draw the same bits. */
+/* The ways in which rays find the cells: the picture at once, or as in the thesis. All draw the same bits. */
 typedef struct surface_way {
     render_traversal traversal;
     const char *neubauer, *robust;
@@ -144,7 +144,7 @@ static void root_rows(studio *s, const surface_way *way)
     measure(s, &(accuracy_row){.layer = "isosurface", .method = way->robust, .setting = "robust"});
 }
 
-/* By packets and by SPMD on a lattice of tets and one of hexes: elsewhere the ratios are theirs. */
+/* Packets and SPMD are measured only on a lattice of tets and one of hexes; the ratios are the same elsewhere. */
 void accuracy_surface_rows(const accuracy_context *context)
 {
     static const surface_way ways[] = {{RENDER_BINNED, "Neubauer", "robust"},
@@ -159,7 +159,7 @@ void accuracy_surface_rows(const accuracy_context *context)
     close_studio(&s);
 }
 
-/* A number of cells as a fraction. */
+/* Names a number of cells as a fraction. */
 static void name_cells(char *name, size_t bytes, double cells)
 {
     if (cells >= 1)
@@ -190,7 +190,7 @@ static void group_rows(studio *s)
     s->scene.job.sample_group = 64;
 }
 
-/* The mean of frames of different jitter: their times add up. */
+/* The rows of means over frames of different jitter, whose times add up. */
 static void frame_rows(studio *s)
 {
     const size_t channels = 4 * (size_t)s->count;
@@ -233,7 +233,7 @@ static void max_error_rows(studio *s)
     s->scene.job.max_error = 0;
 }
 
-/* Groups are a matter of time alone, and of one kind of cell as of another. */
+/* Groups change the time alone, alike for all kinds of cells, so they are measured on linear ones. */
 static void sample_rows(studio *s)
 {
     step_rows(s, "samples", 4, 1.0 / 16);
@@ -248,7 +248,7 @@ void accuracy_volume_rows(const accuracy_context *context)
     accuracy_scene_volume(&s.scene, context->subject);
     if (!is_brief) sample_rows(&s);
     s.scene.job.integration = RENDER_SEGMENTS;
-    /* Linear cells are one segment whatever the step. */
+    /* A linear cell is one segment, whatever the step. */
     step_rows(&s, "segments", is_linear || is_brief ? 1 : 4, is_linear || is_brief ? 1 : 1.0 / 8);
     max_error_rows(&s);
     close_studio(&s);

@@ -1,4 +1,4 @@
-/* The peers: one that crashes, or never ends, is a row that says so. */
+/* The rows of the peers. One that crashes or never ends gets a row that says so. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@ typedef struct peer {
     const char *method, *setting;
     bench_vtk_mapper mapper;
     accuracy_opacity meaning;
-    int coarser; /* resample: the finest resolution is halved so often */
+    int coarser; /* resample: how often the finest resolution is halved */
 } peer;
 
 static const peer peers[] = {

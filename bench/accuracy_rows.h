@@ -1,14 +1,14 @@
-/* The rows of the trade: libinsitu at each of its settings, and the peers. */
+/* The rows of speed against error: libinsitu at each of its settings, and the peers. */
 #ifndef ACCURACY_ROWS_H
 #define ACCURACY_ROWS_H
 
 #include "accuracy_truth.h"
 
-/* How much work a run is. */
+/* The amount of work of a run. */
 typedef struct accuracy_effort {
-    int size, block;  /* pixels a side of the picture, and of the block of which one is compared */
+    int size, block;  /* pixels a side of the picture, and of the blocks of which one pixel each is compared */
     int runs;         /* frames timed for a row, at most */
-    double seconds;   /* no more than 3 frames are timed when they have taken this, and no more when four times this */
+    double seconds;   /* timing goes on for so long and for 3 frames, but ends after four times this */
     int frames;       /* accumulated at most */
     int resolution;   /* of the finest image that VTK samples */
     int peer_seconds; /* after which a peer is stopped */
@@ -19,7 +19,7 @@ typedef struct accuracy_context {
     const accuracy_effort *effort;
     const accuracy_truth *truth;
     accuracy_subject *subject;
-    double build; /* seconds of building the tree: the median */
+    double build; /* median of the seconds that building the tree takes */
 } accuracy_context;
 
 /* Build the subject's tree, timed. */
@@ -29,7 +29,7 @@ void accuracy_surface_rows(const accuracy_context *context); /* none where brief
 void accuracy_volume_rows(const accuracy_context *context);
 void accuracy_peer_rows(const accuracy_context *context);
 
-/* One row. first: seconds to the first picture, from the mesh in memory; frames: of each further one. */
+/* One row. first is the seconds from the mesh in memory to the first picture, frames those of each further one. */
 typedef struct accuracy_row {
     const char *layer, *method;
     char setting[32];

@@ -1,5 +1,4 @@
-/* The lattices are those of bench_render; of the real grids, views, isovalues and ranges are as their collection gives
- * them. */
+/* The lattices are those of bench_render; views, isovalues and ranges of the real grids come from their collection. */
 #include "accuracy_subject.h"
 
 #include <stdio.h>
@@ -138,7 +137,7 @@ static double tet_volume(const double *a, const double *b, const double *c, cons
            6;
 }
 
-/* By the tets that join the triangles of its faces to its centre. */
+/* The volume of a polyhedron, from the tets that join the triangles of its faces to its centre. */
 static double polyhedron_volume(const test_mesh *m, int64_t cell)
 {
     double centre[3] = {0, 0, 0}, sum = 0;
@@ -157,7 +156,7 @@ static double polyhedron_volume(const test_mesh *m, int64_t cell)
     return sum;
 }
 
-/* Warped faces as two triangles. */
+/* The volume of a cell, with warped faces as two triangles. */
 static double cell_volume(const test_mesh *m, int64_t cell)
 {
     static const signed char tet[][4] = {{0, 1, 2, 3}}, pyramid[][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}},
@@ -186,7 +185,7 @@ static double mean_cell_size(const test_mesh *m)
     return sum / (double)m->cell_count;
 }
 
-/* The whole angle in which the corners of the bounds are seen. */
+/* The full angle in which the corners of the bounds are seen. */
 static double fitting_degrees(const render_camera *camera, const double low[3], const double high[3])
 {
     double steepest = 0;

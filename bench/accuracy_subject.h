@@ -1,4 +1,4 @@
-/* What bench_accuracy draws: a mesh with its field, and the one picture of it that all are asked for. */
+/* The subject of bench_accuracy: a mesh with its field, and the picture of it that every method draws. */
 #ifndef ACCURACY_SUBJECT_H
 #define ACCURACY_SUBJECT_H
 
@@ -11,20 +11,20 @@ typedef struct accuracy_view {
     double eye[3], focal[3], up[3];
 } accuracy_view;
 
-/* Opacity and colour have the same knots, evenly spaced: VTK's integrators cut cells at the knots of both, and would be
- * slowed down by a long colour table that libinsitu reads for nothing. */
+/* Opacity and colour have the same knots, evenly spaced: VTK's integrators cut cells at the knots of both, and a long
+ * colour table, which costs libinsitu nothing, would slow them down. */
 typedef struct accuracy_subject {
     char name[64];
     test_mesh mesh;
     test_view view; /* the mesh as a simulation would hold it: float32 coordinates and values, int32 indices */
     mmbvh tree;
     accuracy_view look;
-    double degrees; /* the whole angle of the square picture: the bounds just fit */
+    double degrees; /* the full angle of the square picture, in which the bounds just fit */
     double isovalue;
     double knots[ACCURACY_KNOTS];
     float opacities[ACCURACY_KNOTS], colours[3 * ACCURACY_KNOTS];
     double unit_distance;
-    double cell_size; /* as of step_cells in a scene: the mean over the cells of the cube root of the volume */
+    double cell_size; /* unit of step_cells in a scene: the mean over all cells of the cube root of the volume */
     render_camera camera;
     render_space space;
 } accuracy_subject;
@@ -34,7 +34,7 @@ typedef struct accuracy_subject {
 bool accuracy_subject_create(const char *name, int size, accuracy_subject *out);
 void accuracy_subject_free(accuracy_subject *subject);
 
-/* A job of the subject, whose tree has been built, and what it points to: not to be moved. */
+/* A job of the subject, whose tree has been built, with all that it points to. It must not be moved. */
 typedef struct accuracy_scene {
     render_job job;
     render_part part;
@@ -44,14 +44,14 @@ typedef struct accuracy_scene {
     render_volume_layer volume;
 } accuracy_scene;
 
-/* The isosurface, opaque, by robust roots; or the volume, by samples a cell apart. */
+/* Sets the scene to the opaque isosurface, by robust roots, or to the volume, by samples a cell apart. */
 void accuracy_scene_surface(accuracy_scene *scene, const accuracy_subject *subject);
 void accuracy_scene_volume(accuracy_scene *scene, const accuracy_subject *subject);
 
 /* The cube root of the volume of a cell's box. */
 double accuracy_box_size(const grid *cells, int64_t cell);
 
-/* Is every cell linear along a ray, or piecewise so where the kernels know the pieces? */
+/* Tells whether every cell is linear along a ray, or piecewise linear with pieces that the kernels know. */
 bool accuracy_is_linear(const accuracy_subject *subject);
 
 #endif

@@ -1,6 +1,6 @@
-/* The adaptive integral knows opacities alone. Extinctions that are linear between the knots are given to it as a table
- * of opacities dense enough to be one: 1 - exp(-e) between points 1/256 of a knot's interval apart is off its chord by
- * at most (ln 2 / 256)^2 / 8 = 9.2e-7 of opacity. */
+/* The adaptive integral takes only opacities. Extinctions that are linear between the knots are given as a dense table
+ * of opacities: between points 1/256 of a knot's interval apart, 1 - exp(-e) is off its chord by at most (ln 2 / 256)^2
+ * / 8 = 9.2e-7 of opacity. */
 #include "accuracy_truth.h"
 
 #include <stdlib.h>
@@ -9,14 +9,14 @@
 
 enum { DENSE = 256, DENSE_POINTS = (ACCURACY_KNOTS - 1) * DENSE + 1 };
 
-/* What a cell's stretch may be off by: a hundred cells sum up to less than float32's rounding of a channel. */
+/* Error allowed to a cell's stretch: that of a hundred cells is less than float32's rounding of a channel. */
 static const double tolerance = 1e-10;
 
 struct accuracy_truth {
     const accuracy_subject *subject;
     bench_pixels *pixels;
     int count;
-    double *rgba[2]; /* of each accuracy_opacity: count × 4 */
+    double *rgba[2]; /* for each accuracy_opacity: count × 4 */
     accuracy_scene surface;
     render_part kept;
     reference_scene *reference;
@@ -127,8 +127,8 @@ accuracy_error accuracy_volume_error(const accuracy_truth *t, accuracy_opacity m
     return e;
 }
 
-/* In a polyhedron a quad's patch and the tets behind it may be on different sides of the isovalue: where the surface is
- * between them is a matter of definition. Elsewhere what is ambiguous is what settings differ in. */
+/* In a polyhedron a quad's patch and the tets behind it may be on different sides of the isovalue; where the surface
+ * lies between them is a matter of definition. In other cells, settings are compared on ambiguous rays too. */
 static bool is_undefined(const accuracy_truth *t, const reference_ray *ray)
 {
     return ray->ambiguous && t->subject->mesh.face_count > 0;

@@ -1,5 +1,5 @@
-/* Speed against error: isosurfaces and volumes at every setting that trades one for the other, and VTK's volume mappers
- * beside them, of the same meshes, cameras and transfer functions. Prints CSV: a setting a row. */
+/* Measures speed against error: isosurfaces and volumes at every setting that trades one for the other, and VTK's
+ * volume mappers on the same meshes, cameras and transfer functions. Prints CSV, a row for each setting. */
 #include <stdio.h>
 
 #include <getopt.h>

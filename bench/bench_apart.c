@@ -5,7 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* In the child: draw and write what came of it. */
+/* In the child: draws and writes the result. */
 static void draw_and_send(const bench_vtk_request *request, float *rgba, size_t bytes, int seconds, int to)
 {
     bench_vtk_result result = {0};

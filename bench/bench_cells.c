@@ -1,5 +1,5 @@
-/* What a frame costs by the cells that a code hands over: their type, the layout of their arrays, and how small they are
- * beside a pixel. Frames of the renderer alone; those that are compared are drawn in turns. Prints CSV. */
+/* Measures how a frame's cost depends on the cells: their type, the layout of their arrays, and their size beside a
+ * pixel. Only the renderer is timed; frames that are compared are drawn in turns. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,7 +53,7 @@ static void show(bench_scene *s, const picture *p)
     s->transfer.opacities = everything_opacities;
 }
 
-/* As show() found it. */
+/* Sets the transfer function back to what show() found. */
 static void show_band(bench_scene *s)
 {
     s->transfer.low = bench_knots[0], s->transfer.high = bench_knots[BENCH_KNOTS - 1];
@@ -126,7 +126,7 @@ static void measure_layouts(bench_scene *first, const bench_command *command)
     for (int l = 0; l < LAYOUTS; l++) bench_scene_free(&scenes[l]);
 }
 
-/* Cells whose values reach a range: those that a picture shows. */
+/* Counts the cells whose values reach a range, which a picture shows. */
 static double count_shown(const bench_scene *s, double low, double high)
 {
     const grid *g = &s->view.cells;
@@ -145,7 +145,7 @@ static double count_shown(const bench_scene *s, double low, double high)
     return (double)count;
 }
 
-/* The share of a rank among a thousand: all of the mesh within AWAY_PIXELS pixels' width. */
+/* Measures the share of one rank among a thousand: all of the mesh within a width of AWAY_PIXELS pixels. */
 static void measure_thousand(bench_scene *s, const bench_command *command)
 {
     const double half = tan(bench_degrees * acos(-1) / 360), wide = sqrt(3);

@@ -11,7 +11,7 @@ enum { BENCH_MAX_MESHES = 16 };
 
 typedef struct bench_command {
     int runs;           /* of each measure; 5 by default */
-    int shrink;         /* pictures have so many times fewer pixels a side; 1 by default */
+    int shrink;         /* pictures have 1/shrink of the pixels a side; 1 by default */
     const char *depths; /* where pictures of depths are to be written; NULL: nowhere */
     int mesh_count;
     struct {
@@ -21,8 +21,8 @@ typedef struct bench_command {
     int status; /* what main() returns where there is nothing to do */
 } bench_command;
 
-/* Print the CSV's head unless told not to. about: what the program does, for --help. last: the last kind of mesh that
- * it knows. False with a status where the help was asked for or the line is wrong. */
+/* Reads the command line, and prints the CSV's head unless it says not to. about is what the program does, for --help;
+ * last is the last kind of mesh that it knows. False with a status where help is asked for or the line is wrong. */
 bool bench_command_parse(int argc, char **argv, const char *about, test_mesh_kind last, bench_command *command);
 
 #endif

@@ -1,5 +1,5 @@
-/* Compositing alone: the time of the slowest rank, bytes, messages and peak memory of each schedule, beside IceT's
- * strategies on the same pictures, in turns. An MPI program; prints CSV.
+/* Measures compositing alone: the time of the slowest rank, bytes, messages and peak memory of each schedule, and of
+ * IceT's strategies on the same pictures, in turns. An MPI program; prints CSV.
  *
  *     mpirun -n 8 bench_composite [--runs N] [--size N] [--width W] [--height H] [--random]
  *
@@ -25,7 +25,7 @@ typedef struct options {
 static int own_rank, rank_count;
 static const float background[4] = {0, 0, 0, 0};
 
-/* Blocks along each axis, as like each other as the number of ranks lets them be. */
+/* Chooses the numbers of blocks along the axes, as equal as the number of ranks allows. */
 static void count_blocks(int blocks[3])
 {
     int left = rank_count;
@@ -37,7 +37,7 @@ static void count_blocks(int blocks[3])
     }
 }
 
-/* The ranks' blocks from front to back: the eye is beyond the last block along every axis. */
+/* Orders the ranks' blocks from front to back; the eye is beyond the last block along every axis. */
 static void block_order(int *order)
 {
     for (int i = 0; i < rank_count; i++) order[i] = rank_count - 1 - i;
@@ -134,11 +134,11 @@ static void make_picture(const fragment_list *list, bool is_surface, int width, 
 
 /* ---- measuring ----------------------------------------------------------------------------------------------- */
 
-/* What one way of compositing takes. */
+/* The measures of one way of compositing. */
 typedef struct measure {
     char name[32];
-    bench_series series, cpu;     /* of the slowest rank; of all ranks, waiting included */
-    double bytes, messages, peak; /* of all ranks, of all, of the greatest */
+    bench_series series, cpu;     /* the slowest rank's time; the CPU time of all ranks, waiting included */
+    double bytes, messages, peak; /* bytes and messages of all ranks, peak of the largest */
     bool can;
 } measure;
 
@@ -193,7 +193,7 @@ static void run_own(bench *b, comp_schedule schedule, int number, measure *m)
     base_error error = {0};
     if (have->count) memcpy(list.items, have->items, bytes);
     b->group.schedule = schedule;
-    /* All are on one node, which is what is chosen for; the others take four ranks for one. */
+    /* All ranks are on one node, and the automatic choice knows that; fixed schedules take four ranks for a node. */
     b->group.nodes = (comp_nodes){schedule != COMP_AUTOMATIC && rank_count % 4 == 0 ? 4 : 1, false};
     base_memory_reset_peak();
     const int64_t held = base_memory_held();

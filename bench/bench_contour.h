@@ -27,10 +27,10 @@ typedef struct bench_contour_view {
 /* Three vertices a triangle, not shared. */
 typedef struct bench_triangles {
     int64_t count;
-    const float *xyz; /* count × 9, and 4 bytes that can be read behind them; until the next extraction */
+    const float *xyz; /* count × 9, and 4 readable bytes behind them; valid until the next extraction */
 } bench_triangles;
 
-/* Is VTK in this program? None of the rest is to be called otherwise. */
+/* Tells whether VTK is in this program; otherwise nothing else here may be called. */
 bool bench_contour_is_there(void);
 
 typedef struct bench_contour bench_contour;
@@ -38,16 +38,16 @@ typedef struct bench_contour bench_contour;
 bench_contour *bench_contour_create(const bench_contour_mesh *mesh, const bench_contour_view *view, int threads);
 void bench_contour_destroy(bench_contour *contour);
 
-/* Has it a window to draw in, an X server's? The context is made here, untimed. */
+/* Tells whether there is an X server's window to draw in. The context is made here, untimed. */
 bool bench_contour_can_draw(bench_contour *contour);
 
-/* The mesh has other coordinates and values from now on. */
+/* Sets new coordinates and values of the mesh. */
 void bench_contour_set(bench_contour *contour, const float *xyz, const float *values);
 
 bench_triangles bench_contour_extract(bench_contour *contour, const double *isovalues, int count);
 
-/* Draw what was extracted last, to the end of OpenGL's work; the first time includes what VTK prepares. Nothing is
- * read back. */
+/* Draws the last extraction, and waits for the end of OpenGL's work; the first time includes what VTK prepares. Nothing
+ * is read back. */
 void bench_contour_draw(bench_contour *contour);
 
 /* Depth along the camera's axis in the last picture, row-major, top row first; infinity where nothing is. */

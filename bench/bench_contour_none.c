@@ -1,4 +1,4 @@
-/* In place of bench_contour.cpp where there is no VTK. */
+/* Replaces bench_contour.cpp where there is no VTK. */
 #include "bench_contour.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/* Embree, as its documentation says it is fastest: static scenes of one geometry, coherent packets of 16 rays, the
- * builder's nodes from its thread-local allocators. Its threads are as many as ours. */
+/* Embree is used as its documentation says it is fastest: static scenes of one geometry, coherent packets of 16 rays,
+ * the builder's nodes from its thread-local allocators. It gets as many threads as libinsitu. */
 #include "bench_embree.h"
 
 #include <math.h>
@@ -18,7 +18,7 @@ struct bench_embree {
     int threads;
     uint32_t *iota; /* indices of triangles that share no vertex: 0, 1, 2, ... */
     int64_t iota_count;
-    struct RTCBuildPrimitive *boxes, *sorted; /* cell_count: as made, and what the builder may work in */
+    struct RTCBuildPrimitive *boxes, *sorted; /* cell_count each: as made, and a copy for the builder to work in */
     int64_t cell_count;
     RTCBVH bvh;
     void *root;
@@ -26,7 +26,7 @@ struct bench_embree {
 
 enum { WIDE = 8, PACKET = 4 };
 
-/* child_count 0: a leaf of cell_count cells. A leaf stands with the boxes of its parent. */
+/* A node with child_count 0 is a leaf of cell_count cells, whose box is with its parent. */
 typedef struct tree_node {
     uint32_t child_count, cell_count;
 } tree_node;
@@ -138,7 +138,7 @@ static pinhole pinhole_of(const render_camera *c)
     return p;
 }
 
-/* One clone an instruction set, so that making rays costs as little as tracing them deserves. */
+/* There is a clone for each instruction set, so that making rays costs little beside tracing them. */
 __attribute__((target_clones("avx512f", "avx2", "default"))) static void
 make_packet(const pinhole *p, int x0, int y0, struct RTCRayHit16 *packet, int *valid)
 {
@@ -318,7 +318,7 @@ static struct RTCBounds united(const struct RTCBounds *a, const struct RTCBounds
                               .upper_z = fmaxf(a->upper_z, b->upper_z)};
 }
 
-/* What is tested below a node whose own half area is area: two boxes, or the cells; each times its node's half area. */
+/* The tests below a node of this half area, two boxes or the cells, each times its node's half area. */
 static double cost_below(const tree_node *node, double area)
 {
     if (!node->child_count) return area * node->cell_count;

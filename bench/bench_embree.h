@@ -1,10 +1,10 @@
-/* Embree as a peer: ray tracing of a triangle mesh, and its builder over the boxes of cells. */
+/* Embree as a peer: it traces rays in a triangle mesh, and builds trees over the boxes of cells. */
 #ifndef BENCH_EMBREE_H
 #define BENCH_EMBREE_H
 
 #include "render.h"
 
-/* Is Embree in this program? None of the rest is to be called otherwise. */
+/* Tells whether Embree is in this program; otherwise nothing else here may be called. */
 bool bench_embree_is_there(void);
 
 typedef struct bench_embree bench_embree;
@@ -12,13 +12,13 @@ typedef struct bench_embree bench_embree;
 bench_embree *bench_embree_create(int threads);
 void bench_embree_destroy(bench_embree *embree);
 
-/* The acceleration structure of triangles, three vertices of their own each (xyz: triangle_count × 9, borrowed, with 4
- * bytes that can be read behind them), which replaces the last one. is_fast: by Morton codes (RTC_BUILD_QUALITY_LOW),
- * else by binned SAH (MEDIUM). */
+/* Builds the acceleration structure of triangles that share no vertices (xyz: triangle_count × 9, borrowed, with 4
+ * readable bytes behind them); it replaces the last one. If is_fast, by Morton codes (RTC_BUILD_QUALITY_LOW), else by
+ * binned SAH (MEDIUM). */
 void bench_embree_build(bench_embree *embree, const float *xyz, int64_t triangle_count, bool is_fast);
 
-/* What a ray of each pixel hits: the depth along the camera's axis, infinity for nothing, and the triangle's normal
- * (pixels × 3, not of unit length, of either sign). By packets of 16 = 4 × 4 rays. */
+/* Traces a ray for each pixel, in packets of 16 = 4 × 4. depths gets the hit's depth along the camera's axis, or
+ * infinity; normals the triangle's normal (pixels × 3, not of unit length, of either sign). */
 void bench_embree_trace(bench_embree *embree, const render_camera *camera, float *depths, float *normals);
 
 typedef enum bench_embree_builder {
@@ -27,14 +27,14 @@ typedef enum bench_embree_builder {
     BENCH_EMBREE_MEDIUM_WIDE /* binned SAH, 8-wide, up to 8 cells a leaf: its fastest */
 } bench_embree_builder;
 
-/* The boxes of all cells in Embree's form, made once. */
+/* Makes the boxes of all cells in Embree's form, once. */
 void bench_embree_set_cells(bench_embree *embree, const grid *cells);
 
-/* Seconds of rtcBuildBVH over the boxes, which are copied before, as it sorts them in place. In the memory of the last
- * such build. */
+/* Runs rtcBuildBVH over a copy of the boxes, which it sorts in place, in the memory of the last such build. Returns the
+ * seconds without the copy. */
 double bench_embree_build_cells(bench_embree *embree, bench_embree_builder builder);
 
-/* SAH cost of a binary tree built last, counted as mmbvh_cost() does. */
+/* SAH cost of the last tree, a binary one, counted as by mmbvh_cost(). */
 double bench_embree_cost(const bench_embree *embree);
 
 #endif

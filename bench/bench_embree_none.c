@@ -1,4 +1,4 @@
-/* In place of bench_embree.c where there is no Embree. */
+/* Replaces bench_embree.c where there is no Embree. */
 #include "bench_embree.h"
 
 #include <stdlib.h>

@@ -1,9 +1,9 @@
 /* The double reference on a few hundred pixels of a big mesh.
  *
- * Brute force over all cells is affordable because each cell is first projected: the rectangle around its projected
- * vertices holds the projection of all of it (every kind of cell lies within the hull of its vertices), and the cell is
- * kept only where that rectangle, a pixel wider all round, holds a chosen pixel. The reference then tries every
- * chosen pixel's ray against every cell that was kept for any of them. */
+ * Brute force over all cells is affordable because each cell is first projected. Every kind of cell lies within the
+ * hull of its vertices, so the rectangle around its projected vertices holds its projection, and the cell is kept only
+ * where that rectangle, a pixel wider all round, holds a chosen pixel. The reference then tries every chosen pixel's
+ * ray against every cell that was kept for any of them. */
 #include "bench_error.h"
 
 #include <stdlib.h>
@@ -92,7 +92,7 @@ static void cell_entries(const grid *cells, int64_t cell, int64_t *first, int64_
     *end = walk.end;
 }
 
-/* kept: the wanted cells in the mesh's order. */
+/* Fills kept with the wanted cells in the mesh's order. */
 static void keep_cells(bench_pixels *all, const grid *cells, const unsigned char *wanted)
 {
     int64_t count = 0, entries = 0, at = 0, first, end;
@@ -166,7 +166,7 @@ const grid *bench_pixels_cells(const bench_pixels *all)
     return &all->kept;
 }
 
-/* The chosen pixels by the reference; the caller frees them. */
+/* Traces the chosen pixels by the reference; the caller frees them. */
 static reference_ray *trace_chosen(const bench_pixels *all, const render_job *job)
 {
     const float nothing[4] = {0, 0, 0, 0};
@@ -190,7 +190,7 @@ static int chosen_index(const bench_pixels *all, uint32_t pixel)
     return column < all->columns && row < all->rows && all->pixels[i].pixel == pixel ? i : -1;
 }
 
-/* Depths leave the kernels as the ray's parameter t. */
+/* The kernels return depths as the ray's parameter t. */
 void bench_pixels_merge(const bench_pixels *all, const render_space *space, const fragment_list *fragments, float *rgba,
                         double *depths)
 {

@@ -1,5 +1,5 @@
-/* How far a frame is from the truth, on some of its pixels: one at a hashed place in each square block of the image.
- * The truth is the tests' brute-force renderer in double, which knows no tree. */
+/* Measures how far a frame is from the truth on some of its pixels: one at a hashed place in each square block of the
+ * image. The truth is the tests' brute-force renderer in double, which knows no tree. */
 #ifndef BENCH_ERROR_H
 #define BENCH_ERROR_H
 
@@ -20,25 +20,25 @@ void bench_pixels_place(const bench_pixels *pixels, int i, int *x, int *y);
 /* The cells that can be seen in the chosen pixels, with the whole mesh's vertices. */
 const grid *bench_pixels_cells(const bench_pixels *pixels);
 
-/* The chosen pixels of a frame as compositing would finish them, over nothing: count × 4, and their depths along the
- * camera's axis, infinite where there is no surface. */
+/* Merges the chosen pixels of a frame as compositing would, over a clear background: rgba gets count × 4, depths their
+ * depths along the camera's axis, infinite where there is no surface. */
 void bench_pixels_merge(const bench_pixels *pixels, const render_space *space, const fragment_list *fragments,
                         float *rgba, double *depths);
 
 typedef struct bench_surface_error {
     int checked;       /* pixels */
     int disagreements; /* pixels hit in the frame or in the reference, but not in both */
-    int ambiguous;     /* of those: pixels whose ray met a cell with more than one root */
+    int ambiguous;     /* of these, pixels whose ray met a cell with more than one root */
     bench_stats depth; /* |difference| along the camera's axis, where both hit */
-    bench_stats field; /* |exact(point hit) - isovalue|: what the cells' interpolation costs */
+    bench_stats field; /* |exact(point hit) - isovalue|: the error of the cells' interpolation */
 } bench_surface_error;
 
-/* fragments: what render_frame() made of job, which has one opaque isosurface and one part: the grid of pixels. */
+/* fragments are what render_frame() made of job, which has one opaque isosurface and one part, the grid of pixels. */
 bench_surface_error bench_surface_compare(const bench_pixels *pixels, const render_job *job,
                                           double (*exact)(const double position[3]), const fragment_list *fragments);
 
-/* The largest difference of a pixel's linear premultiplied red, green, blue or opacity, where the ray meets cells, of a
- * job with volumes alone. */
+/* For a job with volumes alone: each pixel's largest difference in linear premultiplied red, green, blue or opacity,
+ * where the ray meets cells. */
 bench_stats bench_volume_compare(const bench_pixels *pixels, const render_job *job, const fragment_list *fragments);
 
 #endif

@@ -1,5 +1,5 @@
-/* What slices, outer surfaces, clips, edges and antialiasing cost: whole steps of new values, beside VTK's way to the
- * same picture from the same values, in turns in one process. Prints CSV. */
+/* Measures what slices, outer surfaces, clips, edges and antialiasing cost: whole steps with new values, and VTK's way
+ * to the same picture from the same values, in turns in one process. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -39,7 +39,7 @@ static bench_layers_vtk *create_vtk(const bench_scene *scene, float *xyz)
     return bench_layers_vtk_create(&mesh, &view, bench_plane, scene->subject.threads);
 }
 
-/* The first three have a peer. */
+/* Only the first three pictures have a peer. */
 static void measure_pictures(const bench_scene *scene, bench_layers_vtk *vtk, int runs)
 {
     bench_session sessions[PICTURES];

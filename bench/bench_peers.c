@@ -1,12 +1,12 @@
-/* Tracing and building beside VTK and Embree, in turns in one process, on the same mesh, camera and image: Embree
- * traces the triangles that VTK extracts, and builds trees over the boxes of our cells. Prints CSV. */
+/* Measures tracing and building beside VTK and Embree, in turns in one process, on the same mesh, camera and image:
+ * Embree traces the triangles that VTK extracts, and builds trees over the boxes of libinsitu's cells. Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "bench_command.h"
 #include "bench_routes.h"
 
-/* The tree of the first is the one that is traced. */
+/* The builders of trees; the tree of the first is traced. */
 static const struct {
     const char *name;
     mmbvh_options how;
@@ -21,7 +21,7 @@ typedef struct peers_series {
 
 static const char *const builder_names[3] = {"low", "medium", "medium wide"};
 
-/* The first of several pictures, and a further one. */
+/* Traces the first of several pictures, and a further one. */
 static void trace_kept(bench_scene *scene, peers_series *series, int number)
 {
     scene->job.active = render_active_cells_create();
@@ -55,7 +55,7 @@ static void run(bench_scene *scene, bench_routes *routes, peers_series *series, 
     }
 }
 
-/* After a last build of each kind. */
+/* Prints the cost of the trees of each of Embree's binary builders, built once more. */
 static void print_costs(bench_scene *scene, bench_routes *routes)
 {
     for (int i = 0; routes->embree && i <= BENCH_EMBREE_MEDIUM; i++) {

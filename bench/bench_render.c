@@ -1,6 +1,6 @@
-/* Speed and error of building, refitting and rendering, on one mesh that can be made at any size. A speed is the median
- * of several runs with the least and the greatest; beside it stands the error against double precision on some of the
- * pixels. Prints CSV. */
+/* Measures speed and error of building, refitting and rendering, on a mesh that can have any size. A speed is the
+ * median of several runs, with the least and the greatest; the error is against double precision on some of the pixels.
+ * Prints CSV. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -8,7 +8,7 @@
 #include "bench_scene.h"
 #include "memory.h"
 
-/* How fast is act()? units / seconds, over the runs and one before them that is not counted. */
+/* Speed of act() in units / seconds, over the runs; one more before them is not counted. */
 static bench_stats speed(bench_scene *scene, int runs, void (*act)(bench_scene *), double units)
 {
     double speeds[BENCH_MAX_RUNS];
@@ -49,7 +49,7 @@ static void measure_tree(bench_scene *s, int runs)
     bench_print(&s->subject, "refit bounds", "Mcells/s", speed(s, runs, refit_bounds, 1e-6 * cells));
 }
 
-/* The peak is of what the frame holds beside the tree. */
+/* Measures a frame. Its peak memory is without the tree. */
 static void measure_frame(bench_scene *s, int runs, const char *layer)
 {
     char name[64];

@@ -1,5 +1,5 @@
-/* The routes that a user would take instead, for the bench's own programs: VTK's extraction and picture, and Embree's
- * ray tracing of what was extracted. What is not in this program, or has no window, is left out. */
+/* The routes that a user would take instead of libinsitu: VTK's extraction and picture, and Embree's ray tracing of the
+ * extraction. A route that is not in this program, or has no window, is left out. */
 #ifndef BENCH_ROUTES_H
 #define BENCH_ROUTES_H
 
@@ -24,19 +24,19 @@ typedef struct bench_routes {
 void bench_routes_create(bench_routes *routes, const bench_scene *scene);
 void bench_routes_free(bench_routes *routes);
 
-/* New coordinates (x, y, z each, vertex_count) and values of the scene's mesh. */
+/* Sets new coordinates (x, y, z, vertex_count each) and values of the scene's mesh. */
 void bench_routes_set(bench_routes *routes, const float *const coordinates[3], int64_t vertex_count,
                       const float *values);
 
-/* Go all of them once, timed. number 0: the warm-up. */
+/* Runs and times all routes once; number 0 is the warm-up. */
 void bench_routes_run(bench_routes *routes, const double *isovalues, int count, int number);
 
-/* Print and forget the times. name: of the layer, before the measures' names. */
+/* Prints and forgets the times. name is the layer's, put before the measures' names. */
 void bench_routes_print(bench_routes *routes, const char *name);
 
-/* Print how far the routes' last pictures are from these depths (of the camera's pixels, infinity where nothing is):
- * the pixels that one shows and the other does not, and the difference in depth where both show it. folder: write the
- * depths there, as PNG; NULL: do not. */
+/* Compares the routes' last pictures with these depths (of the camera's pixels, infinity where nothing is). Prints the
+ * number of pixels that only one of them shows, and the difference in depth where both do. Depths are written to folder
+ * as PNG, unless it is NULL. */
 void bench_routes_compare(bench_routes *routes, const float *depths, const char *name, const char *folder);
 
 #endif

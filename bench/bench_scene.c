@@ -16,9 +16,9 @@ const float bench_opacities[BENCH_KNOTS] = {0, 0.5f, 0};
 const double bench_unit_distance = 0.5;
 const double bench_eye[3] = {2.4, 1.6, 3.0}, bench_focal[3] = {0, 0, 0}, bench_up[3] = {0, 1, 0}, bench_degrees = 40;
 
-enum { ROWS = 18 /* of chosen pixels */, BIG_MESH = 13000000 };
+enum { ROWS = 18 /* rows of chosen pixels */, BIG_MESH = 13000000 };
 
-/* What a cell's stretch of the integral may be off by: a thousand cells sum up to less than float32's rounding. */
+/* Error allowed to a cell's stretch of the integral: that of a thousand cells is less than float32's rounding. */
 static const double tolerance = 1e-11;
 
 static const double jitter = 0.2;
@@ -142,8 +142,8 @@ void bench_scene_frame(bench_scene *s)
     must(s, render_frame(&s->job, &s->fragments, NULL, &s->error));
 }
 
-/* Chosen when first asked for: not every benchmark asks. Fewer of a big mesh, as the reference tries each pixel's ray
- * against every cell near any of them. */
+/* Pixels are chosen when first asked for, as not every benchmark needs them. A big mesh gets fewer, because the
+ * reference tries each pixel's ray against every cell near any of them. */
 const bench_pixels *bench_scene_pixels(bench_scene *s)
 {
     const int block = s->job.camera.height / (s->subject.cells < BIG_MESH ? ROWS : ROWS / 2);

@@ -1,9 +1,9 @@
-/* What the benchmarks of speed draw: the bench mesh with its field, seen by one camera, as an isosurface and as a
+/* The scene of the benchmarks of speed: the bench mesh with its field, seen by one camera, as an isosurface and as a
  * volume.
  *
  * The mesh is the cube [-1, 1]^3 of n^3 jittered cubes, as hexes or six tets each, with the field sin 6x cos 6y + sin
- * 6y cos 6z + sin 6z cos 6x: smooth, with an isosurface that folds back many times, and nothing at which a cell could
- * be skipped as outside. Errors end the process: a benchmark has no one to tell. */
+ * 6y cos 6z + sin 6z cos 6x: smooth, with an isosurface that folds back many times, and without cells that could be
+ * skipped as outside. Errors end the process. */
 #ifndef BENCH_SCENE_H
 #define BENCH_SCENE_H
 
@@ -12,10 +12,10 @@
 
 enum { BENCH_WIDTH = 1920, BENCH_HEIGHT = 1080, BENCH_ISOVALUES = 3, BENCH_KNOTS = 3 };
 
-/* The first is that of the one isosurface. */
+/* A single isosurface has the first one. */
 extern const double bench_isovalues[BENCH_ISOVALUES];
 
-/* Opacity is a tent over |f| < 0.6, its peak such that a ray through the whole cube keeps a good part of its light. */
+/* Opacity is a tent over |f| < 0.6, so low that a ray through the whole cube keeps a good part of its light. */
 extern const double bench_knots[BENCH_KNOTS];
 extern const float bench_opacities[BENCH_KNOTS];
 extern const double bench_unit_distance;
@@ -33,7 +33,7 @@ typedef struct bench_scene {
     mmbvh tree;
     fragment_list fragments;
     bench_pixels *pixels; /* NULL until an error is asked for */
-    double *integrals;    /* of these pixels, × 4; NULL as well */
+    double *integrals;    /* these pixels' integrals, × 4; NULL as long */
     render_job job;       /* camera, space, light, sampling of half a cube's side; no layer */
     render_part part;
     mmbvh_ranges ranges;
@@ -43,26 +43,27 @@ typedef struct bench_scene {
     base_error error;
 } bench_scene;
 
-/* Not to be moved. program: for the subject. No tree yet; pictures of BENCH_WIDTH × BENCH_HEIGHT. */
+/* Makes a scene, which must not be moved, with pictures of BENCH_WIDTH × BENCH_HEIGHT and without a tree. program names
+ * the subject. */
 void bench_scene_create(bench_scene *scene, const char *program, test_mesh_kind kind, int n);
 void bench_scene_free(bench_scene *scene);
 
-/* Pictures of another size. */
+/* Sets another size of pictures. */
 void bench_scene_resize(bench_scene *scene, int width, int height);
 
-/* The tree anew, as a new mesh makes it necessary. */
+/* Builds the tree again, as for a new mesh. */
 void bench_scene_build(bench_scene *scene);
 
-/* What frames show from now on: count isosurfaces, or the volume. */
+/* Makes frames show count isosurfaces, or the volume. */
 void bench_scene_show_surfaces(bench_scene *scene, int count);
 void bench_scene_show_volume(bench_scene *scene);
 
-/* fragments anew. */
+/* Draws a frame into fragments. */
 void bench_scene_frame(bench_scene *scene);
 
-/* Print the error of the frame, of one isosurface or of the volume: measures that begin with name. A volume's is
- * against the same samples in double, which shows rounding and what is missed, or against the integral itself, which
- * shows what the step costs. */
+/* Prints the error of the last frame, of one isosurface or of the volume, as measures that begin with name. A volume's
+ * error is against the same samples in double, which shows rounding and missed samples, or against the integral itself,
+ * which shows the error of the step. */
 void bench_scene_surface_error(bench_scene *scene, const char *name);
 void bench_scene_sample_error(bench_scene *scene, const char *name);
 void bench_scene_integral_error(bench_scene *scene, const char *name);
@@ -73,7 +74,7 @@ const bench_pixels *bench_scene_pixels(bench_scene *scene);
 /* The volume's integral at these pixels by a transfer function: count × 4, the caller's to free. */
 double *bench_scene_integrals(bench_scene *scene, const render_transfer *transfer);
 
-/* How far such pixels are from the integrals, where these show something: the largest of the four channels. */
+/* The pixels' differences from the integrals, where these show something: the largest of the four channels. */
 bench_stats bench_scene_pixel_error(const bench_scene *scene, const double *integrals, const float *rgba);
 
 #endif

@@ -1,5 +1,5 @@
-/* Schedules of compositing by arithmetic (comp_cost.h), for any number of ranks: messages, bytes and time of the rank
- * that has most to send, of a picture that a block partition cuts into P^(1/3) layers. Prints CSV; takes no MPI.
+/* Computes schedules of compositing (comp_cost.h) for any number of ranks: messages, bytes and time of the rank that
+ * has most to send, for a picture that a block partition cuts into P^(1/3) layers. Prints CSV; uses no MPI.
  *
  *     bench_schedules [RANKS_PER_NODE] */
 #include <math.h>
@@ -8,7 +8,7 @@
 
 #include "comp_cost.h"
 
-/* 1920 × 1080 pixels, of which the object covers half; the busiest rank has twice the mean. */
+/* The load of 1920 × 1080 pixels, of which the object covers half; the busiest rank has twice the mean. */
 static comp_load load_of(int ranks)
 {
     const double covered = 0.5 * 1920 * 1080, layers = cbrt(ranks);

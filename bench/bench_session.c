@@ -7,14 +7,15 @@
 
 #include "session_image.h"
 
-/* Steps before those that count; on a mesh that stands as many more as the session takes to buy its full tree. */
+/* Number of steps before those that count. A mesh at rest takes as many more as the session needs to decide for its
+ * full tree. */
 enum { WARM_UP = 8, MOST_WARM_UP = 60 };
 
 static const char *const part_names[BENCH_PARTS] = {"prepare", "build", "refit", "trace", "composite"};
 
 const double bench_plane[3] = {0.4, 0.6, 0.7};
 
-/* The depths of the last picture, where it came with them. */
+/* The depths of the last picture, if it had any. */
 static float *caught_depths;
 
 bool session_writes_behind;
@@ -63,7 +64,7 @@ static float *copy(const float *from, int64_t count)
     return to;
 }
 
-/* The second state: the field a little further along, the vertices swayed by less than a cell, so that no cell turns
+/* Makes the second state: the field has moved a little, and the vertices by less than a cell, so that no cell turns
  * inside out. */
 static void make_states(bench_session *s)
 {
@@ -115,7 +116,7 @@ static void set_field(bench_session *s, insitu_session *to)
     must(s, insitu_set_field(to, "cube", &s->field));
 }
 
-/* Slices and outer surfaces, coloured as VTK's are; false where the picture is neither. */
+/* Writes the scene of slices and outer surfaces, coloured as VTK's are; false where the picture is neither. */
 static bool write_plane_or_faces(const bench_session *s, FILE *file)
 {
     const char *colours = "field: f, map: cool_to_warm, range: [-1.5, 1.5]";
@@ -156,7 +157,7 @@ static void write_layer(const bench_session *s, FILE *file)
                                               : "");
 }
 
-/* A session whose picture ends in ending: .exr comes with its depth. */
+/* Opens a session whose picture has this ending; .exr has depth. */
 static insitu_session *open_session(const bench_session *s, const char *ending)
 {
     char path[] = "/tmp/bench_session_XXXXXX";

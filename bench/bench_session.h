@@ -1,17 +1,17 @@
-/* Whole steps of a session, through the public interface alone, as a simulation would take them: the bench mesh on this
- * one rank, of which the same is new at every step. What is timed is insitu_step() from its call to the finished
- * picture on rank 0; the picture is not written (this defines session_write_image() in place of the library's). */
+/* Whole steps of a session through the public interface alone, as a simulation would take them: the bench mesh on one
+ * rank, with the same kind of change at every step. insitu_step() is timed from its call to the finished picture on
+ * rank 0. The picture is not written: session_write_image() is defined here in place of the library's. */
 #ifndef BENCH_SESSION_H
 #define BENCH_SESSION_H
 
 #include "bench_scene.h"
 #include "insitu/insitu.h"
 
-/* What differs from the step before. */
+/* The change from the step before. */
 typedef enum bench_change {
     BENCH_NEW_VALUES,
     BENCH_MOVED_VERTICES,
-    BENCH_NEW_MESH, /* and all that is on it */
+    BENCH_NEW_MESH, /* with all fields on it */
     BENCH_CHANGE_COUNT
 } bench_change;
 
@@ -52,23 +52,23 @@ typedef struct bench_session {
     int64_t bytes_trees, bytes_peak;
 } bench_session;
 
-/* The scene is borrowed; MPI is initialized. Some steps are taken, so that the session has seen what is new and what
- * stands. */
+/* The scene is borrowed; MPI is initialized. Some steps are taken, so that the session knows what changes and what does
+ * not. */
 void bench_session_create(bench_session *session, const bench_scene *scene, bench_picture picture, bench_change change);
 void bench_session_free(bench_session *session);
 
-/* Change and step. number 0: the warm-up. */
+/* Changes the mesh or field and steps; number 0 is the warm-up. */
 void bench_session_step(bench_session *session, int number);
 
-/* What is set now. */
+/* The arrays that are set now. */
 const float *const *bench_session_coordinates(const bench_session *session);
 const float *bench_session_values(const bench_session *session);
 
-/* "isosurface new values" and its parts. */
+/* Prints the times, as "isosurface new values", and those of the parts. */
 void bench_session_print(bench_session *session);
 
-/* Draw what is set now once more and return its depths, width × height, infinity where nothing is; the caller frees
- * them. In a session of its own. */
+/* Draws the arrays that are set now once more, in a session of its own, and returns the depths, width × height,
+ * infinity where nothing is; the caller frees them. */
 float *bench_session_depths(const bench_session *session);
 
 #endif

@@ -9,13 +9,13 @@ typedef struct bench_stats {
     double median, low, high;
 } bench_stats;
 
-/* Sorts values. All zero for none. */
+/* Sorts values and computes their statistics, all zero for none. */
 bench_stats bench_stats_of(double *values, int count);
 
 /* Seconds on a clock that only rises. */
 double bench_seconds(void);
 
-/* What a line's first columns say. */
+/* The first columns of a line. */
 typedef struct bench_subject {
     const char *program, *isa, *mesh;
     int threads, n;
@@ -29,7 +29,7 @@ void bench_print(const bench_subject *subject, const char *measure, const char *
 /* A measure that is one number. */
 void bench_print_number(const bench_subject *subject, const char *measure, const char *unit, double number);
 
-/* Times of several acts that are run in turns, so that whatever else the machine does falls on all of them alike. */
+/* Times of several acts that are run in turns, so that other work of the machine disturbs all of them alike. */
 enum { BENCH_MAX_RUNS = 100 };
 
 typedef struct bench_series {
@@ -37,16 +37,16 @@ typedef struct bench_series {
     double seconds[BENCH_MAX_RUNS];
 } bench_series;
 
-/* Wait until the threads of the last act have stopped looking for work, and begin. */
+/* Waits until the threads of the last act have stopped looking for work, and begins. */
 double bench_begin(void);
 
-/* Keep a time; of the first, the warm-up with number 0, nothing. */
+/* Keeps a time, unless number is 0, the warm-up. */
 void bench_keep(double seconds, int number, bench_series *series);
 
-/* Keep what has passed since began, and return it. */
+/* Keeps the time since began, and returns it. */
 double bench_end(double began, int number, bench_series *series);
 
-/* Milliseconds. Sorts. */
+/* Prints milliseconds. Sorts the series. */
 void bench_print_series(const bench_subject *subject, const char *measure, bench_series *series);
 
 #endif

@@ -1,9 +1,8 @@
-/* The thesis's tables in kind: 4.1 traversals, 4.2 sample groups, 4.3 groups against steps, 5.2 sizes; and how speed
- * goes with the instruction set and the threads, for which it is started once each. A speed is the median of the runs,
- * beside it the error. Prints CSV.
+/* Measures tables of the thesis's kind: 4.1 traversals, 4.2 sample groups, 4.3 groups against steps, 5.2 sizes. It is
+ * started once for each instruction set and number of threads, to compare their speeds. A speed is the median of the
+ * runs; the error stands beside it. Prints CSV.
  *
- * Isosurfaces are of BENCH_WIDTH × BENCH_HEIGHT pixels. Volumes are slower by far, so that their pictures are smaller.
- */
+ * Isosurfaces have BENCH_WIDTH × BENCH_HEIGHT pixels. Volumes are slower by far, so their pictures are smaller. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +16,7 @@ enum { VOLUME_WIDTH = 640, VOLUME_HEIGHT = 360, GROUPS = 6, STEPS = 6 };
 
 static const int groups[GROUPS] = {1, 4, 8, 16, 24, 32};
 
-/* In sides of a cube. As in table 4.3 from a quarter to one and a half of what other tables use. */
+/* In sides of a cube: as in table 4.3, from a quarter to one and a half of the step of other tables. */
 static const double steps[STEPS] = {0.125, 0.25, 0.375, 0.5, 0.625, 0.75};
 
 static const struct {
@@ -53,7 +52,7 @@ static void measure_volume(bench_scene *s, const char *name, const bench_command
     bench_scene_integral_error(s, name);
 }
 
-/* Tiles look up as many samples as they can, whatever the group. */
+/* Groups do not matter to tiles, which look up as many samples as they can. */
 static void measure_groups(bench_scene *s, const char *prefix, const bench_command *command)
 {
     char name[64];

@@ -1,9 +1,9 @@
-/* Volumes: whole steps, and frames, beside VTK's mappers of unstructured grids, which draw in processes of their own,
- * one after the other in the same run. Pictures are square, samples half a cube's side apart. Prints CSV.
+/* Measures volumes: whole steps and frames, and VTK's mappers of unstructured grids, which draw in processes of their
+ * own, one after the other in the same run. Pictures are square, samples half a cube's side apart. Prints CSV.
  *
- * VTK's mappers take the extinction to be linear between the knots where we take the opacity, and cut cells at the
- * knots of the colours too; so they get colours at the opacity's knots alone, and are measured against the integral of
- * that. */
+ * Between the knots VTK's mappers interpolate the extinction linearly, libinsitu the opacity. They cut cells at the
+ * knots of the colours too. So they get colours at the opacity's knots only, and are measured against the integral of
+ * their own function. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 #include "bench_command.h"
 #include "bench_session.h"
 
-/* DENSE: opacities between knots, dense enough to be the extinction: off by at most (ln 2 / 256)^2 / 8 = 9.2e-7. */
+/* DENSE opacities between knots stand for a linear extinction: they are off by at most (ln 2 / 256)^2 / 8 = 9.2e-7. */
 enum {
     SIZE = 1080,
     DENSE = 256,
@@ -133,7 +133,7 @@ static void measure_steps(bench_scene *scene, int runs)
     }
 }
 
-/* The frame alone, and its error. max_error: 0 for none. */
+/* Measures the frame alone, and its error. max_error is 0 for none. */
 static void measure_frames(bench_scene *scene, const char *name, render_integration integration, double max_error,
                            int runs)
 {

@@ -1,12 +1,11 @@
-/* The peers.
+/* VTK's volume mappers.
  *
- * Debian's VTK draws through X and OpenGL; its ray casters work on the CPU and put their picture up as a texture at the
- * end, so the server may be Xvfb. Times are of whole renders, with a context that is there already: a first render of
- * nothing pays for that.
+ * Debian's VTK draws through X and OpenGL. Its ray casters work on the CPU and show their picture as a texture in the
+ * end, so the server may be Xvfb. Whole renders are timed, after a first, empty one that makes the context.
  *
- * The ray cast mapper keeps 8 bits a channel; the same rays are therefore cast once more, untimed, through the same
- * function and integrator for the float colour. Z-sweep keeps a float image, the fixed-point mapper 15 bits, projected
- * tetrahedra what the frame buffer has. */
+ * The ray cast mapper keeps 8 bits a channel; so the same rays are cast once more, untimed, through the same function
+ * and integrator for the float colour. Z-sweep keeps a float image, the fixed-point mapper 15 bits, projected
+ * tetrahedra those of the frame buffer. */
 #include "bench_vtk.h"
 #include "bench_vtk_mesh.h"
 
@@ -63,7 +62,7 @@ class zsweep_mapper : public vtkUnstructuredGridVolumeZSweepMapper
 };
 vtkStandardNewMacro(zsweep_mapper)
 
-    /* The mapper with its input, and what its pictures are read by. */
+    /* A mapper with its input, and the objects that read its pictures. */
     struct peer {
     const bench_vtk_request &request;
     vtkNew<vtkRenderWindow> window;
@@ -79,7 +78,7 @@ double seconds()
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/* The ray caster and projected tetrahedra take tets alone. */
+/* Makes a grid of tets, as the ray caster and projected tetrahedra take no other cells. */
 vtkSmartPointer<vtkUnstructuredGrid> only_tets(vtkUnstructuredGrid *grid)
 {
     if (grid->IsHomogeneous() && grid->GetNumberOfCells() > 0 && grid->GetCellType(0) == VTK_TETRA) return grid;
@@ -124,7 +123,7 @@ void set_projected(peer &p, vtkUnstructuredGrid *grid)
     p.mapper = mapper;
 }
 
-/* Points outside the mesh get the least knot, which has no opacity. */
+/* Gives points outside the mesh the least knot, which has no opacity. */
 void clear_outside(vtkImageData *image, const char *mask_name, double value)
 {
     vtkDataArray *values = image->GetPointData()->GetArray("f"), *mask = image->GetPointData()->GetArray(mask_name);

@@ -6,7 +6,7 @@
 
 #ifdef __cplusplus
 extern "C" {
-/* C's own way of leaving members zero. */
+/* In C, members that are not named are zero. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 #endif
@@ -21,7 +21,7 @@ typedef enum bench_vtk_mapper {
     BENCH_VTK_RAY_PARTIAL, /* vtkUnstructuredGridVolumeRayCastMapper with partial pre-integration */
     BENCH_VTK_RAY_LINEAR,  /* the same with the linear ray integrator */
     BENCH_VTK_ZSWEEP,      /* vtkUnstructuredGridVolumeZSweepMapper, partial pre-integration */
-    BENCH_VTK_PROJECTED,   /* vtkProjectedTetrahedraMapper: on Mesa's rasterizer */
+    BENCH_VTK_PROJECTED,   /* vtkProjectedTetrahedraMapper, on Mesa's rasterizer */
     BENCH_VTK_RESAMPLE     /* vtkResampleToImage and vtkFixedPointVolumeRayCastMapper */
 } bench_vtk_mapper;
 
@@ -29,16 +29,16 @@ typedef enum bench_vtk_mapper {
 typedef struct bench_vtk_request {
     const test_mesh *mesh;
     bench_vtk_mapper mapper;
-    int resolution; /* of the image that is sampled, points a side of its longest axis */
+    int resolution; /* of the sampled image: points along its longest axis */
     double eye[3], focal[3], up[3], degrees;
     int size; /* pixels a side */
-    /* Opacity and colour by value, linear between the knots. What opacity means is the mapper's own matter. */
+    /* Opacity and colour by value, linear between the knots. Each mapper has its own meaning of opacity. */
     int knot_count;
     const double *knots, *opacities;
     const float *colours; /* knot_count × 3 */
     double unit_distance;
     double sample_distance; /* of the fixed-point mapper */
-    int runs;               /* frames to time after the first: one, and more as long as seconds have not passed */
+    int runs;               /* frames to time after the first; fewer, but at least one, when seconds have passed */
     double seconds;
     int pixel_count;
     const int *pixels; /* pixel_count × 2: x and y, y = 0 at the top */
@@ -52,16 +52,15 @@ typedef struct bench_vtk_result {
     double frames[BENCH_VTK_MAX_RUNS]; /* seconds of each further one */
 } bench_vtk_result;
 
-/* Draw. rgba gets pixel_count × 4, premultiplied: in float where the mapper has that, else in what it has. False where
- * VTK has no window to draw in (no X server) or says that the mapper cannot run. VTK may also crash: call it in a
- * process that may be lost. */
+/* Draws. rgba gets pixel_count × 4, premultiplied, in the mapper's precision. False where VTK has no window to draw in
+ * (no X server) or says that the mapper cannot run. VTK may also crash: call it in a process that may be lost. */
 bool bench_vtk_draw(const bench_vtk_request *request, bench_vtk_result *result, float *rgba);
 
 /* A .vtu file of tets, hexes, wedges and pyramids with a scalar of its points. False where it cannot be read, or has
  * other cells. */
 bool bench_vtk_read(const char *path, const char *field, test_mesh *out);
 
-/* Is VTK in this program at all? */
+/* Tells whether VTK is in this program. */
 bool bench_vtk_is_there(void);
 
 #ifdef __cplusplus

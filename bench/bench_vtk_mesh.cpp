@@ -1,4 +1,4 @@
-/* Between VTK's unstructured grids and the tests' meshes. */
+/* Converts between VTK's unstructured grids and the tests' meshes. */
 #include "bench_vtk_mesh.h"
 
 #include <cstdlib>
@@ -25,7 +25,7 @@ template <typename T> T *reserve(int64_t count)
     return static_cast<T *>(block);
 }
 
-/* A polyhedron as VTK's face stream. */
+/* Adds a polyhedron by VTK's face stream. */
 void add_polyhedron(const test_mesh &mesh, int64_t cell, vtkUnstructuredGrid &grid)
 {
     vtkNew<vtkIdList> stream;

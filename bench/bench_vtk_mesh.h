@@ -1,4 +1,4 @@
-/* Meshes of the tests as VTK's. */
+/* Converts the tests' meshes to VTK's. */
 #ifndef BENCH_VTK_MESH_H
 #define BENCH_VTK_MESH_H
 
@@ -7,7 +7,7 @@
 
 #include "bench_vtk.h"
 
-/* float32 points and values, the point scalars "f". */
+/* The grid has float32 points, and float32 values as the point scalars "f". */
 vtkSmartPointer<vtkUnstructuredGrid> bench_vtk_grid(const test_mesh &mesh);
 
 #endif

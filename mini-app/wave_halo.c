@@ -1,5 +1,5 @@
-/* Pack, send to and receive from each linked rank, unpack. Values are moved as bits of 4 or 8 bytes: the same code for
- * float and double. */
+/* Values are packed, sent to and received from each linked rank, and unpacked. They are moved as 4 or 8 bytes, so that
+ * float and double share the code. */
 #include "wave_halo.h"
 
 #include <stdlib.h>

@@ -16,7 +16,7 @@ typedef struct wave_halo {
     MPI_Request *requests;
 } wave_halo;
 
-/* Values of four components a cell, of value_bytes each. False where memory ran out. Local. */
+/* Makes an exchange of values with four components a cell, of value_bytes each. False where memory ran out. Local. */
 bool wave_halo_create(const wave_mesh *mesh, MPI_Comm comm, int value_bytes, wave_halo *halo);
 void wave_halo_free(wave_halo *halo);
 

@@ -1,25 +1,24 @@
 /* Godunov's scheme for acoustics on any cells, of second order by values at vertices.
  *
- *   p_t = -K div u        p' = p - dt K/V sum_f A_f u*_f        over the faces f of a cell
- *   u_t = -1/rho grad p   u' = u - dt/(rho V) sum_f A_f n_f p*_f
+ * p_t = -K div u        p' = p - dt K/V sum_f A_f u*_f        over the faces f of a cell u_t = -1/rho grad p   u' = u -
+ * dt/(rho V) sum_f A_f n_f p*_f
  *
  * p* and u* solve Riemann's problem between the two sides a, b of a face, each with its own impedance Z = rho c:
  *
- *   p* = (Zb pa + Za pb + Za Zb (ua - ub)) / (Za + Zb)        u* = (Za ua + Zb ub + pa - pb) / (Za + Zb)
+ * p* = (Zb pa + Za pb + Za Zb (ua - ub)) / (Za + Zb)        u* = (Za ua + Zb ub + pa - pb) / (Za + Zb)
  *
  * The reconstruction needs no gradients. Let P_v be the state at a vertex, from the cells around it, P_f and P_c its
  * means over a face's and a cell's vertices. The linear function through them, moved to the cell's own mean q, is at
  * the face
  *
- *   q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
+ * q + (P_f - P_c) = P_f + j        with the cell's jump j = q - P_c + dt/2 q_t
  *
  * (q_t from Green's theorem with P_f: the step from the old time to the middle of the new). P_f is common to both
- * sides, so ranks exchange four jumps a cell and nothing else. In one dimension this is Fromm's scheme. Of first order,
- * j = q and P = 0.
+ * sides, so ranks exchange four jumps a cell and nothing else. In one dimension this is Fromm's scheme. In the scheme
+ * of first order, j = q and P = 0.
  *
- * Every cell gathers over its own faces: each flux is computed twice, but nothing is written twice, the order of every
- * sum is the cell's own, and so each cell's result is the same to the bit on any partition.
- */
+ * Every cell gathers over its own faces. Each flux is computed twice, but nothing is written twice, and each sum has
+ * the cell's own order, so that each cell's result has the same bits on any partition. */
 #include "wave_kernel.h"
 
 #include <stddef.h>
@@ -179,7 +178,7 @@ INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, cons
     real za = layers->impedance[layer_a], pa = mean[0] + a[0];
     real ua = n[0] * (mean[1] + a[1]) + n[1] * (mean[2] + a[2]) + n[2] * (mean[3] + a[3]);
     if (!b) {
-        /* A rigid wall mirrors the state; one that absorbs has silence behind it. */
+        /* A rigid wall mirrors the state; behind an absorbing wall there is silence. */
         star[0] = grid->reflecting ? pa + za * ua : (pa + za * ua) * (real)0.5;
         star[1] = grid->reflecting ? 0 : star[0] * (2 * layers->inverse_sum[layer_a][layer_a]);
         return;

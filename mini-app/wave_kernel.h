@@ -25,8 +25,8 @@ typedef struct wave_grid {
     const int64_t *around_offsets;
     const int32_t *around;
     const uint8_t *walls;
-    const uint8_t *layers;      /* cells: of the medium */
-    const void *around_weights; /* real, as around: of each cell in the value at the vertex */
+    const uint8_t *layers;      /* cells: layer of the medium */
+    const void *around_weights; /* real, as around: weight of each cell in the value at the vertex */
     const void *faces;          /* real, own faces x 4: outward unit normal, area */
     const void *inverse_volume; /* real, own_cells */
     wave_values state;          /* cells: pressure, velocity */
@@ -39,13 +39,13 @@ typedef struct wave_grid {
 } wave_grid;
 
 typedef struct wave_kernel {
-    /* vertex_state from the state of the cells around. */
+    /* Computes vertex_state from the state of the cells around. */
     void (*to_vertices)(const wave_grid *grid);
-    /* jump, half a time step ahead, of own cells. */
+    /* Computes the jumps of own cells, half a time step ahead. */
     void (*find_jumps)(const wave_grid *grid, double time_step);
-    /* state of own cells, a time step ahead, from jump of all cells. */
+    /* Moves the state of own cells a time step ahead, by the jumps of all cells. */
     void (*apply_fluxes)(const wave_grid *grid, double time_step);
-    /* coordinates of own vertices by scale * their velocity. */
+    /* Moves the coordinates of own vertices by scale * their velocity. */
     void (*move_vertices)(const wave_grid *grid, double scale);
 } wave_kernel;
 

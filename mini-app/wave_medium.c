@@ -1,5 +1,5 @@
-/* The earthquake in small: a source at depth under slower and lighter layers, so that the wave bends towards the
- * surface and each interface sends a part of it back. */
+/* A small earthquake: the source is at depth under slower and lighter layers, so that the wave bends towards the
+ * surface and each interface reflects a part of it. */
 #include "wave_medium.h"
 
 #include <math.h>
@@ -40,7 +40,8 @@ wave_source wave_source_default(const wave_lattice *lattice, const wave_medium *
                           .delay = 0.36};
     int layer = wave_medium_layer(medium, source.position[2]);
     source.amplitude = 4 * pi * 0.5 / medium->density[layer];
-    /* A ninth of a wavelength where cells resolve it; never less than a cube, which sampling needs to see the ball. */
+    /* The radius is a ninth of a wavelength where cells resolve that, and never less than a cube, so that sampling
+     * finds the ball. */
     source.radius = fmax(medium->speed[layer] / source.frequency / 9, lattice->edge);
     return source;
 }

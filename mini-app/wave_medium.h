@@ -1,6 +1,5 @@
-/* The medium that the wave goes through, and its source. Lengths in half box sides, speeds so that the slowest layer
- * has 0.8.
- */
+/* The medium that the wave goes through, and its source. Lengths are in half box sides; the slowest layer has speed
+ * 0.8. */
 #ifndef WAVE_MEDIUM_H
 #define WAVE_MEDIUM_H
 

@@ -46,7 +46,7 @@ struct option_row {
     const char *name;
     bool (*read)(const option_row *row, const char *value, void *field); /* NULL: a flag */
     size_t offset;
-    const char *expected; /* for messages; of a choice, its words divided by '|' */
+    const char *expected; /* for messages; for a choice, its words divided by '|' */
     const int *choice;    /* what each word stands for; NULL: 0, 1, 2, ... */
     double low, high;
 };
@@ -114,7 +114,7 @@ static bool read_text(const option_row *row, const char *value, void *field)
 static const int of_bytes[] = {4, 8};
 static const int of_order[] = {1, 2};
 
-/* Choices are stored through int pointers: the enums' and bools' own fields are set from raw_options. */
+/* Choices are stored through int pointers here; enums and bools are set from them afterwards. */
 typedef struct raw_options {
     int cells, partition, real_bytes, index_bytes, apart, reflecting, order, at_vertices, steps, size[3];
     double jitter, swell;
@@ -147,7 +147,7 @@ static const option_row rows[] = {
 
 enum { ROW_COUNT = sizeof rows / sizeof *rows };
 
-/* getopt_long() is told of row i by i + 1: 0 is what it says of none. */
+/* getopt_long() returns i + 1 for row i, as it returns 0 for no row. */
 static void list_options(struct option list[ROW_COUNT + 1])
 {
     for (int i = 0; i < ROW_COUNT; ++i)
@@ -167,7 +167,7 @@ static bool read_option(const option_row *row, raw_options *raw, char *message, 
     return true;
 }
 
-/* Describes the fault of an option that getopt_long() does not take; optopt is its row where it knows that. */
+/* Describes what is wrong with an option that getopt_long() rejects; optopt is its row, if known. */
 static void tell_fault(int found, const char *argument, char *message, size_t size)
 {
     if (optopt > ROW_COUNT) /* a letter of "-abc" */
@@ -180,13 +180,13 @@ static void tell_fault(int found, const char *argument, char *message, size_t si
         snprintf(message, size, "--%s takes no value", rows[optopt - 1].name);
 }
 
-/* Without a word of getopt's own, which would come from every rank. */
+/* Reads the options. getopt_long() prints no messages, since each would come from every rank. */
 static bool read_options(int argc, char **argv, raw_options *raw, char *message, size_t size)
 {
     struct option list[ROW_COUNT + 1];
     list_options(list);
     opterr = 0;
-    optind = 0; /* from the beginning, whoever was here before */
+    optind = 0; /* getopt_long() begins anew, even if it was used before */
     int found;
     while ((found = getopt_long(argc, argv, ":", list, NULL)) != -1) {
         if (found == ':' || found == '?') {

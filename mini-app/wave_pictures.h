@@ -1,4 +1,4 @@
-/* Handing the wave's arrays to libinsitu, and telling what it did: the part of the mini-app to read for an example. */
+/* Hands the wave's arrays to libinsitu, and tells what it did. Read this part of the mini-app for an example. */
 #ifndef WAVE_PICTURES_H
 #define WAVE_PICTURES_H
 
@@ -15,8 +15,8 @@ typedef struct wave_pictures {
     const wave_mesh *mesh;
     const wave_solver *solver;
     int rank;
-    uint8_t *ghosts;   /* cells, where they are handed over */
-    bool handed_over;  /* the mesh, once */
+    uint8_t *ghosts;   /* one a cell, where they are handed over */
+    bool handed_over;  /* the mesh has been handed over once */
     int images;        /* drawn so far */
     int message_count; /* errors and warnings shown so far, by hash */
     uint64_t messages[WAVE_MESSAGES_MAX];
@@ -26,7 +26,8 @@ typedef struct wave_pictures {
 void wave_pictures_open(const wave_options *options, const wave_mesh *mesh, const wave_solver *solver, MPI_Comm comm,
                         wave_pictures *pictures);
 
-/* Hand over and draw what is due. Returns this rank's report, all zero without a session. Collective. */
+/* Hand the arrays over and draw the images that are due. Returns this rank's report, all zero without a session.
+ * Collective. */
 insitu_report wave_pictures_step(wave_pictures *pictures, int64_t cycle, double time);
 
 /* Collective. */

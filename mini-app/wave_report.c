@@ -1,5 +1,5 @@
-/* Times and memory are those of the slowest and largest rank, column by column: the phases of one line may come from
- * different ranks, and need not add up to the whole. */
+/* Each column shows the slowest or largest rank, so the phases of one line may come from different ranks and need not
+ * add up to the whole. */
 #include "wave_report.h"
 
 #include <stdio.h>
@@ -63,8 +63,8 @@ void wave_report_step(wave_report *report, int64_t cycle, double time, double si
     fflush(stdout);
 }
 
-/* End a YAML scalar that begins at text: at its closing quote, or before a comma, a blank or a brace that it did not
- * open itself ("{cycle}" it did). */
+/* Cut text at the end of the YAML scalar that it begins with: at its closing quote, or before a comma, a blank or a
+ * closing brace that it did not open itself (as "{cycle}" does). */
 static void cut_scalar(char *text)
 {
     char quote = *text == '"' || *text == '\'' ? *text : 0;
@@ -78,8 +78,8 @@ static void cut_scalar(char *text)
     *text = 0;
 }
 
-/* The public face does not tell where pictures go; the scene does. Show its output paths and databases as they are
- * written there. A camera's path is a list. */
+/* Shows the scene's output paths and databases as they are written there, since the public functions do not tell where
+ * pictures go. A camera's path is a list, and not shown. */
 static void show_paths(const char *scene)
 {
     char line[1024];

@@ -1,6 +1,6 @@
-/* A step: jumps of own cells, exchanged; fluxes and source; states, exchanged; vertices. The geometry that is computed
- * on is the mesh at rest: the equations are those of small displacements. Where vertices move, what moves is the
- * drawing: each goes with the velocity at it, exaggerated, as the ground does in an earthquake. */
+/* A step computes jumps of own cells and exchanges them, applies fluxes and source, exchanges states, and updates
+ * vertices. It computes on the mesh at rest, by the equations of small displacements. Where vertices move, only the
+ * drawing does: each moves with the velocity there, exaggerated, as the ground does in an earthquake. */
 #include "wave_solver.h"
 
 #include <math.h>
@@ -100,7 +100,7 @@ static void measure(const wave_mesh *mesh, int32_t cell, wave_cell_geometry *out
     wave_cell_measure(shape, (const double(*)[3])position, id, out);
 }
 
-/* Faces and volume of an own cell; returns the time step it allows. */
+/* Stores the faces and volume of an own cell; returns the time step that it allows. */
 static double measure_own(wave_solver *s, int32_t cell, const wave_cell_geometry *g)
 {
     int bytes = s->setup.real_bytes, count = wave_cell_shape_of(wave_mesh_type(s->mesh, cell))->face_count;

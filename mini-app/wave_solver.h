@@ -26,27 +26,28 @@ typedef struct wave_solver {
     wave_halo halo;
     void *around_weights, *faces, *inverse_volume; /* the grid's, owned */
     uint8_t *layers;
-    void *speed;       /* real, cells: of sound */
+    void *speed;       /* real, cells: speed of sound */
     double *volume;    /* own cells */
     int32_t fed_count; /* own cells within the source */
     int32_t *fed;
-    double *fed_rate; /* pressure a unit of the source's rate adds to each, per unit time */
+    double *fed_rate; /* pressure that a unit of the source's rate adds to each per unit time */
     double time_step, time;
 } wave_solver;
 
 /* Sums over all ranks. */
 typedef struct wave_totals {
     double volume;
-    double mass;   /* of V p / K: the volume that was injected */
-    double energy; /* of V (p^2 / 2K + rho u^2 / 2) */
+    double mass;   /* sum of V p / K: the injected volume */
+    double energy; /* sum of V (p^2 / 2K + rho u^2 / 2) */
     double peak;   /* greatest |p| */
 } wave_totals;
 
-/* Local arrays. False where memory ran out: then agree on it before anything collective. Local. */
+/* Makes the local arrays. False where memory ran out: ranks must agree on that before the next collective call. Local.
+ * */
 bool wave_solver_create(const wave_setup *setup, const wave_mesh *mesh, MPI_Comm comm, wave_solver *solver);
 void wave_solver_free(wave_solver *solver);
 
-/* Pressure and velocity of an own cell, before wave_solver_start(). Local. */
+/* Set or get pressure and velocity of an own cell, the former before wave_solver_start(). Local. */
 void wave_solver_set(wave_solver *solver, int32_t cell, const double state[4]);
 void wave_solver_get(const wave_solver *solver, int32_t cell, double state[4]);
 void wave_solver_centroid(const wave_solver *solver, int32_t cell, double xyz[3]);

@@ -1,5 +1,5 @@
-/* Counts and ranges are taken over all leaves of a composite, so that a field which every block has is one line. What
- * stands in hidden cells is often junk, so nothing is taken from there. */
+/* Counts and ranges are taken over all leaves of a composite, so that a field of every block is one line. Values in
+ * hidden cells are often junk, so they do not count. */
 #include "data_info.h"
 
 #include <algorithm>
@@ -56,7 +56,7 @@ void add_value(std::pair<double, double> &range, double value, bool &is_finite)
     range.second = std::max(range.second, value);
 }
 
-/* Which cells of a grid are shown, and which points those have; both empty where all are. */
+/* The cells of a grid that are shown, and their points; both empty where all are. */
 struct selection {
     std::vector<bool> cells, points;
 };
@@ -158,7 +158,7 @@ data_summary summarize(vtkDataObject *data)
     return all;
 }
 
-/* "QuadraticTetra" of "vtkQuadraticTetra", with VTK's number. */
+/* The name "QuadraticTetra" for "vtkQuadraticTetra", with VTK's number. */
 std::string cell_name(int type)
 {
     const std::string name = vtkCellTypes::GetClassNameFromTypeId(type);

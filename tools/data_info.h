@@ -11,8 +11,8 @@ namespace render_tool
 {
 
 /* Print the cells by type, bounds, fields with centring, type, components and ranges, and times to stdout, after a line
- * that begins with title. data is of unstructured grids (grids_of.h). Cells that are not drawn since they are hidden or
- * ghosts are a line of their own; they, and points that no other cell has, are left out of everything else. */
+ * that begins with title. data has unstructured grids only (grids_of.h). Cells that are not drawn, being hidden or
+ * ghosts, have a line of their own; they, and points that no other cell has, do not count otherwise. */
 void print_info(const std::string &title, vtkDataObject *data, const std::vector<double> &times);
 
 } // namespace render_tool

@@ -43,7 +43,7 @@ std::string quoted(const std::string &text)
     return out + '"';
 }
 
-/* Numbers that say whose a point or cell is are no field to look at. */
+/* Arrays of ids, and VTK's own flags, are no fields to look at. */
 bool is_field(vtkDataArray *array)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";

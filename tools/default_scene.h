@@ -1,4 +1,4 @@
-/* The scene that files are drawn by where the caller has none. */
+/* The scene for files where the caller gives none. */
 #ifndef DEFAULT_SCENE_H
 #define DEFAULT_SCENE_H
 
@@ -9,11 +9,11 @@
 namespace render_tool
 {
 
-/* The outer surface of the data, coloured by a field: the one the options name, else the first that the first file has,
- * at points before cells. Reads that file where no field is named. Throws std::runtime_error. */
+/* A scene of the data's outer surface, coloured by the field that the options name, else by the first file's first
+ * field, at points before cells. Reads that file where no field is named. Throws std::runtime_error. */
 std::string default_scene(const options &o);
 
-/* A file that holds a text for as long as the object lives. */
+/* A file with a text, which exists as long as the object. */
 class temporary_file
 {
   public:

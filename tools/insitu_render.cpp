@@ -1,8 +1,9 @@
-/* insitu-render: the engine of libinsitu on files. A simulation that has already run is played back to a session: each
- * step is read, dealt out, handed over by the VTK adaptor and drawn.
+/* insitu-render draws files by libinsitu. A simulation that has already run is played back to a session: each step is
+ * read, dealt out, handed over by the VTK adaptor and drawn.
  *
- * One rank may fail where others do not (a file that only it cannot read). So nothing local is followed by anything
- * collective before all ranks have agreed that none failed; if one did, all throw its message, and rank 0 prints it. */
+ * One rank may fail where others do not, as on a file that only it cannot read. So after each local part all ranks
+ * agree that none failed before anything collective follows; if one did, all throw its message, and rank 0 prints it.
+ * */
 #include <chrono>
 #include <climits>
 #include <cstdio>
@@ -88,7 +89,7 @@ class stage
         (void)insitu_destroy(&session_);
     }
 
-    /* Collective: the pictures are written, all of them, or this throws. */
+    /* Collective: waits until all pictures are written; throws if one cannot be. */
     void close()
     {
         insitu_vtk_destroy(&adaptor_);
@@ -97,7 +98,7 @@ class stage
     stage(const stage &) = delete;
     stage &operator=(const stage &) = delete;
 
-    /* A part of which nothing can be drawn is no error here: the rest of the data may lie on other ranks. */
+    /* It is no error here that nothing of a part can be drawn: the rest of the data may lie on other ranks. */
     insitu_vtk_report set(vtkDataObject *data)
     {
         insitu_vtk_report report;
@@ -118,7 +119,7 @@ class stage
     insitu_vtk_adaptor *adaptor_ = nullptr;
 };
 
-/* Collective: the lines of every rank's text that no earlier rank, and no earlier call, had; on rank 0. */
+/* Collective: on rank 0, the lines of all ranks' texts without those that it has seen already. */
 std::vector<std::string> new_lines(const world &w, const std::string &text, std::set<std::string> &seen)
 {
     int length = static_cast<int>(text.size());
@@ -138,7 +139,7 @@ std::vector<std::string> new_lines(const world &w, const std::string &text, std:
     return fresh;
 }
 
-/* One run's memory of what it has said and done. */
+/* The warnings that a run has shown, and the number of its images. */
 struct run_state {
     std::set<std::string> said;
     int images = 0;
@@ -154,7 +155,7 @@ void show_warnings(const world &w, const std::string &text, run_state &run, prog
         bar.note("warning: and " + std::to_string(fresh.size() - warnings_at_once) + " more");
 }
 
-/* The adaptor counts the cells of a rank; here they are counted over all. */
+/* The warnings about cells, counted over all ranks; the adaptor counts only its rank's. */
 std::string cell_warnings(const int64_t sums[4])
 {
     std::string text;
@@ -185,7 +186,7 @@ std::string milliseconds(double ms)
     return text;
 }
 
-/* Collective: a line on the step; cells are summed over ranks, times are the slowest rank's. */
+/* Collective: the line about the step. Cells are summed over ranks, times are the slowest rank's. */
 std::string step_line(const world &w, const insitu_report &r, const std::string &name, double time, double read_ms)
 {
     const char *const names[] = {"prepare", "build", "refit", "surface", "volume", "composite", "write"};
@@ -219,7 +220,7 @@ void draw_step(const world &w, step_source &source, stage &on, size_t index, run
         report = on.set(part.data);
     });
     const std::chrono::duration<double, std::milli> read_time = std::chrono::steady_clock::now() - start;
-    /* All ranks take one time, whichever of them read a part without it. */
+    /* All ranks take rank 0's time, as some may have read a part without one. */
     MPI_Bcast(&part.time, 1, MPI_DOUBLE, 0, w.comm);
     std::string warnings = check_cells(w, report, name) + report.warnings + "\n";
     const insitu_report &done = on.step(source.cycle(index), part.time);
@@ -244,7 +245,7 @@ void draw(const world &w, const options &o)
     all_do(w, [&] {
         if (scene.empty() && w.is_root()) made = std::make_unique<temporary_file>(default_scene(o));
     });
-    if (made) scene = made->path(); /* rank 0 alone reads it */
+    if (made) scene = made->path(); /* only rank 0 reads it */
     stage on(w, scene.empty() ? "default scene" : scene);
     run_state run;
     progress bar(w.is_root(), source->count());

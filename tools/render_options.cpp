@@ -1,4 +1,5 @@
-/* By CLI11, which throws rather than prints: every rank reads the same line, and one tells what is wrong with it. */
+/* Options are read by CLI11, which throws and does not print: every rank reads the same line, and one tells what is
+ * wrong with it. */
 #include "render_options.h"
 
 #include <CLI/CLI.hpp>
@@ -68,7 +69,7 @@ bool is_scene(const std::string &name)
     return ends_with(".yaml") || ends_with(".yml");
 }
 
-/* The runs of digits of a name, and the name with each run as '#'. */
+/* A name's runs of digits, and the name with '#' for each run. */
 struct numbered_name {
     std::string path, shape;
     std::vector<std::string> numbers; // without leading zeros
@@ -138,7 +139,7 @@ struct help_formatter : CLI::Formatter {
 
 using value_reader = void (*)(const std::string &text, options &o);
 
-/* The last value of an option that is given twice counts. */
+/* Adds an option; if it is given twice, the last value counts. */
 void add_value(CLI::App &app, options &o, const char *name, const char *type, value_reader read, const char *meaning)
 {
     app.add_option_function<std::string>(

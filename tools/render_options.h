@@ -27,8 +27,8 @@ struct options {
     std::vector<std::string> files;
 };
 
-/* Throws std::runtime_error with what is wrong. Files whose names differ in nothing but numbers come in the order of
- * the numbers, so that a shell's file_10 does not precede its file_2. */
+/* Throws std::runtime_error with what is wrong. Files whose names differ only in numbers are sorted by these, so that
+ * file_2 comes before file_10, unlike in a shell's order. */
 options parse_options(int argc, char **argv);
 
 std::string help_text();

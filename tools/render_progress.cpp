@@ -1,4 +1,4 @@
-/* The bar is drawn over itself with a carriage return; it is cleared before every line that stays, and at the end. */
+/* A carriage return draws the bar over itself; it is cleared before every line that stays, and at the end. */
 #include "render_progress.h"
 
 #include <cstdio>

@@ -1,4 +1,4 @@
-/* How far a run is: a line a step on stdout, and on a terminal a bar below it on stderr. */
+/* Shows how far a run is: a line a step on stdout, and on a terminal a bar below it on stderr. */
 #ifndef RENDER_PROGRESS_H
 #define RENDER_PROGRESS_H
 

@@ -1,6 +1,6 @@
-/* A rank reads no more than it must where files are made of parts: with at least as many parts (the pieces of a .pvtu,
- * the blocks of a .vtm, the files of --pieces) as ranks, each rank reads some parts whole. Otherwise, and for any other
- * partition than blocks, every rank reads all and keeps its cells. */
+/* Where files have at least as many parts (the pieces of a .pvtu, the blocks of a .vtm, the files of --pieces) as there
+ * are ranks, each rank reads some parts whole. Otherwise, and for any other partition than blocks, every rank reads all
+ * and keeps its cells. */
 #include "step_source.h"
 
 #include <algorithm>

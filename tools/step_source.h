@@ -1,4 +1,4 @@
-/* The steps of a run: which file and which step in it each is, and this rank's part of one. */
+/* The steps of a run: the file of each and the step in it, and this rank's part of its data. */
 #ifndef STEP_SOURCE_H
 #define STEP_SOURCE_H
 
@@ -17,7 +17,7 @@ namespace render_tool
 class step_source
 {
   public:
-    /* Opens the files that hold steps inside; throws std::runtime_error. */
+    /* Opens the files that hold several steps; throws std::runtime_error. */
     step_source(const options &o, int rank, int ranks);
 
     size_t count() const { return steps_.size(); }

@@ -1,6 +1,6 @@
-/* Who lies beyond each face: faces are hashed by their vertex ids, and every face of an own cell must be met by exactly
- * one other cell, or lie on a wall of the box. The table holds (cell, face) of those seen once; the second sight joins
- * them and leaves the entry, marked, so that a third is noticed. */
+/* Finds the cell beyond each face. Faces are hashed by their vertex ids, and every face of an own cell must have
+ * exactly one other cell, or lie on a wall of the box. The table holds (cell, face) of faces seen once. The second cell
+ * is joined to the first, and the entry stays, marked, so that a third is noticed. */
 #include <stdlib.h>
 
 #include "wave_mesh.h"
@@ -57,7 +57,7 @@ static face_entry *find_entry(const face_table *table, const int64_t key[4], uin
     }
 }
 
-/* All vertices of the face lie on one side of the lattice. */
+/* Tells whether all vertices of the face lie on one side of the lattice. */
 static bool on_a_wall(const wave_mesh *mesh, int32_t cell, int face)
 {
     const wave_lattice *lattice = &mesh->partition.lattice;

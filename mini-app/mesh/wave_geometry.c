@@ -1,5 +1,5 @@
-/* Quads are bilinear patches. Their area vector is half the cross product of the diagonals, whatever the warp; what
- * they add to a volume is the mean of the two ways to split them into triangles, which is exact for the patch. So the
+/* Quads are bilinear patches. Their area vector is half the cross product of the diagonals, whatever the warp. Their
+ * part of a volume is the mean over the two ways to split them into triangles, which is exact for the patch. So the
  * volumes of cells that share faces add up to the box, and the areas around a cell to zero. */
 #include "wave_geometry.h"
 
@@ -45,7 +45,7 @@ static double face_volume(const double p[4][3], int size)
            12;
 }
 
-/* A face's vertices relative to origin, from the one of least id on, so that its two cells round alike. */
+/* Gets a face's vertices relative to origin, from the one of least id on, so that its two cells round alike. */
 static void face_points(const wave_cell_shape *shape, int face, const double position[8][3], const int64_t id[8],
                         const double origin[3], double p[4][3])
 {

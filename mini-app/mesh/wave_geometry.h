@@ -10,7 +10,7 @@ typedef struct wave_cell_geometry {
     double area[6][3]; /* outward area vectors; exactly opposite seen from the two cells of a face */
 } wave_cell_geometry;
 
-/* position: of the shape's vertices; id: their ids, the same on every rank. */
+/* position and id are those of the shape's vertices; ids are the same on every rank. */
 void wave_cell_measure(const wave_cell_shape *shape, const double position[8][3], const int64_t id[8],
                        wave_cell_geometry *out);
 

@@ -17,7 +17,7 @@
 static const int8_t corner_offset[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                            {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
-/* The faces of a cube, outward; the axis and side each lies on. */
+/* The faces of a cube, outward, with the axis and side that each lies on. */
 static const struct {
     int8_t corner[4];
     int8_t axis, step;

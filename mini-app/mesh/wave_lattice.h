@@ -1,4 +1,4 @@
-/* The lattice of cubes that the mesh is cut from, all by index arithmetic: nothing here is stored per cube, so that any
+/* The lattice of cubes that the mesh is cut from. It is index arithmetic alone: nothing is stored per cube, so that any
  * rank can make any part of the mesh. Cube (i, j, k) has id i + nx (j + ny k); i, j, k go along x, y, z. z = 0 is the
  * surface of the ground, z falls with depth; x and y are centred on 0. */
 #ifndef WAVE_LATTICE_H
@@ -15,7 +15,7 @@ typedef struct wave_lattice {
     int size[3];      /* cubes along x, y, z; each >= 1 */
     wave_cells cells; /* what the cubes are cut into */
     double jitter;    /* inner vertices move by up to this times the edge, per axis; 0 .. 0.3 */
-    double edge;      /* of a cube; the longest side of the box is 2 */
+    double edge;      /* edge of a cube; the longest side of the box is 2 */
     double origin[3]; /* the corner of least x, y, z */
 } wave_lattice;
 

@@ -1,4 +1,4 @@
-/* The mesh is made from ids that any rank can compute; the arrays that are computed on want small local numbers. */
+/* The mesh is made from ids that any rank can compute; the solver's arrays need small local numbers. */
 #include "wave_map.h"
 
 #include <stdlib.h>

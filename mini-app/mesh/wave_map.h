@@ -14,7 +14,7 @@ typedef struct wave_map {
 /* Value of key, or -1. */
 int32_t wave_map_find(const wave_map *map, int64_t key);
 
-/* Value of key; put there, as value, where there was none. -1 where memory ran out. */
+/* Value of key; where it had none, this value is put there. -1 where memory ran out. */
 int32_t wave_map_insert(wave_map *map, int64_t key, int32_t value);
 
 void wave_map_free(wave_map *map);

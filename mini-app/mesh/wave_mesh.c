@@ -1,13 +1,12 @@
-/* Making one rank's part.
+/* Makes one rank's part.
  *
- *   own cubes ──> own cells ──> own vertices          (rising cube id)
- *   the 26 cubes around each ──> foreign cubes, by (owner, cube) ──> those of their cells that touch an own vertex
- *   own cells with a corner that a foreign cube has too ──> sends to its owner, by (owner, cell)
+ * own cubes ──> own cells ──> own vertices          (rising cube id) the 26 cubes around each ──> foreign cubes, by
+ * (owner, cube) ──> those of their cells that touch an own vertex own cells with a corner that a foreign cube has too
+ * ──> sends to its owner, by (owner, cell)
  *
- * Every corner of a cube is a vertex of some cell of it, whatever it is cut into, so "shares a corner with a cube of
- * rank B" is "shares a vertex with a cell of rank B", and A's list of sends to B is B's list of receives from A, in the
- * same order of cell ids.
- */
+ * Every corner of a cube is a vertex of one of its cells, whatever they are, so "shares a corner with a cube of rank B"
+ * is "shares a vertex with a cell of rank B", and A's list of sends to B is B's list of receives from A, in the same
+ * order of cell ids. */
 #include "wave_mesh.h"
 
 #include <stdlib.h>
@@ -107,7 +106,7 @@ static bool add_foreign_cubes(maker *m, int64_t cube, int owner[3][3][3])
     return true;
 }
 
-/* Add a send; the last ones added are this cell's, and one a rank is enough. */
+/* Add a send, unless there is one of this cell to the rank; this cell's are the last ones in the list. */
 static bool add_send(maker *m, int rank, int32_t cell)
 {
     for (int64_t i = m->sends.count - 1; i >= 0 && m->sends.items[i].value == cell; --i) {
@@ -284,8 +283,8 @@ static void sort_by_id(const wave_mesh *mesh, int32_t *cells, int64_t count)
     }
 }
 
-/* Cells around the own vertices: counted, placed, and each vertex's sorted by cell id, so that sums over them round
- * alike on every rank that has the vertex. */
+/* Lists the cells around the own vertices. Each vertex's are sorted by cell id, so that sums over them round alike on
+ * every rank that has the vertex. */
 static bool make_around(wave_mesh *mesh)
 {
     int32_t v[8];

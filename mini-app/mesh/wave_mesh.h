@@ -1,6 +1,6 @@
-/* One rank's part of the mesh: its own cells, then the halo: the cells of other ranks that share a vertex with one of
- * its own. Everything follows from the partition by index arithmetic, so both sides of every exchange make the same
- * lists without talking to each other. */
+/* One rank's part of the mesh: its own cells, and then the halo, which is the cells of other ranks that share a vertex
+ * with one of its own. Everything follows from the partition by index arithmetic, so both sides of every exchange make
+ * the same lists without talking to each other. */
 #ifndef WAVE_MESH_H
 #define WAVE_MESH_H
 
@@ -20,7 +20,7 @@ typedef struct wave_mesh {
     wave_partition partition;
     int rank;
     int32_t own_cells, cells;       /* own ones first; cells counts the halo too */
-    int32_t own_vertices, vertices; /* of own cells first; then those of halo cells alone */
+    int32_t own_vertices, vertices; /* own cells' first, then those of halo cells alone */
     int64_t *cell_ids;              /* cells */
     int64_t *vertex_ids;            /* vertices */
     uint8_t *walls;                 /* vertices: wave_lattice_walls() */

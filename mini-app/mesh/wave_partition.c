@@ -1,5 +1,5 @@
-/* Partitions. A lattice is rarely a power of two wide, so a cube's place on the Morton curve is not its Morton code: it
- * is the number of the lattice's cubes that come before it, counted octant by octant from the top. */
+/* Partitions. The width of a lattice is rarely a power of two, so a cube's place on the Morton curve is not its Morton
+ * code, but the number of the lattice's cubes before it, counted octant by octant from the top. */
 #include "wave_partition.h"
 
 static double block_surface(const wave_lattice *lattice, const int blocks[3])
@@ -9,7 +9,7 @@ static double block_surface(const wave_lattice *lattice, const int blocks[3])
     return s[0] * s[1] + s[1] * s[2] + s[2] * s[0];
 }
 
-/* The factors of ranks with the least surface between blocks. */
+/* Chooses the factors of ranks that leave the least surface between blocks. */
 static void choose_blocks(const wave_lattice *lattice, int ranks, int best[3])
 {
     best[0] = ranks;
@@ -32,7 +32,7 @@ wave_partition wave_partition_make(const wave_lattice *lattice, wave_partition_k
     return partition;
 }
 
-/* Cubes of the lattice in the box of this edge at low. */
+/* Counts the cubes of the lattice in the box of this edge at low. */
 static int64_t cubes_within(const wave_lattice *lattice, const int low[3], int edge)
 {
     int64_t count = 1;

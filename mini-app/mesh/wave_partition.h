@@ -1,4 +1,4 @@
-/* Which rank owns a cube of the lattice: arithmetic alone, the same on every rank. */
+/* Tells which rank owns a cube of the lattice, by arithmetic that is the same on every rank. */
 #ifndef WAVE_PARTITION_H
 #define WAVE_PARTITION_H
 
@@ -22,7 +22,7 @@ wave_partition wave_partition_make(const wave_lattice *lattice, wave_partition_k
 
 int wave_partition_owner(const wave_partition *partition, const int ijk[3]);
 
-/* A box of cubes, low .. high - 1, that holds all that rank owns: what it has to look through to find its own. */
+/* A box of cubes, low .. high - 1, that holds all that rank owns, so that it need not look elsewhere. */
 void wave_partition_box(const wave_partition *partition, int rank, int low[3], int high[3]);
 
 #endif

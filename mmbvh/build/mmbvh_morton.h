@@ -15,8 +15,7 @@ typedef struct morton_coder {
     double most[3];   /* the last step */
     int index_bits;
     int code_bits;
-    uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* where the bits of an axis go in a key, so many at a time
-                                                             */
+    uint64_t parts[3][MORTON_PARTS][1 << MORTON_PART_BITS]; /* where an axis's bits go in a key, so many at a time */
 } morton_coder;
 
 /* Prepares for cells below index_count, within a box in the tree's coordinates. */

@@ -1,4 +1,5 @@
-/* A geometry file, by the format's description; [] where its header asks for it, n and m counts that stand before:
+/* A geometry file, by the format's description. Parts in [] are there if its header says so; n and m are counts that
+ * stand before:
  *
  *     [format] 2 descriptions, node id, element id, [extents: 6 floats]
  *     part     = "part" number description sections
@@ -6,8 +7,8 @@
  *              | "block" i j k 3ijk floats [ijk ints]     (rectilinear: i + j + k floats, uniform: 6)
  *              | type n [n ids] n × nodes ints            (nsided, nfaced: counts, then nodes)
  *
- * A variable's file has a description, then for each of some parts: "part" number, and by nodes "coordinates" or
- * "block", by elements each type or "block", followed by one value a node or element and component. */
+ * A variable's file has a description, and then for some parts: "part" number, and for nodes "coordinates" or "block",
+ * for elements each type or "block", followed by one value a node or element and component. */
 #include "ensight_check.h"
 
 #include <algorithm>
@@ -43,7 +44,7 @@ bool starts_with(const std::string &text, const char *start)
     return text.compare(0, std::strlen(start), start) == 0;
 }
 
-/* -1 for a word that is no type of elements; 0 for those whose elements differ in size. */
+/* -1 for a word that is no element type; 0 for types whose elements differ in size. */
 int nodes_of_type(const std::string &type)
 {
     static const std::map<std::string, int> nodes = {
@@ -186,14 +187,14 @@ void walk_variable(const std::string &path, encoding how, const geometry &parts,
     if (!has_values) in.refuse("is cut short: a part has no values");
 }
 
-/* A file that a line of the case names. */
+/* A file named in a line of the case. */
 struct named_file {
     std::string pattern; // with '*' for the step's number
     int components = 0;  // 0: geometry
     bool is_per_node = false;
 };
 
-/* "1 1 name file" without the numbers of time and file sets. */
+/* The words of "1 1 name file" without the numbers of time and file sets. */
 std::vector<std::string> words_of(const std::string &text)
 {
     std::vector<std::string> words;
@@ -233,7 +234,7 @@ std::vector<named_file> files_of(const std::string &case_path)
     return files;
 }
 
-/* The files that a pattern stands for, by what stands for its stars. */
+/* The files that match a pattern, by what its stars stand for. */
 std::map<std::string, std::string> matches(const std::string &folder, const std::string &pattern)
 {
     const size_t first = pattern.find('*'), last = pattern.find_last_of('*');

@@ -1,5 +1,5 @@
-/* Whether the files of an EnSight Gold case are whole. VTK's reader of them takes numbers that are missing at a file's
- * end from whatever its memory holds, or crashes. */
+/* Checks that the files of an EnSight Gold case are whole. Where numbers are missing at a file's end, VTK's reader
+ * takes whatever its memory holds, or crashes. */
 #ifndef ENSIGHT_CHECK_H
 #define ENSIGHT_CHECK_H
 

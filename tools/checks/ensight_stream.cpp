@@ -1,5 +1,5 @@
-/* Text has a number or the numbers of an element in a line. Binary files have lines of 80 bytes and numbers of 4 bytes,
- * which Fortran puts into records: their length in bytes, what is in them, their length again. */
+/* Text has one number, or the numbers of one element, in a line. Binary files have lines of 80 bytes and numbers of 4
+ * bytes; Fortran puts both into records, with the length in bytes before and after the contents. */
 #include "ensight_stream.h"
 
 #include <array>
@@ -83,7 +83,7 @@ std::string ensight_stream::line()
     return text;
 }
 
-/* The numbers of a part and of its points are small and not negative: bytes in the other order make them huge. */
+/* Numbers of parts and of points are small and not negative; bytes in the wrong order make them huge. */
 int32_t ensight_stream::binary_integer()
 {
     int32_t n = 0;

@@ -13,13 +13,13 @@ namespace render_tool
 class ensight_stream
 {
   public:
-    /* The encoding is that of the case's geometry files, which say it in their first bytes. */
+    /* The case's geometry files tell the encoding by their first bytes. */
     enum class encoding { text, c_binary, fortran_binary };
 
     static encoding encoding_of(const std::string &path);
     ensight_stream(const std::string &path, encoding how);
 
-    /* The next line, without blanks around it; of text one that is not blank. False at the end of the file. */
+    /* The next line, without blanks around it; in text the next one that is not blank. False at the end of the file. */
     bool next_line(std::string &line);
     std::string line();
 

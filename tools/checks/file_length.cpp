@@ -1,6 +1,5 @@
-/* A number that lost its last digits is a number still, so plain text must end with the end of a line. Files of VTK's
- * XML formats must end with their last tag; where VTK's readers open other files that such a file names, those must
- * too. */
+/* A number without its last digits is still a number, so plain text must end with an end of line. Files of VTK's XML
+ * formats must end with their last tag, and so must the files that they name and VTK's readers open. */
 #include "file_length.h"
 
 #include <algorithm>
@@ -50,7 +49,7 @@ void check_last_tag(const std::string &path)
     if (!is_whole) throw std::runtime_error(path + ": is cut short: it has no </VTKFile> at its end");
 }
 
-/* VTK's XML formats all begin so. */
+/* Tells whether the file begins as all of VTK's XML formats do. */
 bool is_vtk_xml(const std::string &path)
 {
     const std::string name = path.substr(path.find_last_of('/') + 1);
@@ -60,7 +59,7 @@ bool is_vtk_xml(const std::string &path)
            (ending.compare(0, 3, ".vt") == 0 && ending != ".vtk" && ending != ".vtkhdf");
 }
 
-/* The value of name="0" in a tag is zero. */
+/* Tells whether a tag has name="0". */
 bool is_zero(const std::string &tag, const std::string &name)
 {
     return tag.find(' ' + name + "=\"0\"") != std::string::npos;

@@ -1,4 +1,4 @@
-/* Reads from a file's own text how long it should be, for formats whose readers take a cut end for zeros. */
+/* Checks a file's length by its own text, for formats whose readers read zeros where the end is cut off. */
 #ifndef FILE_LENGTH_H
 #define FILE_LENGTH_H
 

@@ -1,5 +1,5 @@
 /* After four lines of heading ("# vtk DataFile Version 5.1", a title, ASCII or BINARY, DATASET and its kind) come
- * sections, each a word and counts, and most with values: text, or big-endian numbers and the end of a line. */
+ * sections: each has a word and counts, and most have values, as text or as big-endian numbers and an end of line. */
 #include "legacy_check.h"
 
 #include <algorithm>
@@ -180,7 +180,7 @@ class walker
         return true;
     }
 
-    /* Up to version 5.0 one list of counts and points, later two. */
+    /* Skips the cells: up to version 5.0 one list of counts and points, later two lists. */
     bool skip_cells()
     {
         const int64_t cells = count(1), size = count(2);
@@ -212,7 +212,7 @@ class walker
         return true;
     }
 
-    /* Lines up to an empty one. What is lost of it changes no picture. */
+    /* Skips the lines up to an empty one. Missing ones change no picture. */
     bool skip_metadata()
     {
         for (std::string line; std::getline(in_, line) && !line.empty();) {

@@ -1,4 +1,4 @@
-/* Whether a file of VTK's legacy format (.vtk) is whole. VTK's reader goes on with whatever its memory held where
+/* Checks that a file of VTK's legacy format (.vtk) is whole. VTK's reader goes on with whatever its memory held where
  * numbers are missing at a file's end, and crashes where a header is cut. */
 #ifndef LEGACY_CHECK_H
 #define LEGACY_CHECK_H

@@ -1,4 +1,4 @@
-/* The header, by the format's specification, all numbers big-endian; N is 4 bytes, in CDF-5 8:
+/* The header by the format's specification. All numbers are big-endian; N has 4 bytes, or 8 in CDF-5:
  *
  *     "CDF" version  records:N  dimensions  attributes  variables
  *     list           = tag:4 count:N entries
@@ -90,14 +90,14 @@ class header
         }
         skip_attributes();
         const int64_t bytes = elements * bytes_of_type(number(4));
-        count(); // its size as padded, and not to be relied on above 4 GB
+        count(); // its padded size, which is wrong above 4 GB
         const int64_t begin = number(version_ == 1 ? 4 : 8);
         int64_t &end = has_records ? record_end_ : fixed_end_;
         end = std::max(end, begin + bytes);
         if (has_records) record_bytes_ += (bytes + 3) / 4 * 4;
     }
 
-    static constexpr int64_t streaming_ = 0xffffffff; // records that a writer did not count
+    static constexpr int64_t streaming_ = 0xffffffff; // number of records where the writer did not count them
     std::ifstream in_;
     int version_ = 0;
     int64_t records_ = 0;

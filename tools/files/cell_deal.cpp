@@ -1,5 +1,5 @@
-/* Cells are numbered through all leaves of a data set in the iterator's order; who owns a cell follows from that
- * number, or from its place, alone. So ranks that hold the same data agree without a message. */
+/* Cells are numbered through all leaves of a data set in the iterator's order. A cell's number, or its place, alone
+ * tells its owner, so ranks that hold the same data agree without a message. */
 #include "cell_deal.h"
 
 #include <algorithm>

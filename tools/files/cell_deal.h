@@ -1,4 +1,4 @@
-/* Dealing the cells of a data set out to ranks. */
+/* Deals the cells of a data set out to ranks. */
 #ifndef CELL_DEAL_H
 #define CELL_DEAL_H
 
@@ -19,9 +19,9 @@ enum class partition {
 
 bool parse_partition(const std::string &text, partition &out);
 
-/* This rank's part of data, which is of unstructured grids (grids_of.h): cells that belong to it, with the points they
- * use and all arrays. Every cell goes to exactly one rank. Leaves of composites keep their numbers; those without a
- * cell for this rank are null. data is returned as it is where all of it belongs to this rank. */
+/* This rank's part of data, which has unstructured grids only (grids_of.h): the rank's cells, with the points they use
+ * and all arrays. Every cell goes to exactly one rank. Leaves of composites keep their numbers; those without a cell
+ * for this rank are null. data is returned as it is where all of it belongs to this rank. */
 vtkSmartPointer<vtkDataObject> deal(vtkDataObject *data, partition how, int rank, int ranks);
 
 } // namespace render_tool

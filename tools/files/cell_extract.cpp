@@ -1,5 +1,5 @@
-/* VTK has a filter for this, vtkExtractCells. It reads beyond the lists of faces that VTK's own readers may leave
- * shorter than the cells, so it is not used. */
+/* VTK's filter for this, vtkExtractCells, is not used: VTK's own readers may leave lists of faces shorter than the
+ * cells, and it reads beyond them. */
 #include "cell_extract.h"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace render_tool
 namespace
 {
 
-/* The new numbers of points, given in the order of their first use. */
+/* Numbers points anew, in the order of their first use. */
 class renumbering
 {
   public:
@@ -43,7 +43,8 @@ class renumbering
     std::vector<vtkIdType> numbers_;
 };
 
-/* The faces of polyhedra: [faces, points of the first, its points, ...] of each, from its place on; -1 for none. */
+/* The faces of polyhedra. Each one's place is where its [number of faces, number of the first one's points, its points,
+ * ...] begins; -1 for none. */
 class face_streams
 {
   public:
@@ -67,7 +68,7 @@ class face_streams
     vtkNew<vtkIdTypeArray> stream, places;
 
   private:
-    /* 0 where it does not lie within the stream whole, or names a point that is not there. */
+    /* The length of a cell's faces; 0 where they do not lie within the stream, or name a point that does not exist. */
     static vtkIdType length_of(vtkUnstructuredGrid *grid, vtkIdType cell, const renumbering &points)
     {
         vtkIdTypeArray *const all = grid->GetFaces(), *const starts = grid->GetFaceLocations();
@@ -86,7 +87,7 @@ class face_streams
     }
 };
 
-/* The arrays of one value an element; others cannot be dealt out. */
+/* Picks from arrays with one value an element; others cannot be dealt out. */
 void pick_arrays(vtkDataSetAttributes *from, vtkIdType count, vtkIdList *picked, vtkDataSetAttributes *to)
 {
     for (int i = 0; i < from->GetNumberOfArrays(); i++) {

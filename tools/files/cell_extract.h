@@ -1,4 +1,4 @@
-/* Some cells of a grid as a grid of their own. */
+/* Makes a grid of some of a grid's cells. */
 #ifndef CELL_EXTRACT_H
 #define CELL_EXTRACT_H
 

@@ -1,5 +1,5 @@
-/* Files that one of VTK's readers reads, and the choice of who reads which (file_kinds.cpp, piece_files.cpp). Readers
- * that take what is missing at a file's end for zeros get help: the length is checked before they read. */
+/* Opens each file by one of VTK's readers (file_kinds.cpp), or as a list of other files (piece_files.cpp). For readers
+ * that read zeros where a file's end is missing, the length is checked first. */
 #include "data_file.h"
 
 #include <cerrno>

@@ -1,4 +1,4 @@
-/* A file of cells, by whichever reader reads it. */
+/* A file of cells, whichever reader it needs. */
 #ifndef DATA_FILE_H
 #define DATA_FILE_H
 
@@ -13,7 +13,8 @@ class vtkDataObject;
 namespace render_tool
 {
 
-/* "" or why the file cannot be one of data: missing, a directory, not readable, an ending that no reader has. */
+/* "" or why the file cannot be read as data: it is missing, a directory or not readable, or no reader has its ending.
+ * */
 std::string why_not_data(const std::string &path);
 
 /* The endings that are read, for help texts: ".vtu .pvtu ...". */
@@ -30,13 +31,13 @@ class data_file
     /* The times of the steps inside; empty where the file has none. */
     virtual const std::vector<double> &times() const = 0;
 
-    /* The file that step is read from, as a person would name it. */
+    /* The file from which the step is read, as a person would name it. */
     virtual std::string step_path(size_t step) const = 0;
 
     /* The number of pieces that a step can be read in; 1 for most files. Throws as read() does. */
     virtual int pieces(size_t step) = 0;
 
-    /* One step (0 where there are none inside), and of it piece `piece` of `pieces`, with 0 of 1 for all. Throws
+    /* Reads piece `piece` of `pieces` of a step (0 where the file has none); 0 of 1 is all of it. Throws
      * std::runtime_error with the file's name and what is wrong. */
     virtual vtkSmartPointer<vtkDataObject> read(size_t step, int piece, int pieces) = 0;
 };
@@ -44,7 +45,7 @@ class data_file
 /* Throws as data_file::read() does. */
 std::unique_ptr<data_file> open_data_file(const std::string &path);
 
-/* The time a data set says it is of, in the field data TimeValue; fallback where it says nothing. */
+/* A data set's time, from its field data TimeValue, or fallback where there is none. */
 double time_of(vtkDataObject *data, double fallback);
 
 } // namespace render_tool

@@ -120,7 +120,8 @@ reader make_ensight(const std::string &path)
 #endif
 
 #ifdef INSITU_VTK_OPENFOAM
-/* The cells of the mesh alone, with the values that the solver computed, not VTK's means of them at the points. */
+/* Makes a reader of the mesh's cells with the values that the solver computed, without VTK's means of them at the
+ * points. */
 reader make_openfoam(const std::string &path)
 {
     auto r = vtkSmartPointer<vtkOpenFOAMReader>::New();

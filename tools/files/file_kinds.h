@@ -16,8 +16,8 @@ struct file_kind {
     const char *ending;
     vtkSmartPointer<vtkAlgorithm> (*make)(const std::string &path); // null: no reader of VTK's (see data_file.cpp)
     bool may_hold_steps;
-    bool names_files;      // of its own folder, which the reader opens
-    const char *piece_tag; // an XML tag the file has once for each piece that can be read apart
+    bool names_files;      // it names files of its own folder, which the reader opens
+    const char *piece_tag; // an XML tag that the file has once for each piece that can be read separately
 };
 
 const std::vector<file_kind> &file_kinds();

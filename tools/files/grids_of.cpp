@@ -24,7 +24,7 @@ namespace render_tool
 namespace
 {
 
-/* Any other object than a data set is returned as it is. */
+/* An object that is no data set is returned as it is. */
 vtkSmartPointer<vtkDataObject> grid_of(vtkDataObject *leaf, const std::string &path)
 {
     auto *data = vtkDataSet::SafeDownCast(leaf);

@@ -68,7 +68,7 @@ std::vector<vtkSmartPointer<vtkXMLDataElement>> read_elements(const std::string 
     return found;
 }
 
-/* The file an element names, which must be there. */
+/* The file that an element names; it must exist. */
 std::string file_named_by(vtkXMLDataElement *element, const char *attribute, const std::string &path)
 {
     const char *name = element->GetAttribute(attribute);
@@ -93,7 +93,7 @@ bool is_file_of_piece(size_t index, size_t count, int piece, int pieces)
 
 using grid_list = std::vector<vtkSmartPointer<vtkUnstructuredGrid>>;
 
-/* Appending keeps only what all pieces have: a piece without ghost flags is given some. */
+/* Gives ghost flags to pieces without them, because appending keeps only arrays that all pieces have. */
 void even_out_ghosts(const grid_list &grids)
 {
     const bool has_ghosts = std::any_of(grids.begin(), grids.end(), [](auto &g) { return g->GetCellGhostArray(); });

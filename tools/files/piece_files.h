@@ -10,8 +10,8 @@
 namespace render_tool
 {
 
-/* Throw std::runtime_error with the file's name and what is wrong, as the others below. Of an XML file that names
- * others for VTK's own readers: that each is there and whole. */
+/* Check that the files which an XML file names for VTK's own readers exist and are whole. Throws std::runtime_error
+ * with the file's name and what is wrong, as do the functions below. */
 void check_named_files(const std::string &path);
 
 std::unique_ptr<data_file> open_pvtu(const std::string &path);

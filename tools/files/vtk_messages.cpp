@@ -61,8 +61,8 @@ vtkStandardNewMacro(message_catcher)
 
     message_catcher *catcher = nullptr; // owned by VTK from catch_vtk_messages() on
 
-/* VTK writes "ERROR: In file, line n\nclass (0x...): what\n\n", and nothing of a class where it has none; only the last
- * part is of use to a person. */
+/* VTK writes "ERROR: In file, line n\nclass (0x...): what\n\n", the class only if there is one. Only the last part is
+ * of use to a person. */
 std::string plain_words(std::string text)
 {
     if (text.find("returned failure for request") != std::string::npos) return "VTK's reader failed";

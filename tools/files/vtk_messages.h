@@ -13,8 +13,8 @@ void catch_vtk_messages();
 /* Throw std::runtime_error with path and what VTK reported since the last call, if anything. */
 void throw_caught(const std::string &path);
 
-/* While it lives nothing reaches stderr: the libraries below VTK's readers (Exodus, NetCDF, HDF5) print by themselves
- * what VTK then reports. */
+/* While it lives nothing reaches stderr, for the libraries below VTK's readers (Exodus, NetCDF, HDF5) print what VTK
+ * reports as well. */
 class quiet_stderr
 {
   public:

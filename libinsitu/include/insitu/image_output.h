@@ -125,8 +125,7 @@ typedef struct insitu_image {
     const insitu_decorations *decorations; /* NULL: none, and rgba has its background */
     int channel_count;
     const insitu_channel *channels; /* borrowed; passed over where the format has none */
-    const insitu_deep *deep;        /* NULL, or the samples for a deep format, which then uses nothing else but the size
-                                     */
+    const insitu_deep *deep;        /* NULL, or the samples for a deep format, which uses only them and the size */
 } insitu_image;
 
 /* Write to a temporary file beside path and rename it, so that path is never half a picture. Missing folders are made.

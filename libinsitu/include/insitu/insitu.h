@@ -72,8 +72,7 @@ typedef enum insitu_cell_type {
 /* The order of a cell's vertices in connectivity. Cell types that an order does not name are in VTK's order. Mirrored
  * cells are drawn right in any order. */
 typedef enum insitu_vertex_order {
-    INSITU_ORDER_VTK = 0,           /* as said at insitu_cell_type; CGNS, Exodus II, Gmsh, libMesh and MFEM have it too
-                                     */
+    INSITU_ORDER_VTK = 0,           /* as said at insitu_cell_type; also in CGNS, Exodus II, Gmsh, libMesh, MFEM */
     INSITU_ORDER_LEXICOGRAPHIC = 1, /* quads, hexes and bases of pyramids by x first, then y, then z: a quad is VTK's 0
                                        1 3 2. deal.II, dolfinx, DUNE and p4est have it. */
     INSITU_ORDER_DMPLEX = 2         /* hexes are VTK's 0 3 2 1 4 5 6 7 and wedges VTK's 0 2 1 3 4 5: their two ends run
@@ -122,8 +121,7 @@ typedef struct insitu_mesh {
     insitu_array face_offsets;       /* int32 or int64, face_count + 1: where each face begins in face_connectivity */
     int64_t face_connectivity_count; /* elements in face_connectivity */
     insitu_array face_connectivity;  /* int32 or int64, face_connectivity_count: the faces' vertex indices from
-                                        index_base, at least 3 a face, around it in either direction, from any vertex on
-                                        */
+                                        index_base, at least 3 a face, around it from any vertex in either direction */
     insitu_array ghosts;             /* optional, uint8, cell_count: cells with a nonzero flag are not drawn */
     unsigned changed;                /* INSITU_CHANGED_* bits of TOPOLOGY and GEOMETRY; ALL by default */
     int index_base;                  /* 0 by default, or 1, as Fortran counts: the index of the first vertex, face, cell
@@ -295,8 +293,7 @@ typedef struct insitu_report {
     const char *schedule;     /* the way on which the last frame's fragments were sent, named as in the scene: "direct",
                                  "nodes", "radix" or "binary"; "" where none was sent */
     const char *copied_why;   /* "" or a list of what was copied and why; valid until the next step */
-    const char *left_out;     /* "" or a list of what was not computed because the scene does not need it; valid as long
-                               */
+    const char *left_out;     /* "" or a list of what the scene does not need and was left out; valid as long */
     const char *warnings; /* "" or one warning a line; valid as long. A warning is given when it begins to be true, and
                              again if it has ceased to be in between. Two are given at every step: that an edit of the
                              scene file is broken, and how many cells of this rank have values that are not finite. All
