@@ -1,5 +1,5 @@
-/* The public calls, but for the step: a session's life, and what the caller gives it. What can fail on one rank alone
- * at its birth ends in agreement, so that a session is born on all ranks or on none. */
+/* The public calls, but for the step: a session's life, and what the caller gives it. Parts of its creation that may
+ * fail on one rank alone end in agreement, so that a session is created on all ranks or on none. */
 #include "session.h"
 
 #include "memory.h"
@@ -59,7 +59,7 @@ static void free_session(insitu_session *session)
     base_free(session);
 }
 
-/* On all ranks or on none. The team's communicators are freed by the caller where this fails. */
+/* Creates a session, on all ranks or on none. If this fails, the caller frees the team's communicators. */
 static insitu_status create(const session_team *team, const session_scene_source *source, insitu_session **out,
                             base_error *error)
 {

@@ -1,6 +1,5 @@
-/* A session: what it is made of. The parts know nothing of each other but what their headers include; what a function
- * may touch is said by its parameters, so that the whole session is seen by the public calls, the step and its first
- * reduction alone. */
+/* The parts of a session. They know of each other only what their headers include, and a function's parameters are the
+ * parts that it may touch; only the public calls, the step and its first reduction see the whole session. */
 #ifndef SESSION_SESSION_H
 #define SESSION_SESSION_H
 

@@ -1,9 +1,8 @@
 /* The reduction is a maximum over a few integers. It tells every rank whether all are at the same cycle (maximum and
  * minimum), the lowest rank that has an error to tell of, whether cells, coordinates or names changed anywhere, whether
  * all tables of names are alike, whether any rank lacks threads, the lowest of the instruction sets, and, from rank 0,
- * the time, whether the scene file was edited, whether pictures could not be written, and whether they are written in the
- * step; and whether any field is filled on demand. After it, ranks decide alike
- * without another word. */
+ * the time, whether the scene file was edited, whether pictures could not be written, and whether they are written in
+ * the step; and whether any field is filled on demand. After it, ranks decide alike without further messages. */
 #include "session_changes.h"
 
 #include <string.h>

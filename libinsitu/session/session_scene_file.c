@@ -1,6 +1,6 @@
-/* The scene: rank 0 reads its file, or is given its text, and everyone parses the same text, so that all ranks come to
- * the same scene without a word about its structure. A file edited while the simulation runs is taken at the next step;
- * an edit that does not parse leaves the old scene in place and a warning in the reports until it is mended. */
+/* The scene: rank 0 reads its file, or is given its text, and everyone parses the same text, so that all ranks have the
+ * same scene without exchanging its structure. A file edited while the simulation runs is taken at the next step; an
+ * edit that does not parse leaves the old scene in place and a warning in the reports until it is mended. */
 #include "session_scene_file.h"
 
 #include <errno.h>
@@ -28,7 +28,7 @@ static const char *kind_of(mode_t mode)
     return "a device";
 }
 
-/* Waits for nobody: what is not a regular file is refused before it is read. */
+/* Reads a regular file; any other is refused first, so that reading never waits for anybody. */
 static insitu_status read_regular(int file, const char *path, scene_file_text *text, base_error *error)
 {
     if (fstat(file, &text->stamp) != 0) return base_fail(error, INSITU_ERROR_SCENE, "%s: %s", path, strerror(errno));
@@ -135,7 +135,8 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_sec == b->st_mtim.tv_sec && a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* The caller's text as if it had been read. One that is too long is cut behind the limit, and so refused as such. */
+/* Copies the caller's text as if it had been read. One that is too long is cut behind the limit, and so refused as too
+ * long. */
 static insitu_status copy_text(const char *given, scene_file_text *text, base_error *error)
 {
     text->size = (int64_t)strnlen(given, MAX_SCENE_BYTES);

@@ -42,8 +42,8 @@ static void reload_scene(insitu_session *s)
     for (int i = 0; i < s->meshes.count; i++) session_drop_scalars(s->meshes.items[i]);
 }
 
-/* The kernels that every rank has: two sets differ in roundings, and at a face between their cells volumes would
- * overlap. */
+/* Takes kernels that every rank has. Two instruction sets differ in roundings, so that volumes would overlap at a face
+ * between cells of two ranks. */
 static void use_common_kernels(int level, session_report *report)
 {
     render_isa_limit(level);
@@ -52,8 +52,8 @@ static void use_common_kernels(int level, session_report *report)
                          cpu_isa_name((cpu_isa)level), cpu_isa_name((cpu_isa)render_isa_level()));
 }
 
-/* Statistics that are due, and which images their conditions let through. What fails here does not keep the others from
- * being drawn: it is told when they are. Collective. */
+/* Finds the statistics that are due, and the images whose conditions hold. An error here does not keep images from
+ * being drawn, and is returned afterwards. Collective. */
 static void update_events(insitu_session *s, session_plan_basis *basis, base_error *error)
 {
     const session_moment *moment = basis->moment;

@@ -25,7 +25,7 @@ static char *file_in(const scene_database *database, const char *file)
 
 /* ---- lines ----------------------------------------------------------------------------------------------------- */
 
-/* And for a byte that ends the text. */
+/* Makes room for more bytes, and for one that ends the text. */
 static bool reserve(session_table *t, size_t more)
 {
     if (t->size + more < t->capacity) return true;
@@ -59,7 +59,7 @@ static void add_number(table_line *line, double number)
     add_bytes(line, text, (size_t)length);
 }
 
-/* In quotes where it has what separates fields (RFC 4180). */
+/* Adds a text, in quotes where it has a character that separates fields (RFC 4180). */
 static void add_text(table_line *line, const char *text, char end)
 {
     const bool is_quoted = strpbrk(text, ",\"") != NULL;
@@ -110,7 +110,7 @@ static void add_picture(table_line *line, const scene_image *image, const scene_
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
-/* Lines of this cycle and later ones go. */
+/* Drops the lines of this cycle and later ones. */
 static void drop_from(session_table *t, int64_t cycle)
 {
     const char *end = t->size ? memchr(t->text, '\n', t->size) : NULL;
@@ -119,7 +119,7 @@ static void drop_from(session_table *t, int64_t cycle)
     t->size = header + text_keep_below(t->text + header, cycle);
 }
 
-/* The lines that the folder has. */
+/* Takes over the lines of the folder's table from before this cycle. */
 static insitu_status take_over(session_table *t, const char *old, int64_t cycle, base_error *error)
 {
     const scene_database *database = t->database;
@@ -214,7 +214,8 @@ static void write_table(FILE *file, const void *what)
     fwrite(t->text, 1, t->size, file);
 }
 
-/* Not as it is in a script's text. Bytes above 0x7f are: they are UTF-8's, as the page's scripts are. */
+/* Tells whether a byte must be escaped in a script's text. Bytes above 0x7f need not be: the page's scripts are UTF-8.
+ * */
 static bool is_escaped(unsigned char byte)
 {
     return byte == '"' || byte == '\\' || byte < 0x20;
@@ -231,7 +232,7 @@ static void write_script_line(FILE *file, const char *line, size_t size)
     }
 }
 
-/* The lines as a list of texts, given to a function of the page. */
+/* Writes the lines as a list of texts, given to a function of the page. */
 static void write_script(FILE *file, const void *what)
 {
     const session_table *t = what;

@@ -20,7 +20,7 @@ typedef struct session_table {
     const scene_database *database; /* of the scene */
     char *text;                     /* of data.csv: whole lines */
     size_t size, capacity;
-    bool is_begun;      /* what the folder had is in text */
+    bool is_begun;      /* text has the folder's earlier lines */
     bool is_open;       /* a line of this step is in it */
     bool is_changed;    /* since the files were written */
     bool has_page;      /* this session has written index.html */
@@ -39,12 +39,12 @@ typedef struct session_cinema {
 void session_begin_cinema(session_cinema *cinema, int64_t cycle);
 
 /* Note a picture that was written for an output with a database. Where a step goes back in the run, lines from its
- * cycle on go. Local. */
+ * cycle on are dropped. Local. */
 insitu_status session_note_picture(session_cinema *cinema, const scene *scene, const scene_image *image,
                                    const scene_output *output, const scene_moment *moment, base_error *error);
 
-/* Write the tables that have changed. All of them, though some fail; the first error is told, and what could not be
- * written is tried again when this is called next. Local. */
+/* Write all tables that have changed, though some fail. Returns the first error; the next call tries the failed ones
+ * again. Local. */
 insitu_status session_write_cinema(session_cinema *cinema, base_error *error);
 
 void session_cinema_free(session_cinema *cinema);

@@ -1,10 +1,10 @@
 /* Simulations trap floating-point exceptions to find their own faults (gfortran's -ffpe-trap, feenableexcept()), or
- * flush small numbers to zero (icc's -ftz, gcc's -ffast-math). Under the first, a box test of ours that divides by
- * zero on purpose, or a scene's 1e999, would kill the run; under the second, pictures would change. Both are settings
- * of a thread, which OpenMP's workers inherit from whoever first needed them (GNU's), or at the begin of every parallel
- * region from the thread that opens it (LLVM's, which also undoes at its end what the region changed on any thread). So
- * every call works under the default environment, a step on every thread, and leaves each as it was; the calling thread
- * is set outside of parallel regions. A worker keeps its own: which threads a team has is OpenMP's choice. */
+ * flush small numbers to zero (icc's -ftz, gcc's -ffast-math). Traps would kill the run at a box test that divides by
+ * zero on purpose, or at a scene's 1e999; flushing would change pictures. Both are settings of a thread. GNU's OpenMP
+ * workers inherit them from the thread that first needed them; LLVM's from the thread that opens a parallel region, at
+ * whose end changes on any thread are undone. So every call works under the default environment, a step on every
+ * thread, and restores each thread's afterwards; the calling thread's is set outside of parallel regions. Each worker
+ * keeps its own old settings, as OpenMP chooses the threads of a team. */
 #include "session_guard.h"
 
 #include <omp.h>

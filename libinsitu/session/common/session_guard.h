@@ -20,7 +20,7 @@ void session_guard_end(const session_guard *guard);
  * born under the caller's own environment, as if the caller had needed them first. */
 void session_guard_begin_team(const session_guard *guard, int threads);
 
-/* Give those back what they had that were there at the begin. */
+/* Give the threads that were there at the begin their environment back. */
 void session_guard_end_team(int threads);
 
 #endif

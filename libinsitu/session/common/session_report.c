@@ -97,7 +97,7 @@ static uint64_t key_of(const session_warning *w)
     return key;
 }
 
-/* told_count: not among them. */
+/* Finds a told warning; told_count if it is not among them. */
 static int find_told(const session_report *report, uint64_t key)
 {
     int at = 0;

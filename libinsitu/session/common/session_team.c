@@ -20,7 +20,8 @@ insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *
     return INSITU_OK;
 }
 
-/* Nodes of one size, on which ranks lie one node after the other, or round the nodes: only what all ranks find. */
+/* Finds whether all nodes have as many ranks, and ranks lie on them one node after the other, or in turn. It counts
+ * only if all ranks find the same. */
 static void find_placing(session_team *team, MPI_Comm node)
 {
     int within = 0, first = team->rank, all[4];

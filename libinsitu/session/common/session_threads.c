@@ -1,13 +1,13 @@
 /* OpenMP's runtimes end the process where they cannot start a thread. So threads are started here first, where a
- * failure is a number: as many as the step wants and a few more, with the stacks that OpenMP would give them, and kept
- * until every rank has tried, since the ranks of a node draw on the same limits (processes of a user or a container,
- * memory, address space). What could be started is what OpenMP is asked for. The few more, and some memory, are left
- * for everybody else.
+ * failure only lowers their number: as many as the step wants and a few more, with the stacks that OpenMP would give
+ * them. They are kept until every rank has tried, since the ranks of a node share limits (processes of a user or a
+ * container, memory, address space). OpenMP is then asked for as many as could be started; the few more, and some
+ * memory, are left for other needs.
  *
- * OpenMP keeps its threads for later regions, so that a team need not be tried again unless it grows, or some of its
- * threads have ended: GNU's do where a region of the caller's has fewer. A destructor of each thread's counts these.
+ * OpenMP keeps its threads for later regions, so a team need be tried again only if it grows, or if threads have ended,
+ * as GNU's do where a region of the caller's has fewer. A destructor in each thread counts these.
  *
- * How large the stacks of workers are no interface of OpenMP tells; the workers themselves are asked. */
+ * OpenMP has no call that tells the stack size of workers, so the workers are asked. */
 #define _GNU_SOURCE 1
 #include "session_threads.h"
 
@@ -25,7 +25,7 @@
 
 enum {
     SPARE_THREADS = 4,
-    SPARE_BYTES = 4 << 20 /* OpenMP ends the process where it gets none for a region's or a task's description */
+    SPARE_BYTES = 4 << 20 /* OpenMP ends the process where it finds no memory to describe a region or a task */
 };
 
 /* ---- wanted -------------------------------------------------------------------------------------------------- */
@@ -35,7 +35,7 @@ typedef struct team_cap {
     const char *reason;
 } team_cap;
 
-/* Within a region of the caller's, GNU's OpenMP would start a team's threads anew for every region of ours. */
+/* Within a region of the caller's, GNU's OpenMP would start new threads for every region of the library. */
 static team_cap cap_of_team(void)
 {
     const int cores = omp_get_num_procs(), limit = omp_get_thread_limit();
@@ -78,7 +78,7 @@ static void make_key(void)
     has_key = pthread_key_create(&key, count_end) == 0;
 }
 
-/* Those that are known to be there. */
+/* The number of threads that are known to be there. */
 static int living_threads(const session_threads *threads)
 {
     const bool is_same = threads->count > 0 && pthread_equal(threads->caller, pthread_self());
@@ -107,7 +107,7 @@ static void *pass_gate(void *gate)
     return NULL;
 }
 
-/* "512k", " 16 M": the runtimes' way of writing sizes. 0: none. */
+/* Reads a size as the runtimes write it, as in "512k" or " 16 M". 0: none. */
 static size_t parse_size(const char *text, size_t unit)
 {
     static const char suffixes[] = "bkmg";
@@ -165,8 +165,8 @@ static void end_trial(trial *t)
     base_free(t->room);
 }
 
-/* Where any rank lacks threads, before its first parallel region: the ranks of a node share its limits, and try at the
- * same time. Collective. */
+/* Tries threads where any rank lacks some, before its first parallel region. All ranks try at the same time, for those
+ * of a node share its limits. Collective. */
 static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm comm, base_error *error)
 {
     const int living = living_threads(threads), lacking = wanted - living;
@@ -181,7 +181,7 @@ static insitu_status try_threads(session_threads *threads, int wanted, MPI_Comm 
     return status;
 }
 
-/* The threads of this step; tells in the report where they are fewer than were asked for. */
+/* Chooses the number of threads of this step; the report says so if there are fewer than asked for. */
 static int choose_threads(const session_threads *threads, int asked, int wanted, session_report *report)
 {
     if (asked > wanted)
@@ -196,7 +196,7 @@ static int choose_threads(const session_threads *threads, int asked, int wanted,
 
 /* ---- stacks -------------------------------------------------------------------------------------------------- */
 
-/* From here to this thread's lowest address; where the stack is none of the system's, as much as one likes. */
+/* The stack from here to this thread's lowest address; unlimited if it is not the system's. */
 static int64_t stack_left(void)
 {
     pthread_attr_t attributes;

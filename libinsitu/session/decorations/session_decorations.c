@@ -1,6 +1,6 @@
-/* The domain's box is convex and all data is in it: an edge between two faces that are seen from within lies behind
- * everything, any other edge before everything or beside it. So no depth is needed to draw edges right, neither among
- * surfaces nor in the mist of a volume. */
+/* The domain's box is convex and all data is in it. So an edge between two faces that are seen from within lies behind
+ * everything, and any other edge before everything or beside it: edges are drawn right without depth, among surfaces as
+ * in the mist of a volume. */
 #include "session_decorations.h"
 
 #include <math.h>
@@ -131,7 +131,7 @@ static insitu_label label_at(const double at[2], const double away[2], double ga
     return out;
 }
 
-/* Ticks are as many as there is room for words. */
+/* Draws as many ticks as there is room for words. */
 static void rule_edge(const ruled_edge *e, int axis, const render_camera *c, double size, insitu_decorations *out,
                       insitu_stroke *strokes, insitu_label *labels)
 {
@@ -186,7 +186,7 @@ insitu_scale_bar session_make_scale_bar(const render_camera *camera, const doubl
 
 /* ---- words and bars ------------------------------------------------------------------------------------------ */
 
-/* Light on a dark background, dark on a light one or on none. */
+/* Chooses a light colour on a dark background, and a dark one on a light one or on none. */
 static void choose_colour(const scene_image *image, float colour[3])
 {
     const float *b = image->background;
@@ -229,7 +229,7 @@ static void write_label(const scene_decorations *scene, int bar, const scene_fie
         snprintf(label, 300, "%s%s", field->name, component);
 }
 
-/* Has an earlier bar the same field, colours and numbers? Several layers may show one field. */
+/* Tells whether an earlier bar has the same field, colours and numbers; several layers may show one field. */
 static bool is_repeated(const session_decorations *d, int bar)
 {
     const insitu_colour_bar *b = &d->bars[bar];

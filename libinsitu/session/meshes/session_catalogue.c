@@ -1,9 +1,9 @@
-/* Which meshes and fields there are over all ranks. With it every rank finds out alone, and all find out the same,
- * whether a picture can be drawn: a missing field is then nobody's surprise in the middle of a collective call.
+/* The catalogue lists the meshes and fields of all ranks. By it every rank finds out alone, and all alike, whether a
+ * picture can be drawn, so that no rank misses a field in the middle of a collective call.
  *
  * A rank's table is a text of lines: "m <has cells> <has ids> <name>" begins a mesh, "f <components> <centring> <name>"
- * is a field of it. Ranks whose tables are alike (the usual case, found by hashes in the step's one
- * reduction) exchange nothing; else the texts are gathered by all. */
+ * is a field of it. Ranks whose tables are alike (the usual case, found by hashes in the step's one reduction) exchange
+ * nothing; else the texts are gathered by all. */
 #include "session_catalogue.h"
 
 #include <inttypes.h>
@@ -120,7 +120,7 @@ static bool take_field(session_catalogue_mesh *mesh, bool has_cells, int rank, i
     return true;
 }
 
-/* After a rank's table of a mesh: which fields were not in it? */
+/* Ends a rank's table of a mesh: notes the fields that were not in it. */
 static void close_mesh(session_catalogue_mesh *mesh, bool has_cells, bool has_ids, int rank)
 {
     if (!mesh || !has_cells) return;

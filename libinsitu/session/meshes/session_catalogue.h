@@ -1,4 +1,4 @@
-/* Which meshes and fields there are over all ranks. */
+/* The meshes and fields of all ranks. */
 #ifndef SESSION_CATALOGUE_H
 #define SESSION_CATALOGUE_H
 

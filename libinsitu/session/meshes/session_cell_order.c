@@ -1,13 +1,13 @@
 /* The rooms below read each cell's vertices one after the other, in VTK's order. Kernels that take eight cells at once
- * rely on it, so another order is a copy of connectivity rather than a case in each of them. What is the same in both
- * orders, as tets are, is not copied. */
+ * rely on it, so another order is a copy of connectivity rather than a case in each of them. Cells that are the same in
+ * both orders, as tets, are not copied. */
 #include "session_cell_order.h"
 
 #include "session_topology.h"
 
 enum { ORDERS = INSITU_ORDER_DMPLEX + 1 };
 
-/* Where VTK's vertices stand in the other order; NULL: where they do in VTK's. Each turn is its own inverse. */
+/* The places of VTK's vertices in the other order; NULL: the orders are the same. Each turn is its own inverse. */
 static const signed char *turn_of(insitu_vertex_order order, int type)
 {
     static const signed char lexicographic[GRID_MAX_CELL_VERTICES] = {0, 1, 3, 2, 4, 5, 7, 6};
@@ -28,7 +28,7 @@ bool session_is_reordered(const insitu_mesh *given)
     return has_gaps || turn_of(given->vertex_order, type);
 }
 
-/* The walk over mixed cells. */
+/* Tells whether any of mixed cells is in another order than VTK's. */
 static bool has_turned_cells(const session_mesh *mesh)
 {
     const grid *g = &mesh->cells;
@@ -60,8 +60,8 @@ static cell_rows rows_of(const session_mesh *mesh)
     return rows;
 }
 
-/* A number that does not fit into 4 bytes is no index of a vertex unless there are so many, and is reported as it is.
- */
+/* Tells whether all entries fit into 4 bytes. One that does not, though vertices are few, is a bad index, and is copied
+ * whole so that it is reported as it is. */
 static bool fit_narrow(const cell_rows *rows, int threads)
 {
     int64_t least = 0, most = 0;

@@ -327,7 +327,7 @@ static insitu_status describe_offsets(const session_mesh *mesh, int64_t cell, co
 #pragma GCC diagnostic pop
 }
 
-/* The cell is looked at again: what is found good now lacked memory before. */
+/* The cell is checked again; if it is good now, memory ran out before. */
 static insitu_status describe_fault(const session_mesh *mesh, int64_t cell, base_error *error)
 {
     fault_place place = {0};
@@ -410,7 +410,7 @@ static insitu_status check_last_offset(const session_mesh *mesh, base_error *err
                      mesh->name, last + base, base ? " + 1" : "", mesh->topology.connectivity_count + base);
 }
 
-/* The squares and volumes of larger ones, and what follows from them, would leave double. */
+/* With larger coordinates, squares and volumes would overflow double. */
 static const double largest_coordinate = 1e100;
 
 /* The first drawn cell with too large a coordinate. */
@@ -454,7 +454,7 @@ static void find_flat(const grid *g, int threads, uint64_t *flat)
     }
 }
 
-/* Cells of no volume are kept out of the trees: a tree without them does not do where they are others than before. */
+/* Finds the cells without volume, which trees leave out. If they are others than before, the tree is dropped. */
 static insitu_status update_flat(session_mesh *mesh, int64_t count, int threads, base_error *error)
 {
     const size_t bytes = (size_t)(mesh->cells.cell_count + 63) / 64 * sizeof *mesh->flat;
@@ -493,7 +493,7 @@ static insitu_status check_cells_of(session_mesh *mesh, int threads, base_error 
     return INSITU_OK;
 }
 
-/* Where cells are wrong, what was made of them is forgotten: the caller may right them in place. */
+/* Where cells are wrong, the topology made of them is dropped, as the caller may mend them in place. */
 static insitu_status check_mesh(session_mesh *mesh, int threads, base_error *error)
 {
     if (!mesh->topology.is_made && session_make_topology(mesh, threads, error)) return error->status;

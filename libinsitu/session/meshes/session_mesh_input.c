@@ -1,6 +1,6 @@
-/* The set calls fill in the table of meshes. Only descriptions are looked at here; the arrays behind them are read by a
- * step. An error is returned at once, and stays with the mesh or the field until that is set again, so that the next
- * step can tell every rank. */
+/* The set calls fill in the table of meshes. Only descriptions are checked here; a step reads the arrays. An error is
+ * returned at once, and stays with the mesh or the field until that is set again, so that the next step can return it
+ * on every rank. */
 #include "session_mesh_input.h"
 
 #include <stdio.h>
@@ -195,7 +195,7 @@ static insitu_status check_choices(const insitu_mesh *mesh, base_error *error)
     return INSITU_OK;
 }
 
-/* Rows are what cells are found by, beside nothing else. */
+/* Checks that cells given in rows are not given in another way as well. */
 static insitu_status check_rows(const insitu_mesh *mesh, base_error *error)
 {
     const long long row = mesh->connectivity_row, vertices = grid_type_vertices((int)mesh->cell_type);
@@ -256,7 +256,7 @@ static insitu_status check_mesh(const insitu_mesh *mesh, base_error *error)
     return status;
 }
 
-/* Whether cells differ, whatever the caller says of them. */
+/* Tells whether cells must differ, whatever the caller says. */
 static bool has_other_shape(const insitu_mesh *a, const insitu_mesh *b)
 {
     return a->vertex_count != b->vertex_count || a->cell_count != b->cell_count ||
@@ -275,8 +275,8 @@ bool session_is_same_array(const insitu_array *a, const insitu_array *b)
     return x.data == y.data && x.stride == y.stride && (!x.data || a->type == b->type);
 }
 
-/* Changes that two descriptions show by themselves of as many cells and vertices: arrays that lie elsewhere, or
- * are read otherwise, hold what nobody has looked at. */
+/* The changes that two descriptions with as many cells and vertices show: arrays at other addresses, or read in another
+ * way, have not been checked yet. */
 static unsigned seen_changes(const insitu_mesh *a, const insitu_mesh *b)
 {
     bool has_same_cells =

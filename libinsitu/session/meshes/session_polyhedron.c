@@ -1,6 +1,6 @@
-/* The mean size of cells, which steps are in, comes of volumes. So a volume is of the cell's geometry alone: another
- * rank may list a face from another vertex on or the other way round, and faces in another order. What is left is
- * rounding, which the mean size is rid of (session_space.c). */
+/* The unit of sample distances is the mean size of cells, which comes from volumes. So a volume depends on the cell's
+ * geometry alone: another rank may list a face from another vertex on or the other way round, and faces in another
+ * order. Differences by rounding remain, but not in the mean size (session_space.c). */
 #include "session_polyhedron.h"
 
 #include <string.h>
@@ -23,7 +23,7 @@ typedef struct frame_sums {
     double count;
 } frame_sums;
 
-/* A vertex beside itself is one. */
+/* Adds a face's vertices. One that follows itself counts once. */
 static void add_face(const grid *g, int64_t face, frame_sums *sums, double least[3])
 {
     int64_t from, to;

@@ -1,14 +1,14 @@
-/* Every number here comes out of reductions, so that it is the same on every rank and for every partition. The space
- * is kept while the cells stay about where they were, since a new one means new trees: a moving mesh does not move it
- * at every step. */
+/* All numbers here come from reductions, and so are the same on every rank and for every partition. A new space means
+ * new trees, so the old one is kept while the cells stay about where they were, even if the mesh moves a little in
+ * every step. */
 #include "session_space.h"
 
 #include "session_agree.h"
 
-/* To 13 bits, which is within 1.6e-4: steps are derived from it, and a sum over cells rounds by the order of the cells,
- * of a cell's vertices and of the ranks, by 1e-12 or so. Where to round up is a matter of choice. The golden ratio is
- * far from every fraction of small numbers, which the means of regular and refined lattices are; halves are among them,
- * and rounding would decide. */
+/* Rounds the mean size to 13 bits, which is within 1.6e-4. Steps are derived from it, and the sum over cells is off by
+ * 1e-12 or so, depending on the order of cells, of their vertices and of ranks. Rounding up begins at the golden ratio,
+ * which is far from all fractions of small numbers, as the means of regular and refined lattices are. Halves are among
+ * these: at them that error would decide. */
 static double rounded_size(double size)
 {
     enum { BITS = 13 };

@@ -113,8 +113,8 @@ MMBVH_INLINE bool has_usual_root(double x)
     return x > 1e-280 && x < 1e280;
 }
 
-/* About the cube root: a third of the exponent (bits of a double are its logarithm, but for a part of 0.09), off by at
- * most 0.033. */
+/* Approximates the cube root to 0.033 by a third of the bits, since a double's bits are its logarithm to within 0.09.
+ * */
 MMBVH_INLINE double cube_root_begin(double x)
 {
     uint64_t bits;
@@ -428,8 +428,8 @@ MMBVH_INLINE bool run_lanes(const grid *g, int64_t cell, mesh_tally *t, lane_bou
     return true;
 }
 
-/* Only where the least of the volumes may be flat beside all cells of the run are they looked at again, each with its
- * own box: to know all boxes takes a thirtieth of the time of a mesh of tets. */
+/* Cells of a run are tallied again, each with its own box, only if the least volume may be flat beside the box of all
+ * of them. Computing all boxes would take a thirtieth of the time of a mesh of tets. */
 static mesh_tally tally_again(const grid *g, int64_t begin, int64_t end)
 {
     mesh_tally again = tally_empty();

@@ -1,8 +1,8 @@
-/* The rooms below the session read cells -> faces -> vertices. Codes of finite volumes hold faces -> vertices and, of
- * each face, the cell that owns it and the neighbour beyond. What lies between is built here, once for each topology:
- * the faces of each cell, in the order of their numbers. Which way round a face runs means nothing below, and so
- * nothing is turned. The faces' vertices are read where they are; only where each face has a list of its own are they
- * brought together.
+/* The rooms below the session read cells -> faces -> vertices. Codes of finite volumes hold faces -> vertices and, for
+ * each face, the cell that owns it and the neighbour beyond. The link between the two is built here, once for each
+ * topology: the faces of each cell, in the order of their numbers. The rooms below do not care which way round a face
+ * runs, so nothing is turned. The faces' vertices are read where they are; only where each face has a list of its own
+ * are they brought together.
  *
  * A polyhedron of six quads may be a hex, which is drawn in a fraction of the time. It is recognised by its faces
  * alone, never by coordinates: all ranks that have the cell take it for the same, and so does every step of a mesh that
@@ -11,14 +11,13 @@
  *      t3 ------ t2      The base is any face of the right size. The face on the other side of each of its edges
  *      /|        /|      is a side, which tells what stands above the edge's ends: t0 and t1 above a0 and a1. If
  *     / |       / |      neighbouring sides agree in what is above the vertex between them, if the one face that is
- *   t0 ------ t1  |      left goes around the tops in their order, and if no two vertices are the same, then every
- *    | a3 -----|- a2     face has its place and every edge is one of two faces: the cell is closed, and is a hex
- *    | /       | /       (base of 4), or a wedge (base of 3). Sides that are triangles have one top, of a pyramid or a
- *    |/        |/        tet. The faces' own directions are not asked.
- *   a0 ------ a1
+ * t0 ------ t1  |      left goes around the tops in their order, and if no two vertices are the same, then every | a3
+ * -----|- a2     face has its place and every edge is one of two faces: the cell is closed, and is a hex | /       | /
+ * (base of 4), or a wedge (base of 3). Sides that are triangles have one top, of a pyramid or a |/        |/ tet. The
+ * faces' own directions are not asked. a0 ------ a1
  *
- * Whatever is wrong with any cell, nothing is recognised in the mesh, so that session_check.c finds it in the caller's
- * own terms. */
+ * If any cell is wrong, nothing is recognised in the mesh, so that session_check.c reports the error in the caller's
+ * terms. */
 #include "session_topology.h"
 
 #include <string.h>
@@ -239,8 +238,8 @@ static insitu_status count_faces(const session_mesh *mesh, const session_face_si
     return INSITU_OK;
 }
 
-/* The counts become where each cell begins, then, as its faces are put there, where it ends, which is where the next
- * one begins. */
+/* The counts are turned into where each cell begins. As its faces are put there, that moves to where the cell ends,
+ * which is where the next one begins. */
 static void put_faces(const session_mesh *mesh, const session_face_sides *sides, const session_topology *t)
 {
     const int64_t count = mesh->given.cell_count;
@@ -305,7 +304,8 @@ static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
     return true;
 }
 
-/* The unused face on the edge from a to b, and what follows each of them on it; -1: there is none. */
+/* Finds the unused face on the edge between ends, and the vertices that follow each of them on it; -1: there is none.
+ * */
 static int find_side(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
 {
     for (int f = 0; f < count; f++) {
@@ -375,8 +375,8 @@ static void swap_vertices(int64_t *vertices, int i, int j)
     vertices[j] = v;
 }
 
-/* The other way round, where the cell would else be left-handed: by where its vertices are now, for faces may run
- * either way. Pictures are the same in both. */
+/* Turns a left-handed cell round, judged by where its vertices are now, since faces may run either way. Pictures are
+ * the same in both cases. */
 static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
 {
     double points[GRID_MAX_CELL_VERTICES][3];
@@ -387,7 +387,7 @@ static void make_right_handed(const grid *g, int type, int n, int64_t *vertices)
     if (count == 2 * n) swap_vertices(vertices, n + 1, 2 * n - 1);
 }
 
-/* Which type a polyhedron's faces make it, and its vertices as that; GRID_POLYHEDRON: another one. */
+/* Returns the type that a polyhedron's faces make, with its vertices in that type's order, or GRID_POLYHEDRON. */
 static int recognise(const session_mesh *mesh, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     static const struct {
@@ -509,7 +509,7 @@ static void put_offsets(const session_mesh *mesh, const recognition *r, const gr
     }
 }
 
-/* The cells of the types found; read instead of what was before. Cells of one type need neither types nor offsets. */
+/* Writes the cells by the types found; they are read from then on. Cells of one type need neither types nor offsets. */
 static insitu_status write_cells(session_mesh *mesh, recognition *r, int threads, base_error *error)
 {
     session_topology *t = &mesh->topology;

@@ -49,8 +49,8 @@ static inline void session_put_index(const grid_array *array, int64_t i, int64_t
 
 /* Make what the description leaves to the library, once for each topology: cells' faces from owner and neighbour,
  * faces' vertices in one array from lists, cells' vertices in VTK's order, and tets, hexes, wedges and pyramids from
- * the polyhedra that are such. Then read it. What is wrong with owner and neighbour or with the lists is told; the rest
- * is not looked at for errors, which is for session_check.c. On an error nothing is made. Local. */
+ * the polyhedra that are such. Then read it. Errors in owner, neighbour and lists are reported; session_check.c looks
+ * for all others. On an error nothing is made. Local. */
 insitu_status session_make_topology(session_mesh *mesh, int threads, base_error *error);
 
 #endif

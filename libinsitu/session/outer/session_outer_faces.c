@@ -1,11 +1,12 @@
 /* Faces that two cells share cancel. A face's key is made of its vertices' hashes in no order: their first three power
- * sums. All faces' keys are put into slots by exclusive or, so that shared ones leave nothing behind; a second pass
- * takes the faces whose slots are not empty, few but the outer ones, and counts them exactly. So the memory goes with
- * the slots and the outer faces, not with all faces.
+ * sums. All faces' keys are put into slots by exclusive or, so that shared faces leave nothing behind. A second pass
+ * takes the faces whose slots are not empty, mostly outer ones, and counts them exactly. So memory is needed for the
+ * slots and the outer faces, not for all faces.
  *
- * Shells are faces that are always kept, and take the place of a cell's outer face: what is there is drawn once.
+ * Shells are faces that are always kept. One that lies on a cell's outer face replaces it, so that only one is drawn
+ * there.
  *
- * Of the faces that a rank has once, those in other ranks' boxes go to rank hash(key) % ranks, which counts them for
+ * Faces that a rank has once, but that lie in other ranks' boxes, go to rank hash(key) % ranks, which counts them for
  * all. */
 #include "session_outer_faces.h"
 
@@ -46,8 +47,8 @@ static void search_free(face_search *s)
 
 /* ---- keys ---------------------------------------------------------------------------------------------------- */
 
-/* False where the face has fewer than three vertices. One that it has twice counts once: a quad with two corners in one
- * place is a triangle. */
+/* Makes a face's key; false where it has fewer than three vertices. A vertex that it has twice counts once: a quad with
+ * two corners in one place is a triangle. */
 static bool make_key(const face_search *s, const session_face_loop *loop, session_key *key)
 {
     uint64_t sums[3] = {0, 0, 0}, vertices = 0;
@@ -102,7 +103,7 @@ static void cancel_faces(face_search *s)
     }
 }
 
-/* Faces of one cell whose slots are not empty: how many, and where faces are given, which. */
+/* Counts the faces of one cell whose slots are not empty, and lists them where faces is given. */
 static int64_t take_faces(const face_search *s, int64_t cell, session_face *faces, session_key *keys)
 {
     const session_cell_faces of_cell = session_faces_of_cell(&s->mesh->cells, cell);
@@ -210,7 +211,7 @@ static int home_of(const session_key *key, int ranks)
     return (int)(session_key_hash(key) % (uint64_t)ranks);
 }
 
-/* The keys of faces in other ranks' boxes by their homes; order: which face each is of. */
+/* Packs the keys of faces in other ranks' boxes by their home ranks; order tells each key's face. */
 static bool pack_keys(const face_search *s, const session_box *boxes, int box_count, int ranks, session_mail *mail,
                       int64_t **order)
 {

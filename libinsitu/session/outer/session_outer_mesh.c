@@ -10,8 +10,8 @@
 
 /* ---- one face ------------------------------------------------------------------------------------------------ */
 
-/* Three or four corners in an order that depends on their places alone: from the least, towards the lesser of its
- * neighbours. */
+/* Three or four corners. Their order depends on their places alone: it begins at the least corner, and goes towards the
+ * lesser of its neighbours. */
 typedef struct corner_loop {
     int count;
     int64_t vertices[4];
@@ -60,7 +60,7 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Twice the area, and of which way. */
+/* Finds the normal, whose length is twice the area. */
 static void find_normal(const corner_loop *loop, double out[3])
 {
     double a[3], b[3];
@@ -82,8 +82,8 @@ static double perimeter(const corner_loop *loop)
     return sum;
 }
 
-/* Over the middle of the corners, half a mean side away, on the side of inside. False where the face has no area but
- * what rounding leaves. */
+/* Puts the apex above the middle of the corners, half a mean side away, on the side of inside. False where the face's
+ * area is no more than rounding. */
 static bool find_apex(const corner_loop *loop, const double inside[3], double apex[3])
 {
     double normal[3], towards[3], middle[3] = {0, 0, 0};
@@ -202,7 +202,7 @@ static face_fan make_fan(const grid *g, const session_face_loop *face)
     return fan;
 }
 
-/* False where it has no area; its own apex else. */
+/* Makes a triangle of the fan and its own apex; false where it has no area. */
 static bool fan_triangle(const grid *g, const face_fan *fan, int64_t i, const double inside[3], corner_loop *out,
                          double apex[3])
 {
@@ -215,9 +215,9 @@ static bool fan_triangle(const grid *g, const face_fan *fan, int64_t i, const do
     return find_apex(out, inside, apex);
 }
 
-/* The mean of the triangles' apexes, for all of them: so the tets share faces, and a ray along the line between two of
- * the triangles leaves the one for the other, where from tets that part there it would come out with nothing. False
- * where it is not well over each triangle: they are too far from a plane. */
+/* Finds an apex for all triangles, the mean of their own. Their tets then share faces, and a ray along the line between
+ * two triangles goes from one tet into the other; between separate tets it might hit neither. False where the apex is
+ * not well above each triangle, because they are too far from a plane. */
 static bool find_common_apex(const grid *g, const face_fan *fan, const double inside[3], double out[3])
 {
     corner_loop loop;

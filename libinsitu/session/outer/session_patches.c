@@ -1,7 +1,7 @@
-/* A face is on the boundary if one cell has it. Meshes with owners say so themselves. Of others all cells' faces are
- * looked through: a face's key is made of the groups of its vertices in no order, their first three power sums hashed,
- * and each face that is given wants a cell of its own that has it. So a face between two cells is found out, and a
- * baffle, whose two sides are one face to such a mesh, may be given once for each side.
+/* A face is on the boundary if one cell has it. Meshes with owners tell that themselves. In other meshes all cells'
+ * faces are searched: a face's key is a hash of the first three power sums of its vertices' groups, in no order, and
+ * each given face needs a cell of its own that has it. So a face between two cells is noticed, and a baffle, whose two
+ * sides are one face to such a mesh, may be given once for each side.
  *
  *     patches -> faces: groups of vertices, value -> is a drawn cell behind it? -> (group, value) of each vertex */
 #include "session_patches.h"
@@ -59,7 +59,7 @@ static insitu_status tell_range(const patch_faces *p, int patch, int64_t face, c
 
 /* ---- faces ----------------------------------------------------------------------------------------------------- */
 
-/* Where the patch has the face's vertices itself. */
+/* Gets a face's vertices from the patch's own list. */
 static void own_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int64_t i, patch_face *out)
 {
     out->list = session_index_array(mesh, &patch->connectivity);
@@ -74,7 +74,7 @@ static void own_vertices(const insitu_mesh *mesh, const insitu_patch *patch, int
     out->size = grid_array_index(&offsets, i + 1) - out->first;
 }
 
-/* Where the mesh has them. */
+/* Gets a face's vertices from the mesh. */
 static void mesh_vertices(const insitu_mesh *mesh, int64_t number, patch_face *out)
 {
     out->number = number;
@@ -127,7 +127,7 @@ static insitu_status read_face(const patch_faces *p, int patch, int64_t i, const
     return INSITU_OK;
 }
 
-/* All faces of all patches, once to learn how much room they take, and once to take it. */
+/* Lists all faces of all patches, in two passes: the first counts the room that they take. */
 static insitu_status list_faces(patch_faces *p, base_error *error)
 {
     const insitu_field *field = &p->field->given;

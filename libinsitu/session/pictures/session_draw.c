@@ -126,7 +126,7 @@ static void average_frames(canvas *c, int frames, int threads)
     for (int64_t i = 0; i < count; i++) c->frame.rgba[i] = (float)(c->sum[i] / frames);
 }
 
-/* Depths of fragments are the rays' t: to the distance along the camera's axis. Infinity stays. */
+/* Turns depths from the rays' t into distances along the camera's axis. Infinity stays. */
 static void scale_depths(canvas *c, const render_space *space, int threads)
 {
     const int64_t count = (int64_t)c->frame.width * c->frame.height;
@@ -234,7 +234,7 @@ static insitu_status share_edges(frames_basis *b, unsigned char **pixels, base_e
     return session_mpi(error, MPI_Bcast(*pixels, (int)bytes, MPI_BYTE, 0, team->comm), "MPI_Bcast");
 }
 
-/* Frames through places in the pixels, in turn. Where they are of edges alone, these are those of the job. */
+/* Draws frames through the places in the pixels, in turn. If only edges are drawn, the job has their pixels. */
 static insitu_status draw_samples(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -249,8 +249,8 @@ static insitu_status draw_samples(frames_basis *b, const scene_image *image, ren
     return status;
 }
 
-/* Surfaces alone are drawn once through the pixels' centres, and then where edges are. With volumes that frame is for
- * the depth, and not one of those averaged. */
+/* A picture without volumes is drawn once through the pixels' centres, and then again only at edges. With volumes the
+ * frame through the centres gives the depth alone, and is not averaged. */
 static insitu_status draw_all(frames_basis *b, const scene_image *image, render_job *job, base_error *error)
 {
     canvas *c = b->canvas;
@@ -326,8 +326,8 @@ static void give_picture(const session_drawing *d, const scene_image *image, can
     session_writer_give(d->writer, files, d->report, error);
 }
 
-/* Where nothing is written in the step, all that can go wrong is that rank 0 lacks the memory to hand the picture over:
- * that is told when the next step begins, as all is that its thread meets. ranges: NULL, or those of the run. */
+/* Where nothing is written in the step, only rank 0's lack of memory to hand the picture over can go wrong. The next
+ * step reports that, as it does the errors of the writing thread. ranges is NULL, or those of the run. */
 static insitu_status write_outputs(const session_drawing *d, const scene_image *image, canvas *c,
                                    session_image_ranges *ranges, base_error *error)
 {
@@ -345,14 +345,14 @@ static insitu_status write_outputs(const session_drawing *d, const scene_image *
 
 /* ---- active cells --------------------------------------------------------------------------------------------
  *
- * Isosurfaces are compared as the scene writes them: one that is the same by other words ("0" of a field of one
- * component) is drawn as if it were another, which costs time alone. Whether a mesh's arrays can be stored the renderer
- * decides, at no cost. */
+ * Isosurfaces are compared as the scene writes them. One that is the same in other words ("0" of a field of one
+ * component) is drawn as if it were another, which only costs time. The renderer decides whether a mesh's arrays can be
+ * stored, at no cost. */
 
-/* Filling costs up to a third of a frame, of which one that follows may save less (docs/decisions/find.md). */
+/* Filling costs up to a third of a frame, and each later frame may save less than that (docs/decisions/find.md). */
 enum { LEAST_FRAMES = 3 };
 
-/* As the renderer has it (render.h). */
+/* Tells whether the renderer can store active cells for the layer, by its rule (render.h). */
 static bool can_be_stored(const scene_isosurface *layer)
 {
     return layer->opacity >= 1 && !layer->has_colour_by && layer->normals == SCENE_GRADIENT;
@@ -379,7 +379,7 @@ static bool has_same(const scene_image *image, const scene_isosurface *layer)
     return false;
 }
 
-/* Frames of all pixels: the others are not drawn from what is stored. */
+/* Counts the frames of all pixels; others do not use stored cells. */
 static int whole_frames(const scene_image *image)
 {
     return has_edges_alone(image) ? 1 : image->frames;
@@ -417,8 +417,8 @@ static insitu_status decorate(const session_drawing *d, const scene_image *image
     return INSITU_OK;
 }
 
-/* What one rank alone may lack goes in *error to the next agreement, of which there are few: the layers' and the first
- * frame's. active: NULL, or for the image's frames to fill and to draw from. */
+/* An error of one rank alone, such as lack of memory, goes in *error to the next agreement: that of the layers or of
+ * the first frame. active is NULL, or filled by the image's first frame and used by the others. */
 static insitu_status draw_image(const session_drawing *d, const scene_image *image, render_active_cells *active,
                                 base_error *error)
 {

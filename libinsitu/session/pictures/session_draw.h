@@ -1,4 +1,4 @@
-/* The plan's images to pictures on rank 0. */
+/* Turns the plan's images into pictures on rank 0. */
 #ifndef SESSION_DRAW_H
 #define SESSION_DRAW_H
 
@@ -31,13 +31,13 @@ typedef struct session_drawing {
     bool writes_behind; /* pictures are written when the step is over */
 } session_drawing;
 
-/* Is an isosurface of the image drawn so often in this step, by this and others of the plan's images or frame by frame,
- * that storing its active cells pays (render.h: render_active_cells)? Looks at the scene alone: the same on every rank.
- */
+/* Tells whether an isosurface of the image is drawn so often in this step, in frames of this image and of others of the
+ * plan, that storing its active cells pays (render.h: render_active_cells). Depends on the scene alone, and so is the
+ * same on every rank. */
 bool session_active_cells_pay(const session_plan *plan, const scene_image *image);
 
-/* Draw the plan's images and give them to the writer. One that fails is left out; the first reason, the plan's refusal
- * before all others, is the error. Collective. */
+/* Draw the plan's images and give them to the writer. One that fails is left out. The plan's refusal, if there is one,
+ * else the first failure, is the error. Collective. */
 insitu_status session_draw_images(const session_drawing *d, const session_plan *plan, base_error *error);
 
 #endif

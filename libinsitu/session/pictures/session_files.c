@@ -52,7 +52,7 @@ static void write_output(session_files *files, const scene_output *output)
     base_free(path);
 }
 
-/* By no call of MPI, which this thread may not make. */
+/* Milliseconds on a clock. This thread may not call MPI. */
 static double milliseconds(void)
 {
     struct timespec now;

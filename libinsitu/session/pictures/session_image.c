@@ -1,12 +1,12 @@
-/* The image library is the one beside the object this code is in (libinsitu), or in the lib folder next to that one's,
- * which is where it stands for a program in bin that links libinsitu statically: by its full path, so that no other of
- * its name gets into someone's run. Only where neither is there the loader looks for it, and not where LD_LIBRARY_PATH
- * would have it look in the working directory. It stays loaded until the process ends: C++ libraries with threads and
+/* The image library is loaded by its full path, so that no other of its name gets into someone's run: from the folder
+ * of the object that this code is in (libinsitu), or from the lib folder next to that one, where it is for a program in
+ * bin that links libinsitu statically. Only if it is in neither, the loader searches for it, unless LD_LIBRARY_PATH
+ * would make it search the working directory. It stays loaded until the process ends: C++ libraries with threads and
  * static objects do not survive being unloaded.
  *
- * Some library behind OpenImageIO starts threads as it is loaded. They sleep, but they would take the simulation's
- * signals and run its handlers; so they are born with every signal blocked. Others end the process where their
- * constructors find no memory; so nothing is loaded unless there is some to spare. */
+ * Some library behind OpenImageIO starts threads when it is loaded. They sleep, but would take the simulation's signals
+ * and run its handlers, so they are started with every signal blocked. Other libraries end the process where their
+ * constructors find no memory, so nothing is loaded unless there is memory to spare. */
 #define _GNU_SOURCE 1 /* dladdr1 */
 #include "session_image.h"
 

@@ -7,12 +7,12 @@
 #include "error.h"
 #include "insitu/image_output.h"
 
-/* Write by libinsitu_image, which the first call of the process loads; an error where it is not to be had, and the next
- * call tries again. Local. Thread-safe. */
+/* Write by libinsitu_image, which the first call of the process loads. If that fails it is an error, and the next call
+ * tries again. Local. Thread-safe. */
 insitu_status session_write_image(const insitu_image *image, insitu_image_format format, const char *path,
                                   base_error *error);
 
-/* Load it ahead of the first picture. An error is told by that. Local. Thread-safe. */
+/* Load the library ahead of the first picture, whose write reports an error. Local. Thread-safe. */
 void session_load_image_library(void);
 
 /* May pictures be written by a thread of their own (session_writer.h)? Tests that take the place of this file say no.

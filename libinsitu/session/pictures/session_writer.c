@@ -1,6 +1,6 @@
-/* Some library behind OpenImageIO starts threads and makes static objects as it is loaded. These are destroyed as the
- * process exits, in the reverse of the order in which they were made; so that no picture is written with what is left
- * of them, the wait at exit is registered again once the library is there, and goes before. */
+/* Some library behind OpenImageIO makes threads and static objects when it is loaded. These are destroyed as the
+ * process exits, in the reverse of the order in which they were made. So the wait at exit is registered again once the
+ * library is loaded, and comes before: no picture is written with half-destroyed objects. */
 #include "session_writer.h"
 
 #include <mpi.h>
@@ -21,7 +21,7 @@ static const int64_t most_waiting_bytes = (int64_t)128 << 20, most_free_bytes = 
 
 static pthread_mutex_t all_mutex = PTHREAD_MUTEX_INITIALIZER;
 static session_writer *all_writers;
-static pid_t process; /* that the threads are of: a fork has none of them */
+static pid_t process; /* the process that has the threads; a fork has none */
 
 static void wait_for_thread(session_writer *w)
 {
@@ -98,7 +98,8 @@ static void keep_memory(session_writer *w, session_picture *memory)
     session_drop_picture(memory);
 }
 
-/* Locked. None that is large enough: *memory stays empty, and one that is too small goes. */
+/* Takes kept memory of at least so many bytes. If none is large enough, *memory stays empty, and one that is too small
+ * is freed. Locked. */
 static void take_memory(session_writer *w, size_t bytes, session_picture *memory)
 {
     int small = -1;

@@ -1,8 +1,8 @@
 /* Rank 0's writer: a thread that encodes and writes pictures while the simulation goes on.
  *
  * Pictures wait for it in a queue, at most 128 MiB of them or one: a step that draws more waits until there is room.
- * What it was given is written in turn. How that went is collected when the next step begins. Where the scene asks for
- * it, or where no thread can be started, pictures are written before the step is over.
+ * They are written in turn, and the next step collects the results when it begins. Where the scene asks for it, or
+ * where no thread can be started, pictures are written before the step is over.
  *
  * The thread calls no MPI, takes none of the process's signals, and leaves the image library loaded when it ends. A
  * process that ends without insitu_destroy() waits for it too: in MPI_Finalize(), and as it exits. Pictures that wait
@@ -79,7 +79,7 @@ int64_t session_writer_bytes(session_writer *writer, int *waiting);
 /* Free the memory that is kept. Local. */
 void session_writer_drop_memory(session_writer *writer);
 
-/* Wait until all is written and end the thread. What was not collected is not told. Local. */
+/* Wait until all is written and end the thread. Results that were not collected are lost. Local. */
 void session_writer_end(session_writer *writer);
 
 #endif

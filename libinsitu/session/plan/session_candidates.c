@@ -76,7 +76,7 @@ static bool mark_volume(session_mesh *mesh, const scene_volume *layer, double ha
     return !scalar || add_volume(scalar, layer, half_diagonal);
 }
 
-/* The distance that is drawn is 0 or little from it: see session_slice_distance(). */
+/* The distance that is drawn is 0 or nearly so: see session_slice_distance(). */
 static bool mark_plane(session_mesh *mesh, const scene_plane *plane, const session_extent *extent)
 {
     const float reach = (float)(2 * SESSION_BORDER_SHARE * extent->half_diagonal);

@@ -55,7 +55,7 @@ typedef struct planned_surface {
     bool is_news; /* a value is outside what the trees hold, and that was not told */
 } planned_surface;
 
-/* A sweep over isovalues leaves one in each picture: its number is that of the file's. */
+/* In a sweep over isovalues each picture has one, whose number is that in the file. */
 static session_warning isovalue_warning(const planned_surface *s, int value)
 {
     return (session_warning){WARNING_ISOVALUE, s->image->name, NULL,
@@ -82,7 +82,8 @@ static int list_surfaces(const session_plan *plan, planned_surface *out)
     return count;
 }
 
-/* Over all ranks, with what a rank failed at before: then the ranges mean nothing. Collective. */
+/* Reduces the ranges over all ranks, together with errors from before; on an error the ranges mean nothing. Collective.
+ * */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, planned_surface *surfaces,
                                    int count, bool of_all_cells, base_error *error)
 {

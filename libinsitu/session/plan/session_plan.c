@@ -1,5 +1,5 @@
-/* The plan: nothing is built, recentred or ranged but what an image of this step names. Whether an image can be drawn
- * is read off the catalogue, which all ranks share, so all come to the same answer without asking. */
+/* The plan: trees, recentred values and ranges are made only if an image of this step names them. All ranks have the
+ * same catalogue, which tells whether an image can be drawn, so all come to the same answer without asking. */
 #include "session_plan.h"
 
 #include <math.h>
@@ -48,7 +48,7 @@ static insitu_status refuse_missing(const session_plan_basis *basis, const scene
                      field->line, field->name, names);
 }
 
-/* A mesh that the layer names is there, and has the field, unless it has no cells anywhere. */
+/* Checks that a mesh that the layer names is there, and has the field unless it has no cells anywhere. */
 static insitu_status check_named_mesh(const session_plan_basis *basis, const scene_field *field, const char *name,
                                       base_error *error)
 {
@@ -98,7 +98,7 @@ static const session_catalogue_field *find_shown(const session_catalogue_mesh *m
     return scene_field_is_on(field, mesh->name) ? session_catalogue_find(mesh, field->name) : NULL;
 }
 
-/* Some mesh has the field; and on those that the layer shows it on it is sound. */
+/* Checks that some mesh has the field, and that it is sound on those on which the layer shows it. */
 static insitu_status check_field(const session_plan_basis *basis, const scene_field *field, base_error *error)
 {
     bool is_there = false;
@@ -120,7 +120,7 @@ static insitu_status check_layer_field(const session_plan_basis *basis, const sc
     return status;
 }
 
-/* Meshes that have the surface but not what colours it. */
+/* Warns of meshes that have the surface but not the field that colours it. */
 static void warn_of_grey(const session_catalogue *catalogue, const scene_image *image, const scene_isosurface *layer,
                          session_report *report)
 {
@@ -223,7 +223,8 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
 
-/* Multiples of the interval up to the time. A time that is one but for rounding counts: steps of 0.1 add up to less. */
+/* Counts the multiples of the interval up to the time. A time within rounding of a multiple counts, as steps of 0.1 add
+ * up to less. */
 static double intervals(double time, double interval)
 {
     const double count = time / interval;
@@ -280,7 +281,7 @@ static void warn_of_grey_layers(const session_catalogue *catalogue, const scene_
         if (image->surfaces[i].has_colour_by) warn_of_grey_surface(catalogue, image, &image->surfaces[i], report);
 }
 
-/* Without cells anywhere no field can be asked of anyone: the picture is its background. */
+/* If no rank has cells, fields are not asked for, and the picture is its background. */
 static bool can_be_drawn(const session_plan_basis *basis, const scene_image *image, session_report *report,
                          base_error *refusal)
 {
@@ -297,7 +298,7 @@ void session_plan_free(session_plan *plan)
     *plan = (session_plan){0};
 }
 
-/* Views of an orbit have their layers in common, and so what can be said of these. */
+/* Views of an orbit share their layers, and so the warnings about these. */
 static void take_images(const session_plan_basis *basis, session_report *report, session_plan *plan)
 {
     bool is_well = false;

@@ -1,4 +1,4 @@
-/* From the due images to what they need of the meshes. */
+/* Finds what the due images need of the meshes. */
 #ifndef SESSION_PLAN_H
 #define SESSION_PLAN_H
 
@@ -43,10 +43,11 @@ typedef struct session_plan_basis {
     bool is_filled; /* some field is filled on demand, on any rank */
 } session_plan_basis;
 
-/* How many images are due, but for conditions. Local. */
+/* Counts the images that are due, without regard to conditions. Local. */
 int session_count_due(const scene *scene, const session_moment *moment);
 
-/* Are the fields there whose statistics the step wants? images: those of conditions too. Local, the same everywhere. */
+/* Checks that the fields whose statistics the step wants are there, and, if images, those of conditions too. Local, the
+ * same everywhere. */
 insitu_status session_check_event_fields(const session_plan_basis *basis, bool images, base_error *error);
 
 /* Find which of the due images can be drawn, mark on this rank's meshes and scalars what they need, and copy values

@@ -1,7 +1,7 @@
-/* Percentiles are found digit by digit: values are taken as float32 numbers, and these as whole numbers in the same
- * order. A pass counts the values whose leading bits are those found so far by the 11 bits that follow; all ranks add
- * their counts, and so know in which bin the value of the wanted rank is. Three passes have all 32 bits: the value
- * itself, not an estimate, whoever counted which cell. */
+/* Percentiles are found digit by digit. Values are taken as float32 numbers, and these as whole numbers in the same
+ * order. A pass takes the values whose leading bits are those found so far, and counts them by the next 11 bits; the
+ * sum of all ranks' counts tells in which bin the wanted value is. Three passes find all 32 bits, and so the value
+ * itself, not an estimate, for any partition. */
 #include "session_ranges.h"
 
 #include <math.h>
@@ -105,7 +105,7 @@ static insitu_status count_digits(const session_meshes *meshes, const session_te
                        "MPI_Allreduce");
 }
 
-/* The bin in which the rank is that is left, which becomes one in the bin. */
+/* Finds the bin of the value with this rank in order; *rank becomes its rank within the bin. */
 static int find_digit(const int64_t counts[DIGITS], int64_t *rank)
 {
     int digit = 0;

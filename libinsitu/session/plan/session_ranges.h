@@ -20,8 +20,8 @@ typedef struct session_range_subject {
 insitu_status session_find_extremes(const session_meshes *meshes, const session_team *team,
                                     const session_range_subject *of, double *low, double *high, base_error *error);
 
-/* The range of a layer's field by the map's source over all ranks' drawn cells, of SCENE_RANGE_RUN of this step alone;
- * low > high: there are no values. The same bits on any partition. Collective. */
+/* The range of a layer's field over all ranks' drawn cells, by the map's source; for SCENE_RANGE_RUN that of this step
+ * alone. low > high: there are no values. It has the same bits on any partition. Collective. */
 insitu_status session_find_range(const session_meshes *meshes, const session_team *team, const scene_field *field,
                                  const scene_colour_map *map, double *low, double *high, base_error *error);
 

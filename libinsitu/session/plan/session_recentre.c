@@ -1,11 +1,11 @@
 /* Recentring: the value at a vertex is the mean over its cells (or, of values at corners, over the corners there) on
  * all ranks, and bitwise the same for any partition. Where the field has values on faces of the boundary, a vertex of
- * such a face gets the mean over those faces instead, be they all on other ranks than its cells.
+ * such faces gets the mean over them instead, even if all of them are on other ranks than its cells.
  *
- * Sums depend on their order, so partial sums of ranks would not do: every rank's single values come together, are
- * sorted, and summed in that order. Vertices are one where their keys are (global ids where all ranks give them, else
- * the bits of the coordinates, -0 as +0), on one rank as on several: else a mesh that doubles its vertices along a
- * crack would look one way on one rank and another on two.
+ * Sums depend on their order, so partial sums of ranks would not do: all ranks' single values are brought together,
+ * sorted, and summed in that order. Vertices with equal keys are one (global ids where all ranks give them, else the
+ * bits of the coordinates, -0 as +0), also on a single rank: otherwise a mesh that doubles its vertices along a crack
+ * would look different on one rank and on two.
  *
  *     local:  vertices -> groups of equal keys -> values of incident cells, group by group -> means
  *     shared: groups inside another rank's box  --(key, values)-->  rank hash(key) % ranks: merged by key, means
@@ -52,7 +52,7 @@ static bool groups_create(value_groups *groups, int64_t count)
     return groups->starts && groups->means && groups->are_faces;
 }
 
-/* After starts[g + 1] was filled with the count of group g: values get their room. Filling then moves starts[g] to
+/* Makes room for the values, after starts[g + 1] was filled with the count of group g. Filling then moves starts[g] to
  * where g ends; groups_close() moves them back. */
 static bool groups_open(value_groups *groups)
 {
@@ -118,15 +118,15 @@ static void group_vertices(const session_mesh *mesh, bool by_id, vertex_groups *
     }
 }
 
-/* The value that the cell, or its corner that is this vertex, gives to the vertex; false where it gives none. */
+/* Gets the value that the cell, or its corner at this vertex, gives to the vertex; false where it gives none. */
 static bool gives(const grid_field *field, int64_t cell, int64_t vertex, double *value)
 {
     *value = grid_field_value(field, field->is_cell_centred ? cell : vertex);
     return isfinite(*value);
 }
 
-/* Each cell's value to the groups of its vertices, once to each: last has the last cell that gave to a group; of values
- * at corners each one's. The first pass counts, the second stores. */
+/* Gives each cell's value to the groups of its vertices, once to each; last has the last cell that gave to a group.
+ * Values at corners are given each. The first pass counts, the second stores. */
 static void give_values(const grid *g, const grid_field *field, vertex_groups *groups, int64_t *last, bool is_stored)
 {
     value_groups *values = &groups->values;
@@ -242,7 +242,7 @@ static void write_record(const vertex_groups *groups, int64_t group, uint64_t *r
     memcpy(record + RECORD_HEAD, groups->values.values + groups->values.starts[group], (size_t)count * sizeof(double));
 }
 
-/* Shared groups sorted by their home ranks into records. */
+/* Packs shared groups into records, sorted by their home ranks. */
 static bool pack_records(const vertex_groups *groups, int ranks, shared_groups *shared)
 {
     session_mail *mail = &shared->mail;
@@ -302,13 +302,14 @@ static const uint64_t *next_record(const uint64_t *record)
     return record + RECORD_HEAD + record_count(record);
 }
 
-/* Does the record have values that its group takes? Those of cells give way to those of faces, on whichever rank. */
+/* Tells whether the record has values that its group takes. If any rank has values of faces, those of cells do not
+ * count. */
 static bool has_values(const uint64_t *record, const value_groups *values, int64_t group)
 {
     return !values->are_faces[group] || record[RECORD_HEAD - 1] & FACE_VALUES;
 }
 
-/* Means of the records' keys, one a record, into reply->words and reply->counts. */
+/* Puts the mean for each record's key into reply->words and reply->counts. */
 static bool merge_records(const session_mail *in, int ranks, int threads, session_mail *reply)
 {
     session_key_table keys = {0};
@@ -408,8 +409,8 @@ static session_scalar *scalar_of(const session_mesh *mesh, const session_recentr
     return NULL;
 }
 
-/* A corner whose own value is not finite keeps its cell from being drawn, as it would without means; a cell's own value
- * is looked at elsewhere (grid_field.own). */
+/* A corner whose own value is not finite stays so, and keeps its cell from being drawn, as without means. A cell's own
+ * value is checked elsewhere (grid_field.own). */
 static void spread_means(const vertex_groups *groups, const grid_field *own, int64_t count, double *values, int threads)
 {
 #pragma omp parallel for num_threads(threads) schedule(static)

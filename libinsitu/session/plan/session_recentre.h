@@ -1,4 +1,4 @@
-/* Cell values to vertices, for isosurfaces. */
+/* Takes cell values to vertices, for isosurfaces. */
 #ifndef SESSION_RECENTRE_H
 #define SESSION_RECENTRE_H
 

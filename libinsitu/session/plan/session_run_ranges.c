@@ -51,7 +51,7 @@ static int count_layers(const scene_image *image)
 
 /* ---- the file -------------------------------------------------------------------------------------------------- */
 
-/* reason: of errno. */
+/* Records an error of the file; reason is an errno. */
 static insitu_status fail(const session_image_ranges *ranges, const char *what, int reason, base_error *error)
 {
     return base_fail(error, reason == ENOMEM ? INSITU_ERROR_MEMORY : INSITU_ERROR_IO,
@@ -167,7 +167,7 @@ static session_image_ranges *find_ranges(const session_run_ranges *all, const sc
     return NULL;
 }
 
-/* An entry at the end of the list, which counts once it is whole. */
+/* Prepares an entry at the end of the list, which is counted when it is complete. */
 static bool prepare_ranges(session_run_ranges *all, const scene_image *image, base_error *error)
 {
     const int count = count_layers(image);
@@ -201,7 +201,7 @@ static insitu_status share_ranges(session_image_ranges *ranges, MPI_Comm comm, b
     return status;
 }
 
-/* From the file that rank 0 reads. Collective. */
+/* Fills the ranges from the file, which rank 0 reads. Collective. */
 static insitu_status fill_ranges(session_image_ranges *ranges, const session_team *team, base_error *error)
 {
     if (team->rank == 0) read_ranges(ranges, error);

@@ -2,11 +2,10 @@
  *
  * They are kept in a file NAME.ranges, NAME being the image's, in the folder of the image's first output: the part of
  * its path before the last slash that comes before any placeholder; those of a sweep's pictures but the first in
- * NAME.1.ranges and so on. It is text, written anew after each picture for
- * which a range became wider, and read when the first picture of the image is drawn, so that a run that is started
- * again goes on with the ranges of the one before. A line: isosurface, surface, slice or volume, the layer's number
- * among those of its kind from 0 on, the component (scene.h), low, high, and the field. Lines that are of no layer of
- * the image are left out. */
+ * NAME.1.ranges and so on. It is text, written anew after each picture for which a range became wider, and read when
+ * the first picture of the image is drawn, so that a run that is started again goes on with the ranges of the one
+ * before. A line has: isosurface, surface, slice or volume, the layer's number among those of its kind from 0 on, the
+ * component (scene.h), low, high, and the field. Lines that match no layer of the image are left out. */
 #ifndef SESSION_RUN_RANGES_H
 #define SESSION_RUN_RANGES_H
 
@@ -40,7 +39,7 @@ typedef struct session_run_ranges {
 insitu_status session_open_run_ranges(session_run_ranges *all, const scene_image *image, const session_team *team,
                                       session_image_ranges **out, base_error *error);
 
-/* Take in the range of this step of the layer with the map, and give what it is together with those before. Local. */
+/* Widen the range of the layer with the map by that of this step, and return the result in its place. Local. */
 void session_widen_run_range(session_image_ranges *ranges, const scene_colour_map *map, double *low, double *high);
 
 /* Write the file where a range has changed. On rank 0. */

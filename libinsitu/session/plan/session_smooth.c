@@ -1,13 +1,13 @@
-/* Smooth normals without a seam. A rank knows which vertices it needs, those of cells that an isosurface crosses, but
- * not all cells around them: ranks whose boxes hold such a vertex are asked for their share of its sum.
+/* Computes smooth normals without a seam. A rank knows the vertices that it needs, those of cells that an isosurface
+ * crosses, but not all cells around them: it asks the ranks whose boxes hold such a vertex for their share of its sum.
  *
  *     local:  crossed cells -> their vertices -> keys
  *     shared: keys inside another rank's box  --(keys)-->  that rank adds them to its own
  *     local:  every vertex with one of these keys; the cells around them; their sums (session_gradients.h)
  *     shared: <--(sums)--, in whole numbers, which add up in any order
  *
- * Of a mesh that is cut into blocks few vertices lie in other ranks' boxes; where each rank has cells everywhere, each
- * asks all of them. */
+ * If a mesh is cut into blocks, few vertices lie in other ranks' boxes; if each rank has cells everywhere, each asks
+ * all others. */
 #include "session_smooth.h"
 
 #include <math.h>
@@ -43,7 +43,7 @@ typedef struct smooth_work {
     session_mesh *mesh; /* NULL: nothing of it is here */
     session_scalar *scalar;
     grid_field values;
-    int32_t *entries;       /* of each vertex: its key, or -1 */
+    int32_t *entries;       /* each vertex's key, or -1 */
     session_key_table keys; /* those of this rank first, then those that others ask for */
     int64_t own_count;
     session_gradient_sum *sums; /* one a key */
@@ -80,7 +80,7 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     return true;
 }
 
-/* In one order on all ranks. */
+/* Lists the items, in the same order on all ranks. */
 static bool list_items(const session_plan *plan, const session_catalogue *catalogue, smooth_items *out)
 {
     bool is_listed = true;
@@ -200,7 +200,7 @@ static bool find_places(const smooth_work *work, bool by_id, double (**out)[3])
     return true;
 }
 
-/* To each rank the keys in its box. numbers: of the keys, in the order of the mail. */
+/* Writes to each rank the keys in its box. numbers are the keys' numbers, in the order of the mail. */
 static bool write_questions(const smooth_work *work, const session_team *team, const rank_box *boxes,
                             const double (*places)[3], session_mail *out, int64_t **numbers)
 {
@@ -226,7 +226,7 @@ static bool write_questions(const smooth_work *work, const session_team *team, c
     return true;
 }
 
-/* The keys of the questions come behind this rank's own. numbers: in the order of the mail. */
+/* Adds the keys of the questions behind this rank's own. numbers are theirs, in the order of the mail. */
 static bool read_questions(const session_mail *in, smooth_work *work, int64_t **numbers)
 {
     const int64_t count = in->total / KEY_WORDS;
@@ -264,7 +264,7 @@ static bool filter_create(const session_key_table *keys, key_filter *out)
     return out->bits != NULL;
 }
 
-/* Every vertex with one of the keys, of any cell: those of this rank, which a crack may double, and those asked for. */
+/* Finds all vertices with one of the keys: this rank's own, which a crack may double, and those asked for. */
 static bool find_entries(smooth_work *work, bool by_id, int threads)
 {
     key_filter filter;

@@ -51,7 +51,7 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
     return count;
 }
 
-/* Which faces are not known on some rank. Collective. */
+/* Finds the faces that some rank does not know. Collective. */
 static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
                                 const session_team *team, int *stale, base_error *error)
 {
@@ -74,7 +74,7 @@ static insitu_status find_faces(const session_meshes *meshes, const surface_wish
     return status;
 }
 
-/* All cells of it have a face that is drawn. */
+/* Makes the mesh of outer faces ready to be drawn. All of its cells have a drawn face. */
 static insitu_status make_ready(const session_mesh *mesh, session_outer *outer, base_error *error)
 {
     const insitu_status status = session_make_outer_mesh(mesh, outer, error);

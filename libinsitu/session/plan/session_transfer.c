@@ -1,10 +1,9 @@
 /* A surface is coloured by the map as it is. A volume is integrated over transfer functions that are linear between
- * points of value, so what else a map may be is made of that: bands of a table in which each has 16 entries, so that
- * they change within 1/16 of a band; colours outside of the range of one more entry at an end; and ramps of opacity
- * that are straight along a scale of several pieces that are straight along the values. Those are cut into
- * pieces that are equal along the scale, until all 32 points are in use: by six decades of a logarithm a single ramp is
- * then off by less than 0.002 of its height, and seven ramps by less than 0.02; by as many to both sides of 0, by twice
- * that. */
+ * points of value, so other maps are made of such: each band has 16 entries of a table, so that colours change within
+ * 1/16 of a band; colours outside of the range are one more entry at an end; and a ramp of opacity that is straight
+ * along a scale becomes several pieces that are straight along the values. Pieces are equal along the scale, and are
+ * cut until all 32 points are in use. Over six decades of a logarithm a single ramp is then off by less than 0.002 of
+ * its height, and seven ramps by less than 0.02; with as many decades on both sides of 0, by twice that. */
 #include "session_transfer.h"
 
 #include <float.h>
@@ -15,8 +14,8 @@
 
 enum { band_entries = 16 };
 
-/* A range may not be narrower, of its larger end: values are float32, relative to the range, or, with a scale, to its
- * larger end, which then leaves 1e-4 of the map to rounding. */
+/* A range must be at least this share of its larger end. Values are float32, relative to the range or, with a scale, to
+ * its larger end; rounding then moves them by up to 1e-4 of the map. */
 static const double narrowest_linear = 1e-6, narrowest_scaled = 1e-3, widest_log = 1e30;
 
 static render_scale scale_of(const scene_colour_map *map)
@@ -67,7 +66,7 @@ bool session_takes_memory(const scene_colour_map *map, const scene_volume *volum
     return volume && (map->is_banded || map->has_below || map->has_above);
 }
 
-/* Bands and what is outside as a table. */
+/* Makes a table of bands and of the colours outside. */
 static bool expand_table(const scene_colour_map *map, session_transfer *out)
 {
     render_transfer *t = &out->transfer;
@@ -95,7 +94,7 @@ typedef struct opacity_points {
     scene_opacity_point items[RENDER_MAX_OPACITY_POINTS];
 } opacity_points;
 
-/* By how much the straight way by value between two points is off that by place, at most, looked at in 15 places. */
+/* The largest difference, at 15 places between two points, of being straight by value from being straight by place. */
 static double chord_error(const render_transfer *t, const scene_opacity_point *a, const scene_opacity_point *b)
 {
     enum { PARTS = 16 };
@@ -115,7 +114,7 @@ static scene_opacity_point point_between(const scene_opacity_point *a, const sce
                                  (float)(a->opacity + share * (b->opacity - a->opacity))};
 }
 
-/* The same of a ramp that is cut into pieces which are equal by place. */
+/* The same for a ramp that is cut into pieces of equal length by place. */
 static double ramp_error(const render_transfer *t, const scene_opacity_point *ramp, int pieces)
 {
     double most = 0;

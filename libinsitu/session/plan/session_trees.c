@@ -1,17 +1,17 @@
 /* Trees that are up to date are left alone: new cells build a tree, moved vertices refit its bounds (until its cost has
  * grown by half, then it is built again), new values refit ranges. The first scalar that a mesh is drawn with has the
- * nodes' own ranges, further ones have pairs beside the tree. Where values tell what can be seen, vertices that move in
- * every step have bounds refitted where something can be seen, and no further: a fifth of the nodes for an isosurface.
+ * nodes' own ranges, further ones have pairs beside the tree. Where values tell what can be seen and vertices move in
+ * every step, bounds are refitted only where something can be seen: a fifth of the nodes for an isosurface.
  *
  * A full tree is dear to build and cheap to keep; a partial one, over the cells that the images can show, is cheap to
  * build where they show little, but ends with the values. Which serves better depends on how long the cells will stay,
- * which nobody tells. So partial trees are rented until the rent since the cells last changed comes to the price of
- * the full tree, and then that is bought: never more than twice what the best choice in hindsight would have cost
- * (Karlin, Manasse, Rudolph and Sleator 1988). Prices are as measured in this run.
+ * which is not known. So partial trees are rented until the rent since the cells last changed reaches the price of the
+ * full tree, which is then bought. This never costs more than twice the best choice in hindsight (Karlin, Manasse,
+ * Rudolph and Sleator 1988). Prices are as measured in this run.
  *
- * Where the last full tree of a mesh served one step alone, the next one is likely to do so too, as with a caller that
- * sets its mesh anew at every step. It is built along a space-filling curve then, in half the time; where it serves on,
- * it is not built again. */
+ * If the last full tree of a mesh served only one step, the next one is likely to as well, as when the caller sets a
+ * new mesh at every step. It is then built along a space-filling curve, in half the time, and is kept if it does serve
+ * longer. */
 #include "session_trees.h"
 
 #include "memory.h"
@@ -82,7 +82,7 @@ static double surface_of(const session_mesh *mesh)
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-/* A tree over a selection serves one step as a rule too, but is of few cells: its builder hardly matters. */
+/* A tree over a selection mostly serves one step too, but has few cells, so its builder hardly matters. */
 static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_selection *selection)
 {
     return !selection && mesh->full_tree_steps == 1 ? MMBVH_MORTON : MMBVH_SAH;
@@ -163,8 +163,8 @@ static insitu_status build_and_refit(const tree_update *u, session_mesh *mesh, b
     return status ? status : refit_ranges(u, mesh, error);
 }
 
-/* Has the tree grown so much beside its mesh that it is better built anew? Boxes that stand as they were before the
- * vertices moved count as they are. */
+/* Tells whether the tree has grown so much beside its mesh that it is better built again. Boxes that were not refitted
+ * count as they are. */
 static bool is_decayed(const session_mesh *mesh)
 {
     const double tree = mesh->tree.area * mesh->built_surface, built = mesh->tree.built_area * surface_of(mesh);
@@ -203,8 +203,8 @@ static insitu_status refit_bounds(const tree_update *u, session_mesh *mesh, bool
     return is_decayed(mesh) ? build_and_refit(u, mesh, error) : INSITU_OK;
 }
 
-/* Bounds of what could be seen do for as long as that can be seen and nothing else. Where the vertices have come to
- * rest meanwhile, all are refitted, once. */
+/* Bounds that hold only what could be seen serve as long as nothing else can be. If something else can, and the
+ * vertices have come to rest, all bounds are refitted, once. */
 static insitu_status update_bounds(const tree_update *u, session_mesh *mesh, bool are_values_new, base_error *error)
 {
     uint64_t key;

@@ -13,7 +13,7 @@ static uint64_t mix(uint64_t sum, uint64_t bits)
     return product ^ product >> 29;
 }
 
-/* Lanes of their own, since each multiplication waits for the one before. */
+/* Sums in several independent lanes, since each multiplication waits for the one before in its lane. */
 static uint64_t sum_words(const char *data, int64_t bytes)
 {
     uint64_t lanes[LANES] = {1, 2, 3, 4}, words[LANES];
@@ -67,7 +67,7 @@ static uint64_t sum_field(uint64_t sum, const session_mesh *mesh, const grid_fie
     return sum;
 }
 
-/* A cell that has lost its own value may leave the means at its vertices as they are. */
+/* A cell's own value is part of it, since losing that may leave the means at its vertices unchanged. */
 static uint64_t checksum_of(const session_mesh *mesh, const session_scalar *scalar, int threads)
 {
     const grid_field field = session_scalar_field(mesh, scalar);

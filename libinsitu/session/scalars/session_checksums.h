@@ -1,4 +1,4 @@
-/* Have a field's values changed, as the caller says? */
+/* Finds whether a field's values have changed, as the caller says. */
 #ifndef SESSION_CHECKSUMS_H
 #define SESSION_CHECKSUMS_H
 

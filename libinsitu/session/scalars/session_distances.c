@@ -121,8 +121,8 @@ insitu_status session_update_distances(const session_meshes *meshes, const sessi
     return session_agree(team->comm, error);
 }
 
-/* A crossing belongs to the cell that is below the distance and reaches it: the least distance of all has none. A tenth
- * of the tolerance is told apart from it in single precision, and is less than that resolves of the scene. */
+/* A crossing belongs to the cell that reaches the distance from below, so the least distance of all has no crossing. A
+ * tenth of the tolerance more can be told from it in single precision, but is too little to be seen in the scene. */
 double session_slice_distance(double low, double high, double half_diagonal)
 {
     const double tolerance = SESSION_BORDER_SHARE * half_diagonal;

@@ -22,12 +22,12 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 /* NULL: the mesh has no distances from the plane. */
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
 
-/* Compute the distances in use that are out of date: from a vertex's own coordinates alone, so that all ranks have the
+/* Compute the distances in use that are out of date. They depend on a vertex's coordinates alone, so all ranks have the
  * same. Collective. */
 insitu_status session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
 
-/* The distance that is drawn for the plane, of data whose distances are from low to high over all ranks: 0, or, where
- * the plane lies on their border, so far into them that it shows. */
+/* The distance at which the plane is drawn, where the data's distances go from low to high over all ranks: 0, or, if
+ * the plane lies on their border, as far inside as it takes to be seen. */
 double session_slice_distance(double low, double high, double half_diagonal);
 
 #endif

@@ -1,4 +1,4 @@
-/* As session_mesh_input.c, of fields. */
+/* As session_mesh_input.c, for fields. */
 #include "session_field_input.h"
 
 #include <string.h>
@@ -31,7 +31,7 @@ int64_t session_corner_count(const insitu_mesh *mesh)
     return mesh->cell_count * grid_type_vertices((int)mesh->cell_type);
 }
 
-/* Vertices, cells or corners of the mesh; of corners in rows: from the first to the last. */
+/* Counts vertices, cells or corners of the mesh; for corners in rows, all entries from the first to the last corner. */
 int64_t session_field_places(const insitu_mesh *mesh, const insitu_field *field)
 {
     if (field->centring == INSITU_VERTEX) return mesh->vertex_count;
@@ -89,7 +89,7 @@ static insitu_status check_corners(const insitu_mesh *mesh, const insitu_field *
     return INSITU_OK;
 }
 
-/* How the faces are told, and their values. */
+/* Checks how the patch names its faces, and its values. */
 static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *patch, base_error *error)
 {
     const bool has_vertices = patch->connectivity.data != NULL;
@@ -146,7 +146,7 @@ static insitu_status check_patches(const session_mesh *mesh, const insitu_field 
     return INSITU_OK;
 }
 
-/* Before it was called. */
+/* Checks a field that is filled on demand, before fill is called. */
 static insitu_status check_fill(const insitu_field *field, base_error *error)
 {
     if (field->patch_count)
@@ -201,7 +201,7 @@ static bool are_same_patches(const insitu_field *a, const insitu_field *b)
     return is_same;
 }
 
-/* Are the values read from where they were? */
+/* Tells whether the values are read from the same place as before. */
 static bool is_same_place(const insitu_field *a, const insitu_field *b)
 {
     return session_is_same_array(&a->values, &b->values) && a->component_stride_bytes == b->component_stride_bytes &&
@@ -224,7 +224,7 @@ static bool copy_patches(session_field *field, const insitu_field *given, base_e
     return true;
 }
 
-/* The arrays, and what of their copy is to be made again. Patches have been copied. */
+/* Takes the arrays, and notes whether their copy must be made again. Patches have been copied. */
 static void read_values(const session_mesh *mesh, session_field *field, const insitu_field *given, bool is_other,
                         bool is_stale)
 {

@@ -5,13 +5,13 @@
 #include "session_catalogue.h"
 #include "session_mesh.h"
 
-/* Have the values made that are wanted, or, of images, that scalars in use are of, and were not yet made in this step:
- * all, though some fail, in an order that is the same on all ranks; the first error is told. Local, but what is called
- * may communicate. */
+/* Call the fills of the fields that are wanted, or, if of_images, of those whose scalars are in use, unless they were
+ * called in this step. All are called, though some fail, in the same order on all ranks; the first error is returned.
+ * Local, but fills may communicate. */
 insitu_status session_fill_fields(const session_meshes *meshes, const session_catalogue *catalogue, bool of_images,
                                   base_error *error);
 
-/* The step is over: what was made in it is the caller's again. */
+/* Ends the step: the filled arrays are the caller's again. */
 void session_forget_filled(const session_meshes *meshes);
 
 #endif

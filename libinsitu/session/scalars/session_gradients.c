@@ -1,17 +1,17 @@
-/* The rule: every corner of a cell gives the gradient of the linear function through the corner's value and those at
- * the three ends of its edges; a pyramid's apex, which has four, that of each three of them; a corner of a polyhedron's
- * face that of its two edges there and the line to the cell's centre, which has the mean of the vertices' places and
- * values. So a linear field has its own gradient everywhere, and vertices on a boundary have theirs from the cells that
- * there are.
+/* Every corner of a cell gives the gradient of the linear function through the corner's value and those at the other
+ * ends of its three edges. A pyramid's apex has four edges, and gives one for each three of them. A corner of a
+ * polyhedron's face gives one by its two edges there and the line to the cell's centre, which has the mean of the
+ * vertices' places and values. So a linear field has its own gradient everywhere, and vertices on a boundary get theirs
+ * from the cells on one side.
  *
- * A corner weighs its determinant over the fourth power of its edges' length l = sqrt(|a|² + |b|² + |c|²): the share of
- * the determinant in l³ tells a good shape from a sliver, which counts for nothing, and 1 / l weighs small cells more,
- * whose gradients are those of places nearer by; of a mesh whose cells double their size at a vertex the errors of
+ * A corner's weight is its determinant over the fourth power of its edges' length l = sqrt(|a|² + |b|² + |c|²). The
+ * share of the determinant in l³ tells a good shape from a sliver, which counts for nothing; 1 / l weighs small cells
+ * more, whose gradients belong to nearer places. In a mesh whose cells double their size at a vertex the errors of
  * first order cancel. Weight times gradient is a sum of cross products: nothing is divided by a determinant.
  *
- * Edges are taken in the order of coordinates, each corner's numbers are rounded to whole ones, of 87 bits below the
- * largest of all ranks, and these are summed: no order of cells, of their vertices or of ranks shows. 2^19 corners
- * have room at one vertex. */
+ * Edges are taken in the order of coordinates, and each corner's numbers are rounded to whole ones, with 87 bits below
+ * the largest of all ranks, before they are summed. So the order of cells, of their vertices and of ranks does not
+ * matter. 2^19 corners have room at one vertex. */
 #include "session_gradients.h"
 
 #include <stdlib.h>
@@ -27,7 +27,7 @@ typedef struct node {
     int64_t vertex;
 } node;
 
-/* The receiver of corners: the largest is looked for where there are no sums. */
+/* The receiver of corners: it sums them, or without sums finds the largest. */
 typedef struct target {
     const session_gradient_basis *basis;
     session_gradient_sum *sums;
@@ -101,7 +101,7 @@ static void cross(const double a[3], const double b[3], double out[3])
         out[axis] = a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3];
 }
 
-/* Mirrored ends turn the signs of the sum and of the determinant alike. */
+/* Adds a corner. Mirrored ends change the signs of both the sum and the determinant. */
 static void give_corner(target *to, const node *corner, const node *p, const node *q, const node *r)
 {
     const node *swap, *ends[3] = {p, q, r};
@@ -255,7 +255,7 @@ static bool has_entry(const session_gradient_basis *basis, int64_t cell)
     return false;
 }
 
-/* Counted first, so that no list has to grow while threads fill it. */
+/* Cells are counted first, so that no list has to grow while threads fill it. */
 bool session_list_cells(const session_gradient_basis *basis, session_cell_list *out)
 {
     enum { BLOCK = 4096 };

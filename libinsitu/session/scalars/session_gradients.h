@@ -1,5 +1,5 @@
-/* Gradients of a field at vertices, out of the cells around them, to the same bits whatever the order of these and on
- * whichever ranks they are. */
+/* Gradients of a field at vertices, from the cells around them. They have the same bits for any order of the cells and
+ * any ranks that have them. */
 #ifndef SESSION_GRADIENTS_H
 #define SESSION_GRADIENTS_H
 

@@ -1,7 +1,6 @@
-/* Values that are found by an index are copied into the order of the vertices, cells or corners, once for all that
- * reads them; so are those at the vertices of a mesh that is torn, into the order of the corners. A cell would
- * otherwise go through the index at each of its vertices, in each tree and in each layer, and no kernel that takes many
- * cells at once could be used. */
+/* Values that are found by an index are copied once into the order of the vertices, cells or corners; so are those at
+ * the vertices of a torn mesh, into the order of its corners. Otherwise every tree and layer would go through the index
+ * at each vertex of a cell, and kernels that take many cells at once could not be used. */
 #include "session_indexed.h"
 
 #include <string.h>
@@ -52,7 +51,7 @@ static indexed_values values_of(const session_mesh *mesh, const session_field *f
     return out;
 }
 
-/* Where the caller's arrays have the place: the number of the vertex, the cell, or the corner. */
+/* The entry of the caller's arrays for a place: the number of the vertex, the cell, or the corner. */
 static int64_t entry_of(const indexed_values *v, int64_t place)
 {
     if (v->torn) return session_torn_origin(v->torn, place);
@@ -106,7 +105,7 @@ static insitu_status copy_values(const session_mesh *mesh, session_field *field,
     return INSITU_OK;
 }
 
-/* Where it is due. Scalars have the values of cells beside those that are made of them. */
+/* Makes the copy where it is due. Scalars with values made from cells use the cells' values too. */
 static insitu_status update_copy(session_mesh *mesh, int index, int threads, base_error *error)
 {
     session_field *field = &mesh->fields[index];

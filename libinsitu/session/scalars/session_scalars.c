@@ -134,7 +134,7 @@ mmbvh_ranges session_scalar_ranges(const session_mesh *mesh, const session_scala
     return scalar->has_own_ranges ? mmbvh_own_ranges(&mesh->tree) : mmbvh_pair_ranges(scalar->pairs);
 }
 
-/* has_shells: of planes there are none, which cut no shell. */
+/* has_shells is false for planes, which cut no shells. */
 static session_extremes find_extent(const grid *g, const grid_field *field, int threads, bool has_shells,
                                     bool is_positive)
 {

@@ -6,10 +6,10 @@
 #include "scene.h"
 #include "session_mesh.h"
 
-/* Which component a layer means, as grid_field.component. */
+/* The component that a layer means, as grid_field.component. */
 int session_resolve_component(const scene_field *field, int component_count);
 
-/* Is a field of this centring shown by means at vertices? */
+/* Tells whether a field of this centring is shown by means at vertices. */
 bool session_is_recentred(const scene_field *field, insitu_centring centring);
 
 /* Note that an image of this step uses the layer's field on the mesh; *marked: NULL where the mesh does not have it.
@@ -22,7 +22,7 @@ session_scalar *session_find_scalar(const session_mesh *mesh, const scene_field 
 /* The mesh's field, or a component of it, as the caller gave it, in the order of the vertices or cells. */
 grid_field session_given_field(const session_mesh *mesh, int field, int component);
 
-/* Are its values read out of a copy of ours, in the order of the vertices, cells or corners? */
+/* Tells whether the values are read from the session's copy, in the order of the vertices, cells or corners. */
 bool session_is_copied(const session_mesh *mesh, const session_field *field);
 
 /* The field's values as the caller gave them, with no scalar for it; false where the mesh does not have it. */

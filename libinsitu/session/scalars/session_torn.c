@@ -61,7 +61,8 @@ static insitu_status refuse_polyhedra(const session_mesh *mesh, base_error *erro
     return INSITU_OK;
 }
 
-/* Packed, of the type that they have. What no cell uses may be no vertex, and is at the first one's place. */
+/* Copies coordinates, packed, in their own type. Entries that no cell uses may be no vertices; they get the first one's
+ * place. */
 static bool copy_coordinates(const grid *shared, int threads, session_torn *torn)
 {
     for (int axis = 0; axis < 3; axis++) {

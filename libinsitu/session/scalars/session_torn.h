@@ -2,9 +2,9 @@
  *
  * The rooms below find values by the number of a vertex. So a mesh with a field at corners is read as one in which
  * every corner is a vertex: its coordinates are copied corner by corner, and its connectivity counts up. All that is
- * drawn of the mesh is drawn by it, so that layers of fields at corners, vertices and cells go together. What must know
- * which vertices are one (means at vertices, outer faces) goes by their ids or coordinates as it is, across corners as
- * across ranks. */
+ * drawn of the mesh is drawn by it, so that layers of fields at corners, vertices and cells go together. Code that must
+ * know which vertices are the same (means at vertices, outer faces) compares ids or coordinates anyway, across ranks,
+ * and so works across corners too. */
 #ifndef SESSION_TORN_H
 #define SESSION_TORN_H
 
@@ -13,8 +13,8 @@
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Tear the meshes that have a field at corners which the scene names, where they are not yet, or not by the coordinates
- * of now; and mend the others. Cells have been checked. Collective. */
+/* Tear the meshes with a corner field that the scene names, unless they are torn by the present coordinates already;
+ * make the others whole. Cells have been checked. Collective. */
 insitu_status session_tear_meshes(const session_meshes *meshes, const session_catalogue *catalogue, const scene *scene,
                                   const session_team *team, base_error *error);
 

@@ -38,15 +38,15 @@ static void convert_background(const scene_file_image *in, float background[4])
     background[3] = alpha;
 }
 
-/* Nothing was said of how the volume is to be sampled. Any key but method and max_error, be it of samples alone, says
- * how samples are to be taken. */
+/* Tells whether the scene does not say how to sample volumes. Any key other than method and max_error says so, even one
+ * for samples only. */
 static bool is_unsaid(const scene_file_sampling *in)
 {
     return !in->method && !in->max_error && !in->step && !in->step_cells && !in->jitter && !in->frames;
 }
 
-/* One volume is drawn to an error: samples are cheaper, but noise of what error they leave nobody knows. Several are
- * sampled, as their segments are mixed pixel by pixel. */
+/* A single volume is drawn to an error: samples are cheaper, but leave noise of unknown error. Several volumes are
+ * sampled, as their segments would have to be mixed pixel by pixel. */
 static void choose_method(const scene_file_sampling *in, scene_image *out)
 {
     static const double default_error = 0.01;
@@ -134,7 +134,8 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
     return status;
 }
 
-/* Put the views of orbits beside the first ones; from the last image on, because there is room behind them alone. */
+/* Put the views of orbits behind the first ones, beginning with the last image, because only behind it there is room.
+ * */
 static void add_views(scene *s, int picture_count)
 {
     int end = picture_count;

@@ -12,7 +12,8 @@
 typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampling_method;
 typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
 
-/* Which scalar of a field: the magnitude, or component n. Default: component 0 of a field of one, else magnitude. */
+/* The scalar of a field: the magnitude, or component n. Default: component 0 if the field has one, else the magnitude.
+ * */
 enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 
 /* A field as a layer shows it: on some of the meshes. */
@@ -32,7 +33,7 @@ bool scene_field_is_on(const scene_field *field, const char *mesh);
 /* Does name stand for the mesh? */
 bool scene_name_stands_for(const char *name, const char *mesh);
 
-/* Where a range comes from that is not fixed: always from the values on all ranks, at each drawn step. */
+/* The source of a range that is not fixed. All use the values on all ranks, at each drawn step. */
 typedef enum scene_range_source {
     SCENE_RANGE_DATA,       /* the least and the greatest value */
     SCENE_RANGE_RUN,        /* those of all steps drawn so far, kept in a file over restarts (session_run_ranges.h) */
@@ -46,13 +47,13 @@ typedef struct scene_range {
     scene_range_source source; /* where not fixed */
 } scene_range;
 
-/* How values are spaced along a colour map: as they are; by their logarithm; or, where they are of both signs, linear
- * up to a threshold and by the logarithm beyond (render_scaled() of render.h, whose words these are). */
+/* How values are spaced along a colour map: as they are; by their logarithm; or, for values of both signs, linearly up
+ * to a threshold and by the logarithm beyond (render_scaled() of render.h, in the same terms). */
 typedef enum scene_scale { SCENE_LINEAR, SCENE_LOG, SCENE_SYMLOG } scene_scale;
 
 /* How a value becomes a colour: the same for all layers. Its place is (s(value) - s(low)) / (s(high) - s(low)), s being
- * the scale and [low, high] the range. Places below 0 and above 1 have the colours of 0 and 1, or those of outside. The
- * colour of a place is that of the table: linear between entries, or, of bands, of entry floor(place × count). */
+ * the scale and [low, high] the range. Places below 0 and above 1 have the colours of 0 and 1, or those of outside. A
+ * place's colour is taken from the table, linear between entries; in bands it is that of entry floor(place × count). */
 typedef struct scene_colour_map {
     char *name;     /* of a built-in map or of one in a file; "" of a list */
     int count;      /* >= 2; of bands >= 1 */
@@ -72,9 +73,9 @@ typedef struct scene_attachment {
     int64_t size;
 } scene_attachment;
 
-/* Files that a scene is read with. One rank reads them while it parses, and they go to the others with the scene. */
+/* Files that a scene names. One rank reads them while it parses, and the others get them with the scene. */
 typedef struct scene_attachments {
-    /* Reads a whole file into *text, from base_alloc(); NULL: what is not in items is not to be had. */
+    /* Reads a whole file into *text, from base_alloc(); NULL: only files in items can be had. */
     insitu_status (*read)(const char *path, char **text, int64_t *size, base_error *error);
     int count;
     scene_attachment *items;

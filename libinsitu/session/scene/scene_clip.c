@@ -1,5 +1,5 @@
 /* Reads the regions that are cut away from an image's layers: half spaces, boxes and spheres. An image has one list of
- * them all, in which what is there twice stands once; each layer has a set of its entries. */
+ * them, without duplicates; each layer has a set of its entries. */
 #include <stdio.h>
 #include <string.h>
 
@@ -22,7 +22,7 @@ static insitu_status add_clip(const scene_document *d, const char *path, const s
     return INSITU_OK;
 }
 
-/* Zeroed padding and all, so that two can be compared. */
+/* Zeroes all of it, padding too, so that two clips can be compared. */
 static scene_clip *clear_clip(scene_clip *clip, scene_clip_kind kind, bool is_outside)
 {
     memset(clip, 0, sizeof *clip);

@@ -18,7 +18,7 @@ __attribute__((format(printf, 2, 3))) static void set_path(char path[path_size],
     va_end(arguments);
 }
 
-/* Up to how many digits below its high end a logarithmic range may go, by float32's exponents. */
+/* The largest ratio of a logarithmic range's ends, by float32's exponents. */
 static const double widest_log_range = 1e30;
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
@@ -121,7 +121,7 @@ static const scene_attachment *find_attachment(const scene_attachments *all, con
     return NULL;
 }
 
-/* Takes the path over where it is read. */
+/* Reads the file as an attachment, which takes the path over. */
 static insitu_status read_attachment(const scene_document *d, const char *key, char *path)
 {
     scene_attachments *all = d->attachments;
@@ -216,7 +216,7 @@ static void reverse(scene_colour_map *map)
     }
 }
 
-/* The table's colours at even places, ends included; of one band that in the middle. */
+/* Takes the table's colours at even places, ends included; a single band gets the middle one. */
 static insitu_status cut_into_bands(const scene_document *d, int bands, scene_colour_map *map)
 {
     float *colours = base_alloc((size_t)bands * 3 * sizeof *colours);

@@ -1,4 +1,5 @@
-/* From the schema's structs to struct scene: defaults filled in, and what the schema cannot say is checked. */
+/* Turns the schema's structs into struct scene: defaults are filled in, and what the schema cannot express is checked.
+ * */
 #ifndef SCENE_SCENE_CONVERT_H
 #define SCENE_SCENE_CONVERT_H
 
@@ -21,7 +22,7 @@ bool scene_normalize(double v[3]);
 /* Unit vectors count as parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);
 
-/* How many pictures an image makes in a step: their product. */
+/* The numbers whose product is how many pictures an image makes in a step. */
 typedef struct scene_series {
     int fields, isovalues, views; /* each 1 or more */
 } scene_series;
@@ -31,7 +32,7 @@ insitu_status scene_find_series(const scene_document *d, const char *path, const
                                 scene_series *out);
 /* Counted over all images together; too many are an error. */
 insitu_status scene_count_pictures(const scene_document *d, const scene_file *in, int *count);
-/* Leave what the variant shows in the layers, which are those of the file. */
+/* Keep in the layers, which are those of the file, only what the variant shows. */
 insitu_status scene_apply_sweep(const scene_document *d, const char *path, const scene_file_image *in,
                                 scene_image *out);
 
@@ -93,7 +94,8 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 /* NULL: a slight gloss. */
 scene_material scene_convert_material(const scene_file_material *in);
 
-/* Adds what cuts to the image's list and to the set, a bit an entry of the list. in: NULL where nothing does. */
+/* Adds the clips to the image's list and to the set, a bit for each entry of the list. in is NULL where there are none.
+ * */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
 /* The set of a layer: that of all layers, and its own. */

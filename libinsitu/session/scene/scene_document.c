@@ -1,7 +1,7 @@
-/* A scene file is read as events, to refuse what could hurt (depth, and aliases, which can make a few lines stand for
- * billions of nodes) before anything grows, and as a tree. The tree is held against the schema, because only here are a
- * value, its key and its line together for a message a person can use; what is right goes into the schema's structs in
- * the same walk. */
+/* A scene file is read twice: as events, to refuse dangerous input before anything grows (depth, and aliases, by which
+ * a few lines can stand for billions of nodes), and as a tree. The tree is compared with the schema here, because only
+ * here are a value, its key and its line together for a useful message; the same walk stores right values in the
+ * schema's structs. */
 #include "scene_document.h"
 
 #include <errno.h>
@@ -37,7 +37,7 @@ static size_t lines_before(const char *text, size_t size, size_t offset)
 
 static insitu_status bad_syntax(const scene_document *d, const yaml_parser_t *parser, const char *text, size_t size)
 {
-    /* libyaml has no word for some of the memory that it lacks. */
+    /* libyaml does not report all of its lack of memory as such. */
     if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) {
         return base_fail(d->error, INSITU_ERROR_MEMORY, "%.300s: no memory to read it", d->file_name);
     }
@@ -278,7 +278,7 @@ static insitu_status bad_value(const scene_document *d, const char *path, const 
     return scene_bad(d, path, "", "%s is not allowed, expected %s", quoted, expected);
 }
 
-/* Decimal only, and 010 is neither 10 nor 8. */
+/* Reads a decimal number; 010 is refused, as it could mean 10 or 8. */
 static bool read_whole_number(const char *text, double *number)
 {
     const char *digits = text + (*text == '-' || *text == '+');
@@ -329,8 +329,8 @@ static bool is_scalar_right(const yaml_node_t *node, const cyaml_schema_value_t 
     }
 }
 
-/* Take `count` things at *to, or, of a pointer there, where it will point. NULL at *to: the value is not stored, but
- * read from the document. */
+/* Make room for `count` values at *to, or, if there is a pointer, where it will point. NULL at *to: the value is not
+ * stored, but read from the document. */
 static bool make_room(scene_document *d, const cyaml_schema_value_t *value, int count, void **to)
 {
     if (!*to || !(value->flags & CYAML_FLAG_POINTER)) return true;
@@ -408,7 +408,7 @@ static bool takes(const cyaml_schema_value_t *value, const yaml_node_t *node)
     }
 }
 
-/* The first of the forms that the node can be is the one that it is held against. */
+/* Checks the node against the first form that it can have. */
 static insitu_status check_forms(scene_document *d, const char *path, const yaml_node_t *node,
                                  const cyaml_schema_value_t *value, const scene_key *key)
 {

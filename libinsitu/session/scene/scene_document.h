@@ -1,5 +1,5 @@
-/* A scene file as a tree of YAML nodes with their lines: where its errors are found and worded, and what it says goes
- * into the schema's structs. */
+/* A scene file as a tree of YAML nodes with their lines. Errors are found and worded here, and right values go into the
+ * schema's structs. */
 #ifndef SCENE_SCENE_DOCUMENT_H
 #define SCENE_SCENE_DOCUMENT_H
 
@@ -26,8 +26,9 @@ insitu_status scene_document_open(scene_document *d, const char *text, size_t si
 
 void scene_document_close(scene_document *d);
 
-/* Hold the document against the schema (keys known, given once, none missing; types, counts and ranges right) and make
- * *file of it, which is the document's, and valid until that is closed. Undefined on an error. */
+/* Check the document by the schema (keys are known, given once, and none is missing; types, counts and ranges are
+ * right) and make *file of it. *file belongs to the document and is valid until that is closed; it is undefined on an
+ * error. */
 insitu_status scene_document_read(scene_document *d, scene_file **file);
 
 /* The line (from 1) of a path such as "images[0].size[1]"; of as much of it as there is. */

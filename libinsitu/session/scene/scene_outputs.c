@@ -121,7 +121,7 @@ char *scene_expand(const char *pattern, const scene_moment *moment)
     return text;
 }
 
-/* Names what the image lacks for the placeholder; NULL where it has it. image: its path. */
+/* Names what the image lacks for the placeholder; NULL: it lacks nothing. image is its path. */
 static const char *what_lacks(const scene_document *d, const char *image, placeholder_kind kind)
 {
     const bool is_view = kind == PLACEHOLDER_VIEW, is_value = kind == PLACEHOLDER_ISOVALUE;

@@ -1,5 +1,5 @@
-/* The scene file's schema: what is read into, and beside each key what it may hold and what it means. libcyaml's header
- * has the words for it; nothing of the library is called.
+/* The scene file's schema: the structs that are read into, and for each key its values and meaning. It is written in
+ * terms of libcyaml's header; nothing of that library is called.
  *
  * Everything optional is a pointer, NULL where the file does not give it; defaults are filled in by scene.c. */
 #ifndef SCENE_SCENE_SCHEMA_H
@@ -284,7 +284,7 @@ typedef struct scene_mapping {
 
 enum { SCENE_MAX_BYTES = 1 << 20, SCENE_MAX_DEPTH = 16 };
 
-/* There is no word there for "a name or a list of names", nor for values of several forms: CYAML_IGNORE stands for both
+/* libcyaml has no type for "a name or a list of names", nor for values of several forms. CYAML_IGNORE stands for both
  * here, and they are read from the document (scene_document_texts(), scene_document_kind()). */
 enum { SCENE_NAME_BYTES = 255, SCENE_MAX_NAMES = 64 };
 

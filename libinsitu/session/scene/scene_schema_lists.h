@@ -1,6 +1,6 @@
-/* How the schema's lists are made, and what its two files share. One list a mapping holds each key twice over, as
- * a field of libcyaml's header and as our scene_key: the reader, the checks, the error messages and docs/scene.md all
- * come from these lists, so that none can fall behind the others. */
+/* Macros that make the schema's lists, for its files. Each mapping has one list, which gives each key as a field of
+ * libcyaml's header and as a scene_key. The reader, the checks, the error messages and docs/scene.md all come from
+ * these lists, so that none can fall behind the others. */
 #ifndef SCENE_SCHEMA_LISTS_H
 #define SCENE_SCHEMA_LISTS_H
 

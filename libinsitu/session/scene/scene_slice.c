@@ -8,7 +8,7 @@
 
 static const scene_material no_light = {.ambient = 1, .shininess = 1};
 
-/* The square of a number far from 1 is infinite or 0; the square of its share in the largest number is not. */
+/* Scales by the largest number first: squares of numbers far from 1 may be infinite or 0. */
 static bool make_unit(const double in[3], double out[3])
 {
     const double largest = fmax(fabs(in[0]), fmax(fabs(in[1]), fabs(in[2])));

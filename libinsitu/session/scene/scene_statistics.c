@@ -1,4 +1,4 @@
-/* Numbers of fields: those that are written, and those that images wait for. */
+/* Statistics of fields: those that are written, and those that images wait for. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Outer surfaces of meshes: what colours them. */
+/* Outer surfaces of meshes, and the fields that colour them. */
 #include <math.h>
 #include <stdio.h>
 

@@ -106,7 +106,7 @@ static insitu_status convert_light(const scene_document *d, const char *path, co
                                            : scene_bad(d, path, "direction", "has length 0, expected a direction");
 }
 
-/* The fill keeps the side that the key light leaves dark readable, and is too weak to flatten what it shows. */
+/* The fill light keeps the side readable that the key light leaves dark, and is too weak to flatten shapes. */
 static void default_lights(scene_light lights[2])
 {
     lights[0] = (scene_light){.direction = {0.5, 0.7, 1}, .colour = {1, 1, 1}};

@@ -55,14 +55,14 @@ static bool work_create(const scene *scene, int64_t cycle, event_work *w)
     return true;
 }
 
-/* Without any value nothing holds. */
+/* Tells whether the condition holds; without values it does not. */
 static bool holds(const scene_condition *c, const session_statistics *s)
 {
     const double value = c->of == SCENE_MEAN ? s->mean : c->of == SCENE_MINIMUM ? s->least : s->most;
     return s->cells > 0 && value > c->above && value < c->below;
 }
 
-/* All of them, though some fail; the first error is told. */
+/* Writes all that are due, though some fail; returns the first error. */
 static void write_due(session_events *events, const scene *scene, const event_work *w, const session_event_time *now,
                       base_error *error)
 {

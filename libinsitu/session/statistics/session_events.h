@@ -18,7 +18,7 @@ typedef struct session_events {
     uint64_t drawn; /* images that were drawn */
 } session_events;
 
-/* Does the step want statistics? images: it may draw some, but for their conditions. Local. */
+/* Tells whether the step wants statistics. images: it may draw some, if conditions hold. Local. */
 bool session_has_events(const scene *scene, int64_t cycle, bool images);
 bool session_is_statistics_due(const scene_statistics *statistics, int64_t cycle);
 

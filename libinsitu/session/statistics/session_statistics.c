@@ -1,6 +1,6 @@
 /* Sums are of whole numbers, which add up to the same in any order: shares of the largest cell's volume, from 0 to 1,
- * times 2^52. A sum is kept in two parts, so that 2^34 cells fit: what is above 2^28, and the rest. Each cell is off by
- * 2^-53 of the largest at most. */
+ * times 2^52. A sum has two parts, multiples of 2^28 and the rest, so that 2^34 cells fit. Each cell is off by at most
+ * 2^-53 of the largest. */
 #include "session_statistics.h"
 
 #include <math.h>

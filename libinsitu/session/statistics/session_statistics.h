@@ -1,4 +1,4 @@
-/* Statistics of fields over all cells that are drawn: they do not depend on how cells are dealt out to ranks. */
+/* Statistics of fields over all drawn cells. They do not depend on the partition. */
 #ifndef SESSION_STATISTICS_H
 #define SESSION_STATISTICS_H
 

@@ -5,8 +5,8 @@
 #include "error.h"
 #include "session_statistics.h"
 
-/* Add a line; missing folders are made. The first of a session leaves out what the file has of this cycle and of later
- * ones, which a run that began again draws again; a file of other columns is an error, and stays as it is. Local. */
+/* Add a line; missing folders are made. A session's first line drops the file's lines of this cycle and of later ones,
+ * which a restarted run writes again. A file with other columns is an error, and stays as it is. Local. */
 insitu_status session_write_statistics(const char *path, bool is_first, int64_t cycle, double time,
                                        const session_statistics *values, base_error *error);
 

@@ -1,11 +1,10 @@
-/* An automatic camera looks along a given direction. What is left to find is where it stands: for the sphere around the
- * bounds, on the line through their middle; for the box, where its corners just fill what decorations leave of the
- * frame.
+/* An automatic camera looks along a given direction, and its place is computed: for the sphere around the bounds, on
+ * the line through their middle; for the box, where its corners just fill the part of the frame that decorations leave.
  *
  * A corner at (x, y) across and w towards the eye, seen from a place s to the right and D towards the eye, is within
- * the right border if x - s <= r (D - w), r being its tangent; and within the left one, of tangent l, if s - x <=
- * l (D - w). So with a = max(x + r w) and b = max(l w - x), D is at least (a + b) / (r + l), and s = (a - b + (l - r)
- * D) / 2 does for every such D. The same holds for up and down; the larger D serves both. */
+ * the right border if x - s <= r (D - w), r being its tangent; and within the left one, of tangent l, if s - x <= l (D
+ * - w). So with a = max(x + r w) and b = max(l w - x), D is at least (a + b) / (r + l), and s = (a - b + (l - r) D) / 2
+ * does for every such D. The same holds for up and down; the larger D serves both. */
 #include "session_camera.h"
 
 #include <math.h>
@@ -38,8 +37,9 @@ static void choose_up(const double direction[3], const double up[3], double out[
 
 /* ---- where it stands ------------------------------------------------------------------------------------------- */
 
-/* How far from the middle of the bounds: to the right and up, and by how much more for each length towards the eye; how
- * far towards it; and of an orthographic picture half the height, for each length of which it is moved too. */
+/* The camera's place, from the middle of the bounds: right and up, and how much more for each length towards the eye;
+ * back, towards the eye; and for an orthographic picture half its height, and how much right and up for each length of
+ * that. */
 typedef struct camera_stand {
     double right, up, right_slope, up_slope, back, half_height, right_share, up_share;
 } camera_stand;
@@ -55,7 +55,7 @@ static camera_tangents tangents_of(const scene_image *image)
     return (camera_tangents){up * image->width / image->height, up};
 }
 
-/* From where a sphere just fits into the narrower of the two angles of view. */
+/* The place from which a sphere just fits into the narrower of the two angles of view. */
 static camera_stand fit_sphere(double radius, const scene_image *image, camera_tangents t)
 {
     double half = 0.5 * image->camera.angle * 3.14159265358979323846 / 180;
@@ -73,7 +73,7 @@ typedef struct camera_frame {
     double right, left, up, down;
 } camera_frame;
 
-/* In heights of words: what a colour bar, a title, and rulers' numbers take of the picture. */
+/* The room that a colour bar, a title, and rulers' numbers take of the picture, in heights of words. */
 static const double bar_room = 6.5, title_room = 2.4, ruler_room = 3;
 
 static double less_room(double words, double pixels)
@@ -129,13 +129,13 @@ static camera_stand fit_box(const session_extent *e, const render_camera *axes, 
                           .up_share = 0.5 * (share.down - share.up)};
 }
 
-/* The camera of an orthographic picture. */
+/* Half the height of an orthographic picture. */
 static double half_height_of(const scene_image *image, double fitting)
 {
     return image->camera.height > 0 ? 0.5 * image->camera.height : fitting;
 }
 
-/* The eye is where all data is before it. An orthographic picture is no other from farther away. */
+/* The eye stays where it is, with all data before it: an orthographic picture is the same from any distance. */
 static void set_orthographic(const scene_image *image, double half_height, render_camera *camera)
 {
     if (!image->camera.is_orthographic) return;

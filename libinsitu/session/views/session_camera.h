@@ -1,4 +1,4 @@
-/* A scene's camera to the renderer's. */
+/* Turns a scene's camera into the renderer's. */
 #ifndef SESSION_CAMERA_H
 #define SESSION_CAMERA_H
 

@@ -1,6 +1,6 @@
-/* A part is a mesh of this rank that has a tree with cells in it. A layer's field stands once for each part; where a
- * part does not have it, its ranges are none, and the renderer passes by; a surface whose colour's field a part does
- * not have is drawn there by values that are not numbers. */
+/* A part is a mesh of this rank that has a tree with cells in it. A layer has a field for each part. If a part does not
+ * have the field, its ranges are NULL, and the renderer passes the part by. If a part has the surface but not the field
+ * that colours it, it is drawn with NaN as values. */
 #include "session_layers.h"
 
 #include <math.h>
@@ -144,7 +144,7 @@ static void warn_of_scale(const session_layer_basis *basis, const scene_field *f
                  basis->image->name, field->name);
 }
 
-/* With what a run has met before. Collective. */
+/* Makes a transfer function, whose range may include that of the run before. Collective. */
 static insitu_status make_transfer(const session_layer_basis *basis, const scene_field *field,
                                    const scene_colour_map *map, const scene_volume *volume, session_transfer *out,
                                    base_error *error)
@@ -158,12 +158,11 @@ static insitu_status make_transfer(const session_layer_basis *basis, const scene
         session_widen_run_range(basis->run_ranges, map, &low, &high);
     if (!session_make_transfer(basis->half_diagonal, map, low, high, volume, out))
         session_no_memory(error, map->count * 3 * (int64_t)sizeof *map->colours, "the colours of a volume");
-    return INSITU_OK; /* what lacks memory is for the next agreement */
+    return INSITU_OK; /* lack of memory is left to the next agreement */
 }
 
 /* An isosurface is as rough as its cells are: within one it bends, between two it breaks, and in polyhedra it juts out
- * at faces. What is nearer than this share of a cell is taken for the surface itself, which does not hide its own
- * light. */
+ * at faces. Hits nearer than this share of a cell count as the surface itself, which does not shade itself. */
 #define CONTACT 0.5F
 
 static insitu_status fill_surface(const session_layer_basis *basis, const scene_isosurface *layer, int index,
@@ -345,7 +344,7 @@ insitu_status session_make_layers(const session_layer_basis *basis, const scene_
     session_layers layers = {0};
     if (!error->status && !allocate_layers(basis->meshes, image, &layers))
         session_no_memory(error, 1 << 10, "an image's layers");
-    /* What the scene asks too much of is no one rank's. */
+    /* Where the scene asks for too much, the error is not one rank's. */
     insitu_status status = error->status == INSITU_ERROR_SCENE ? session_agree_as_is(basis->team->comm, error)
                                                                : session_agree(basis->team->comm, error);
     if (!status) fill_parts(basis->meshes, &layers);

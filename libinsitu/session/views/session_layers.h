@@ -36,9 +36,9 @@ typedef struct session_layer_basis {
     const scene_image *image;
 } session_layer_basis;
 
-/* Collective: ranges from the data are over all ranks. All agree first on what *error holds of each, and on an error
- * nothing is left to free. Where all is well but this rank lacks memory for colours, *error says so for the next
- * agreement. */
+/* Collective, as ranges from the data are over all ranks. All ranks first agree on the error that each one's *error
+ * holds; on an error nothing is left to free. If only this rank's memory for colours is lacking, *error says so for the
+ * next agreement. */
 insitu_status session_make_layers(const session_layer_basis *basis, const scene_image *image, session_layers *out,
                                   base_error *error);
 

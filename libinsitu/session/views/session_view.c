@@ -1,4 +1,5 @@
-/* The scene's words to the renderer's numbers. All of it is arithmetic on what ranks share, so nothing is exchanged. */
+/* Turns the scene's view into the renderer's numbers. It is arithmetic on what all ranks have, so nothing is exchanged.
+ * */
 #include "session_view.h"
 
 #include <math.h>
@@ -43,7 +44,7 @@ static double sample_distance(const session_extent *extent, const scene_image *i
     return cell > 0 ? image->step_cells * cell : 1;
 }
 
-/* A tenth of the diagonal; where that is 0, so that nothing is near, any. */
+/* A tenth of the diagonal by default. If that is 0, any radius will do, as nothing is near. */
 static double occlusion_radius(const session_extent *extent, const scene_image *image)
 {
     if (image->occlusion_radius > 0) return image->occlusion_radius;
@@ -150,7 +151,7 @@ static corner_bounds project_bounds(const session_extent *e, const render_camera
     return b;
 }
 
-/* Why nothing is in view, NULL where something may be. */
+/* The reason why nothing is in view, or NULL where something may be. */
 static const char *why_unseen(const session_extent *e, const render_camera *c)
 {
     const corner_bounds b = project_bounds(e, c);

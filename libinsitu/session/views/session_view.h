@@ -18,9 +18,9 @@ typedef struct session_view {
     render_clip clips[RENDER_MAX_CLIPS];
 } session_view;
 
-/* Fails where the camera looks nowhere, which it does on all ranks alike. Leaves an error where samples of the image's
- * volumes would take longer than its max_seconds, by estimate, which ranks may see differently: it is for the next
- * agreement. Warns of a camera that has no cells in view. scene_path: for messages. Local. */
+/* Fails where the camera looks nowhere, on all ranks alike. If samples of the image's volumes would take longer than
+ * its max_seconds by an estimate, which may differ between ranks, *error says so for the next agreement. Warns of a
+ * camera that has no cells in view. scene_path: for messages. Local. */
 insitu_status session_make_view(const session_space *space, const char *scene_path, const scene_image *image,
                                 const session_team *team, session_report *report, session_view *out, base_error *error);
 

@@ -5,7 +5,7 @@
 #include "memory.h"
 #include "scene_convert.h"
 
-/* A line of a table is a line of text, so that a part of one can be told from a whole. */
+/* Finds a control character. A picture is one line of text in the table, so that a torn line can be recognised. */
 static const char *find_control(const char *text)
 {
     for (; text && *text; text++)
@@ -59,7 +59,7 @@ insitu_status scene_convert_cinema(const scene_document *d, const char *path, co
 {
     char file[96];
     const char *folder = in->cinema;
-    while (strncmp(folder, "./", 2) == 0) folder += 2; /* one folder has one table, whatever it is called */
+    while (strncmp(folder, "./", 2) == 0) folder += 2; /* one folder has one table, however the scene writes its name */
     insitu_status status = check_folder(d, path, folder);
     if (!status) status = check_file(d, path, image, in->path);
     if (!status && out->format == SCENE_EXR)

@@ -10,8 +10,9 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Across the axis, phi = 0 and phi = 90 degrees. The first is as near as can be to the coordinate axis after that which
- * the axis is nearest to, x -> y -> z -> x: where it is z, phi is the longitude of spherical coordinates. */
+/* Finds the directions across the axis at phi = 0 and 90 degrees. The first is as near as possible to the coordinate
+ * axis that follows (x -> y -> z -> x) the one nearest to the axis: for an axis along z, phi is the longitude of
+ * spherical coordinates. */
 static void find_plane(const double axis[3], double first[3], double second[3])
 {
     int nearest = 0;

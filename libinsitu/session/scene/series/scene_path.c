@@ -1,9 +1,9 @@
 /* A camera that moves: cubics through its points, one for each coordinate.
  *
  * The slope at a point is the weighted harmonic mean of the slopes to its neighbours (Fritsch and Butland's), and 0 at
- * the ends and where the coordinate turns: the curve has one slope at each point and stays between its two values,
- * whatever the times are. A spline's slopes would be smoother still, but swing out where a short time follows a long
- * one, through the data. */
+ * the ends and where the coordinate turns: the curve has one slope at each point, and stays between the values of its
+ * two ends, whatever the times are. A spline's slopes would be smoother still, but swing out where a short time follows
+ * a long one, through the data. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -40,7 +40,8 @@ static double slope_at(const cubic_points *p, int i)
     return (w + v) / (w / down + v / up);
 }
 
-/* share: from 0 at the second point to 1 at the third. Rounding does not leave the two values. */
+/* The value at share, which goes from 0 at the second point to 1 at the third. Rounding does not take it beyond these
+ * points' values. */
 static double cubic_value(const cubic_points *p, double share)
 {
     const double h = p->at[2] - p->at[1], a = p->value[1], b = p->value[2], t = share;

@@ -1,4 +1,4 @@
-/* The keys that say where an image is seen from, and of what it is drawn several times: scene_schema_lists.h. */
+/* The keys that say from where an image is seen, and over what it makes several pictures: scene_schema_lists.h. */
 #include "scene.h"
 #include "scene_schema_lists.h"
 

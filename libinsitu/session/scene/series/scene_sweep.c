@@ -95,7 +95,7 @@ static bool replace_field(scene_field *field, const char *name, int line)
     return true;
 }
 
-/* In all layers that a field colours. *count: of them. */
+/* Replaces the field in all layers that a field colours; *count is their number. */
 static bool replace_fields(scene_image *image, const char *name, int line, int *count)
 {
     bool is_done = true;

@@ -3,7 +3,7 @@
 
 #include "scene_convert.h"
 
-/* Scaled first, so that neither 1e-200 nor 1e200 is lost in its square. */
+/* The vector is scaled first, so that squares of 1e-200 and 1e200 are not lost. */
 bool scene_normalize(double v[3])
 {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -14,7 +14,7 @@ bool scene_normalize(double v[3])
     return true;
 }
 
-/* So close the image's right would be mostly rounding. */
+/* Any closer, the image's right direction would be mostly rounding. */
 bool scene_is_parallel(const double a[3], const double b[3])
 {
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
