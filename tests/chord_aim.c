@@ -1,6 +1,6 @@
-/* Cameras and rays at a mesh (chord_aim.h). A ray to a point is exact in double; float32 then moves it, the point and
- * all else by their rounding, and where the point is the tile's own middle, not even that: the ray and the point are
- * then the same numbers, and which side of it the ray is on is a tie. */
+/* Cameras and rays at a mesh (chord_aim.h). A ray to a point is exact in double; float32 then moves ray and point by
+ * their rounding. Where the point is the tile's own middle, both stay the same numbers, and the side of it that the ray
+ * is on is a tie. */
 #include "chord_aim.h"
 
 #include <math.h>
@@ -74,7 +74,7 @@ typedef struct face_loop {
     const double *at[MAX_LOOP];
 } face_loop;
 
-/* Of a cell of a VTK type: a random face of a tet, wedge, pyramid or hex. */
+/* Picks a random face of a tet, wedge, pyramid or hex. */
 static int typed_face(int type, uint64_t *counter, int picks[4])
 {
     static const int tet[4][4] = {{0, 1, 2, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {0, 2, 3, -1}};
@@ -162,7 +162,7 @@ static void aim_anywhere(const render_camera *camera, uint64_t *counter, chord_r
         add_ray(rays, rays->centre_x + uniform(counter, -half, half), rays->centre_y + uniform(counter, -half, half));
 }
 
-/* From the eye, which way it looks: rays of no more than 45 degrees. */
+/* Aims rays from the eye, at most 45 degrees off its view. */
 static void aim_forward(uint64_t *counter, chord_rays *rays)
 {
     rays->centre_x = uniform(counter, -0.9, 0.9);
@@ -213,8 +213,8 @@ static void aim_along(const test_mesh *mesh, int64_t cell, chord_aim aim, uint64
     aim_at_cell(mesh, cell, (chord_aim)(CHORD_TO_VERTICES + whole(counter, 3)), camera, counter, rays);
 }
 
-/* Along an axis, a diagonal of a face or of the cube, either way; perspective eyes stand on lattice lines. Rays are
- * eighths of a cube apart and begin on a lattice plane. */
+/* Aims along an axis, or a diagonal of a face or of the cube, either way; perspective eyes stand on lattice lines. Rays
+ * are eighths of a cube apart and begin on a lattice plane. */
 static void aim_by_lattice(int n, uint64_t *counter, render_camera *camera, chord_rays *rays)
 {
     const double side = 2.0 / n;

@@ -22,7 +22,7 @@ static chord_line ray_line(const render_job *job, const chord_rays *rays, int i)
     return l;
 }
 
-/* Where the ray is in the hull of this half side, from the eye's plane on: depths from the eye. */
+/* The depths from the eye between which the ray is in the hull of this half side, from the eye's plane on. */
 static chord_depths hull_chord(const chord_line *l, double half)
 {
     chord_depths c = {0, (double)INFINITY};

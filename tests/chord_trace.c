@@ -91,7 +91,7 @@ static void chord_tile_rays(kernel_packet *p, const kernel_lanes *l)
     p->slope_y = vf_load(lanes[3]);
 }
 
-/* As kernel_packet_setup() and kernel_packet_complete(), with rays that need not be those of pixels. */
+/* Does as kernel_packet_setup() and kernel_packet_complete(), for any rays, not only those of pixels. */
 static void chord_packet(kernel_packet *p, const kernel_frame *f, const kernel_tile *tile, kernel_thread *thread,
                          const chord_rays *rays, int first)
 {

@@ -1,7 +1,6 @@
 /* Rays for the tests of exactness, and the intervals of cells that the kernels find on them. The kernels' own headers
- * are compiled into chord_trace.c, once an instruction set as render_kernels.c is: the rays are put into packets, the
- * packets go down the tree, and what is written down is every [t_in, t_out) that volumes and surfaces would be given.
- */
+ * are compiled into chord_trace.c, once an instruction set as render_kernels.c is: rays are put into packets, packets
+ * go down the tree, and every [t_in, t_out) that volumes and surfaces would get is recorded. */
 #ifndef CHORD_TRACE_H
 #define CHORD_TRACE_H
 

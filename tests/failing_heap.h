@@ -1,8 +1,8 @@
-/* A heap that runs out on demand, for what all libraries of the process ask of it: malloc() and its kin stand in the
- * test program, in front of the C library's, and operator new comes through them.
+/* A heap that runs out on demand, for all libraries of the process: malloc() and its kin in the test program take the
+ * place of the C library's, and operator new calls them.
  *
- * What is asked within MPI, by libgomp, and by the loader is neither counted nor failed: they end the process, and
- * nobody above them can help it. Counts and fails what the thread asks that armed it. */
+ * Allocations within MPI, by libgomp and by the loader are neither counted nor failed, for these would end the process.
+ * Only allocations of the thread that armed the heap are counted and failed. */
 #ifndef TEST_FAILING_HEAP_H
 #define TEST_FAILING_HEAP_H
 
@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-/* From now on the n-th allocation of this thread fails (1: the next one), and all after it where it is for good. */
+/* Makes the n-th allocation of this thread from now on fail (1: the next one), and all after it if is_for_good. */
 void heap_arm(int64_t n, bool is_for_good);
 
 /* Allocations work again. Returns how many were asked for since heap_arm(). */
@@ -23,7 +23,7 @@ int64_t heap_disarm(void);
 void heap_pause(void);
 void heap_resume(void);
 
-/* Whether the program has this heap: sanitizers bring their own. */
+/* Tells whether the program has this heap: sanitizers bring their own. */
 bool heap_can_fail(void);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* The integral compiled a second time, on doubles, with as many nodes as they resolve: what is left of its error is
- * then the method's, not the arithmetic's. Stands in for simd.h with vectors of two doubles. */
+/* Compiles the integral a second time, on doubles, with as many nodes as they resolve, so that its error is the
+ * method's, not the arithmetic's. Replaces simd.h by vectors of two doubles. */
 #define KERNEL_REAL_IS_DOUBLE
 #define BASE_SIMD_H
 #define render_pieces_build pieces_build_of_doubles

@@ -1,4 +1,4 @@
-/* A library of the image library's name, planted in the working directory: whoever loads it gets no picture. */
+/* A library of the image library's name, planted in the working directory: a session that loads it gets no picture. */
 #include <stdio.h>
 
 #include "insitu/image_output.h"

@@ -1,4 +1,4 @@
-/* What the reference's parts share. */
+/* Functions that the reference's parts share. */
 #ifndef REFERENCE_BASE_H
 #define REFERENCE_BASE_H
 
@@ -6,7 +6,7 @@
 
 #include "render.h"
 
-/* As realloc(); running out of memory ends the process. */
+/* Does as realloc(); running out of memory ends the process. */
 void *reference_reserve(void *block, size_t bytes);
 
 /* Colour and opacity of a value, as render.h says. */

@@ -120,7 +120,7 @@ static double solve_u(const double *a, const double *b, const double *c, const d
     return below != 0 ? -(a[axis] + w * c[axis]) / below : 0.5;
 }
 
-/* What a + u b + w c + u w d is short of 0, relative to the quad's size. */
+/* How far a + u b + w c + u w d is from 0, relative to the quad's size. */
 static double bilinear_residual(const double *a, const double *b, const double *c, const double *d, double u, double w)
 {
     double residual = 0, size = 0;
@@ -135,8 +135,9 @@ typedef struct patch_point {
     double u, w, beyond;
 } patch_point;
 
-/* The two (u, w) with a + u b + w c + u w d = 0, and how far beyond the unit square they are: eliminating u leaves a
- * quadratic in w. Of a quad with two corners in one place one root is none. Returns how many are in the square. */
+/* Finds the two (u, w) with a + u b + w c + u w d = 0, and how far beyond the unit square they are: eliminating u
+ * leaves a quadratic in w. For a quad with two corners in one place one of the roots is no solution. Returns how many
+ * are in the square. */
 static int solve_bilinear(const double *a, const double *b, const double *c, const double *d, patch_point points[2])
 {
     const double qa = (double)cross(d, c), qb = (double)(cross(b, c) + cross(d, a)), qc = (double)cross(b, a);
@@ -173,10 +174,9 @@ static int find_patch_points(const reference_cell *cell, const reference_line *l
     return solve_bilinear(a, b, c, d, points);
 }
 
-/* From a quad's triangles that are crossed, count of them, to the crossings of its patch, of which there are as many
- * but for an even number: a ray through one triangle meets the patch once, a ray through both or none twice or not at
- * all, as the patch is smooth where the triangles have a fold. Returns how many there are; sets is_folded for a ray
- * that meets both triangles and not the patch. */
+/* Replaces crossings of a quad's triangles, count of them, by those of its patch. A ray through one triangle meets the
+ * patch once; a ray through both or none meets it twice or not at all, since the patch is smooth where the triangles
+ * have a fold. Returns how many there are; sets is_folded for a ray that meets both triangles but not the patch. */
 static int move_to_patch(const reference_cell *cell, const reference_line *line, const int *face,
                          reference_crossing crossings[2], int count, bool *is_folded)
 {
@@ -351,8 +351,8 @@ int reference_profile_breaks(const reference_cell *cell, const reference_line *l
     return count;
 }
 
-/* The sum at a sheet, of the side that has one: a piece between two triangles of a quad, whose patch the ray does not
- * meet, is in none of the tets, and the field on it the line between its sheets. */
+/* Finds the sum at a sheet, on the side that has one. A piece between two triangles of a quad whose patch the ray does
+ * not meet is in no tet; the field on it is linear between its sheets. */
 static bool sum_at_sheet(const reference_cell *cell, const reference_line *line, double z, double aside,
                          const double *values, double *value)
 {
@@ -368,7 +368,7 @@ bool reference_profile_value(const reference_cell *cell, const reference_line *l
     int next = 1;
     while (next < count - 1 && breaks[next] <= z) next++;
     const double before = breaks[next - 1], behind = breaks[next];
-    /* From triangles on the profile is the sum itself. */
+    /* On triangles the profile is the sum itself. */
     const bool is_first = next == 1 && cell->poly.face_size[ends[0].face] == 4;
     const bool is_last = next == count - 1 && cell->poly.face_size[ends[1].face] == 4;
     if (!is_first && !is_last) {
@@ -467,7 +467,7 @@ static bool solve3(const double *a, const double *b, const double *c, const doub
     return true;
 }
 
-/* The map's columns dP/dparameter and what is left of point - P(parameter). */
+/* The map's columns dP/dparameter and the rest point - P(parameter). */
 static void map_at(const reference_cell *cell, const double *parameter, const double *point, double columns[3][3],
                    double left[3])
 {

@@ -7,7 +7,7 @@
 
 enum { REFERENCE_MAX_VERTICES = 96, REFERENCE_MAX_FACES = 64, REFERENCE_MAX_SIDES = 24, REFERENCE_MAX_TRIANGLES = 192 };
 
-/* What a polyhedron has beyond its vertices. */
+/* The faces and centre that a polyhedron has besides its vertices. */
 typedef struct reference_polyhedron {
     int face_count;
     int face_size[REFERENCE_MAX_FACES];
@@ -32,8 +32,8 @@ typedef struct reference_line {
     double base[2], slope[2];
 } reference_line;
 
-/* Where a line meets the cell's surface: triangles as they are, a quad on its bilinear patch, at the coordinates u, w;
- * whether an odd number of times, its triangles say. */
+/* A place where a line meets the cell's surface: on triangles as they are, on a quad's bilinear patch at the
+ * coordinates u, w. The quad's triangles tell whether the line meets it an odd number of times. */
 typedef struct reference_crossing {
     double z;
     int face;
@@ -55,16 +55,16 @@ void reference_polyhedron_setup(reference_cell *cell);
 /* How near, in lengths, the point is to a sheet between two of the polyhedron's tets. */
 double reference_sheet_distance(const reference_cell *cell, const double point[3]);
 
-/* A polyhedron's field at depth z between two crossings: the sum over the tets that hold the point; and from a crossing
- * to the next sheet linear along the line, from the face's own value, which on quads is the patch's. Where tets
- * overlap at the crossing, what the others have there is added to the face's. False where no sum is found. */
+/* A polyhedron's field at depth z between two crossings: the sum over the tets that hold the point. From a crossing to
+ * the next sheet it is linear along the line, beginning at the face's own value, which on quads is the patch's. Where
+ * tets overlap at the crossing, the others' values are added to the face's. False where no sum is found. */
 bool reference_profile_value(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
                              const double *values, double z, double *value);
 
 enum { REFERENCE_MAX_BREAKS = 3 * REFERENCE_MAX_TRIANGLES + 2 };
 
-/* Where a polyhedron's profile bends: depths from the first crossing to the second, rising; sheets count where they are
- * between both the faces and the triangles. Returns how many. */
+/* Finds the rising depths, from the first crossing to the second, at which a polyhedron's profile bends. Sheets count
+ * if they are between both the faces and the triangles. Returns how many there are. */
 int reference_profile_breaks(const reference_cell *cell, const reference_line *line, const reference_crossing ends[2],
                              double z[REFERENCE_MAX_BREAKS]);
 

@@ -1,10 +1,9 @@
-/* Adaptive integration. The ray is cut wherever a cell begins or ends, and where a polyhedron's profile bends: a peak
- * there may be all of it that shows, and so narrow that no sample would meet it. Between cuts all cells that are there,
- * of all volume layers, emit and absorb together: extinctions add, and so does what is emitted. An interval is
- * integrated by Boole's rule whole and in halves; where the two differ by more than the tolerance each half is taken
- * in turn. It is cut as well where the field comes to a point of the opacity, which it may barely do, for less than any
- * sampling would meet: found between samples and the extremes beside them. Kinks of the colours are not known here:
- * they are found by halving. */
+/* Adaptive integration. The ray is cut wherever a cell begins or ends, and where a polyhedron's profile bends, because
+ * only a peak there may show, too narrow for any sample. Between cuts all cells, of all volume layers, emit and absorb
+ * together: extinctions add up, and so does emission. An interval is integrated by Boole's rule whole and in halves;
+ * where the two differ by more than the tolerance each half is taken in turn. The ray is also cut where the field
+ * reaches a point of the opacity, which may last too short for any sampling: such places are sought between samples and
+ * the extremes beside them. Kinks of the colours are found by halving. */
 #include "reference_integral.h"
 
 #include "reference_base.h"
@@ -27,14 +26,14 @@ struct reference_integral {
     placed_cell *cells;
 };
 
-/* Where the ray is in a cell of a layer. */
+/* The stretch of the ray in a cell of a layer. */
 typedef struct stretch {
     const placed_cell *cell;
     double z_in, z_out;
     reference_crossing ends[2];
 } stretch;
 
-/* What a stretch does to light: C and T. */
+/* The effect of a stretch on light: C and T. */
 typedef struct light {
     double colour[3], transmittance;
 } light;
@@ -254,7 +253,7 @@ static int compare_numbers(const void *left, const void *right)
     return (a > b) - (a < b);
 }
 
-/* Where the stretch begins, bends and ends; returns how many. */
+/* Finds where the stretch begins, bends and ends; returns how many places. */
 static int stretch_cuts(const stretch *s, const reference_line *line, double z[REFERENCE_MAX_BREAKS])
 {
     z[0] = s->z_in;
@@ -328,7 +327,7 @@ static void add_crossings(const stretch *s, const reference_line *line, double f
     }
 }
 
-/* Where the stretch, which bends nowhere between the places, comes to a point of the opacity. */
+/* Adds the places at which the stretch, which does not bend between from and to, reaches a point of the opacity. */
 static void add_points(const stretch *s, const reference_line *line, double from, double to, places *out)
 {
     enum { SAMPLES = 48 };
@@ -362,7 +361,7 @@ static void add_points(const stretch *s, const reference_line *line, double from
     }
 }
 
-/* Where something begins, bends, comes to a point of the opacity or ends, sorted. */
+/* The sorted places where something begins, bends, reaches a point of the opacity or ends. */
 static double *find_cuts(const stretch *list, int64_t count, const reference_line *line, const reference_hit *hits,
                          int hit_count, int64_t *cuts)
 {

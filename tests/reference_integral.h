@@ -1,6 +1,6 @@
-/* The truth of volumes: emission and absorption integrated along a ray through every cell, adaptively, in double, no
- * tree. Where there are several layers, or cells overlap, all of them emit and absorb together. With the surfaces'
- * hits that reference_trace() found. */
+/* The truth of volumes: emission and absorption are integrated along a ray through every cell, adaptively, in double,
+ * without a tree. Where there are several layers, or cells overlap, all of them emit and absorb together. Surfaces'
+ * hits come from reference_trace(). */
 #ifndef REFERENCE_INTEGRAL_H
 #define REFERENCE_INTEGRAL_H
 
@@ -8,7 +8,7 @@
 
 typedef struct reference_integral reference_integral;
 
-/* job is borrowed. tolerance is what a cell's interval may be off by, in colour and optical depth. */
+/* job is borrowed. tolerance is the error allowed to a cell's interval, in colour and optical depth. */
 reference_integral *reference_integral_create(const render_job *job, double tolerance);
 void reference_integral_free(reference_integral *scene);
 

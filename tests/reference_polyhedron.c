@@ -1,8 +1,9 @@
-/* A polyhedron in double, by the letter of its definition: every face a fan from its smallest vertex, every triangle of
- * it with the centre a tet, and the field at a point the sum over the tets that hold it of sign times linear field.
+/* A polyhedron in double, by the letter of its definition: every face is a fan from its smallest vertex, every triangle
+ * makes a tet with the centre, and the field at a point is the sum, over the tets that hold it, of sign times linear
+ * field.
  *
- * The signs come from faces turned alike: one face is taken as it is, and whatever face has a directed edge of a turned
- * one in the same direction is turned over, until nothing changes. Then each connected piece is turned to have a
+ * The signs come from faces turned alike: one face is taken as it is, and any face that shares a directed edge with it
+ * in the same direction is turned over, and so on until nothing changes. Then each connected piece is turned to have a
  * positive volume, or a negative one if its first vertex is inside the rest. */
 #include "reference_polyhedron.h"
 #include <stdlib.h>
@@ -26,8 +27,8 @@ static double determinant(const double *a, const double *b, const double *c)
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-/* 1 where the faces run along a common edge in opposite directions, -1 where in the same, 0 without one. From a vertex
- * to itself there is no direction: a collapsed face has such sides in common with its neighbours, which say nothing. */
+/* 1 where the faces run along a common edge in opposite directions, -1 where in the same, 0 without one. An edge from a
+ * vertex to itself has no direction: collapsed faces share such edges with their neighbours, and they do not count. */
 static int agreement(const reference_polyhedron *p, int one, int other)
 {
     for (int i = 0; i < p->face_size[one]; i++)
@@ -216,7 +217,7 @@ static int sum_at(const reference_cell *cell, const double point[3], const doubl
     return cover;
 }
 
-/* Where rounding on a sheet has a point in none or two of its tets, a point a little farther serves. */
+/* On a sheet, rounding may put a point into none or two of its tets; then a point a little farther serves. */
 bool reference_polyhedron_interpolate(const reference_cell *cell, const double point[3], const double *values,
                                       double *value, double gradient[3])
 {

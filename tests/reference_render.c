@@ -210,7 +210,7 @@ static double relative_along(const along *a, double z)
     return value_along(a->t, a->c, a->values, z) - a->iso;
 }
 
-/* Where side times the field is least in [low, high], by golden section. */
+/* Finds where side times the field is least in [low, high], by golden section. */
 static double dip(const along *a, double low, double high, double side)
 {
     const double golden = 0.6180339887498949;
@@ -264,7 +264,7 @@ static int crossing_fence(const along *a, double z_in, double z_out, double *z, 
     return n;
 }
 
-/* Where a polyhedron's profile bends: between two such places it is linear. Near the isovalue a bend may be seen on
+/* Finds where a polyhedron's profile bends; between two such places it is linear. A bend near the isovalue may count on
  * either side of it. */
 static int profile_fence(const along *a, double z[REFERENCE_MAX_BREAKS], double v[REFERENCE_MAX_BREAKS])
 {
@@ -350,8 +350,8 @@ static reference_hit *add_hit(trace *t, const placed_cell *c, const render_surfa
     normalize(e->hit.normal);
     const double along = reference_dot(e->hit.normal, t->direction) / sqrt(reference_dot(t->direction, t->direction));
     for (int axis = 0; axis < 3 && along > 0; axis++) e->hit.normal[axis] = -e->hit.normal[axis];
-    /* A polyhedron that is entered and left through one quad's patch, beside its triangles, is passed outside of its
-     * tets: the field there goes from patch to patch along the ray, and across it there is none. */
+    /* A ray that enters and leaves a polyhedron through one quad's patch, beside its triangles, is outside of its tets:
+     * the field there is defined along the ray, from patch to patch, but not across it. */
     const bool has_gradient = along != 0;
     if (!has_gradient) t->out->ambiguous = true;
     e->hit.conditioning = has_gradient ? 1 / fabs(along) : 1;

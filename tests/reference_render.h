@@ -1,5 +1,5 @@
-/* The brute-force renderer: every ray against every cell, in double, no tree. It draws a render_job as the kernels do
- * and says of each ray how near it came to a decision that rounding could turn. */
+/* The brute-force renderer: it tests every ray against every cell, in double, without a tree. It draws a render_job as
+ * the kernels do and tells for each ray how near it came to a decision that rounding could change. */
 #ifndef REFERENCE_RENDER_H
 #define REFERENCE_RENDER_H
 
@@ -32,9 +32,9 @@ typedef struct reference_ray {
     double value_margin;  /* between a face's value and an isovalue */
     double sample_margin; /* between a sample and the cell interval's ends, or a hit and a sample */
     double eye_margin;    /* between a hit and the eye's plane */
-    bool ambiguous;       /* a cell met more than one root, or its interpolant at a face has the other side of the
-                             isovalue than the face: the first hit is then a matter of the root finder. Or a face's
-                             bilinear map is folded where the ray meets it, in a polyhedron. */
+    bool ambiguous;       /* the ray met a cell with more than one root, or one whose interpolant at a face is on the
+                             other side of the isovalue than the face, so that the first hit depends on the root finder;
+                             or a polyhedron's face whose bilinear map is folded there */
     bool map_failed;      /* an inverse map had no solution */
 } reference_ray;
 
@@ -44,8 +44,8 @@ typedef struct reference_scene reference_scene;
 reference_scene *reference_create(const render_job *job);
 void reference_free(reference_scene *scene);
 
-/* On the ray of pixel (x, y), in a hit's cell: field at depth - isovalue, its derivative by depth and its gradient
- * (world; may be NULL), all over the range of the cell's values. */
+/* For the ray of pixel (x, y) in a hit's cell: field at depth - isovalue, its derivative by depth and its gradient
+ * (world; may be NULL), all relative to the range of the cell's values. */
 double reference_residual(const reference_scene *scene, int x, int y, const reference_hit *hit, double depth,
                           double *slope, double gradient[3]);
 

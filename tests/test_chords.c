@@ -1,10 +1,10 @@
 /* A ray's intervals in the cells of a mesh add up to its chord of the mesh's hull, and every end within the hull is the
- * end of exactly two intervals, to the bit: no gap, no double. On exact and on jittered lattices of every cell type,
- * the hull of all of them being the cube [-1, 1]^3, for rays at random, to and along vertices, edges and faces, and
- * along the lattice. Every ray is traced twice: set up alone, its edge functions all projected (as differences for
- * normals have it), and as one of a tile, its edge functions by lines where these are good enough (as frames have it).
- * The tile is as wide as its rays are apart: a thousandth of a cell to several cells. What holds of the sum and of the
- * ends is in chord_hull.h. */
+ * end of exactly two intervals, to the bit: no gap, no double. This is tested on exact and jittered lattices of every
+ * cell type, whose hull is the cube [-1, 1]^3, with rays at random, to and along vertices, edges and faces, and along
+ * the lattice. Every ray is traced twice: set up alone, its edge functions all projected (as differences for normals
+ * have it), and as one of a tile, its edge functions by lines where these are good enough (as frames have it). The tile
+ * is as wide as its rays are apart: a thousandth of a cell to several cells. The bounds on the sum and the ends are in
+ * chord_hull.h. */
 #include "chord_aim.h"
 #include "chord_hull.h"
 #include "cpu.h"
@@ -27,8 +27,8 @@ enum { SIDE = 4 };
 
 static const double length_allowed = 1e-6;
 
-/* Two faces that meet at a vertex are each placed to float32, 6e-8 times a few: so far may one cell's interval reach
- * into the next one's, or, where a concave cell has several there, end before it. */
+/* Two faces that meet at a vertex are each placed to float32, a few times 6e-8. By so much one cell's interval may
+ * reach into the next one's, or end before it, where a concave cell has several there. */
 static const double doubled_allowed = 5e-7;
 
 static int64_t rays_wanted = 1000000;
@@ -79,13 +79,13 @@ static void make_mesh(chord_mesh kind, double jitter, test_mesh *out)
     if (kind == MESH_BESIDE) test_mesh_to_polyhedra(out, 0.5);
 }
 
-/* Of a cube's side. Cells are whole up to here; at 0.3 quads stand through the faces beside them, and cells overlap in
- * truth (docs/hard-cases.md). */
+/* As a share of a cube's side. Cells are sound up to here; at 0.3 quads pass through the faces beside them, and cells
+ * really overlap (docs/hard-cases.md). */
 static const double jitter_wanted = 0.2;
 
 /* ---- a ray ---- */
 
-/* What rays were, over a test. Lengths are in sides of the hull. */
+/* Counts of a test's rays. Lengths are in sides of the hull. */
 typedef struct tally {
     int64_t rays, met, spans;
     int64_t slanted, touching; /* of both kinds each ray counts once */
@@ -130,7 +130,7 @@ static int lone_ends(const chord_span *spans, int count, float lone[2 * CHORD_MA
     return alone;
 }
 
-/* From near on: what lies behind the eye's plane does not count. Returns how many are left. */
+/* Clips spans at near: parts behind the eye's plane do not count. Returns how many are left. */
 static int clip_spans(chord_span *spans, int count, float near)
 {
     int left = 0;
@@ -294,9 +294,9 @@ static void add_tally(tally *sum, const tally *t)
     sum->worst_gap = fmax(sum->worst_gap, t->worst_gap);
 }
 
-/* No more rays than are so by how they are aimed are slanted, or run within the hull's surface. Shares as counted, and
- * a tenth or so more: a fifth of all edges and faces are the hull's own, and rays to these and their vertices come from
- * anywhere. And one camera's rays, as few as they may be. */
+/* Bounds the share of slanted rays, and of those that run within the hull's surface, by the way in which rays are
+ * aimed. Bounds are the counted shares and a tenth or so more, and one camera's rays, even if there are few: a fifth of
+ * all edges and faces are the hull's own, and rays to these and their vertices come from anywhere. */
 static void assert_few_at_the_surface(chord_aim aim, const tally *t)
 {
     static const double slanted_most[CHORD_AIM_COUNT] = {

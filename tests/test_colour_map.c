@@ -35,8 +35,8 @@ static const float *table_of(const char *name)
     return table;
 }
 
-/* The published tables in codes of 8 bits: FNV-1a of all 768, and the entry 128. From matplotlib 3.6.3 (the ColorBrewer
- * ones by its way from key to key) and, batlow, from Scientific Colour Maps 7.0.1. */
+/* The published tables in codes of 8 bits: FNV-1a of all 768 codes, and entry 128. They come from matplotlib 3.6.3 (the
+ * ColorBrewer ones by its interpolation between keys); batlow from Scientific Colour Maps 7.0.1. */
 static const struct published {
     const char *name;
     uint64_t hash;

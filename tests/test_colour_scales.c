@@ -57,9 +57,9 @@ static void set_look(render_transfer *t, const look *l)
     if (!l->is_banded) t->colours = colour_map_table("viridis", &t->colour_count);
 }
 
-/* The value at the hit is that of its place: off by the rounding of the depth and of the cell's coordinates and values
- * in float32, 4e-6 by which fixtures bound depths too, of lengths and values near 1. How far that may move a colour is
- * seen at both its ends, and a leap in between (of bands, to what is outside) leaves the pixel out. */
+/* The value at the hit is off by the rounding of the depth and of the cell's coordinates and values in float32: 4e-6
+ * for lengths and values near 1, by which fixtures bound depths too. The colours at both ends of that range tell how
+ * far it may move a colour; a pixel is left out if a step lies between (of bands, or to the colours outside). */
 static const double value_error = 4e-6, colour_error = 3e-6;
 
 /* Returns whether the pixel counts. */
@@ -202,8 +202,8 @@ static const look volume_looks[] = {
     {"symlog", -10, 1e3, RENDER_SYMLOG, 0.1, false, false},
 };
 
-/* By samples: as for other transfer functions, and what the rounding of a place, 3e-7 of the scale's value, moves the
- * colour by: less than 1e-5. */
+/* Samples have the bound of other transfer functions, and one for the rounding of a place, 3e-7 of the scale's value,
+ * which moves the colour by less than 1e-5. */
 static void sampled_volumes_are_the_reference(void **state)
 {
     (void)state;
@@ -221,9 +221,8 @@ static void sampled_volumes_are_the_reference(void **state)
     }
 }
 
-/* By segments colours are straight between entries, of which there are 256: over 12 decades an entry is 0.11 of ln, and
- * the chord is off by 0.11 / 8 of what neighbours differ by, 0.03: 4e-4. Beyond that tets are exact, others to
- * max_error. */
+/* In segments colours are linear between 256 entries. Over 12 decades an entry is 0.11 of ln, and neighbours differ by
+ * 0.03; the chord is off by 0.11 / 8 of that, 4e-4. Otherwise tets are exact, other cells to max_error. */
 static void integrated_volumes_keep_their_error(void **state)
 {
     (void)state;

@@ -289,7 +289,7 @@ static void owners_share_all_pixels_evenly(void **context)
         for (size_t p = 0; p < sizeof pixels / sizeof *pixels; p++) check_layout(pixels[p], ranks[r]);
 }
 
-/* What of a picture's pixels is seen. */
+/* Tells whether a place of the picture is covered. */
 typedef bool seen_function(double x, double y);
 
 static bool is_in_disc(double x, double y)
@@ -328,8 +328,8 @@ static double skew_of(int width, int height, int ranks, seen_function *is_seen)
     return (double)most * ranks / (double)all;
 }
 
-/* Of widths that rounds of runs divide, as of others. A thousand ranks have a hundred pixels each of what is seen of
- * the smaller pictures, which cannot be shared as evenly: there 1.2. */
+/* Tested for widths that rounds of runs divide and for others. In the smaller pictures a thousand ranks have a hundred
+ * covered pixels each, which cannot be shared as evenly: there the bound is 1.2. */
 static void owners_share_what_is_seen(void **context)
 {
     (void)context;
@@ -441,7 +441,8 @@ static void bucket_by_slice_sorts_by_owned_index(void **context)
     }
 }
 
-/* In whatever order: they absorb together what light passes none of them, each in proportion to its own. */
+/* In any order, samples together absorb all light that does not pass every one of them, each in proportion to its own
+ * absorption. */
 static void samples_of_one_place_share_what_they_absorb(void **context)
 {
     (void)context;
@@ -498,8 +499,8 @@ static void mix_media(const medium *media, int count, const fragment *surface, d
     rgba[3] = 1 - through;
 }
 
-/* Roundings of T and C to float are 3e-8, that of the depth then up to e^2 times that for the depth of 2 that a medium
- * has at most: 3e-7 a medium. */
+/* Rounding T and C to float errs by 3e-8, and so the depth, at most 2 for a medium, by up to e^2 times that: 3e-7 a
+ * medium. */
 static void stretches_that_overlap_are_mixed(void **context)
 {
     (void)context;
@@ -526,9 +527,9 @@ static void stretches_that_overlap_are_mixed(void **context)
     }
 }
 
-/* One long stretch over many short ones behind each other, as a ray has them where one mesh is fine and another coarse,
- * in time that goes with their number: a quadratic rule takes minutes. All cuts mix the same two media, so that the
- * whole is one of their sum; roundings of sums of so many are below 1e-9, of the floats below 3e-7. */
+/* A ray through a fine and a coarse mesh has one long stretch over many short ones in a row. The time must be
+ * proportional to their number: a quadratic rule would take minutes. All cuts mix the same two media, so the whole is
+ * one medium of their sum; sums of so many err by less than 1e-9, the floats by less than 3e-7. */
 static void many_short_stretches_under_a_long_one_take_no_time(void **context)
 {
     (void)context;
@@ -554,7 +555,7 @@ static void many_short_stretches_under_a_long_one_take_no_time(void **context)
     free(items);
 }
 
-/* Of a sample that rounding gives to two neighbours the one behind counts, in whatever order they come. */
+/* If rounding gives a sample to two neighbours, the one behind counts, in any order of the two. */
 static void samples_of_neighbours_count_once(void **context)
 {
     (void)context;
@@ -617,7 +618,7 @@ static void overlaps_are_where_a_volume_has_not_ended(void **context)
           {.t_in = 0.999999f, .t_out = 2, .transmittance = 0.5f}},
          false},
         {2, {{0, 1, 1, {0}, 0.5f, S}, {0, 1, 1, {0}, 0.5f, S + 1}}, false},
-        /* nothing shows behind what is opaque */
+        /* fragments behind an opaque one do not show */
         {3,
          {{0, 1, 1, {0}, 0, S},
           {.t_in = 2, .t_out = 4, .transmittance = 0.5f},

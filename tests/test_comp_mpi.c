@@ -1,5 +1,5 @@
-/* Compositing across ranks: whatever way a set of fragments is dealt, rank 0's picture is, bit for bit, the serial
- * merge of the union; and what fails on one rank fails on all.
+/* Compositing across ranks: however a set of fragments is dealt, rank 0's picture is, bit for bit, the serial merge of
+ * the union; and a failure on one rank is one on all.
  *
  * Every rank makes the whole set and keeps its share. Verdicts are reduced before they are asserted, so that a failing
  * rank does not leave the others waiting. */
@@ -251,7 +251,7 @@ static void large_image_equals_serial_merge(void **context)
     check_composite(601, 401 * rank_count, 40000, deal_random, 1001);
 }
 
-/* The pixels of one row each, as a surface that bends: what a tile of a picture is like. */
+/* Fragments of a curved surface, each in the pixels of one row, as in a tile of a picture. */
 static fragment smooth_fragment(uint32_t pixel, int width)
 {
     const float x = (float)(pixel % (uint32_t)width) / 500, y = (float)(pixel / (uint32_t)width) / 500;
@@ -261,8 +261,8 @@ static fragment smooth_fragment(uint32_t pixel, int width)
     return f;
 }
 
-/* A hit is 32 bytes and a finished pixel 24 in memory. Depth and three colours, of which each leaves one or two bytes
- * and two bits, and no other word, are at most 9; a message has a head and blocks have theirs. */
+/* A hit is 32 bytes and a finished pixel 24 in memory. Of a smooth surface only depth and three colours are written, in
+ * one or two bytes and two bits each, at most 9 bytes; messages and blocks have heads as well. */
 static void smooth_surfaces_travel_in_a_third(void **context)
 {
     (void)context;
@@ -286,8 +286,8 @@ static void smooth_surfaces_travel_in_a_third(void **context)
     if (own_rank == 0) free_image(&s.out);
 }
 
-/* The arithmetic of the schedules against what is sent: with no fragment, a message a partner and round, and up the
- * tree one of each owner but rank 0. */
+/* Compares the arithmetic of the schedules with the messages sent: without fragments, one for each partner and round,
+ * and up the tree one from each owner but rank 0. */
 static void messages_are_as_counted(void **context)
 {
     (void)context;

@@ -1,6 +1,5 @@
-/* What travels, without MPI: whole numbers and blocks come back bit for bit, whatever they hold; the ways of a route
- * lead every fragment from every rank to its owner, and every pixel to rank 0, for as many ranks as no machine at hand
- * has. */
+/* Messages without MPI: whole numbers and blocks of any contents come back bit for bit; routes lead every fragment from
+ * every rank to its owner, and every pixel to rank 0, for more ranks than any machine at hand has. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -149,7 +148,7 @@ static void straight_lines_are_a_byte_a_word(void **context)
 
 /* ---- routes -------------------------------------------------------------------------------------------------- */
 
-/* Where a fragment for the owner is after the round. */
+/* The place of a fragment for the owner after the round. */
 static int carried(const comp_route *route, int round, int place, int owner)
 {
     const int stride = comp_route_stride(route, round);
@@ -225,8 +224,8 @@ static void gathering_is_a_tree(void **context)
                 check_gather(counts[i], (comp_nodes){node, false}, s);
 }
 
-/* What is chosen is as cheap as each schedule on its own; few ranks send directly; and at no number of ranks up to
- * 100,000, of a picture's share each, does one send more than a few hundred messages. */
+/* The chosen route is no dearer than any schedule; few ranks send directly; and with up to 100,000 ranks, each with its
+ * share of a picture, none sends more than a few hundred messages. */
 static void the_cheapest_route_is_chosen(void **context)
 {
     (void)context;

@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/* The cells that the adaptor hands over of the file, and the named field of one component at its vertices. False, with
- * a message on stderr, where there is no such file or field. Free with test_mesh_free(). */
+/* The file's cells as the adaptor hands them over, and the named field of one component at the vertices. False, with a
+ * message on stderr, where there is no such file or field. Free with test_mesh_free(). */
 bool test_data_mesh(const char *path, const char *field, test_mesh *out);
 
 #ifdef __cplusplus

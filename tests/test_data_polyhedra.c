@@ -1,6 +1,6 @@
 /* The Voronoi cells of INSITU_TEST_DATA, 8,000 polyhedra of up to 21 faces, against the brute-force renderer: surfaces,
- * samples and segments; and moved, so that their faces are not plane, against the same field on their own tets. 77
- * where INSITU_TEST_DATA is not set. */
+ * samples and segments. They are also moved, so that their faces are not plane, and compared with the same field on
+ * their own tets. Returns 77 where INSITU_TEST_DATA is not set. */
 #include "reference_integral.h"
 #include "test_data_mesh.h"
 #include "test_mesh_dual.h"

@@ -1,13 +1,12 @@
-/* max_error on the real grids of INSITU_TEST_DATA: each is drawn by segments with errors of 1e-2, 1e-3 and 1e-4 asked
- * for, by two transfer functions, and compared with the adaptive integral in double over all cells, in linear light.
+/* Tests max_error on the real grids of INSITU_TEST_DATA: each is drawn by segments to errors of 1e-2, 1e-3 and 1e-4,
+ * with two transfer functions, and compared with the adaptive integral in double over all cells, in linear light.
  *
  *     test_data_volumes [pixels [name]]
  *
- * As many pixels of a picture are compared: half of them those in which the pictures differ most from one another,
- * where errors are largest; the others at random among those that show something; and those that were once wrong. 0:
- * all. 77 where INSITU_TEST_DATA is not set. The ray's cells are found by their projections, so that brute force need
- * not look at half a million others.
- */
+ * So many pixels of a picture are compared, 0: all. Half of them are those in which the pictures differ most from one
+ * another, where errors are largest; the others are at random among those that show something; pixels that were once
+ * wrong are added. Returns 77 where INSITU_TEST_DATA is not set. The ray's cells are found by their projections, so
+ * that brute force need not look at half a million others. */
 #include <mpi.h>
 
 #include "colour_map.h"
@@ -35,7 +34,7 @@ typedef struct data_set {
     double eye[3], focal[3], up[3];
 } data_set;
 
-/* As the data's README has them. */
+/* The data's README gives these numbers. */
 static const data_set sets[] = {
     {"bluntfin_hex",
      "Density",
@@ -226,8 +225,8 @@ static double corner_volume(double p[][3], const signed char corner[4])
            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
 }
 
-/* Is the cell turned inside out at some corner alone? Its map is then not one to one, and which of several values it
- * has at a place is a matter of the solver: there is no truth to compare with. */
+/* Tells whether the cell is turned inside out at some corners only. Its map is then not one to one, and the solver
+ * decides which of several values it has at a place: there is no truth to compare with. */
 static bool is_folded(const grid *g, int64_t cell)
 {
     const int type = grid_cell_type(g, cell);
@@ -400,8 +399,8 @@ static int choose_pixels(const data_set *set, const picture *pictures, int pixel
 
 /* ---- the test ------------------------------------------------------------------------------------------------ */
 
-/* How many of the pixels may have no truth. The crushed can alone has folded cells, and a seventh of all its pixels at
- * most meets one (63 of 612, and 58 of 459); the half of a sample in which pictures differ most may all be such. */
+/* How many of the pixels may have no truth. Only the crushed can has folded cells, which at most a seventh of all its
+ * pixels meet (63 of 612, and 58 of 459); but the half of a sample in which pictures differ most may all be such. */
 static int most_left_out(const data_set *set, int count)
 {
     if (strcmp(set->file, "can_2") != 0) return 0;

@@ -1,5 +1,4 @@
-/* Decorations as they are drawn over a picture: where they stand, what they hide, and that a bar has its map's colours.
- */
+/* Tests decorations drawn over a picture: their places, what they hide, and the colours of bars. */
 #include <cmath>
 #include <csetjmp>
 #include <cstdarg>
@@ -60,8 +59,8 @@ void the_picture_is_put_over_its_background(void **)
         assert_true(std::fabs(out[i] - (i % 4 == 3 ? 1 : 0.125F + 0.75F * 0.25F)) < 1e-6F);
 }
 
-/* A line before the picture has its colour; one behind shows by what light the picture lets through, over the
- * background. Beside them nothing is changed. */
+/* A line before the picture has its own colour; one behind shows, over the background, as far as the picture lets light
+ * through. Beside them nothing changes. */
 void strokes_are_before_or_behind_the_picture(void **)
 {
     const insitu_stroke strokes[] = {{{0, 50.5}, {width, 50.5}, false}, {{0, 100.5}, {width, 100.5}, true}};
@@ -94,7 +93,7 @@ void slanted_strokes_are_as_bright_as_straight_ones(void **)
     }
 }
 
-/* Where the tallest column of the bar's colours is. */
+/* Finds the tallest column of the bar's colours. */
 void a_bar_has_the_colours_of_its_map(void **)
 {
     const float colours[] = {0.1F, 0.2F, 0.9F, 0.3F, 0.8F, 0.1F, 0.9F, 0.1F, 0.2F};
@@ -113,8 +112,7 @@ void a_bar_has_the_colours_of_its_map(void **)
             int run = 0;
             float before = -1;
             for (int y = 0; y < height; y++) {
-                /* On the table's lower half green rises from 0.2 to 0.8 by the share by which blue falls from 0.9 to
-                 * 0.1. */
+                /* In the table's lower half green rises from 0.2 to 0.8 as blue falls from 0.9 to 0.1. */
                 const float r = at(out, x, y, 0), g = at(out, x, y, 1), b = at(out, x, y, 2);
                 const bool is_low = std::fabs((g - 0.2F) / 0.6F - (0.9F - b) / 0.8F) < 1e-4F && r < 0.31F;
                 const bool is_high = std::fabs((r - 0.3F) / 0.6F - (0.8F - g) / 0.7F) < 1e-4F && b < 0.21F && r > 0.29F;

@@ -47,7 +47,7 @@ static void ticks_are_at_round_numbers(void **state)
     }
 }
 
-/* A tick's words are its value, to the last digit that they show; its place is that of the value. */
+/* A tick's words give its value, to the last digit that they show; its place is that of the value. */
 static void ticks_stand_where_their_numbers_are(void **state)
 {
     (void)state;
@@ -131,8 +131,8 @@ static void edges_are_where_rays_see_them(void **state)
     }
 }
 
-/* Of a box seen over a corner three edges are behind it, over an edge five, and face on eight: the far face's four and
- * those that run away from the eye. From within all twelve are. */
+/* A box seen over a corner has three edges behind it, over an edge five, and face on eight: the far face's four and
+ * those that run away from the eye. From within, all twelve are behind. */
 static void edges_that_data_hides_are_told(void **state)
 {
     (void)state;

@@ -74,7 +74,7 @@ void hand_over(insitu_session *session, const slab &s)
     assert_int_equal(insitu_set_field(session, "slab", &field), INSITU_OK);
 }
 
-/* Files of a name each: OpenImageIO remembers what it has read. */
+/* Each file has its own name, because OpenImageIO caches what it has read. */
 void draw(const std::string &name, const std::string &layers)
 {
     const std::string scene = folder + "/scene.yaml";

@@ -1,6 +1,6 @@
-/* Polyhedra that are degenerate: faces with a vertex more than once, of no area, all in one place, and cells of no
- * volume. What is the same cell written otherwise is drawn to the same bits, what has no volume changes none, and the
- * rest is the reference's. All are listed in docs/hard-cases.md; those that are refused are in test_session_faces.c. */
+/* Degenerate polyhedra: faces that repeat a vertex, have no area or are all in one place, and cells without volume. The
+ * same cell written in another way is drawn to the same bits, cells without volume change no bit, and all else agrees
+ * with the reference. All are listed in docs/hard-cases.md; those that are refused are in test_session_faces.c. */
 #include "reference_integral.h"
 #include "test_mesh_make.h"
 #include "test_render_fixture.h"
@@ -15,7 +15,7 @@
 
 static const double values[2] = {-0.2, 0.3};
 
-/* What is drawn: an opaque surface, transparent ones in a sampled volume, a volume by segments. */
+/* The scenes: an opaque surface, transparent ones in a sampled volume, a volume by segments. */
 typedef enum scene_kind { OPAQUE, SURFACES_IN_SAMPLES, SEGMENTS, SCENE_COUNT } scene_kind;
 
 static void open_scene(render_fixture *f, const test_mesh *mesh, scene_kind scene, fixture_camera camera, int width,
@@ -103,7 +103,7 @@ static void finish_copy(test_mesh *mesh, test_mesh *copy)
 
 typedef void rewriting(test_mesh *mesh);
 
-/* Of two faces in three a vertex comes twice or three times, the first one at the end as well: a quad then has up to
+/* Repeats vertices in two faces of three, twice or three times, also the first one at the end: a quad then has up to
  * seven entries. Both of a face's cells have it so. */
 static void repeat_vertices(test_mesh *mesh)
 {
@@ -120,8 +120,8 @@ static void repeat_vertices(test_mesh *mesh)
     finish_copy(mesh, &copy);
 }
 
-/* One face more for every vertex, all in its place; cells have that of the first vertex of their first face, and so
- * share some. */
+/* Adds a face for every vertex, all of it in that place. A cell gets that of the first vertex of its first face, so
+ * cells share some. */
 static void add_point_faces(test_mesh *mesh)
 {
     test_mesh copy = begin_copy(mesh);
@@ -236,7 +236,7 @@ static void add_flat_cells(test_mesh *mesh)
 
 /* ---- the same bits --------------------------------------------------------------------------------------------- */
 
-/* Polyhedra of tets; hexes, half and all of which are polyhedra; mixed cells. */
+/* Makes polyhedra from tets, hexes of which half or all are polyhedra, or mixed cells. */
 static void make_mesh(int kind, double jitter, test_mesh *mesh)
 {
     static const test_mesh_kind kinds[4] = {TEST_POLYHEDRA, TEST_HEXES, TEST_HEXES, TEST_MIXED};
@@ -290,8 +290,8 @@ static void polyhedra_of_no_volume_change_no_pixel(void **state)
 
 /* ---- the reference --------------------------------------------------------------------------------------------- */
 
-/* Pictures of surfaces and samples, and by segments every ray's integral: float32's values err by some 1e-6, the
- * length in a steep stretch of the function by as much (see sums_through_spokes_are_the_reference). */
+/* Compares pictures of surfaces and samples, and for segments every ray's integral: float32's values err by some 1e-6,
+ * and so does the length in a steep stretch of the function (see sums_through_spokes_are_the_reference). */
 static void assert_reference(const test_mesh *mesh, fixture_camera camera, const char *what)
 {
     render_fixture f;
@@ -368,8 +368,8 @@ static void hang_face(const test_mesh *mesh, int64_t face, split_edges *edges, t
     test_mesh_add_face(copy, loop, count);
 }
 
-/* Where one of a cell's two faces at an edge has the middle and the other has not, the cell needs the face of no area
- * between them. */
+/* If only one of a cell's two faces at an edge has the edge's middle, the cell needs the face without area between
+ * them. */
 static int hang_cell(const test_mesh *mesh, int64_t cell, split_edges *edges, test_mesh *copy, int64_t more[32])
 {
     int count = 0;
@@ -411,9 +411,9 @@ static int hang_middles(test_mesh *mesh)
     return cells;
 }
 
-/* Vertices amid edges of which not all faces know, with the value that the edge has there; a jittered lattice's are off
- * the edges by rounding. With other values the field by its definition jumps at the face of no area, and which side a
- * ray's profile takes between it and the next sheet is open: the picture is of numbers all the same. */
+/* Vertices amid edges that some faces do not have, with the value of the edge there; in jittered lattices they are off
+ * the edges by rounding. With other values the field's definition has a jump at the face without area, and a ray's
+ * profile may take either side up to the next sheet: the picture must still be finite numbers. */
 static void faces_of_no_area_are_the_reference(void **state)
 {
     (void)state;
@@ -456,9 +456,8 @@ static void face_through_a_vertex_twice_is_the_reference(void **state)
     }
 }
 
-/* A flat cell alone, of vertices and values of its own: volumes see nothing of it. The field may be another before than
- * behind, and a surface is then seen between them, as in the sliver of which the flat cell is the limit; but nothing is
- * not a number. */
+/* A flat cell alone, with its own vertices and values, does not show in volumes. Its field may differ before and behind
+ * it, and a surface then shows between them, as in the sliver whose limit the flat cell is; but all is finite. */
 static void flat_polyhedra_are_finite(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
 /* A mesh whose faces are not plane: the dual of tets. Its isosurfaces are those of the same field on the tets of its
- * cells' triangles and centres, drawn as tets, to the last pixel of which rounding does not decide; cells that are not
- * star-shaped are left out, as their tets overlap. Faces of four vertices are split there, as they are met on their
- * bilinear patches; whole, and in all cells, they are as the reference has them. */
+ * cells' triangles and centres, drawn as tets, in every pixel that rounding does not decide; cells that are not
+ * star-shaped are left out, as their tets overlap. Faces of four vertices are split for this, as rays meet whole ones
+ * on bilinear patches; with whole faces, all cells agree with the reference. */
 #include "test_mesh_dual.h"
 #include "test_own_tets.h"
 #include "test_render_fixture.h"
@@ -36,7 +36,7 @@ static void duals_are_their_own_tets(void **state)
         assert_true(t.pixels > width * height / 10);
         assert_int_equal(t.missing, 0);
         assert_int_equal(t.added, 0);
-        /* What is left out is little: of the 7,471 cells of the long run 258 are not star-shaped. */
+        /* Little is left out: of the 7,471 cells of the long run 258 are not star-shaped. */
         assert_true(1000 * t.in_band < t.pixels && 25 * t.ghosts < mesh.cell_count);
         test_mesh_free(&mesh);
     }

@@ -12,7 +12,7 @@ static inline bool test_is_whole(void)
     return whole && whole[0] == '1';
 }
 
-/* Of the cases how many to do. */
+/* The number of cases to do. */
 static inline int test_effort(int usual, int whole)
 {
     return test_is_whole() ? whole : usual;

@@ -57,7 +57,7 @@ static void deal(ray *r, double change)
     }
 }
 
-/* What the rank sends: of each run that touches, between surfaces, the fold of what it has all of. */
+/* Makes what the rank sends: for each connected run between surfaces, the fold of all nodes that it has whole. */
 static int64_t send(const ray *r, int rank, fragment *out)
 {
     int64_t count = 0;
@@ -103,8 +103,8 @@ static void blend_in_double(const ray *r, double rgba[4])
     rgba[3] = 1 - through + through * (double)background[3];
 }
 
-/* A fragment is a product and a sum of colours, and a product of what is let through, by which all behind it is off: three
- * roundings of 2^-24 of at most 1. What is dark is left out. */
+/* A fragment adds a product and a sum of colours and a product of transmittances, which affects all behind it: three
+ * roundings of 2^-24 of at most 1. Dark stretches may be left out. */
 static void judge(const ray *r, const float rgba[4])
 {
     double expected[4];

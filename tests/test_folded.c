@@ -1,7 +1,7 @@
-/* Cells whose maps are folded: a point then has several solutions or none, and there is no truth to compare with. What
- * holds all the same: nothing that is not a finite number comes out, what is drawn depends neither on how the
- * simulation numbers a cell's vertices nor on which rank has it, and the count of inverse maps that found nothing comes
- * through. Of cells that are not folded that count is 0. */
+/* Cells whose maps are folded: a point then has several solutions or none, and there is no truth to compare with. But
+ * the picture has finite numbers only, it depends neither on how the simulation numbers a cell's vertices nor on the
+ * rank that has the cell, and the report has the count of inverse maps that found nothing. For cells that are not
+ * folded that count is 0. */
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -80,8 +80,8 @@ static void folded_cells_make_numbers(void **state)
     assert_true(failures > 1000);
 }
 
-/* On seven ranks, each with cells, vertices and the cells' own orders numbered in another way: surfaces to the bit,
- * separate samples to the rounding of "over". */
+/* Draws on seven ranks, each with its own numbering of cells and vertices and order within cells: surfaces agree to the
+ * bit, separate samples to the rounding of "over". */
 static void draw_dealt(const test_mesh *mesh, scene_kind scene, drawn_frame *out)
 {
     render_fixture parts[RANKS];
@@ -137,7 +137,7 @@ static void maps_of_sound_cells_converge(void **state)
                 test_mesh_lattice(kinds[k], SIDE, 0.2, test_wave, &mesh);
                 stage(&f, &mesh, camera, scene);
                 fixture_draw(&f, &drawn);
-                /* Along x rays lie in faces and edges of the rim: a pyramid's map has no inverse at its apex's. */
+                /* Along x, rays lie in faces and edges of the rim, where a pyramid's map has no inverse at its apex. */
                 const int64_t allowed =
                     camera == CAMERA_ALONG_X && kinds[k] == TEST_PYRAMIDS ? drawn.list.count / 50 : 0;
                 if (drawn.statistics.map_failures > allowed)

@@ -1,6 +1,6 @@
 /* Hanging nodes: where one cell's face lies on four or sixteen others', both sides find its depth from vertices of
- * their own, and rounding leaves gaps and overlaps between them. None of these may be seen: no pixel counts as one in
- * which cells overlap, no ray passes between cells, and the picture is one on any number of ranks.
+ * their own, and rounding leaves gaps and overlaps between them. None of these may show: no pixel counts as one in
+ * which cells overlap, no ray passes between cells, and the picture is the same on any number of ranks.
  *
  * Verdicts are reduced before they are asserted, so that a failing rank does not leave the others waiting. */
 #include "reference_integral.h"
@@ -80,7 +80,7 @@ static int64_t draw_whole(const test_mesh *mesh, const drawing *d, fixture_camer
     return overlaps;
 }
 
-/* As the session would: the share of this rank, drawn by all. */
+/* Draws as the session would: all ranks draw, each its share. */
 static int64_t draw_shares(const test_mesh *mesh, test_partition_kind partition, const drawing *d,
                            fixture_camera camera, image *out)
 {
@@ -224,7 +224,7 @@ static bool meets_plane(const render_camera *camera, int p, double value, double
     return *depth > 0 && distance < 0.25;
 }
 
-/* The isosurface of a linear field is a plane, whatever the cells. */
+/* The isosurface of a linear field is a plane, for all cells. */
 static bool is_plane_whole(const hanging_case *c, fixture_camera camera)
 {
     static const drawing plane = {"plane", 0, 1, false, 1};
@@ -268,8 +268,8 @@ static void surfaces_go_on_over_hanging_nodes(void **state)
 
 /* ---- other faces -------------------------------------------------------------------------------------------- */
 
-/* Where refinement moves hanging nodes off the coarse face, cells do overlap: found on any ranks, and within max_error
- * of each other, for whether an overlap that is all but clear is found depends on the partition. */
+/* Where refinement moves hanging nodes off the coarse face, cells do overlap. Any number of ranks finds that, and
+ * pictures agree to max_error: whether an overlap that is almost transparent is found depends on the partition. */
 static void nodes_off_the_coarse_face_overlap(void **state)
 {
     (void)state;

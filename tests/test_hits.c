@@ -1,5 +1,5 @@
-/* Where robust roots lie and what their normals are, through whole frames: on warped lattices of hexes, wedges and
- * pyramids, on ugly single cells, and by closed forms. */
+/* Tests places and normals of robust roots in whole frames: on warped lattices of hexes, wedges and pyramids, on ugly
+ * single cells, and by closed forms. */
 #include "test_render_fixture.h"
 
 #include <setjmp.h>
@@ -14,7 +14,7 @@ static const double three_values[3] = {-0.6, 0.3, 0.95};
 static const double depth_allowed = 1e-5; /* cells */
 static const test_mesh_kind kinds[4] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_TETS};
 
-/* What a ray's hits were, over a test. */
+/* Counts of a test's rays and hits. */
 typedef struct tally {
     int64_t rays, hits, excluded, folded, different, beyond, tangent;
     double residual, depth; /* the worst */
@@ -37,18 +37,18 @@ static double residual_allowed(const render_fixture *f, double slope)
     return 1e-6 + (3e-8 + 3e-8) / f->job.space.scale * fabs(slope);
 }
 
-/* How far float32 may move a hit along its ray, in cells. Along the ray t and its cell's vertices are off by half a
- * unit of 1 each in scaled units, 3e-8. Across it a vertex is off by 3e-8 along both axes, 4.2e-8 together, which by
- * the slant at which the ray meets the surface is one of depth, and the field by half a unit of its values and as much
- * where they are put together, 6e-8 of their range, which is one of depth by the slope. */
+/* How far float32 may move a hit along its ray, in cells. Along the ray, t and the cell's vertices are each off by half
+ * a unit of 1 in scaled units, 3e-8. Across it a vertex is off by 3e-8 along both axes, 4.2e-8 together, which the
+ * slant of ray and surface turns into depth. The field is off by half a unit of its values and as much in their sum,
+ * 6e-8 of their range, which the slope turns into depth. */
 static double depth_moved(const render_fixture *f, const reference_hit *truth, double slope)
 {
     const double scaled_cell = f->cell_size * f->job.space.scale;
     return (6e-8 + 4.2e-8 * truth->conditioning) / scaled_cell + 6e-8 / (fabs(slope) * f->cell_size);
 }
 
-/* A hit is to be within 1e-5 cells of the reference, unless the ray is tangent to the surface: so nearly in it that
- * rounding alone may move the hit farther. That is a slope of the field below some 0.03 ranges a cell. */
+/* A hit must be within 1e-5 cells of the reference, unless the ray is so nearly tangent to the surface that rounding
+ * alone may move the hit farther. That is at slopes of the field below some 0.03 ranges a cell. */
 static void judge_depth(const render_fixture *f, const reference_hit *truth, double depth, double slope, tally *t)
 {
     const double off = fabs(depth - truth->depth) / f->cell_size, moved = depth_moved(f, truth, slope);
@@ -136,8 +136,8 @@ static void add_robust(render_fixture *f, float opacity)
     f->surfaces[0].root = RENDER_ROBUST;
 }
 
-/* Of rays within the margin of another decision the fixture's share, 0.2 % (test_render_fixture.c). No cell here is
- * folded: lattices are jittered by 0.2 and corners stay on their side of the opposite faces. */
+/* Rays within the margin of another decision are at most the fixture's share, 0.2 % (test_render_fixture.c). No cell
+ * here is folded: lattices are jittered by 0.2, and corners stay on their side of the opposite faces. */
 static void assert_few_left_out(const tally *t)
 {
     if (500 * t->excluded > t->rays) fail_msg("%d of %d rays excluded", (int)t->excluded, (int)t->rays);
@@ -253,7 +253,7 @@ static void light_by_axes(render_fixture *f, render_light lights[3])
     f->surfaces[0].material = (render_material){.ambient = 0, .diffuse = 1, .specular = 0, .shininess = 1};
 }
 
-/* How far the fragment's colour is from that of the gradient, towards the eye. */
+/* The difference between the fragment's colour and that of the gradient, turned towards the eye. */
 static double normal_error(const render_fixture *f, const fragment *hit, const double gradient[3])
 {
     const int width = f->job.camera.width;
@@ -273,9 +273,9 @@ static double normal_error(const render_fixture *f, const fragment *hit, const d
 }
 
 /* The gradient is made of differences of float32 values and positions, each off by half a unit, 6e-8, of the cell's
- * range and size; eight of them and the cell's distortion make 2e-6 of range / size, against the gradient's length.
- * The place is off by 1e-6 cells, against second derivatives of a range or two: as much again. Seen edge-on, either
- * side may be the eye's. */
+ * range and size; eight of them and the cell's distortion make 2e-6 of range / size, relative to the gradient's length.
+ * The place is off by 1e-6 cells, which second derivatives of a range or two turn into as much again. Seen edge-on,
+ * either side may face the eye. */
 static void judge_normal(const render_fixture *f, const reference_scene *scene, const reference_hit *truth,
                          const fragment *hit, int64_t *checked)
 {
@@ -336,7 +336,7 @@ static void add_differences(render_fixture *f, const double *values, int count, 
     light_by_axes(f, lights);
 }
 
-/* Isoparametric cells hold a linear field as it is, and so all differences, one-sided ones at the rim too, are its
+/* Isoparametric cells represent a linear field exactly, so all differences, also one-sided ones at the rim, give its
  * gradient. A sample errs by some 5e-7 of the field's range of 3, a difference over half of cells of 2/3, at a slope of
  * 0.9, by some 1e-5 of it. Half a cell from warped faces the polyhedron's field is continued outside the cell's domain,
  * where it is linear as well. */
@@ -396,9 +396,9 @@ static double quadratic_error(int n, render_normal normal, double difference)
     return sum;
 }
 
-/* The trilinear interpolant of a quadratic errs by the same in every cell of a lattice, so that differences over a
- * whole cell are those of the quadratic itself, which are exact: what is left is rounding, well within second order.
- * Over half a cell they err by the cell's size, as the cell's gradient does, but by less. */
+/* The trilinear interpolant of a quadratic has the same error in every cell of a lattice. So differences over a whole
+ * cell are those of the quadratic itself, which are exact up to rounding, well within second order. Over half a cell
+ * their error is of the order of the cell's size, as the cell's gradient's is, but smaller. */
 static void differences_of_a_quadratic_field_are_of_second_order(void **state)
 {
     (void)state;

@@ -1,6 +1,5 @@
-/* Memory runs out while a picture is written: an error or the same file, and the next picture is as if nothing had
- * been. Tables that the image library fills at the first picture are part of it, so that each try has a process of its
- * own. */
+/* Memory runs out while a picture is written: the result is an error or the same file, and the next picture is as if
+ * nothing had happened. The image library fills tables at the first picture, so each try has a process of its own. */
 #define _GNU_SOURCE 1 /* memmem */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
-/* The image adaptor, called as libinsitu calls it: by the loader. What was written is read back by OpenImageIO and held
- * against the pixels, through the sRGB curve in double where the format has it. */
+/* The image adaptor, called as libinsitu calls it: by the loader. Files are read back by OpenImageIO and compared with
+ * the pixels, through the sRGB curve in double where the format uses it. */
 #include <OpenImageIO/deepdata.h>
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
@@ -309,12 +309,12 @@ void check_flat_pixel(const deep_picture &p, std::size_t i, const float *flat)
         const double through = 1 - expected[3];
         for (std::size_t c = 0; c < 4; c++) expected[c] += through * static_cast<double>(sample.rgba[c]);
     }
-    /* Three roundings of numbers up to 1 a sample, and one of what is left. */
+    /* Each sample takes three roundings of numbers up to 1, and one of the transmittance. */
     const double bound = 4 * std::ldexp(1.0, -24) * p.counts[i];
     for (std::size_t c = 0; c < 4; c++) assert_true(std::fabs(static_cast<double>(flat[c]) - expected[c]) <= bound);
 }
 
-/* By what oiiotool --flatten does. */
+/* Flattens as oiiotool --flatten does. */
 void deep_exr_is_flattened_by_openimageio(void **)
 {
     const deep_picture p = make_deep_picture(64, 33);
@@ -348,7 +348,7 @@ void writing_leaves_the_picture_alone(void **)
     assert_int_equal(spec.width, 5);
 }
 
-/* Root may write anywhere, so nothing here goes by permissions. */
+/* Root may write anywhere, so nothing here depends on permissions. */
 void unwritable_places_are_told(void **)
 {
     const fs::path in = folder / "unwritable";
@@ -403,7 +403,7 @@ void full_disk_is_told_and_leaves_the_old_picture(void **)
     }
 }
 
-/* What stands in a folder beside the pictures. */
+/* Counts a folder's files besides the pictures. */
 std::size_t count_others(const fs::path &in, const std::string &name)
 {
     std::size_t count = 0;
@@ -439,9 +439,8 @@ void planted_links_keep_their_victims(void **)
     assert_int_equal(count_others(in, "a.png"), 1);
 }
 
-/* Files of the temporary names: one that a killed run left, one that is being written, a link, a pipe, and others'
- * names.
- */
+/* Makes files with temporary names: one that a killed run left, one that is being written, a link, a pipe, and ones
+ * with other names. */
 void files_of_killed_runs_are_removed(void **)
 {
     const fs::path in = folder / "left";

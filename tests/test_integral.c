@@ -1,5 +1,5 @@
-/* The integral of a segment against high precision: random transfer functions, values and lengths. The oracle splits at
- * every point of the function in long double, has the optical depth in closed form (the integral of -ln u is
+/* Compares the integral of a segment with high precision, for random transfer functions, values and lengths. The oracle
+ * splits at every point of the function in long double, has the optical depth in closed form (the integral of -ln u is
  * u - u ln u) and the colour by adaptive Simpson. */
 #include "integral_double.h"
 #include "test_meshes.h"

@@ -43,7 +43,7 @@ static void random_direction(uint64_t index, uint64_t seed, double out[3])
     out[2] = z;
 }
 
-/* Not in one half, and not too near each other: else the hull has slivers, or not the origin. */
+/* Points must not all be in one half, nor too near each other: else the hull has slivers, or lacks the origin. */
 static void spread_points(hull *h, uint64_t seed)
 {
     double least = 1.9 / sqrt(h->point_count);

@@ -17,9 +17,9 @@ const char *test_random_name(test_random_polyhedron kind);
 void test_mesh_random(test_random_polyhedron kind, uint64_t seed, test_mesh *out);
 
 /* The cube [-1, 1]^3 as n^3 cubes, inner corners moved by up to jitter of a cube's side, each cube twelve tets about
- * its centre with random diagonals of its faces; and of that the dual, without what is cut by the hull: a cell for
- * every inner corner and centre, a face for every edge, a vertex in the mean of every tet. Cells have 8 to 26 faces of
- * 3 to 8 vertices. */
+ * its centre with random diagonals of its faces; and of this mesh the dual, without cells cut by the hull: it has a
+ * cell for every inner corner and centre, a face for every edge, and a vertex at the mean of every tet. Cells have 8 to
+ * 26 faces of 3 to 8 vertices. */
 void test_mesh_dual(int n, double jitter, test_function *f, test_mesh *out);
 
 /* Faces of four vertices, which are bilinear, to two triangles each, in both of their cells alike. All cells are

@@ -1,6 +1,6 @@
-/* Hanging nodes (test_mesh_hanging.h): vertices live on the lattice of the smallest cells, where they are made when a
- * cell first asks for them. One on a cube's boundary has the mean of the cube's corners, which all cubes around it have
- * alike, for the map of a cube is bilinear on its faces. */
+/* Hanging nodes (test_mesh_hanging.h): vertices are on the lattice of the smallest cells, and are made when a cell
+ * first needs them. A vertex on a cube's boundary is an interpolation of the cube's corners, the same for all cubes
+ * around it, because the map of a cube is bilinear on its faces. */
 #include "test_mesh_hanging.h"
 
 #include <stdlib.h>

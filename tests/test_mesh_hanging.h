@@ -16,7 +16,7 @@ const char *test_hanging_shape_name(test_hanging_shape shape);
 
 /* n^3 cubes, of which a third is cut into side^3 each (2 or 4): hexes, wedges or tets, by TEST_HEXES, TEST_WEDGES and
  * TEST_TETS. In curved shapes only hexes meet on one patch. Values at hanging nodes are the bilinear ones of the coarse
- * face, which are those of a coarse hex; of other cells where the function is linear. */
+ * face: they agree with a coarse hex, and with other cells where the function is linear. */
 void test_mesh_hanging(test_mesh_kind kind, int n, int side, test_hanging_shape shape, test_function *f,
                        test_mesh *out);
 

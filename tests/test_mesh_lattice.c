@@ -57,7 +57,7 @@ void test_mesh_add_cube(test_mesh *mesh, test_mesh_kind kind, const int64_t *cor
         add_tets(mesh, corners);
 }
 
-/* What closes the cube's face (as cube_faces) against its centre: two tets where is_split, else a pyramid. */
+/* Closes the cube's face (as in cube_faces) against its centre: by two tets where is_split, else by a pyramid. */
 static void close_face(test_mesh *mesh, const int64_t *corners, int64_t centre, const int face[4], bool is_split)
 {
     const int64_t v[5] = {corners[face[0]], corners[face[1]], corners[face[2]], corners[face[3]], centre};

@@ -9,14 +9,14 @@
 /* Zeroed; running out of memory ends the process. */
 void *test_allocate(int64_t count, size_t size);
 
-/* Of an index and a seed: the same on every machine. */
+/* A hash of an index and a seed, the same on every machine. */
 uint64_t test_hash(uint64_t index, uint64_t seed);
 
 /* Room for so many of each; the mesh has none yet. Faces apart, for few meshes have any. */
 void test_mesh_allocate(test_mesh *mesh, int64_t vertices, int64_t cells, int64_t connectivity);
 void test_mesh_allocate_faces(test_mesh *mesh, int64_t faces, int64_t entries);
 
-/* These return the number of what is new. */
+/* These return the number of the new vertex, face or cell. */
 int64_t test_mesh_add_vertex(test_mesh *mesh, const double p[3]);
 int64_t test_mesh_add_face(test_mesh *mesh, const int64_t *vertices, int64_t count);
 

@@ -1,4 +1,4 @@
-/* Which rank owns which cell, and a rank's part of a mesh. */
+/* Deals cells to ranks, and makes a rank's part of a mesh. */
 #include "test_mesh_make.h"
 
 #include <math.h>

@@ -39,7 +39,7 @@ static void face_table_free(face_table *t)
     free(t->cells);
 }
 
-/* Where a cell's face stands in the table; the cell is noted there. */
+/* Finds a cell's face in the table, and notes the cell there. */
 static int64_t face_table_find(face_table *t, const int64_t *vertices, int count, int64_t cell)
 {
     int64_t key[4] = {INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};

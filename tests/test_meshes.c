@@ -1,4 +1,4 @@
-/* What all meshes for tests and benchmarks are made with. */
+/* Functions that make all meshes for tests and benchmarks. */
 #include "test_mesh_make.h"
 
 #include <math.h>

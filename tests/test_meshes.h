@@ -92,8 +92,8 @@ void test_mesh_mirror(test_mesh *mesh, bool every_second);
 /* Another order of the cells and of the vertices. The same geometry and field. */
 void test_mesh_shuffle(test_mesh *mesh, uint64_t seed);
 
-/* Each cell's vertices by a random symmetry of its kind (rotations and mirrors); faces begun at another vertex and run
- * the other way, a polyhedron's faces in another order. The same geometry and field. */
+/* Reorders each cell's vertices by a random symmetry of its kind (rotations and mirrors); faces begin at another vertex
+ * and run the other way, and a polyhedron's faces are in another order. Geometry and field stay the same. */
 void test_mesh_turn(test_mesh *mesh, uint64_t seed);
 
 /* position * scale + offset. */

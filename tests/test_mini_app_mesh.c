@@ -67,7 +67,7 @@ static void volumes_of_every_kind_fill_the_box_and_faces_meet(void **state)
     }
 }
 
-/* Of a cell with flat faces: cones from vertex 0 over each face's triangles. */
+/* The centroid of a cell with flat faces, by cones from vertex 0 over each face's triangles. */
 static void exact_centroid(const wave_cell_shape *shape, double x[8][3], double centroid[3])
 {
     double volume = 0, e[3][3];
@@ -176,7 +176,7 @@ static void partitions_give_each_cell_to_one_rank(void **state)
     }
 }
 
-/* What a sends to b is what b receives from a: the same cells, in the same order. */
+/* The cells that a sends to b are those that b receives from a, in the same order. */
 static void sends_are_the_other_ranks_receives(void **state)
 {
     (void)state;

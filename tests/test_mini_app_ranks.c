@@ -46,7 +46,7 @@ static int by_id(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Cells (halo included) whose state, and own vertices whose position, differ from those of the whole. */
+/* Counts cells (halo included) and own vertices whose state or position differs from that in the whole. */
 static int count_differences(const model *part, const model *whole)
 {
     int differences = 0;

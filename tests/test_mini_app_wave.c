@@ -1,4 +1,4 @@
-/* The mini-app's physics on one rank: what is conserved, what falls, and how fast it converges to a plane wave. */
+/* The mini-app's physics on one rank: mass is conserved, energy falls, and the solution converges to a plane wave. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -127,8 +127,8 @@ static double bell(double r)
     return exp(-0.5 * r * r);
 }
 
-/* What a downward pulse has become 0.8 later: half of it has turned round at z = -1, where the impedance goes from 1 to
- * 3 (R = (3 - 1) / (3 + 1)), and 1 + R of its pressure has gone on, faster and so stretched by 1.5. */
+/* A downward pulse 0.8 later: half of it was reflected at z = -1, where the impedance goes from 1 to 3 (R = (3 - 1) /
+ * (3 + 1)), and 1 + R of its pressure has gone on, faster and so stretched by 1.5. */
 static double parted_pulse(double z)
 {
     double width = 0.08;
@@ -216,7 +216,8 @@ static void set_bump(model *m, double sharpness)
 
 /* In a box with rigid walls nothing leaves: every flux is taken from one cell and given to another, with the same area
  * and, up to the rounding of the vertices' order, the same value. A step rounds V p / K of each cell by some 60 eps of
- * the terms, which are of the size of the cell's own; 100 steps of random sign, bounded as if all had one. */
+ * the terms, which are about as large as the cell's own; the 100 steps' errors have random signs, but are bounded as if
+ * all had the same. */
 static void mass_is_conserved_between_rigid_walls(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* The tree against brute force over all cells in double: what is built, refitted, and what happens without memory. All
- * of it for both layouts and both builders. */
+/* Compares the tree with brute force over all cells in double, when it is built and refitted, and tests lack of memory,
+ * for both layouts and both builders. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -61,7 +61,7 @@ static void cell_box(const lattice *l, const mmbvh *tree, int64_t cell, double l
     }
 }
 
-/* By the C library, apart from the tree's own rounding. */
+/* Rounds by the C library, not by the tree's own functions. */
 static float float_below(double x)
 {
     const float f = (float)x;
@@ -119,7 +119,7 @@ static void assert_tight_box(const mmbvh *tree, const node_view *node, const nod
     }
 }
 
-/* Not only contained, which mmbvh_check proves, but no larger than need be. */
+/* Boxes are no larger than they need be; mmbvh_check proves that they hold their cells. */
 static void assert_tight(const lattice *l, const mmbvh *tree, const grid_field *field)
 {
     for (int64_t i = 0; i < tree->node_count; i++) {
@@ -317,7 +317,7 @@ static void refitted_ranges_equal_a_fresh_build(void **state)
     free_lattice(&l);
 }
 
-/* Of every kind and layout, with zeros of both signs, and numbers that are no floats where there is room for them. */
+/* Tested for every kind and layout, with zeros of both signs, and in doubles with numbers that are no floats. */
 static void refitted_ranges_are_tight_in_every_layout(void **state)
 {
     (void)state;
@@ -698,7 +698,7 @@ int main(void)
         cmocka_unit_test(failed_allocations_give_an_error_and_leave_nothing),
         cmocka_unit_test(wrong_arguments_are_refused),
     };
-    /* That the layouts hold one tree whoever built it, test_mmbvh_layout shows. */
+    /* test_mmbvh_layout shows that both layouts hold the same tree, by either builder. */
     static const mmbvh_options variants[] = {{.layout = MMBVH_COMPACT, .builder = MMBVH_SAH},
                                              {.layout = MMBVH_REFERENCE, .builder = MMBVH_SAH},
                                              {.layout = MMBVH_COMPACT, .builder = MMBVH_MORTON}};

@@ -24,7 +24,7 @@ typedef struct lattice {
     char *coordinates, *connectivity, *offsets, *types, *ghosts, *values;
 } lattice;
 
-/* In [0, 1), from the bits of i alone. */
+/* A number in [0, 1) from the bits of i alone. */
 static inline double hash_unit(uint64_t i)
 {
     i = (i ^ (i >> 30)) * 0xbf58476d1ce4e5b9u;

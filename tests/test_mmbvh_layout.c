@@ -1,5 +1,5 @@
-/* What the layouts and the builders promise beside a proved tree: boxes of 24 bytes that hold and are tight, grids that
- * fit the mesh, cells of very different sizes told apart, memory. */
+/* Tests what the layouts and builders promise besides a proved tree: boxes of 24 bytes that hold their cells and are
+ * tight, grids that fit the mesh, cells of very different sizes told apart, and memory. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -33,9 +33,9 @@ static mmbvh_statistics assert_proved(const mmbvh *tree, const grid *g, const gr
     return statistics;
 }
 
-/* Boxes at random in a grid at random: sizes and distances from 1e-9 to 1e9, from the whole grid to a point. What is
- * stored holds the box; its lower bound is off by a step and one for rounding, its extent by 1/256 and a sixteenth of a
- * step (mmbvh_compact.h). */
+/* Boxes at random in a grid at random: sizes and distances from 1e-9 to 1e9, from the whole grid to a point. The stored
+ * box holds the given one; its lower bound is off by a step and one for rounding, its extent by 1/256 and a sixteenth
+ * of a step (mmbvh_compact.h). */
 static void compact_box_holds_and_is_tight(void **state)
 {
     (void)state;
@@ -264,7 +264,7 @@ static void curve_costs_little_more_than_planes(void **state)
     }
 }
 
-/* 16 bytes a cell of tets for the tree, and while it is built at most 2.5 times that of the tree. 178,746 tets. */
+/* The tree of 178,746 tets takes 16 bytes a cell, and building it at most 2.5 times as much. */
 static void memory_is_what_was_promised(void **state)
 {
     (void)state;

@@ -13,8 +13,8 @@
 
 enum { SIDE = 7, LARGE_SIDE = 15 /* cells for several blocks of several threads */, WISHES = 5 };
 
-/* A single isovalue, several, and what a transfer function shows; and the least and the greatest of all values, that
- * one vertex has. */
+/* One isovalue, several, the ranges that a transfer function shows, and the least and greatest of all values, which one
+ * vertex has. */
 static const mmbvh_interval at_one[] = {{0.25f, 0.25f}}, at_three[] = {{-1, -1}, {0.1f, 0.1f}, {0.9f, 0.9f}},
                             in_two[] = {{-0.4f, -0.3f}, {1, INFINITY}}, at_least[] = {{-2, -2}}, at_most[] = {{2, 2}};
 

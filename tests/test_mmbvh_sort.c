@@ -1,4 +1,4 @@
-/* Morton keys come out in ascending order, whatever they are: against qsort(). */
+/* Any Morton keys come out in ascending order, compared with qsort(). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -44,7 +44,7 @@ static uint64_t refined(uint64_t random, int64_t i, int bits)
     return even(random, i, bits) >> (random >> 58) % (unsigned)bits;
 }
 
-/* All in one place but for one. */
+/* All keys are the same, except one. */
 static uint64_t outlier(uint64_t random, int64_t i, int bits)
 {
     return i ? even(random, i, bits) >> bits / 2 : (UINT64_C(1) << bits) - 1;

@@ -101,9 +101,8 @@ static node_view box_by_hand(const subject *s, int64_t leaf)
     return box;
 }
 
-/* Goes down as a traversal does; returns what the nodes below hold that can be seen. slack: of float32 and of the
- * compact layout's steps, as a share of the mesh's size: 2 steps of its 2^20 and 1/256 of the box, which is as wide as
- * a leaf. */
+/* Goes down as a traversal does; returns the bounds of all below that can be seen. The slack, as a share of the mesh's
+ * size, is for float32 and the compact layout: 2 of its 2^20 steps and 1/256 of the box, which is as wide as a leaf. */
 static node_view assert_holds(const subject *s, int64_t i, int64_t *visited)
 {
     ++*visited;
@@ -124,7 +123,7 @@ static node_view assert_holds(const subject *s, int64_t i, int64_t *visited)
     return held;
 }
 
-/* By the fixed order of sums any number of threads makes the same tree, and measures the same. */
+/* Sums have a fixed order, so any number of threads makes the same tree and measures the same area. */
 static void assert_same_by_one_thread(const subject *s, const mmbvh *before)
 {
     mmbvh again = *before;
@@ -182,7 +181,7 @@ static void check(subject *s)
     assert_int_equal(mmbvh_refit_bounds(&whole, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_true(visited > 100 && visited < s->tree.node_count);
     assert_true(count_stale(s, &before, &whole) > s->tree.node_count / 10);
-    /* What was passed over is caught up with by a whole refit. */
+    /* A whole refit catches up on nodes that were passed over. */
     assert_int_equal(mmbvh_refit_bounds(&s->tree, &s->l.g, &(mmbvh_options){.threads = 2}), INSITU_OK);
     assert_same_nodes(&s->tree, &whole);
     assert_int_equal(mmbvh_check(&s->tree, &s->l.g, &s->l.field, NULL, NULL), INSITU_OK);
@@ -203,8 +202,8 @@ static void bounds_hold_what_shows_and_stay_where_nothing_does(void **state)
         }
 }
 
-/* The area that refits carry on is what a pass over all nodes finds: n sums of positive doubles and as many of their
- * differences are off by 2 n 2^-53 of the largest sum at most. */
+/* The area that refits keep up to date is what a pass over all nodes finds: n sums of positive doubles and as many
+ * differences are off by at most 2 n 2^-53 of the largest sum. */
 static void area_is_carried_on(void **state)
 {
     (void)state;

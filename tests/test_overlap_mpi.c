@@ -155,7 +155,7 @@ static void free_image(image *picture)
     free(picture->depth);
 }
 
-/* As the session would: the share of this rank, drawn by all. */
+/* Draws as the session would: all ranks draw, each its share. */
 static int64_t draw_shares(const test_mesh *mesh, test_partition_kind partition, const drawing *d, image *out)
 {
     test_mesh share;
@@ -177,9 +177,9 @@ static void assert_everywhere(bool is_well)
 
 /* ---- comparisons --------------------------------------------------------------------------------------------- */
 
-/* Samples of one place mix alike whoever made them; elsewhere "over" rounds in other groups, to 1e-6. An open end: by
- * segments, whether a pixel whose overlap is clear is drawn twice depends on the partition, and the second drawing cuts
- * otherwise: both are within max_error. Measured: 2.7e-6 for 1e-3. */
+/* Samples of one place mix alike on any ranks; elsewhere "over" rounds in other groups, to 1e-6. Segments are an open
+ * end: the partition decides whether a pixel whose overlap is transparent is drawn twice, and the second drawing cuts
+ * in other places. Both are within max_error; 2.7e-6 was measured for 1e-3. */
 static bool same_images(const image *whole, const image *other, const drawing *d, const char *what)
 {
     int depths = 0;
@@ -288,7 +288,7 @@ static void compare(const test_mesh *mesh, const drawing *d, bool with_reference
         /* Segments of several volumes are not first drawn as if nothing overlapped. */
         const bool is_found = (overlaps >= FEWEST && alone >= FEWEST) || (d->max_error > 0 && d->scene == TWO_VOLUMES);
         good = is_found && same_images(&whole, &ours, d, what);
-        /* Slow, and once is enough: on any ranks the picture is that of one. */
+        /* This is slow, and once is enough, because the picture is the same on any number of ranks. */
         if (with_reference && (rank_count == 1 || test_is_whole()))
             good = (d->max_error > 0 ? is_as_integrated : is_as_counted)(mesh, d, &ours, what) && good;
         free_image(&whole);
@@ -356,7 +356,7 @@ static void tangled_lattices_are_the_same_everywhere(void **state)
     }
 }
 
-/* Turns differ in nothing but when a pixel is drawn. */
+/* Turns only change when a pixel is drawn. */
 static void turns_make_the_same_bits(void **state)
 {
     (void)state;
@@ -383,8 +383,9 @@ static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partitio
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             image drawn;
             const drawing d = {scene, camera, (int)camera, MANY, max_error, false};
-            /* Open: a hit that rounding has behind the face at its cell's end is within the next cell's segment, and if
-             * that is another rank's the pixel is drawn twice, and counts. Two volumes are mixed throughout. */
+            /* This is open: a hit that rounding puts behind the face at its cell's end is within the next cell's
+             * segment, and if that is another rank's, the pixel is drawn twice and counts. Two volumes are mixed in all
+             * pixels. */
             if (scene != VOLUME && max_error > 0) continue;
             const int64_t overlaps = draw_shares(mesh, partition, &d, &drawn);
             free_image(&drawn);

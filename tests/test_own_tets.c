@@ -79,7 +79,8 @@ static void draw(const test_mesh *mesh, double cell_size, const double *value, i
     fixture_draw(f, out);
 }
 
-/* In double: does the ray pass so near to an edge, or to the isovalue at a face of a tet, that rounding may decide? */
+/* Tells, in double, whether the ray passes so near to an edge, or to the isovalue at a face of a tet, that rounding may
+ * decide. */
 static bool is_in_band(const reference_scene *scene, int x, int y)
 {
     reference_ray ray;

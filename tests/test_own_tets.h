@@ -4,8 +4,8 @@
 
 #include "test_meshes.h"
 
-/* Of a mesh of polyhedra the tets of their canonical triangles and their centres, which are vertices of their own. A
- * cell that is not star-shaped has tets that overlap: it becomes a ghost, and has none. Returns how many do. */
+/* Makes the tets on the canonical triangles of a mesh's polyhedra, with the cells' centres as new vertices. The tets of
+ * a cell that is not star-shaped overlap: it becomes a ghost without tets. Returns how many such cells there are. */
 int64_t test_own_tets(test_mesh *mesh, test_mesh *out);
 
 typedef struct own_tets_tally {

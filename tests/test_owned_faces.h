@@ -11,8 +11,8 @@ typedef struct label_list {
     int32_t *labels;
 } label_list;
 
-/* Faces in the order of finite volume codes: inner ones first. Beside the arrays of 8 bytes those of 4 that count from
- * base, pairs of owner and neighbour, and lists. */
+/* Faces in the order of finite-volume codes, inner ones first. Besides the arrays of 8 bytes there are those of 4 bytes
+ * that count from base, pairs of owner and neighbour, and lists. */
 typedef struct owned {
     int64_t inner;
     int64_t *owner, *neighbour, *offsets, *vertices;
@@ -24,9 +24,8 @@ typedef struct owned {
 owned make_owned(const test_mesh *part, int32_t base);
 void free_owned(owned *o);
 
-/* FORM_WIDE: 8 bytes, from 0, neighbours of inner faces alone. FORM_PAIRS: 4 bytes, from base, owners and neighbours in
- * turn, as many as faces; on the boundary -1, or base - 1. FORM_LISTS: the same with a list of vertices for each face.
- */
+/* FORM_WIDE: 8 bytes, from 0, neighbours for inner faces only. FORM_PAIRS: 4 bytes, from base, owners and neighbours in
+ * turn, for all faces; -1, or base - 1, on the boundary. FORM_LISTS: the same with a list of vertices for each face. */
 typedef enum form { FORM_WIDE, FORM_PAIRS, FORM_LISTS, FORM_COUNT } form;
 
 /* Describe the faces so, in place of the cells' connectivity. */

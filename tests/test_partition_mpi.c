@@ -1,8 +1,8 @@
 /* One image from any number of ranks: each rank draws its part of a mesh, dealt in blocks, at random or as a
  * checkerboard, with vertices of its own numbering, and compositing makes the picture; rank 0 draws the whole alone and
- * compares. Surfaces: the depth image the same bits everywhere, and the colours too. Volumes, by samples, by segments
- * and to an error: within 1e-6, for fragments blend in other groups. Ranks without a cell, without a mesh, and ranks
- * that hold the others' cells as ghosts take part. */
+ * compares. Surfaces have the same bits in depth and colours. Volumes by samples, by segments and to an error agree
+ * within 1e-6, as fragments blend in other groups. Ranks without a cell, without a mesh, and ranks that hold the
+ * others' cells as ghosts take part. */
 #include "comp.h"
 #include "memory.h"
 #include "test_render_fixture.h"
@@ -99,7 +99,7 @@ static bool same_images(const image *whole, const image *other, const scene *sce
     return !depths && colour <= bound;
 }
 
-/* This rank's share: ghosts: all cells, those of others as ghosts. */
+/* Takes this rank's share; with ghosts, all cells, with those of others as ghosts. */
 static void take_part(const test_mesh *mesh, const int *owners, bool ghosts, test_mesh *out)
 {
     int *all = calloc((size_t)mesh->cell_count, sizeof *all);

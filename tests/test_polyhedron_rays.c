@@ -3,9 +3,9 @@
  * is in the cell the field is the sum over the tets there, each with its sign.
  *
  * What rounding may decide. Places are off by some 3e-6 of the scene in all: vertices by half a unit of 1 along each
- * axis (1e-7), crossings of sheets by what their weights' roundings may move them, 2.4e-7 along the ray and four times
- * as much across (kernel_cell.h), and where tets overlap sums are taken up to 16 times 2.4e-7 beside a sheet. So values
- * are off by that times the field's slope, and by 2e-6 of their range, some ten roundings of theirs: the band. A
+ * axis (1e-7), crossings of sheets by the roundings of their weights, 2.4e-7 along the ray and four times as much
+ * across (kernel_cell.h), and where tets overlap sums are taken up to 16 times 2.4e-7 beside a sheet. So values are off
+ * by that times the field's slope, and by some ten roundings of their own, 2e-6 of their range: this is the band. A
  * crossing is certain where the field passes from beyond the band on one side to beyond it on the other within one stay
  * of the ray in the cell. Each must have a hit, and a hit must be where the field comes within the band. Rays that pass
  * an edge of the cell at less than the error of places may miss the cell or not, and do not count. */
@@ -271,7 +271,7 @@ static bool next_stay(const span *spans, int count, const double *ends, int *nex
     return p->count > 0;
 }
 
-/* What of the path is before the eye. */
+/* Keeps the part of the path before the eye. */
 static void cut_at_eye(path *p)
 {
     int first = 0;
@@ -351,7 +351,7 @@ static bool judge_path(const judge *j, const path *p, double band, const ray_hit
     return true;
 }
 
-/* Where tets overlap the slopes of a sum's terms add up, mostly of three. */
+/* Where tets overlap, the slopes of a sum's terms add up, mostly three of them. */
 static double band_of(const judge *j, const span *spans, int count)
 {
     double steepest = 0;
@@ -392,7 +392,7 @@ static void hits_of(const render_fixture *f, const drawn_frame *drawn, int64_t p
 
 /* ---- frames ---- */
 
-/* From a random side, now and then from the inside or without perspective. */
+/* Looks from a random side, now and then from the inside or without perspective. */
 static void look_at_random(render_fixture *f, uint64_t seed)
 {
     const double angle = test_uniform_in(0, seed, 0, 6.283), height = test_uniform_in(1, seed, -0.9, 0.9);
@@ -508,9 +508,9 @@ static bool passes(const subject *s, const reference_line *line, double value)
     return false;
 }
 
-/* A prism on a hook, in whose stem the centre is: the tets of the hook's two sides, one with its sign turned, reach
- * through the stem. On the inner one values are -1, else 1, and the sum at the stem's wall is some
- * 1 + 1.5 / 4 + 0.5 / 6. */
+/* Makes a prism on a hook with the centre in its stem: the tets of the hook's two sides, one of them with negative
+ * sign, reach through the stem. Values are -1 on the inner side, else 1, and the sum at the stem's wall is some 1 + 1.5
+ * / 4 + 0.5 / 6. */
 static void make_hook(test_mesh *out)
 {
     static const double base[8][2] = {{-1.2, -0.5}, {0, -0.5},   {0, 0.3},   {0.3, 0.3},

@@ -246,7 +246,8 @@ static void trilinear_field_is_exact_in_a_box(void **state)
     test_mesh_free(&mesh);
 }
 
-/* Of any field the gradient is what central differences say: error h²·f''' ~ 1e-9 and rounding 1e-15 / h ~ 1e-10. */
+/* For any field the gradient agrees with central differences: their error is h²·f''' ~ 1e-9 and rounding 1e-15 / h ~
+ * 1e-10. */
 static void gradient_agrees_with_differences(void **state)
 {
     (void)state;
@@ -357,7 +358,7 @@ static void frame_setup(frame_fixture *f, test_mesh_kind kind, bool is_orthograp
     if (is_orthographic) f->job.camera.half_height = 1.5;
 }
 
-/* Where the ray is inside the cube [-1, 1]^3. */
+/* Finds where the ray is inside the cube [-1, 1]^3. */
 static bool cube_interval(const double *base, const double *direction, double *low, double *high)
 {
     *low = 0;
@@ -390,8 +391,8 @@ static void isosurface_of_a_linear_field_is_its_plane(void **state)
             if (!inside) continue;
             hits++;
             if (ray.ambiguous) {
-                /* On a warped face the face's value is that of the bilinear patch, which the split triangles leave by
-                 * up to a tenth of a cell here: a root between the two is found at the face. */
+                /* On a warped face the face's value is that of the bilinear patch, from which the split triangles
+                 * differ by up to a tenth of a cell here: a root between the two is found at the face. */
                 assert_true(fabs(ray.hits[0].depth - z) < 0.1 * 2 / 3 * ray.hits[0].conditioning);
                 ambiguous++;
                 continue;

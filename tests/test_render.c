@@ -18,7 +18,7 @@ static const double linear_values[3] = {-0.6, 0.1, 0.5};
 static void assert_few_ambiguous(const fixture_outcome *o, double share)
 {
     if ((double)o->ambiguous > share * (double)o->rays) fail_msg("%d of %d ambiguous", (int)o->ambiguous, (int)o->rays);
-    /* Of 64 steps of regula falsi. */
+    /* These are rays that took 64 steps of regula falsi. */
     if ((double)o->slow > 0.01 * (double)o->rays) fail_msg("%d of %d slow", (int)o->slow, (int)o->rays);
 }
 
@@ -160,9 +160,9 @@ static double ray_linear(const render_camera *camera, int pixel, double *at_base
     return 0.3 * d[0] - 0.7 * d[1] + 0.5 * d[2];
 }
 
-/* The surface of a linear field is its plane: in plane-faced cells by Neubauer's method, in warped ones by robust
- * roots. Float32 positions and values err by a few 6e-8 of the mesh's size (value 1.6 at most); the ray's slope turns
- * that into depth. */
+/* The surface of a linear field is its plane: found in cells with plane faces by Neubauer's method, in warped ones by
+ * robust roots. Float32 positions and values err by a few 6e-8 of the mesh's size (value 1.6 at most); the ray's slope
+ * turns that into depth. */
 static void compare_plane(test_mesh_kind kind, fixture_camera camera, bool is_robust)
 {
     render_fixture f;
@@ -193,8 +193,8 @@ static void linear_surface_is_a_plane_in_every_kind(void **state)
             for (int is_robust = 0; is_robust < 2; is_robust++) compare_plane(kind, camera, is_robust);
 }
 
-/* A constant opacity: every ray's transmittance is that of the number of samples in the cube, on lattice lines as well:
- * no sample is lost or counted twice at a face, an edge or a vertex. */
+/* With constant opacity every ray's transmittance follows from the number of samples in the cube, on lattice lines as
+ * well: no sample is lost or counted twice at a face, an edge or a vertex. */
 static void constant_volume_counts_every_sample_once(void **state)
 {
     (void)state;
@@ -465,7 +465,7 @@ static void surface_coloured_by_the_field_is_the_reference(void **state)
     }
 }
 
-/* N of Neubauer's method: what is left of the error after each, in cells; the hits are the same for all. */
+/* Steps N of Neubauer's method: the error after each, in cells; all have the same hits. */
 static void root_steps_lessen_the_error(void **state)
 {
     (void)state;
@@ -517,7 +517,7 @@ int main(void)
         cmocka_unit_test(root_steps_lessen_the_error),
         cmocka_unit_test(one_pixel_images_are_the_reference),
     };
-    /* What draws by itself, by each set. */
+    /* Tests that draw by themselves, by each instruction set. */
     const struct CMUnitTest of_a_set[] = {
         cmocka_unit_test(volume_between_many_surfaces_is_the_reference),
         cmocka_unit_test(constant_volume_counts_every_sample_once),

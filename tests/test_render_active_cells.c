@@ -1,5 +1,5 @@
-/* Kept cells change no bit of a picture, whatever is kept and whatever comes after; they are as many as the meshes say,
- * and their memory comes back. */
+/* Kept cells change no bit of a picture, whichever are kept and whatever is drawn afterwards; their number follows from
+ * the meshes, and their memory is freed. */
 #include "memory.h"
 #include "pixel_set.h"
 #include "test_effort.h"
@@ -55,8 +55,8 @@ static int64_t compare(render_fixture *f, render_active_cells *kept, const char 
     return without.count;
 }
 
-/* From all cameras in turn and the first again (or all, twice), by so many threads or less; what is kept by the first
- * serves the others. */
+/* Draws from all cameras in turn and the first again (or all, twice), by at most so many threads; the cells that the
+ * first keeps serve the others. */
 static void look_around_by(render_fixture *f, render_active_cells *kept, int threads, const char *what)
 {
     int64_t fragments = 0, bytes = 0;
@@ -209,7 +209,7 @@ static void ghosts_are_not_kept(void **state)
     }
 }
 
-/* More cells show than a picture lists: tiles go down the tree, and what is kept is passed by. */
+/* More cells show than a picture lists, so tiles go down the tree and do not use kept cells. */
 static void small_pictures_of_many_cells_draw_the_same(void **state)
 {
     (void)state;
@@ -284,7 +284,7 @@ static void other_meshes_and_layouts_are_not_kept(void **state)
         }
 }
 
-/* Layers that want more of a cell than is kept. Tets are kept whatever the roots are found by: they have one. */
+/* Layers that need more of a cell than is kept. Tets are kept for any root finder, as they have one root. */
 static void layers_that_want_more_are_not_kept(void **state)
 {
     enum { COLOURED, DIFFERENCES, TRANSPARENT, NEUBAUER, CASE_COUNT };
@@ -385,8 +385,8 @@ static void layers_of_two_fields_draw_the_same(void **state)
             }
 }
 
-/* The same isovalues of two fields, and two sets of them of one field, are not taken for each other when layers come
- * and go; what is there serves all frames that have it. */
+/* The same isovalues of two fields, and two sets of isovalues of one field, are not confused when layers come and go;
+ * kept cells serve all frames that have their layer. */
 static void layers_are_told_apart(void **state)
 {
     (void)state;
@@ -470,8 +470,8 @@ static void parts_draw_the_same(void **state)
 
 /* ---- numbers -------------------------------------------------------------------------------------------------- */
 
-/* By one thread: cells whose vertices are of sizes a float apart from the others' cover each other within rounding, so
- * that their pictures depend on the order in which threads find them, with kept cells and without. */
+/* One thread draws: surfaces in cells with values far larger or smaller than the others' cover each other within
+ * rounding, so their pictures depend on the order in which threads find them, with and without kept cells. */
 static void odd_values_draw_the_same(void **state)
 {
     (void)state;
@@ -546,7 +546,7 @@ static void odd_isovalues_draw_the_same(void **state)
         }
 }
 
-/* Some vertices are far out, beyond what is kept. */
+/* Some vertices are too far out for cells to be kept. */
 static void vertices_far_out_are_not_kept(void **state)
 {
     (void)state;
@@ -668,7 +668,7 @@ static void more_than_the_bound_draws_the_same(void **state)
         f.job.surface_count = LAYERS;
         f.job.threads = threads;
         for (int turn = 0; turn < 3; turn++) {
-            /* A picture that lists fewer cells than show; one that has few of them; one that lists all. */
+            /* One picture lists fewer cells than show, one has few cells, and one lists all. */
             const bool is_large = turn == 2;
             fixture_look(&f, turn == 1 ? CAMERA_INSIDE : CAMERA_OUTSIDE, is_large ? 900 : 48, is_large ? 700 : 40);
             if (turn == 1) f.job.camera.half_height = 0.01;
@@ -682,7 +682,7 @@ static void more_than_the_bound_draws_the_same(void **state)
     }
 }
 
-/* With the n-th allocation failing the frame is the same, or has failed; so is the next one, and nothing is lost. */
+/* If the n-th allocation fails, the frame is the same or has failed; so has the next one, and nothing is lost. */
 static bool draws_without_the_nth(render_fixture *f, const fragment_list *expected, int64_t n)
 {
     const int64_t held = base_memory_held();

@@ -66,8 +66,8 @@ static void batches_draw_what_single_cells_do(void **state)
             }
 }
 
-/* Hexes are placed together, or where coordinates or indices are wide one by one, whatever their vertices' order; some
- * have an edge of no length, so that two of their faces are triangles. */
+/* Hexes with any order of vertices are placed together, or one by one where coordinates or indices are wide; some have
+ * an edge without length, so that two of their faces are triangles. */
 static void hexes_are_numbered_anyhow(void **state)
 {
     (void)state;
@@ -88,7 +88,7 @@ static void hexes_are_numbered_anyhow(void **state)
         }
 }
 
-/* What waits for a batch is of one mesh and one layer. */
+/* The cells of a batch are of one mesh and one layer. */
 static void meshes_and_layers_take_turns(void **state)
 {
     (void)state;
@@ -124,8 +124,7 @@ static void ties_are_kept(void **state)
     }
 }
 
-/* Values of no usual size, from nearly nothing to what is no number: such cells are found one by one, and in one vector
- * with others. */
+/* Cells with values of unusual size, from tiny ones to NaN, are found one by one, and in one vector with others. */
 static void odd_values_are_found_one_by_one(void **state)
 {
     static const float opacity[1] = {0.3f};

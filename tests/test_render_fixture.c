@@ -1,8 +1,8 @@
 /* Frames for the tests of the renderer.
  *
  * A ray counts unless the reference says that rounding may turn one of its decisions: within margin of an edge of a
- * cell, of a face value equal to an isovalue, of a sample at a cell's end or a hit at the eye. Those are excluded and
- * their share is bounded. Rays on which a cell has several roots, or a warped face speaks against the interior (its
+ * cell, of a face value equal to an isovalue, of a sample at a cell's end or a hit at the eye. Other rays are excluded,
+ * and their share is bounded. Rays on which a cell has several roots, or a warped face contradicts the interior (its
  * value is the bilinear patch's, its place the split triangles'), count for hit or miss but not for depth. */
 #include "test_render_fixture.h"
 
@@ -21,8 +21,8 @@
 
 const float fixture_background[4] = {0.05f, 0.1f, 0.15f, 0.5f};
 
-/* Margin: float32 rounding of positions near a size of 1 is 6e-8, in cells of 1/3 some 2e-7, a few of them 1e-6. A
- * pixel meets some 20 cells of 12 edges: a share of 20 · 12 · 2e-6 · (1 / pixels of a cell's width) is below 1e-3. */
+/* The margin: float32 rounds positions near 1 by 6e-8, which is some 2e-7 of cells of 1/3; a few such errors make 1e-6.
+ * A pixel meets some 20 cells of 12 edges: a share of 20 · 12 · 2e-6 · (1 / pixels of a cell's width) is below 1e-3. */
 const fixture_bounds fixture_usual_bounds = {.depth = 1e-5, .colour = 1e-5, .excluded = 2e-3, .margin = 1e-6};
 
 static const float surface_colours[4][3] = {
@@ -111,7 +111,8 @@ void fixture_look(render_fixture *f, fixture_camera camera, int width, int heigh
     assert_true(render_camera_look_at(c, eye, focal, (const double[]){0, 1, 0}, angle, width, height));
     if (camera != CAMERA_OUTSIDE && camera != CAMERA_INSIDE) {
         c->is_orthographic = true;
-        /* Along x, pixels of a sixteenth: their centres fall on lattice planes for n = 4 and images of odd height. */
+        /* Along x, pixels are a sixteenth wide, so that their centres fall on lattice planes for n = 4 and images of
+         * odd height. */
         c->half_height = (camera == CAMERA_ALONG_X ? height / 32.0 : 1.5) * f->scale;
     }
     for (int axis = 0; axis < 3; axis++) depth += c->forward[axis] * (f->offset[axis] - c->eye[axis]);

@@ -60,7 +60,7 @@ typedef struct fixture_function {
 void fixture_set_function(render_fixture *f, fixture_function *function, uint64_t seed, bool step, double most,
                           double unit);
 
-/* What came of a frame. */
+/* The results of a frame. */
 typedef struct drawn_frame {
     image picture;      /* over the background of fixture_background */
     fragment_list list; /* as made, then sorted by pixel and depth */
@@ -74,12 +74,13 @@ extern const float fixture_background[4];
 double fixture_depth(const render_fixture *f, float t);
 
 void fixture_draw(const render_fixture *f, drawn_frame *out);
-/* The instruction sets of this machine, up to that of INSITU_ISA, by number: fixture_use_set() chooses the one that
- * frames are drawn by from then on, which is the best until it is called. A truth serves all of them. */
+/* The instruction sets of this machine, up to that of INSITU_ISA, by number. fixture_use_set() chooses the one for all
+ * later frames; before, it is the best. One truth serves all of them. */
 int fixture_set_count(void);
 const char *fixture_set_name(int set);
 void fixture_use_set(int set);
-/* For programs that run once a set: whether INSITU_ISA names one that this machine lacks. They then end by 77. */
+/* For programs that run once for each set: tells whether INSITU_ISA names one that this machine lacks. They then return
+ * 77. */
 bool fixture_lacks_set(void);
 /* Each fixture drawn as a rank of its own, all their fragments merged. */
 void fixture_draw_apart(const render_fixture *fixtures, int count, drawn_frame *out);

@@ -1,5 +1,5 @@
-/* What must not change a picture: threads, groups of samples, the order and numbering of cells and vertices, layouts,
- * how cells are dealt to parts and ranks, ghosts; and what values that are not finite may change. */
+/* Pictures must not change with threads, groups of samples, the order and numbering of cells and vertices, layouts, the
+ * dealing of cells to parts and ranks, and ghosts; values that are not finite may change only their own cells. */
 #include "memory.h"
 #include "pixel_set.h"
 #include "test_render_fixture.h"
@@ -16,7 +16,7 @@ static const double values[2] = {-0.2, 0.3};
 static const double origin[3] = {0, 0, 0};
 static const test_layout wide = {.wide_coordinates = true, .wide_values = true};
 
-/* What is drawn: an opaque surface, transparent ones, a volume, and mixtures. */
+/* The scenes: an opaque surface, transparent ones, a volume, and mixtures. */
 typedef enum scene_kind { OPAQUE, TRANSPARENT, VOLUME, OPAQUE_VOLUME, TRANSPARENT_VOLUME, SCENE_COUNT } scene_kind;
 
 static void add_layers(render_fixture *f, scene_kind scene)
@@ -149,10 +149,10 @@ static void refused_tiles_end_the_frame(void **state)
     assert_int_equal(base_memory_held(), held);
 }
 
-/* The picture at once, a tile, a packet, each ray on its own: the same cells are met, or at least those that have a
- * hit, or samples. Of samples alone, tiles find the values in cells' own coordinates, which are known to 5e-7 there,
- * and packets between crossings: values differ by that times the field's change across a cell, which is about the
- * transfer function's range, and pixels by less than four times as much, as each has its samples' light once. */
+/* Cells are found for the picture at once, for a tile, for a packet and for each ray: the same cells are met, or at
+ * least those with a hit or samples. For samples alone, tiles find values in cells' own coordinates, which are known to
+ * 5e-7, and packets between crossings. So values differ by that times the field's change across a cell, which is about
+ * the transfer function's range, and pixels by less than four times as much, as each has its samples' light once. */
 static void draw_by_traversals(render_fixture *f, bool samples_alone)
 {
     enum { TRAVERSALS = 4 };
@@ -261,9 +261,9 @@ static double depth_difference(const drawn_frame *a, const drawn_frame *b)
     return worst;
 }
 
-/* A cell told by another of its symmetries has the same faces, so the same hits to the bit of the decision; the map
- * inside is written in other coordinates and rounds otherwise: t to some 1e-7 times the conditioning, of which 61 × 47
- * rays have some of 30. */
+/* A cell written in another of its symmetries has the same faces, so exactly the same rays hit it. The map inside has
+ * other coordinates and rounds differently: t to some 1e-7 times the conditioning, which is up to 30 among 61 × 47
+ * rays. */
 static void turned_cells_draw_the_same(void **state)
 {
     (void)state;
@@ -321,7 +321,7 @@ static void layouts_do_not_change_a_bit(void **state)
 
 /* ---- parts and ranks ---- */
 
-/* The mesh's cells dealt out; ghosts: every part holds all cells, those of others as ghosts. */
+/* Deals the mesh's cells out. With ghosts, every part holds all cells, with those of others as ghosts. */
 static void deal(const test_mesh *mesh, test_partition_kind partition, int n, int parts, bool ghosts, test_mesh *out)
 {
     int *owners = malloc((size_t)mesh->cell_count * sizeof *owners);
@@ -379,8 +379,8 @@ static void compare_dealt(test_mesh_kind kind, scene_kind scene, test_partition_
     test_mesh_free(&mesh);
 }
 
-/* Of two meshes that lie through each other: windows of three samples, so that most cells lie in several, and of all.
- * Tets of narrow arrays go through vectors from their indices on. */
+/* Draws two meshes that lie through each other, with windows of three samples, so that most cells lie in several, and
+ * of all samples. Tets of narrow arrays are read by vectors. */
 static void compare_volume_traversals(test_mesh_kind kind, scene_kind scene, fixture_camera camera, test_layout layout)
 {
     render_fixture f;
@@ -518,7 +518,7 @@ static bool touches(const test_mesh *mesh, int64_t cell)
     return false;
 }
 
-/* By samples, by exact segments, and by segments to an error. */
+/* Draws by samples, by exact segments, or by segments to an error. */
 static void draw_opaque_ends(const test_mesh *mesh, scene_kind scene, int way, drawn_frame *out)
 {
     static const float opaque_ends[3] = {0.6f, 0.1f, 0.5f};
@@ -583,8 +583,8 @@ static void constant_equal_to_the_isovalue_has_no_surface(void **state)
     }
 }
 
-/* x alone: whole planes of vertices hold the isovalue 0 exactly. A ray through an edge that lies in the surface passes
- * cells where the value is zero to rounding, on either side: its hits are an odd number at one place. */
+/* The field is x: whole planes of vertices hold the isovalue 0 exactly. A ray through an edge that lies in the surface
+ * passes cells where the value is zero to rounding, on either side: its hits are an odd number at one place. */
 static double plane_field(const double p[3])
 {
     return p[0];

@@ -1,6 +1,6 @@
-/* Every instruction set against the plain C kernels. The set is chosen once a process, so that this program runs
- * itself: with a file's name it draws its scenes with whatever INSITU_ISA says and writes colours and depths there;
- * without, it has that done for each set and compares.
+/* Every instruction set against the plain C kernels. The set is chosen once a process, so this program runs itself:
+ * with a file's name it draws its scenes by the set of INSITU_ISA and writes colours and depths there; without one it
+ * runs itself so for each set, and compares.
  *
  * The sets differ in how wide a packet is, which must change nothing, and in where a multiply and an add are fused,
  * which changes roundings: t by some 6e-8 times the conditioning, a colour by as much times the slopes of shading. */
@@ -24,8 +24,8 @@ enum {
 
 static const char *program;
 
-/* By segments, with steps and a narrow ramp of the opacity: stretches are halved in double (kernel_cell_segments.h), ray
- * by ray, from the caller's coordinates. */
+/* Draws by segments, with steps and a narrow ramp of the opacity: stretches are halved in double
+ * (kernel_cell_segments.h), ray by ray, from the caller's coordinates. */
 static void set_steps(render_fixture *f)
 {
     static const double values[6] = {-0.7, -0.15, -0.15, 0.3, 0.301, 0.7};
@@ -72,7 +72,7 @@ static int dump(const char *path)
     return good ? 0 : 1;
 }
 
-/* What the set drew: FRAMES × NUMBERS; used gets the set that ran. */
+/* The numbers that the set drew, FRAMES × NUMBERS; used gets the set that ran. */
 static float *drawn_with(const char *isa, char used[16])
 {
     char path[512], command[1200];

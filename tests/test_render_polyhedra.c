@@ -29,8 +29,8 @@ static const char *case_name(const char *what, fixture_camera camera)
 }
 
 /* Prisms on bases that are not convex, spikes, a cavity. The fan of the U's base folds over itself in its plane: rays
- * cross triangles that lie on each other, in an order that rounding decides. For a linear field that is nothing, for
- * others the triangles' values differ, and there is no telling. */
+ * cross triangles that lie on each other, in an order that rounding decides. That does not matter for a linear field;
+ * for others the triangles' values differ, and no result is right. */
 static void compare_shape(test_polyhedron_shape shape, fixture_camera camera, bool is_linear, render_root root)
 {
     test_mesh mesh;
@@ -79,9 +79,9 @@ static void aim_at_spoke(render_fixture *f, const test_mesh *mesh, uint64_t ray)
 }
 
 /* Where tets of the cell overlap, the field is a sum over those that hold the place, and rounding may put the ends of
- * neighbours in the wrong order: on rays through the line that many of them share it does. A wrong sum is another
- * tet's value, off by tenths; float32's values err by some 1e-6, the length in a steep stretch of the function by as
- * much. The field is continuous: what the ray's own rounding does to the sum is of that size as well. */
+ * neighbours in the wrong order, as it does on rays through the line that many of them share. A wrong sum would be off
+ * by another tet's value, some tenths; float32's values err by some 1e-6, and so does the length in a steep stretch of
+ * the function. As the field is continuous, the ray's own rounding changes the sum by no more than that. */
 static void sums_through_spokes_are_the_reference(void **state)
 {
     static const test_polyhedron_shape shapes[3] = {TEST_L_PRISM, TEST_BENT_SPIKES, TEST_CAVITY};
@@ -184,7 +184,7 @@ static void tets_given_as_polyhedra_are_tets(void **state)
     }
 }
 
-/* Intervals are the same bits whichever of a face's cells is a polyhedron: nothing between them, nothing twice. */
+/* Intervals have the same bits whichever of a face's cells is a polyhedron, so nothing is lost or counted twice. */
 static void intervals_of_polyhedra_are_those_of_the_types(void **state)
 {
     (void)state;
@@ -289,7 +289,7 @@ static void random_ownership_changes_nothing(void **state)
     }
 }
 
-/* Under valgrind those that a pattern names. */
+/* Under valgrind only the tests that a pattern names run. */
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {

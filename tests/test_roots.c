@@ -3,9 +3,9 @@
  *
  * What rounding may decide: the field's eight coefficients are sums of up to 8 values of at most 1, rounded to float32
  * (half a unit of 1, 3 of 2, 3 of 4 and 1 of 8: 27 · 6e-8 = 1.6e-6), its evaluation rounds some ten times at the size
- * of its terms (6e-7 · 2), and coordinates are off by 2e-7 against slopes of at most some 4. So the sign of a |F| below
- * band = 4e-6 is not told by float32. A crossing is certain where the cubic passes from beyond band on one side to
- * beyond band on the other: the first hit must not come after that, and every hit must lie within band of 0. */
+ * of its terms (6e-7 · 2), and coordinates are off by 2e-7 against slopes of at most some 4. So float32 cannot tell the
+ * sign of F where |F| is below band = 4e-6. A crossing is certain where the cubic passes from beyond band on one side
+ * to beyond band on the other: the first hit must not come after that, and every hit must lie within band of 0. */
 #include <math.h>
 
 #include "kernel_cell.h"
@@ -65,7 +65,7 @@ static long double at(const cubic *g, long double t)
     return ((g->c[3] * t + g->c[2]) * t + g->c[1]) * t + g->c[0];
 }
 
-/* Between low and high, where g is monotone and passes v. */
+/* Finds where g, which is monotone between low and high, passes v. */
 static long double pass(const cubic *g, long double low, long double high, long double v)
 {
     const bool rises = at(g, high) > at(g, low);

@@ -8,13 +8,13 @@
  * level.
  *
  * What rounding may decide. A polynomial of the eight coefficients c at coordinates in [0, 1] is evaluated in float32
- * with one rounding (6e-8) of a coefficient and up to six of sums and products on the way of each term: it errs by
- * 7 * 6e-8 sum |c|. So the field's polynomial does, and so do those of the three positions, beside the ray's point,
- * which is rounded three times at a size of 1.5 and by t itself. An error of the position moves the value by the
- * field's gradient. (Newton's method ends below a step of 5e-5, which leaves 1e-8.) band is the sum of both, of each
- * cell and ray: the sign of a field below it is not told by float32. A crossing is certain where the field passes from
- * beyond band on one side to beyond band on the other: the first hit must not come after that, and every hit must lie
- * within band of 0. */
+ * with one rounding (6e-8) of a coefficient and up to six of sums and products on the way of each term: it errs by 7 *
+ * 6e-8 sum |c|. The field's polynomial errs so, and so do those of the three positions; the ray's point is also rounded
+ * three times at a size of 1.5, and by t itself. An error of the position moves the value by the field's gradient.
+ * (Newton's method ends below a step of 5e-5, which leaves 1e-8.) band is the sum of both, for each cell and ray:
+ * float32 cannot tell the sign of a field below it. A crossing is certain where the field passes from beyond band on
+ * one side to beyond band on the other: the first hit must not come after that, and every hit must lie within band of
+ * 0. */
 #include "reference_cell.h"
 #include "root_bundle.h"
 #include "test_meshes.h"
@@ -110,7 +110,7 @@ static void course_trace(course *c, double low, double high)
     course_halve(c, first, course_at(c, high), 0);
 }
 
-/* Between two knots, where the field passes v. */
+/* Finds where the field passes v between two knots. */
 static double course_pass(course *c, const knot *from, const knot *to, double v)
 {
     const bool rises = to->f > from->f;
@@ -212,7 +212,7 @@ static double cell_determinant(const reference_cell *cell, const double r[3])
     return sum;
 }
 
-/* Not folded, nor nearly: where it is, a point has several values, or none. */
+/* Tells whether the cell is not folded, nor nearly so: in folded cells a point has several values, or none. */
 static bool is_solid(const reference_cell *cell)
 {
     enum { STEPS = 5 };
@@ -292,8 +292,8 @@ static void make_double_root(bundle *b, const reference_cell *cell, course *c, d
         }
 }
 
-/* t is itself a field that every cell holds: with a multiple of it and a constant added the field has its steepest or
- * flattest point on ray 0 where it is 0, and there the given slope: a triple root, or close ones. */
+/* Every cell can represent t as a field. Adding a multiple of it and a constant makes the field 0 at its steepest or
+ * flattest point on ray 0, with the given slope there: a triple root, or three close ones. */
 static void make_triple_root(bundle *b, const reference_cell *cell, course *c, double slope)
 {
     if (!trace_first(b, cell, c)) return;
@@ -381,8 +381,8 @@ static void judge_ray(count *n, const kernel_map *map, course *c, double low, do
     n->off += residual > 1;
 }
 
-/* What a ray is found does not depend on the others of its packet: rays whose first crossing, or number of crossings,
- * is another when they are alone. */
+/* Counts rays whose first crossing, or number of crossings, differs when they are traced alone: a ray's result must not
+ * depend on the others of its packet. */
 static int64_t differ_alone(bundle *b, const kernel_map *map, const kernel_bounds *bounds, const kernel_interval *i,
                             vf t, vf hits)
 {

@@ -1,4 +1,4 @@
-/* Scene files: what a good one becomes, every default, and what a bad one is told. The bad files are one good file with
+/* Scene files: what a good one becomes, all defaults, and the messages about bad ones. Bad files are one good file with
  * one line replaced, so that nothing else in them can be the reason for the message. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -384,7 +384,7 @@ static void scene_image_defaults_hold(void **state)
     scene_free(&s);
 }
 
-/* What is said of sampling, of how many volumes, and how they are integrated. */
+/* A scene's sampling, its number of volumes, and how they are then integrated. */
 static void sampling_is_by_what_is_said(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* How a scene says what colours values have: tables from lists and files, what is done to them, and what is refused. */
+/* How a scene gives values colours: tables from lists and files, changes to them, and errors. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -237,7 +237,7 @@ static void files_of_paraview_become_tables(void **state)
     }
 }
 
-/* What one rank has read all others parse, without reading. */
+/* All other ranks parse the files that one rank has read. */
 static void files_are_read_once_and_then_passed_on(void **state)
 {
     (void)state;
@@ -372,7 +372,7 @@ static void volumes_refuse_what_only_surfaces_have(void **state)
     }
 }
 
-/* Any allocation of ours that fails is an error that says so, and leaves nothing behind. */
+/* Each failed allocation of the library is an error that says so, and leaves nothing behind. */
 static void failed_allocations_are_errors_without_a_leak(void **state)
 {
     (void)state;

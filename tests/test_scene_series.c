@@ -13,7 +13,7 @@
 #include "memory.h"
 #include "scene.h"
 
-/* Of sines and cosines of angles in degrees, turned to radians: a few times 2^-53. */
+/* Error of sines and cosines of angles in degrees, turned to radians: a few times 2^-53. */
 #define ANGLE_TOLERANCE 1e-15
 
 static void parse_good(const char *text, scene *s)
@@ -203,7 +203,7 @@ static void paths_go_through_their_places_and_stay_at_the_ends(void **state)
     scene_free(&s);
 }
 
-/* Between two places alone: 3 s^2 - 2 s^3 of the way. By cycles. */
+/* Between two places, by cycles, the camera has gone 3 s^2 - 2 s^3 of the way. */
 static void paths_of_two_places_ease_in_and_out(void **state)
 {
     (void)state;
@@ -221,8 +221,8 @@ static void paths_of_two_places_ease_in_and_out(void **state)
     scene_free(&s);
 }
 
-/* One slope on both sides of each place, by differences; and nothing beyond two neighbours. A cubic's second derivative
- * is below 12 times its rise, so that a difference over h is off by less than 6 h of it. */
+/* The slope is the same on both sides of each place, by differences, and the path stays between neighbours. A cubic's
+ * second derivative is below 12 times its rise, so a difference over h is off by less than 6 h of the rise. */
 static void paths_are_smooth_and_do_not_swing_out(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Where segments begin and end, which steep functions and dense media magnify: tets so thin that float32 does not tell
- * their ends apart, and cells of every kind with random functions, alone and cut by surfaces. */
+/* Errors of segments' ends, which steep functions and dense media magnify: in tets so thin that float32 does not tell
+ * their ends apart, and in cells of every kind with random functions, alone and cut by surfaces. */
 #include "comp.h"
 #include "reference_integral.h"
 #include "test_render_fixture.h"
@@ -45,7 +45,7 @@ static void set_segments(render_fixture *f, double max_error)
 {
     fixture_set_volume(f, 1);
     f->job.integration = RENDER_SEGMENTS;
-    f->job.extent = 3.5; /* the diagonal of what is drawn is less */
+    f->job.extent = 3.5; /* the scene's own diagonal is less */
     f->job.max_error = max_error;
 }
 
@@ -62,11 +62,10 @@ static void make_layers(double thickness, test_mesh *out)
     }
 }
 
-/* What is told apart on a ray are places 6e-8 from each other, and what is in one place comes in any order: light of
- * one cell is attenuated by the depth of the others there, 6e-8 / thickness times the whole, which is some 1, instead
- * of the other way round. That is the error times the difference of their colours, a tenth at most. Were segments left
- * out whose ends are one number, the slab would be thinner by a few percent of layers of 1e-6, and by half of those of
- * 1e-7. */
+/* Places on a ray are told apart from 6e-8 on, and cells in one place come in any order. So one cell's light may be
+ * attenuated by the depth of the others there, 6e-8 / thickness of the whole, which is some 1, instead of the other way
+ * round. The error is that times the difference of their colours, a tenth at most. If segments whose ends are one
+ * number were left out, the slab would lose a few percent of layers of 1e-6, and half of those of 1e-7. */
 static void thin_tets_are_not_lost(void **state)
 {
     (void)state;
@@ -122,8 +121,8 @@ static bool judge(const test_mesh *mesh, uint64_t seed, bool step, float opacity
 }
 
 /* Where a medium begins or ends, float32's places are off by 1.2e-7, and light by that times the extinction: 5e-8 of
- * the depth across the scene as measured, and here that is 800 at most. On tets, whose ends are exact, and all the rest
- * the error is far less than is asked. */
+ * the depth across the scene as measured, which is 800 at most here. On tets, whose ends are exact, and elsewhere, the
+ * error is far less than allowed. */
 static void max_error_is_kept_in_dense_media(void **state)
 {
     static const float opacities[3] = {0, 0.4f, 1};

@@ -1,7 +1,7 @@
-/* max_error where the opacity has a ramp of next to no width, and the field stays within it: what 3e-8 of the
- * function's domain, a value's rounding to float32 or that of the ramp's ends, is to the opacity there. Of a ramp a
- * millionth of the domain wide that is a tenth. Single cells, whose field is within the ramp and somewhat beyond it, or
- * one value, or at its end in part. */
+/* Tests max_error where the opacity has a very narrow ramp and the field stays within it. There the rounding of a value
+ * or of the ramp's ends to float32, 3e-8 of the function's domain, changes the opacity much: in a ramp a millionth of
+ * the domain wide, by a tenth. Single cells are drawn, whose field is within the ramp and somewhat beyond it, or
+ * constant, or in part at its end. */
 #include "test_effort.h"
 #include "test_step_fixture.h"
 
@@ -16,8 +16,8 @@
 enum { SIDE = 7, WIDTHS = 5, FIELDS = 3, SEEDS = 4 };
 static const double widths[WIDTHS] = {9e-3, 1e-3, 1e-4, 1e-5, 1e-6};
 
-/* As shares of the ramp: from a third below to a third above it, for half of the vertices (a hex's lower quad) at its
- * begin, and all of one value. */
+/* A vertex's value as a share of the ramp: from a third below to a third above it; the ramp's begin for half of the
+ * vertices (a hex's lower quad); or one value for all. */
 static double share_of(int field, uint64_t vertex, uint64_t seed)
 {
     const double share = test_uniform_in(vertex, 100 * seed + 5, -0.3, 1.3);
@@ -25,11 +25,11 @@ static double share_of(int field, uint64_t vertex, uint64_t seed)
     return field == 2 ? test_uniform_in(0, 100 * seed + 5, 0.1, 0.9) : share;
 }
 
-/* What a value off by 4e-7 of the domain, as float32 leaves those of polyhedra, may do to light. To opacity a that
- * times its slope, to extinction, -log(1 - a), no more than 1 / (1 - a) of it. To light: let extinction k be off by
- * dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by int dk (c T - int_s c k T) ds, whose
- * bracket is T at most, for colours c in [0, 1]. So by int dk T ds, which is no more than dk times the way, all of it
- * seen, and no more than the largest dk / k, as int k T ds <= 1. */
+/* How much light changes if a value is off by 4e-7 of the domain, as float32 leaves those of polyhedra. Opacity a is
+ * off by that times its slope, extinction, -log(1 - a), by no more than 1 / (1 - a) of that. For light, let extinction
+ * k be off by dk(s). With the transmittance T(s) up to s, light L = int c k T ds is off by int dk (c T - int_s c k T)
+ * ds, whose bracket is T at most, for colours c in [0, 1]. So light is off by at most int dk T ds, which is no more
+ * than dk times the length, and no more than the largest dk / k, as int k T ds <= 1. */
 static double rounding_of(const step_function *function, double width, double unit)
 {
     const double a = (double)function->opacities[1], b = (double)function->opacities[2], way = 1.8 * 1.24 * sqrt(3);
@@ -42,7 +42,7 @@ static double rounding_of(const step_function *function, double width, double un
 /* The worst of each error asked for. Ramps do not begin at float32's numbers. */
 typedef enum ramp_scene { ALONE, CUT, POLYHEDRON } ramp_scene;
 
-/* What a surface that cuts the cell takes of the light. */
+/* The share of light that a surface which cuts the cell takes. */
 #define FILM 1e-7f
 
 /* first, every: of the seeds. */
@@ -100,7 +100,7 @@ static void fields_within_a_narrow_ramp(void **state)
     judge_ramps(ALONE);
 }
 
-/* By a surface that lets all but a ten-millionth through: the picture is the same. */
+/* A surface that lets all but a ten-millionth through cuts the cell: the picture is the same. */
 static void cut_fields_within_a_narrow_ramp(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
-/* max_error where the opacity has a step: a cell's field is curved along a ray, and may barely reach the step or come
- * back through it within the cell. The light of the little that is beyond it, or of the wrong length of it, is what a
- * sampling misses. Single cells, warped at random; where rays graze the step by a given amount; and functions that are
- * all but a step. */
+/* Tests max_error where the opacity has a step: a cell's field is curved along a ray, and may barely reach the step or
+ * come back through it within the cell. Sampling would miss the little light beyond the step, or get its length wrong.
+ * Cells are single ones, warped at random, and ones whose rays graze the step by a given amount; functions have steps
+ * or ramps almost as steep. */
 #include "reference_cell.h"
 #include "test_effort.h"
 #include "test_step_fixture.h"
@@ -95,7 +95,7 @@ static void a_hex_that_barely_reaches_a_step(void **state)
 }
 
 /* Along the middle ray, the hex's diagonal, the field is 0.2 - 0.4 s + 3 s^2 - 2 s^3: it falls to 0.186 and rises to
- * 0.8, and is off its chord there by less than a sixth of that at a quarter, the half and three quarters. */
+ * 0.8. At that dip it is off its chord by less than a sixth of what it is at a quarter, the half and three quarters. */
 static void a_cubic_that_dips_below_a_step(void **state)
 {
     static const double values[8] = {0.2, 0.2 / 3, 2.8 / 3, 0.2 / 3, 0.2 / 3, 2.8 / 3, 0.8, 2.8 / 3};
@@ -112,7 +112,7 @@ static void a_cubic_that_dips_below_a_step(void **state)
         for (int a = 0; a < 3; a++) {
             const double edges[3][3] = {{1 / 3.0, 0.5, 0}, {1 / 3.0, -0.25, 0.43}, {1 / 3.0, -0.25, -0.43}};
             const int corner[3] = {i % 4 == 1 || i % 4 == 2, i % 4 / 2, i / 4};
-            /* Not through the corners themselves. */
+            /* Rays avoid the corners themselves. */
             double along[3] = {-0.5, 1e-4, 2e-4};
             for (int e = 0; e < 3; e++)
                 for (int k = 0; k < 3; k++) along[k] += corner[e] * edges[e][k];
@@ -206,7 +206,7 @@ static void random_cells_and_steps(void **state)
                 step_make_cell(step_shapes[kind], 16 * seed + (uint64_t)kind, &mesh);
                 if (polyhedra) test_mesh_to_polyhedra(&mesh, 1);
                 step_begin(&f, &mesh, seed % 2 ? CAMERA_OUTSIDE : CAMERA_ORTHOGRAPHIC, STEP_SIDE);
-                /* From 2 to 900 optical depths across the cell. */
+                /* The optical depth across the cell is from 2 to 900. */
                 fixture_set_function(&f, &function, 100 * seed + 9, true, seed % 3 ? 0.5 : 0.9,
                                      pow(10, test_uniform_in(0, 100 * seed + 10, -2.2, 0)));
                 assert_true(function.values[1] == function.values[2]);
@@ -223,7 +223,7 @@ static void random_cells_and_steps(void **state)
 
 /* ---- rays that graze a step ---- */
 
-/* From 1e-2 of the function's domain to less than float32 tells apart, and a ray that does not come to the step. */
+/* Rays pass the step by 1e-2 of the function's domain down to less than float32 can tell; one does not reach it. */
 enum { PASSES = 9 };
 static const double passes[PASSES] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 3e-7, 1e-7, 1e-8, -1e-7};
 
@@ -242,7 +242,7 @@ static bool graze(render_fixture *f, const double values[SAMPLES], double sign, 
     return true;
 }
 
-/* Of each type of cell. */
+/* Tests each type of cell. */
 static void graze_by_rays(int rays, double width)
 {
     static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};

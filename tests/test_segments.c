@@ -1,5 +1,5 @@
-/* Volumes by segments against the adaptive integral: tets exactly, other cells to second order, max_error kept; with
- * surfaces; on parts of the mesh; on every instruction set. */
+/* Compares volumes by segments with the adaptive integral: tets are exact, other cells of second order, and max_error
+ * is kept; with surfaces, on parts of the mesh, and by every instruction set. */
 #include "comp.h"
 #include "reference_integral.h"
 #include "test_effort.h"
@@ -51,7 +51,7 @@ static double error_of_set(const render_fixture *f, const double *truth, double 
     return worst;
 }
 
-/* As above, the largest of all instruction sets. */
+/* As above, the largest error of all instruction sets. */
 static double error_of(const render_fixture *f, const double *truth, double *mean)
 {
     double worst = 0, most = 0;
@@ -423,8 +423,8 @@ static void overlapping_meshes_are_all_seen(void **state)
     test_mesh_free(&mesh);
 }
 
-/* The same bits whatever else is in the packet: a picture's pixels do not change with the cut of its border, nor with
- * the order of the cells, which turns the tree's leaves about. */
+/* A ray has the same bits whatever else is in its packet: pixels change neither with the picture's border nor with the
+ * order of the cells, which changes that of the tree's leaves. */
 static void pictures_do_not_depend_on_the_order_of_cells(void **state)
 {
     (void)state;
@@ -459,7 +459,7 @@ int main(void)
         cmocka_unit_test(max_error_is_kept_on_every_kind),
         cmocka_unit_test(random_tets_keep_max_error),
     };
-    /* What draws by itself, by each set. */
+    /* Tests that draw by themselves, by each instruction set. */
     const struct CMUnitTest of_a_set[] = {
         cmocka_unit_test(tiles_have_what_packets_have),
         cmocka_unit_test(parts_make_the_whole),

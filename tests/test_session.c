@@ -115,7 +115,7 @@ static void changed_values_are_noticed(void **context)
     insitu_destroy(&session);
 }
 
-/* Moved and scaled by powers of two, everything is as before: so is the picture, but for its depth, which scales. */
+/* If everything is moved and scaled by powers of two, the picture stays the same, and its depth scales. */
 static void moved_mesh_gives_the_moved_picture(void **context)
 {
     (void)context;
@@ -324,7 +324,7 @@ static void cells_of_one_rank_are_seen(void **context)
     input_free(&all);
 }
 
-/* Every rank's part under a name of its own, and cut in two: the picture is that of one mesh. */
+/* Every rank's part is cut in two, under names of its own: the picture is that of one mesh. */
 static void meshes_of_many_names_make_one_picture(void **context)
 {
     (void)context;
@@ -453,8 +453,8 @@ static void component_that_is_not_there_is_named(void **context)
     insitu_destroy(&session);
 }
 
-/* By multiples of a quarter, at times that are sums of 0.1: the tenth is a rounding less than 1, and counts as 1. A
- * step that passes several multiples draws once, and one that stands still draws nothing. */
+/* Images are due by multiples of a quarter, at times that are sums of 0.1: the tenth time is less than 1 by a rounding,
+ * and counts as 1. A step that passes several multiples draws once, and one that stands still draws nothing. */
 static void images_are_drawn_when_their_time_has_passed(void **context)
 {
     (void)context;
@@ -604,7 +604,7 @@ static void memory_is_given_back(void **context)
     everywhere(session == NULL && base_memory_held() == before);
 }
 
-/* The last picture's memory serves the next one, larger or smaller, and what is not its own does not show. */
+/* The last picture's memory serves the next one, larger or smaller, and no old pixels show. */
 static void picture_memory_is_kept_to_a_limit(void **context)
 {
     (void)context;
@@ -672,7 +672,7 @@ static void failing_allocation_is_an_error_and_no_more(void **context)
         }
         everywhere(failures > 20);
     }
-    /* Texts of the report may have grown; nothing else. */
+    /* Only texts of the report may have grown. */
     everywhere(base_memory_held() <= before + 4096);
     if (own_rank == 0) free(first.rgba), free(first.depth);
     insitu_destroy(&session);

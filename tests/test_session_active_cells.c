@@ -74,7 +74,7 @@ static void images_of_another_isosurface_do_not_pay(void **context)
         everywhere(STORING(SURFACE(""), SURFACE(""), SURFACE(""), others[i]) == 7);
         everywhere(STORING(others[i], SURFACE(""), others[i], SURFACE("")) == 0);
     }
-    /* What is not stored is not shared, however often it is drawn. */
+    /* Surfaces that cannot be stored are not shared, however often they are drawn. */
     for (size_t i = 4; i < sizeof others / sizeof others[0]; i++)
         everywhere(STORING(others[i], others[i], others[i]) == 0);
 }
@@ -114,7 +114,7 @@ static void plain_free(plain_input *in)
     input_free(&in->whole);
 }
 
-/* What this rank's cells that some isovalue crosses take when they are stored. */
+/* The bytes that this rank's cells take when stored, if an isovalue crosses them. */
 static int64_t stored_bytes(const plain_input *in)
 {
     const test_mesh *part = &in->whole.part;
@@ -187,7 +187,7 @@ static void compare_with_images_alone(const plain_input *in, const char *layers,
     if (own_rank > 0) return;
     assert_int_equal(caught_count, 2 * IMAGES);
     for (int n = 0; n < IMAGES; n++) {
-        /* Where cells are stored there is room for more; where not, three images' plan is all that is held. */
+        /* Where cells are stored, more memory is held; otherwise only three images' plan is. */
         const int64_t more = shared[n] - alone[n];
         if (more < stored || more > (stored ? MOST_BYTES : 0) + 4096)
             fail_msg("image %d: %lld bytes more than alone, expected %lld", n, (long long)more, (long long)stored);
@@ -214,7 +214,7 @@ static void three_images_draw_what_each_does_alone(void **context)
     }
 }
 
-/* An image that cannot be written ends no other, and leaves nothing behind. */
+/* An image that cannot be written does not stop the others, and leaves no memory behind. */
 static void memory_is_back_after_an_error(void **context)
 {
     const int64_t held = base_memory_held();

@@ -22,7 +22,7 @@ enum { SIDE = 4, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 
 /* ---- samples ------------------------------------------------------------------------------------------------- */
 
-/* In each column and each row of the grid there is one sample; so their mean is the centre. */
+/* There is one sample in each column and row of the grid, so their mean is the centre. */
 static void samples_are_spread_evenly(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-/* Automatic cameras: what they are to fit is in the frame, and fills it. */
+/* Automatic cameras: the sphere or box that they fit is in the frame, and fills it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -111,7 +111,7 @@ static void a_box_fills_an_orthographic_frame(void **state)
     check_box(true);
 }
 
-/* What decorations leave of half a side: 6.5 heights of words are a colour bar's, 2.4 a title's, 3 those of a ruler. */
+/* The share of half a side that decorations leave: a colour bar takes 6.5 heights of words, a title 2.4, a ruler 3. */
 static double left_by(double words, double size, int pixels)
 {
     return fmax(0.95 - 2 * words * size / pixels, 0.5);

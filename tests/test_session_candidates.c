@@ -134,8 +134,8 @@ static void partial_trees_are_of_the_cells_that_show(void **context)
     input_free(&in);
 }
 
-/* As long as the cells change at every step, trees are partial; when they stand, the rent comes to a full tree's price
- * at last, and that then stays. */
+/* As long as the cells change at every step, trees are partial. When they stop changing, the rent reaches a full tree's
+ * price at last, and that tree then stays. */
 static void standing_cells_get_a_full_tree(void **context)
 {
     (void)context;
@@ -193,9 +193,9 @@ static double tree_cost(const insitu_session *session)
     return mmbvh_cost(&session->meshes.items[0]->tree, &(mmbvh_options){.threads = 1});
 }
 
-/* Two sessions, of which one is told that nothing has changed: its first tree, by the heuristic, stays. The other's is
- * built anew at each step, along a curve from the second on, and by the heuristic again after one that stayed. The
- * pictures are the same throughout. */
+/* One of two sessions is told that nothing has changed: its first tree, by the heuristic, stays. The other's is built
+ * again at each step, along a curve from the second on, and by the heuristic again after one that stayed. The pictures
+ * are always the same. */
 static void trees_of_one_step_are_built_fast(void **context)
 {
     (void)context;
@@ -226,8 +226,9 @@ static void sway(session_input *in, double by)
     }
 }
 
-/* Cells stand and vertices move, with values or without; then values alone are new, which may show what bounds were not
- * refitted for. Beside it a session that builds its trees anew. Images a and b are due in turns from cycle 2 on. */
+/* Cells stay and vertices move, with new values or without; then only values are new, which may show cells whose bounds
+ * were not refitted. A second session builds its trees again at each step. Images a and b are due in turns from cycle 2
+ * on. */
 static void compare_moving(const char *images, test_mesh_kind kind)
 {
     static const struct {
@@ -267,9 +268,9 @@ static void moving_vertices_are_drawn_as_by_new_trees(void **context)
         for (size_t kind = 0; kind < sizeof kinds / sizeof kinds[0]; kind++) compare_moving(images[i], kinds[kind]);
 }
 
-/* What can be seen differs from step to step though values stand: two images, of other layers of the mesh, are due in
- * turns. The mesh drifts upward, and the camera looks where b's surface is at cycle 9: as bounds were when a alone was
- * drawn, it would be below the picture. */
+/* The visible cells differ from step to step though values stay: two images with different layers of the mesh are due
+ * in turns. The mesh drifts upward, and the camera looks where b's surface is at cycle 9: with the bounds from when
+ * only a was drawn, it would be below the picture. */
 #define CAMERA "    camera: {position: [2.3, 0, 0.56], focal: [0, 0, 0.56], up: [0, 0, 1], angle: 1.7}\n"
 static void bounds_of_one_image_do_not_serve_another(void **context)
 {

@@ -1,6 +1,6 @@
 /* Cells whose vertices stand in another order than VTK's, or are the first of longer rows, as codes of finite elements
- * hold them: they draw the pictures of the same cells in VTK's order, to the bit. What is copied for it is told, what
- * need not be is not, and what is wrong on one rank alone is told to all. */
+ * hold them: they draw the pictures of the same cells in VTK's order, to the bit. The report tells what is copied for
+ * it, no more is copied than needed, and all ranks are told what is wrong on one. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,7 @@ static const char scene_text[] =
 
 /* ---- orders --------------------------------------------------------------------------------------------------- */
 
-/* Where the n-th vertex of VTK's stands, by where it is in the unit cell, and by how a face is run around. */
+/* The place of VTK's n-th vertex, by where it is in the unit cell and by how a face is run around. */
 static int place_in(insitu_vertex_order order, int type, int n)
 {
     const int x = n % 4 == 1 || n % 4 == 2, y = n % 4 / 2, z = n / 4;
@@ -72,7 +72,8 @@ static void put(const moved *m, bool is_narrow, int64_t i, int64_t value)
         ((int64_t *)m->connectivity)[i] = value;
 }
 
-/* Of one type without offsets; in rows of ROW entries, what is beside the vertices no index. The last row is short. */
+/* Moves connectivity of one type without offsets into rows of ROW entries, of which those behind the vertices are no
+ * indices. The last row is short. */
 static void move_connectivity(session_input *in, layout how, moved *m)
 {
     const test_mesh *part = &in->part;
@@ -251,8 +252,8 @@ static void quads_are_shells_in_any_order(void **state)
     input_free(&in);
 }
 
-/* Said to stand in an order that they do not stand in, they are warned of; and set right, they are drawn, whatever the
- * caller says of changes. A mesh that moves keeps its copy. */
+/* If the named order is wrong, there is a warning; with the right one the cells are drawn, whatever the caller says of
+ * changes. A mesh that moves keeps its copy. */
 static void the_order_may_be_set_right(void **state)
 {
     (void)state;
@@ -336,7 +337,7 @@ static void vertex_in_row(session_input *in)
     in->mesh.vertex_order = INSITU_ORDER_LEXICOGRAPHIC;
     ((int64_t *)spoilt.connectivity)[3 * ROW + 2] = -5;
 }
-/* As 4 bytes it would be a good one. */
+/* Cut to 4 bytes it would be a good index. */
 static void far_vertex_in_row(session_input *in)
 {
     in_rows(in);

@@ -1,4 +1,4 @@
-/* What a caller says has not changed, and lies elsewhere: it is looked at again. */
+/* Arrays that a caller says have not changed, but that lie elsewhere, are read again. */
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>

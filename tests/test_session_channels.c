@@ -1,5 +1,5 @@
-/* The numbers that an EXR may hold beside colours: normals, values, layers and surfaces of what is nearest, by closed
- * form on planes in a cube of every type of cell, and the same to the bit dealt at random as on one rank. */
+/* The numbers that an EXR may hold beside colours: the nearest surface's normal, value, layer and number, by closed
+ * form on planes in a cube of every type of cell; dealt at random they are the same to the bit as on one rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

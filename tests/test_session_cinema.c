@@ -85,7 +85,7 @@ static void run_steps(const char *scene, const session_input *in, int first, int
 
 /* ---- tables ---------------------------------------------------------------------------------------------------- */
 
-/* What swept writes at these cycles. */
+/* The table that swept writes at these cycles. */
 static void expect_table(int first, int end, char text[MOST])
 {
     static const double values[] = {0.25, -0.5}, elevations[] = {-20, 10.5};
@@ -195,7 +195,7 @@ static void runs_that_begin_again_go_on_with_the_table(void **state)
     input_free(&in);
 }
 
-/* Lines between the session's first cycle and its first picture are of a run that is no more. */
+/* Lines between the session's first cycle and its first picture are from an earlier run. */
 static void lines_go_from_the_first_step_on(void **state)
 {
     (void)state;
@@ -284,7 +284,7 @@ static void pictures_that_cannot_be_written_have_no_line(void **state)
     input_free(&in);
 }
 
-/* Whole lines of whole steps alone, whatever allocation of rank 0's fails; and then it goes on. */
+/* The table has only whole lines of whole steps, whichever allocation of rank 0's fails; and then it goes on. */
 static void tables_stay_whole_where_memory_runs_out(void **state)
 {
     (void)state;

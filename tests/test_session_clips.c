@@ -1,7 +1,7 @@
-/* Clipping: every layer is drawn within what planes, boxes and spheres leave of it alone, by closed form: the cube's
- * surface, isosurfaces that are planes, a medium of one opacity by all methods; cut by the image's clip, by the layer's
- * own, and beside a layer that is whole. On cells of every type, and dealt at random the same picture as on one rank.
- */
+/* Clipping: every layer is drawn only where planes, boxes and spheres leave it, by closed form: the cube's surface,
+ * isosurfaces that are planes, and a medium of one opacity by all methods, cut by the image's clip, by the layer's own,
+ * and beside a layer that is whole. This is tested on cells of every type; dealt at random, the picture is the same as
+ * on one rank. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static const half_space clips[] = {
 static const half_space corner[] = {{{-1, 0, 0}, -0.1}, {{1, 0, 0}, 5},  {{0, -1, 0}, 0.2},
                                     {{0, 1, 0}, 5},     {{0, 0, -1}, 0}, {{0, 0, 1}, 5}};
 
-/* What is left: within the half spaces and the ball, without the hole, which is the ball where that is left out. */
+/* The region that is left: within the half spaces and the ball, without the hole, which is a ball that is cut out. */
 typedef struct region {
     const char *text; /* of the scene's clip */
     const half_space *planes, *hole;
@@ -136,7 +136,7 @@ static bool is_at(double depth, span s)
     return fabs(depth - s.begin) < 1e-4 || fabs(depth - s.end) < 1e-4;
 }
 
-/* Depths of crossings in what is left, in order; -1: rounding decides. */
+/* Keeps the depths of crossings within the region, in order; -1: rounding decides. */
 static int keep(const region *g, const ray *r, const double *depths, int count, double out[MOST])
 {
     const span within = kept_span(g, r), hole = hole_span(g, r);
@@ -253,7 +253,7 @@ static bool is_double_sampled_medium(const caught_picture *p, const region *g)
 
 /* Each layer ends where its own clip may follow. */
 #define MEDIUM "      - volume: {field: f, range: [-9, 9], opacity: [[0, 0.5], [1, 0.5]], unit_distance: 1%s}\n"
-/* It shows nowhere, and keeps the others' clip from being that of all layers. */
+/* This layer shows nowhere, and keeps the others' clip from being that of all layers. */
 #define WHOLE "      - isosurface: {field: f, values: [99]}\n"
 
 typedef struct clip_case {
@@ -280,7 +280,7 @@ static const clip_case cases[] = {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* What carries the clip: the image, the layers, or the layers beside one that is whole. */
+/* Where the clip stands: at the image, at the layers, or at the layers beside one that is whole. */
 typedef enum clip_place { OF_IMAGE, OF_LAYERS, BESIDE_A_WHOLE, PLACES } clip_place;
 
 static const char *scene_of(const clip_case *c, const region *g, clip_place place)

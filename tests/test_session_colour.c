@@ -1,6 +1,6 @@
-/* Where ranges of colours come from, over all ranks: pictures by each source are those by the range that brute force
- * over the whole mesh finds, to the bit; ranges over a run widen, outlive the session, and are told where their file is
- * broken; colour maps from files are every rank's. */
+/* Sources of colour ranges, over all ranks: pictures by each source are to the bit those by the range that brute force
+ * over the whole mesh finds. Ranges over a run widen and outlive the session, and a broken file of them is an error.
+ * All ranks have colour maps from files. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -177,7 +177,7 @@ static void ranges_over_a_run_widen_and_outlive_it(void **state)
     /* Another session goes on; volumes alone, as the surface's colours are of another field. */
     caught_picture again = draw(&dealt, "", run);
     assert_alike(&again, &fixed, 0);
-    /* Of another field there is nothing yet. */
+    /* For another field there is no range yet. */
     caught_picture other = draw(&dealt, "", ", component: magnitude, range: run"), fresh;
     fresh = draw(&dealt, "", ", component: magnitude");
     assert_alike(&other, &fresh, 0);
@@ -253,7 +253,7 @@ static double opacity_by_value(const render_transfer *t, double value)
     return (double)t->opacities[i] + share * ((double)t->opacities[i + 1] - (double)t->opacities[i]);
 }
 
-/* By how much the ramps, whose points are even along the scale, are off between low and 1e6. */
+/* How much the ramps, whose points are even along the scale, are off between low and 1e6. */
 static double ramps_are_off(scene_scale scale, double low, const scene_volume *volume)
 {
     float colours[6] = {0};
@@ -299,7 +299,8 @@ static void assert_colour(const render_transfer *t, double value, const float ex
             fail_msg("value %g, channel %d: %g, expected %g", value, c, colour[c], (double)expected[c]);
 }
 
-/* Within a sixteenth of a band of its borders it may be another's; what is outside begins one entry beyond the ends. */
+/* Within a sixteenth of a band from its border the colour may be the neighbour's; colours outside begin one entry
+ * beyond the ends. */
 static void volumes_have_bands_and_colours_outside(void **state)
 {
     (void)state;

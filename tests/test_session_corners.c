@@ -1,7 +1,7 @@
 /* Fields with a value at each corner of each cell. Torn, they draw the pictures of the mesh whose vertices the caller
  * doubled, to the bit: with fields at vertices and cells beside them, by an index, in rows, in another order of
  * vertices, with ids, as values and coordinates change. Averaged, they draw those of the means at vertices by brute
- * force. What is wrong is told to all. */
+ * force. Errors are returned on all ranks. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -219,7 +219,7 @@ static void scale_coordinates(session_input *in, values *v, double scale)
     for (int64_t i = 0; i < 3 * v->corners; i++) v->coordinates[i] *= scale;
 }
 
-/* As it is, with other values, and with other coordinates. */
+/* Draws the mesh as it is, with other values, and with other coordinates. */
 static drawing draw(session_input *in, values *v, const form *of, bool is_doubled)
 {
     drawing out = {.copied = 0};

@@ -1,5 +1,5 @@
-/* Deep pictures: of every pixel what lies behind each other, in order and without overlaps, which blended in double are
- * the flat picture; of surfaces, the samples of one rank to the bit, on any partition. */
+/* Deep pictures: the samples of every pixel are in order and without overlaps, and blended in double they are the flat
+ * picture; for surfaces they are those of one rank to the bit, on any partition. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,9 +40,9 @@ enum { CASES = sizeof cases / sizeof *cases, ANTIALIASED = 1 };
 
 /* ---- one picture ---------------------------------------------------------------------------------------------- */
 
-/* A float's rounding takes 2^-24 of at most 1. Compositing makes of a sample a product, a sum and a product more, and
- * the deep picture's A is a difference: four a sample. Of mixed stretches the flat picture multiplies what a run of them
- * lets through as one number, which is two more. The background is a product and a sum. */
+/* A float's rounding takes 2^-24 of at most 1. A sample takes a product, a sum and another product in compositing, and
+ * the deep picture's A is a difference: four roundings. For mixed stretches the flat picture multiplies the
+ * transmittance of a run of them as one number: two more. The background is a product and a sum. */
 static double bound_of(int64_t samples)
 {
     return ldexp((double)(6 * samples + 2), -24);

@@ -110,9 +110,8 @@ static double project(const render_camera *c, const double point[3], double out[
     return depth;
 }
 
-/* How far a line's middle is from the pixel's, in pixels: from least to most. The library divides an edge's offset from
- * the ray by the depth of the hit instead of the edge's own, which is off by no more than the edge's depths are from
- * the hit's. */
+/* Bounds the distance of a line's middle from the pixel's, in pixels. The library divides an edge's offset from the ray
+ * by the hit's depth instead of the edge's own; the error is no more than the two depths differ. */
 static void bound_distance(const render_camera *c, const polygon *face, const double pixel[2], double hit,
                            double bounds[2])
 {

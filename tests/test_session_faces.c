@@ -1,5 +1,5 @@
-/* What a user gets wrong in the faces of polyhedra, on one rank alone: every rank is told the same, with the rank, the
- * mesh, the cell, the face and the value; nothing is drawn; and once the thing is right the next step draws.
+/* A user's errors in the faces of polyhedra, on one rank alone: every rank gets the same message, with the rank, the
+ * mesh, the cell, the face and the value; nothing is drawn; and once it is put right the next step draws.
  *
  * A rank's faces and vertices are numbered in the order in which its cells first use them: cell 0 has face 0 first, and
  * no cell before it. */
@@ -139,7 +139,7 @@ static void cell_without_faces(session_input *in)
 {
     in->part.offsets[1] = in->part.offsets[0];
 }
-/* There and back: a, b, a. */
+/* The face goes there and back: a, b, a. */
 static void vertex_twice_apart(session_input *in)
 {
     in->part.face_connectivity[2] = in->part.face_connectivity[0];
@@ -348,8 +348,8 @@ static void flat_polyhedra_are_counted_and_change_no_picture(void **context)
     test_free(before);
 }
 
-/* The first allocation of a step that checks polyhedra, and is not to recognise any, is for their edges. Without it
- * nothing is known of the cells, and the next step must look at them again. */
+/* The first allocation of a step that checks polyhedra, and need not recognise any, is for their edges. If it fails,
+ * the cells are unchecked, and the next step must check them again. */
 static void check_without_memory_is_told_and_repeated(void **context)
 {
     (void)context;

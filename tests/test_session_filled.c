@@ -1,6 +1,6 @@
 /* Fields whose values a function makes: it is called once in a step that needs the field, for a picture, a statistic or
- * a condition, and in no other; it may communicate; what it makes draws the pictures of the same values given. What
- * goes wrong in it is told to all. */
+ * a condition, and in no other; it may communicate; its values draw the same pictures as the same values given. Its
+ * errors are returned on all ranks. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +20,7 @@ static const char scene_text[] =
         IMAGE("b", "4", "{isosurface: {field: f, values: [0.1], colour_by: {field: g}}}")
             IMAGE("c", "3", "{surface: {colour_by: {field: g}}}");
 
-/* What a fill is told, and what it did. */
+/* A fill's input and results. */
 typedef struct maker {
     const session_input *in;
     double *values, scale;

@@ -35,7 +35,7 @@ const char *write_scene(const char *text);
 
 insitu_session *open_session(MPI_Comm comm, const char *scene);
 
-/* A rank's part of a mesh, and what is said of it; the arrays are the test_mesh's, to be spoilt at will. */
+/* A rank's part of a mesh, and its description; the arrays are the test_mesh's, which tests may spoil. */
 typedef struct session_input {
     test_mesh part;
     insitu_mesh mesh;
@@ -49,7 +49,7 @@ typedef struct session_input {
 void input_create(session_input *in, test_mesh_kind kind, int side, test_partition_kind dealt, int rank, int count);
 /* Describe the part again, after it was spoilt. */
 void input_describe(session_input *in);
-/* As it was created. */
+/* Restores the input as it was created. */
 void input_renew(session_input *in);
 void input_free(session_input *in);
 
@@ -95,8 +95,8 @@ void free_caught(caught_picture *picture);
 /* Paths with this in them cannot be written. NULL: all can. */
 extern const char *unwritable;
 
-/* Pictures are written before a step is over, unless session_writes_behind (session_image.h) is set. Called first then,
- * by the thread that writes; NULL: nothing is. */
+/* Pictures are written before a step is over, unless session_writes_behind (session_image.h) is set. Then the writing
+ * thread first calls this, if it is not NULL. */
 extern void (*before_writing)(void);
 
 #endif

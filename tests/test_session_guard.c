@@ -83,7 +83,7 @@ static void threads_first_needed_inside_are_as_the_callers_own(void **state)
     assert_int_equal(flagged, 0);
 }
 
-/* A team that is larger at the end than it was at the begin: threads of which nothing was kept are given nothing. */
+/* The team is larger at the end than at the begin: threads whose settings were not saved are left alone. */
 static void threads_that_come_later_keep_what_they_have(void **state)
 {
     (void)state;

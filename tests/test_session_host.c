@@ -1,8 +1,8 @@
-/* The process that a session is a guest in: one that can start few threads or none, whose OpenMP gives smaller teams
- * than asked for, that traps floating-point exceptions.
+/* Tests a session in difficult processes: ones that can start few threads or none, whose OpenMP gives smaller teams
+ * than asked for, or that trap floating-point exceptions.
  *
- * The number of cores, the starting of threads and (GNU's) parallel regions are ours here, so that any limit can be
- * had on any machine. A thread that cannot be started ends the process where OpenMP is left to find that out. */
+ * The number of cores, the start of threads and (GNU's) parallel regions are replaced here, so that any machine can
+ * have any limit. If OpenMP itself fails to start a thread, the process ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -72,7 +72,7 @@ VISIBLE int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, 
     return code;
 }
 
-/* So many more threads than there are now. */
+/* Allows so many more threads than there are now. */
 static void allow_threads(int more)
 {
     atomic_store(&most_threads, atomic_load(&live_threads) + more);

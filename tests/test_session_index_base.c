@@ -1,5 +1,5 @@
-/* Meshes whose indices begin at 1, as Fortran has them: the same pictures to the bit as from 0, of all types of cells,
- * in arrays of 8 bytes with offsets and of 4 bytes without; and errors that tell indices as the caller has them. */
+/* Meshes whose indices begin at 1, as Fortran has them: the pictures are to the bit those from 0, for all types of
+ * cells, in arrays of 8 bytes with offsets and of 4 bytes without; and errors name indices as the caller has them. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +24,7 @@ static void add_to(int64_t *indices, int64_t count, int64_t base)
     for (int64_t i = 0; i < count; i++) indices[i] += base;
 }
 
-/* Of the whole part: connectivity and offsets, of polyhedra faces too. */
+/* Renumbers the whole part: connectivity and offsets, and for polyhedra also faces. */
 static void count_from_one(session_input *in)
 {
     test_mesh *part = &in->part;

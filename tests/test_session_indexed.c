@@ -1,6 +1,6 @@
 /* Fields whose values stand in another order than the mesh's vertices or cells, as in vectors of degrees of freedom:
  * found by an index they draw the pictures of the same values in order, to the bit, at each step and as they change.
- * What is wrong with an index on one rank alone is told to all. */
+ * All ranks are told what is wrong with an index on one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -137,7 +137,7 @@ static void step_and_catch(insitu_session *session, int cycle, caught_picture ou
     caught_count = 0;
 }
 
-/* As it is, halved in the same arrays, set as unchanged, and as it was again. */
+/* Draws values as they are, halved in the same arrays, set as unchanged, and as they were again. */
 static drawing draw(const session_input *in, twice *t, bool is_by_index)
 {
     drawing out = {.copied = 0};
@@ -208,7 +208,7 @@ static void an_index_draws_what_values_in_order_draw(void **state)
         for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) check(kind, &forms[i]);
 }
 
-/* Of a field that no scene asks for nothing is copied, and nothing looked at. */
+/* A field that no scene asks for is neither copied nor checked. */
 static void an_index_that_nobody_needs_is_left_alone(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* What a user gets wrong in a mesh or a field, on one rank alone: every rank is told the same, the rank and the thing
- * are named, nothing is drawn; and once the thing is right the next step draws. */
+/* A user's errors in a mesh or a field, on one rank alone: every rank gets the same message, which names the rank and
+ * the fault; nothing is drawn; and once it is put right the next step draws. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -325,7 +325,7 @@ static void inverse_maps_that_fail_are_counted(void **context)
     everywhere(hand_over(session, &input) == INSITU_OK);
 }
 
-/* Cells of one type, and indices of 4 bytes in the place of those of 8. */
+/* Makes cells of one type, with indices of 4 bytes instead of 8. */
 static void make_plain(session_input *in)
 {
     char *indices = (char *)in->part.connectivity;
@@ -382,8 +382,8 @@ static flatness flatness_of(int cell)
     return (flatness)(cell < TILTED ? cell % (OBLIQUE + 1) : cell % FLATNESS_COUNT);
 }
 
-/* Coordinates along x and y are multiples of 2^-40, along z of 2^-16, which a float has: sums are exact, and what is to
- * be flat is so to the bit. */
+/* Coordinates along x and y are multiples of 2^-40, along z of 2^-16, which floats hold: sums are exact, and flat cells
+ * are flat to the bit. */
 static double flat_coordinate(int type, int cell, int corner, int axis)
 {
     const flatness how = flatness_of(cell);

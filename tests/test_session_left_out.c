@@ -1,7 +1,7 @@
-/* Cells that are not drawn, of every type and dealt to any ranks. One whose own value is not finite shows no isosurface
- * of the values that its neighbours give to the vertices: it is as if it were flagged as a ghost. One of no volume
- * shows none though the field before it differs from the field behind: it is as if it were not there. Both to the bit.
- */
+/* Cells that are not drawn, of every type and dealt to any ranks. A cell whose own value is not finite shows no
+ * isosurface of the values that its neighbours give to the vertices, as if it were flagged as a ghost. A cell without
+ * volume shows none, though the field before it differs from that behind, as if it were not there. Both hold to the
+ * bit. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -72,7 +72,7 @@ static void free_picture(caught_picture *picture)
 
 /* ---- cells without a value of their own ---------------------------------------------------------------------- */
 
-/* Of its corners' places in the wave; of a polyhedron one of each face. */
+/* The cell's value: from its corners' places in the wave; for a polyhedron, from one of each face. */
 static double cell_value(const test_mesh *part, int64_t cell)
 {
     double sum = 0;
@@ -194,7 +194,7 @@ static void add_flat_cell(test_mesh *mesh, int type, double corners[4][3])
     test_mesh_add_cell(mesh, type, vertices, (const int[]){0, 1, 2, 3, 4, 5, 6, 7});
 }
 
-/* Beside every hex of the mesh a flat cell on one of its faces. as_polyhedra: all of them, the faces plane. */
+/* Adds beside every hex a flat cell on one of its faces. as_polyhedra: all cells become polyhedra, with plane faces. */
 static void add_flat_cells(test_mesh *mesh, bool as_polyhedra)
 {
     static const int types[4] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_TET};

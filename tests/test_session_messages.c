@@ -1,5 +1,5 @@
-/* What is told of input that is sound, but hardly what was meant: by warnings, the same on all ranks, once; and by
- * errors, where nothing of use could be drawn in any time. */
+/* Messages about input that is sound, but hardly meant: warnings, the same on all ranks, given once; and errors, where
+ * nothing useful could be drawn in any time. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static void exchange(int64_t *a, int64_t *b)
     *b = held;
 }
 
-/* Row by row: what VTK has as 2 comes fourth, what it has as 6 last. */
+/* Numbers quads row by row: VTK's vertex 2 comes fourth, its vertex 6 last. */
 static void number_by_rows(session_input *in)
 {
     for (int64_t cell = 0; cell < in->part.cell_count; cell++) {
@@ -37,7 +37,7 @@ static void number_by_rows(session_input *in)
     }
 }
 
-/* Without the jitter: then cells numbered by rows have no volume to the bit. */
+/* Removes the jitter: then cells numbered by rows have exactly no volume. */
 static void straighten(session_input *in)
 {
     for (int64_t i = 0; i < 3 * in->part.vertex_count; i++)

@@ -1,6 +1,6 @@
 /* Meshes of finite volumes: faces with an owner and a neighbour, in all the forms that codes have them in, draw the
  * pictures of the same polyhedra given cell by cell, to the bit. Polyhedra that are hexes, wedges, pyramids or tets
- * draw the pictures of those. What is wrong on one rank alone is told to all. */
+ * draw the pictures of those. All ranks are told what is wrong on one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -98,7 +98,7 @@ static void create_polyhedra(session_input *in, test_mesh_kind kind, double shar
     input_describe(in);
 }
 
-/* As CGNS may have them: 0 for no cell on either side. */
+/* Exchanges the sides of some faces, as CGNS may have them: 0 stands for no cell on either side. */
 static void exchange_sides(owned *faces, int64_t count)
 {
     for (int64_t face = 0; face < count; face += 2) {

@@ -1,5 +1,5 @@
-/* What a user gets wrong in owners, neighbours and lists of faces, on one rank alone: every rank is told the same, with
- * the rank, the mesh, the face and the value; nothing is drawn; and once the thing is right the next step draws. */
+/* A user's errors in owners, neighbours and lists of faces, on one rank alone: every rank gets the same message, with
+ * the rank, the mesh, the face and the value; nothing is drawn; and once it is put right the next step draws. */
 #include "test_owned_faces.h"
 #include "test_session_fixture.h"
 

@@ -1,10 +1,10 @@
-/* A volume as the library draws it where nothing is said of its sampling, its range, its unit distance or the camera:
- * what these are derived from is that of all ranks together, so the picture is the one that rank 0 draws of the whole
- * mesh alone. Each rank lists its cells its own way: other vertices and cells first, faces from another vertex on and
- * in the other direction, a polyhedron's faces in another order. Warped faces make a cell's volume depend on how a face
- * is cut into triangles, which must not depend on the listing.
+/* A volume for which the scene gives no sampling, range, unit distance or camera. These are derived from all ranks'
+ * data, so the picture is the one that rank 0 draws of the whole mesh alone. Each rank lists its cells in its own way:
+ * other vertices and cells first, faces from another vertex on and in the other direction, a polyhedron's faces in
+ * another order. Warped faces make a cell's volume depend on how a face is cut into triangles, which must not depend on
+ * the listing.
  *
- * The bound is what compositing promises: fragments blend in other groups, 1e-6. */
+ * The bound is that of compositing, 1e-6, as fragments blend in other groups. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,8 +48,8 @@ typedef enum mesh_kind { HONEYCOMB, WARPED_POLYHEDRA, WARPED_MIXED, HEXES, FLAT_
 static const char *const mesh_names[MESHES] = {"honeycomb", "warped polyhedra", "polyhedra among others", "hexes",
                                                "flat cells among hexes"};
 
-/* As many hexes again, each of eight places in one oblique plane: what rounding makes of their volumes goes by which
- * vertex is listed first. */
+/* Adds as many hexes again, each with its eight vertices in one oblique plane: the rounding of their volumes depends on
+ * which vertex is listed first. */
 static void add_flat_hexes(test_mesh *mesh)
 {
     test_mesh old = *mesh;
@@ -158,7 +158,7 @@ static void judge(mesh_kind kind)
 
 /* ---- to a hundredth ------------------------------------------------------------------------------------------ */
 
-/* What is drawn where nothing is said is off by no more than 0.01; the picture that it is compared with, by 1e-4. */
+/* The picture by default is off by no more than 0.01; the one that it is compared with, by 1e-4. */
 static bool is_near(const char *layers, const session_input *in)
 {
     char text[1024];
@@ -216,7 +216,7 @@ static void default_volumes_of_hexes_are_one_picture(void **context)
     judge(HEXES);
 }
 
-/* To an error flat cells are cells that overlap others, whose pixels are one picture to max_error. */
+/* When drawn to an error, flat cells overlap others, and such pixels agree to max_error. */
 static void flat_cells_do_not_change_the_default_step(void **context)
 {
     (void)context;

@@ -1,6 +1,6 @@
-/* What a user gets wrong in the patches of a field, on one rank alone: every rank is told the same, with the rank, the
- * mesh, the field, the patch, the face and what is wrong with it; nothing is drawn; and once the thing is right the
- * next step draws. */
+/* A user's errors in the patches of a field, on one rank alone: every rank gets the same message, with the rank, the
+ * mesh, the field, the patch, the face and what is wrong with it; nothing is drawn; and once it is put right the next
+ * step draws. */
 #include <stdio.h>
 #include <string.h>
 
@@ -76,7 +76,7 @@ static void by_numbers(int64_t second)
     patches[0].faces = (insitu_array){numbers, INSITU_INT64, 0};
 }
 
-/* On a mesh without owners, whose cells have faces, or are hexes: both count from 0. */
+/* Sets a patch by vertices on a mesh without owners, whose cells have faces or are hexes; both count from 0. */
 static void by_vertices(const int64_t *vertices, int64_t count)
 {
     input_describe(&input);

@@ -1,6 +1,6 @@
 /* Values on the boundary: a vertex of a face that has one gets, bit for bit, the mean over such faces that a search
- * over the whole mesh gives, for any dealing of the cells and however the faces are told; linear fields are exact where
- * the header says so. */
+ * over the whole mesh gives, for any dealing of the cells and any way of naming the faces; linear fields are exact
+ * where the header says so. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static int *owners;
 
 /* ---- what is to come out --------------------------------------------------------------------------------------- */
 
-/* Of many magnitudes, so that the order of a sum shows. */
+/* A number of any of many magnitudes, so that the order of a sum matters. */
 static double scattered(double at, uint64_t seed)
 {
     uint64_t bits;
@@ -97,7 +97,8 @@ static bool is_among(const double (*points)[3], int count, const double position
     return false;
 }
 
-/* Over all cells of the whole mesh, which has as many faces as its cells have, those between two of them twice. */
+/* The mean over all cells of the whole mesh, in which each cell has its own faces, so that those between two cells are
+ * there twice. */
 static double expected_at(const grid *all, const double position[3])
 {
     double cells[256], faces[256];

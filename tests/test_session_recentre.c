@@ -33,7 +33,7 @@ static const char mixed_scene[] = "images:\n"
                                   "    outputs:\n"
                                   "      - path: a.exr\n";
 
-/* What mixed_scene draws, but for the isosurface's own field, by c and by v. */
+/* The scene of mixed_scene without the isosurface's own field, drawn by c or by v. */
 #define SMOOTH(field, how, method)                                                                                     \
     "images:\n  - name: a\n    size: [40, 30]\n    layers:\n"                                                          \
     "      - isosurface: {field: c, values: [8], colour_by: {field: " field how "}, opacity: 0.5}\n"                   \
@@ -57,7 +57,7 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Over all cells that have a vertex at this place. */
+/* The mean over all cells that have a vertex at this place. */
 static double expected_at(const double position[3])
 {
     double values[256], sum = 0;
@@ -240,8 +240,8 @@ static void means_follow_values_that_changed_on_one_rank(void **context)
     test_free(right);
 }
 
-/* Rank 0 alone draws the whole; its picture against that of all ranks. Surfaces alone the same bits; with a volume
- * behind transparent surfaces within the rounding of "over" (1e-6, as everywhere). */
+/* Compares rank 0's own picture of the whole with that of all ranks. Surfaces alone have the same bits; with a volume
+ * behind transparent surfaces, pictures agree within the rounding of "over" (1e-6, as everywhere). */
 static void compare_with_alone(const char *scene, double bound)
 {
     for (int dealt = 0; dealt < TEST_PARTITION_COUNT; dealt++) {
@@ -300,7 +300,7 @@ static void smooth_volumes_of_dealt_cells_are_those_of_one_rank(void **context)
     compare_with_alone(SMOOTH("c", AT_VERTICES, "segments"), 1e-6);
 }
 
-/* On rank 0 the picture of a scene, of the cells' values as c and the means of a search over all cells as v. */
+/* On rank 0, draws a scene with the cells' values as c and the means of a search over all cells as v. */
 static caught_picture draw_smooth(const char *scene, const part_input *in, const double *means)
 {
     caught_picture picture = {0};
@@ -325,8 +325,8 @@ static bool is_same_picture(const caught_picture *a, const caught_picture *b)
     return own_rank != 0 || memcmp(a->rgba, b->rgba, 40 * 30 * 4 * sizeof(float)) == 0;
 }
 
-/* By interpolate: vertex a cell's field is that of the means at the vertices; by default it is as it is. Cells without
- * a finite value of their own, which a field at vertices does not know of, are ghosts. */
+/* With interpolate: vertex a cell field is drawn by the means at the vertices, by default as it is. Cells without a
+ * finite value of their own, which a field at vertices does not know of, are ghosts. */
 static void smooth_layers_are_those_of_the_means(void **context)
 {
     (void)context;

@@ -1,5 +1,5 @@
-/* Regions: several meshes in one picture, of which each has fields of its own. What a layer is drawn on, by its field
- * or by name; what is grey; what is refused. On any number of ranks, some of which have no part of a region. */
+/* Regions: several meshes in one picture, each with fields of its own. Tests on which meshes a layer is drawn, by its
+ * field or by name, what is grey, and what is refused, on any number of ranks, some without a part of a region. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

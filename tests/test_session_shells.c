@@ -1,6 +1,6 @@
-/* Shells: triangles, quads and polygons, alone and beside cells of three dimensions. A sheet of them is the plane that
- * it is, by closed form, for any dealing the same to the bit as on one rank; a shell on a cell's face takes its place;
- * isosurfaces, slices and volumes are those of the mesh without them. */
+/* Shells: triangles, quads and polygons, alone and beside cells of three dimensions. A sheet of them is a plane, by
+ * closed form, and for any dealing the same to the bit as on one rank; a shell on a cell's face is drawn instead of the
+ * face; isosurfaces, slices and volumes are those of the mesh without them. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -52,7 +52,7 @@ static void add_cell(shell_mesh *m, unsigned char type, double value, int count,
     m->offsets[++m->cell_count] = m->entry_count;
 }
 
-/* What a block of two squares of a sheet is made of. */
+/* The cells of a block of two squares of a sheet. */
 typedef enum sheet_kind { QUADS, TRIANGLES, POLYGONS, MIXED, SHEET_KINDS } sheet_kind;
 
 static void add_block(shell_mesh *m, sheet_kind kind, const int at[6])
@@ -199,7 +199,7 @@ static bool are_same(const caught_picture *a, const caught_picture *b)
 
 /* ---- what is to be seen -------------------------------------------------------------------------------------- */
 
-/* Where the pixel's ray meets the plane 0.3 x + 0.2 y = z. */
+/* Finds where the pixel's ray meets the plane 0.3 x + 0.2 y = z. */
 static double meet_sheet(int pixel, double place[3])
 {
     static const double normal[3] = {0.3, 0.2, -1};

@@ -93,9 +93,9 @@ static void free_picture(caught_picture *picture)
     free(picture->depth);
 }
 
-/* The planes of the scene in nearest-first order of none: the nearest hit within the cube decides. Rays near the cube's
- * border may do either. Depths are off by roundings of single precision of numbers near 5, times the inverse cosine,
- * at most 10 here; colours by as much of the field, of slope 1 in 3.2, times the table's slope of at most 12. */
+/* Compares with the scene's planes, whose nearest hit within the cube counts. Rays near the cube's border may hit or
+ * miss. Depths are off by roundings of single precision of numbers near 5, times the inverse cosine, at most 10 here;
+ * colours by as much of the field, of slope 1 in 3.2, times the table's slope of at most 12. */
 static bool is_truth(const caught_picture *picture, const plane *planes, int count)
 {
     const double depth_error = 10 * 5 * 3e-7, colour_error = depth_error / 3.2 * 12;

@@ -1,5 +1,6 @@
-/* Normals by gradients at vertices: against gradients solved for at every vertex in double and drawn as three fields
- * that colour the surface; the gradient itself where the field is linear; and the same to the bit on any partition. */
+/* Normals by gradients at vertices are compared with gradients solved for at every vertex in double, drawn as three
+ * fields that colour the surface, and with the gradient itself where the field is linear; they are the same to the bit
+ * on any partition. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -235,8 +236,8 @@ static void whole_create(const mesh_case *c, test_function *f, session_input *wh
 
 /* ---- what normals are ------------------------------------------------------------------------------------------ */
 
-/* The largest sine of the angle between what was drawn and what is expected, over pixels with a surface: one gradient,
- * or what the three pictures have for values. far: pixels where it is more than 3e-4. */
+/* The largest sine of the angle between the drawn and the expected normal, over pixels with a surface. The expected one
+ * is gradient, or the values of the three pictures. far gets the number of pixels where it is more than 3e-4. */
 static double worst_angle(const caught_picture *picture, const caught_picture *expected, const double *gradient,
                           int *pixels, int *far)
 {
@@ -263,9 +264,9 @@ static double worst_angle(const caught_picture *picture, const caught_picture *e
 
 /* Components are between -3 and 3, and gradients 0.3 long or more on these surfaces. Each component, drawn as a field,
  * is off by some units of 6e-8 of 3, and by the place's 1.5e-5 (test_session_surfaces.c) times its own slope, 6 at
- * most: 9e-5 in all, and a normal by 3e-4 of its length. Polyhedra draw fields otherwise near quads, where they have
- * the bilinear value of a neighbour that is a hex, and where tets overlap, where a field is the sum of all and the
- * normal one tet's: of those of triangles alone, some of them concave, nine pixels of ten are to be right. */
+ * most: 9e-5 in all, and a normal by 3e-4 of its length. Polyhedra draw fields differently near quads, which have
+ * bilinear values as in a neighbouring hex, and where tets overlap, since a field is their sum but the normal is one
+ * tet's. So of polyhedra with triangles only, some of them concave, nine pixels of ten must be right. */
 static void normals_are_the_interpolated_gradients(void **state)
 {
     static const char *const scenes[] = {SCENE(COLOURED("gx")), SCENE(COLOURED("gy")), SCENE(COLOURED("gz"))};
@@ -291,8 +292,8 @@ static void normals_are_the_interpolated_gradients(void **state)
     }
 }
 
-/* The lattice's corners are of doubles, each gradient good to some units of 1e-16 over a corner's determinant; what is
- * left is the rounding of gradients, coordinates and normals to float32, some units of 6e-8. */
+/* The lattice's corners are doubles, so each gradient is good to some units of 1e-16 over a corner's determinant; the
+ * error is the rounding of gradients, coordinates and normals to float32, some units of 6e-8. */
 static void a_linear_field_has_its_gradient(void **state)
 {
     static const double gradient[3] = {0.3, -0.7, 0.5};
@@ -349,8 +350,8 @@ static double mean_angle(test_mesh_kind kind, int side, const char *scene)
     return sum / count;
 }
 
-/* Gradients in cells err in the first order of the cells' size; those at vertices, of which errors of first order
- * cancel but at the boundary and by the jitter, by less, and by less than half on cells of half the size. */
+/* The error of gradients in cells is of first order in the cells' size. At vertices errors of first order cancel,
+ * except at the boundary and by the jitter: errors are smaller, and less than half on cells of half the size. */
 static void normals_come_nearer_to_the_truth(void **state)
 {
     static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_POLYHEDRA};
@@ -370,7 +371,7 @@ static void normals_come_nearer_to_the_truth(void **state)
 
 /* ---- on any partition ------------------------------------------------------------------------------------------ */
 
-/* This rank's part, its cells listed in a way of its own; with_ghosts: of all cells, those of others flagged. */
+/* Makes this rank's part, with its cells listed in its own way; with_ghosts: all cells, those of others flagged. */
 static void part_create(const test_mesh *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
 {
     int *owners = zeros(whole->cell_count, sizeof *owners);
@@ -467,7 +468,7 @@ static void doubled_vertices_are_one(void **state)
     input_free(&whole);
 }
 
-/* Cells of values that are not finite are not drawn, and give nothing to the vertices of others. */
+/* Cells with values that are not finite are not drawn, and do not count at vertices that they share. */
 static void rubbish_gives_nothing(void **state)
 {
     (void)state;

@@ -1,11 +1,11 @@
-/* Where and how large a scene is does not show: far from the origin, as projected coordinates of maps are, and a
- * million times smaller or larger, with the camera and all lengths of the scene file, it is the same picture.
+/* A scene's place and size do not matter: far from the origin, as in projected coordinates of maps, and a million times
+ * smaller or larger, together with the camera and all lengths of the scene file, the picture is the same.
  *
- * An offset of whole numbers is exact on coordinates of multiples of 2^-24, so that nothing at all may change but the
- * rounding of the eye's place. A factor of 1e6 is not a power of two: all float32 numbers then round otherwise. In
- * double that changes no pixel by 1e-12, vertices rounded to float32 change none by 1e-7. What counts is how well a hit
- * solves its equation: the field at it need only be off by 3e-8 to change a pixel by 7e-7 where a hex is grazed. The
- * robust finder's last step is therefore from residuals in double. */
+ * An offset of whole numbers is exact on coordinates of multiples of 2^-24, so that only the rounding of the eye's
+ * place may change. A factor of 1e6 is not a power of two: all float32 numbers then round otherwise. In double that
+ * changes no pixel by 1e-12, vertices rounded to float32 change none by 1e-7. It matters how well a hit solves its
+ * equation: if the field there is off by 3e-8, a pixel where a ray grazes a hex changes by 7e-7. So the robust finder's
+ * last step uses residuals in double. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,8 +25,8 @@ typedef struct space_case {
 
 #define FIELD "volume: {field: f, range: [-1.5, 1.5], opacity: [[0, 0.1], [0.5, 0.8], [1, 0.3]], unit_distance: %.17g}"
 
-/* By max_error a stretch of a ray may be cut once more or less where rounding decides: each way is right to its share of
- * the error, of which a hundredth is allowed here (4e-6 was met). */
+/* With max_error a stretch of a ray may be cut once more or less where rounding decides: both are right to their share
+ * of the error, of which a hundredth is allowed here (4e-6 was measured). */
 static const space_case cases[] = {
     {"isosurface of tets", TEST_TETS, false, 1e-6, "isosurface: {field: f, values: [-0.2, 0.3]}", ""},
     {"isosurface of hexes", TEST_HEXES, false, 1e-6, "isosurface: {field: f, values: [-0.2, 0.3], opacity: 0.5}", ""},
@@ -221,8 +221,8 @@ static bool is_depth(const caught_picture *picture, int p, int count, const doub
     return isinf(expected) ? found == (double)INFINITY : fabs(found - expected) <= 1e-5 * 0.5 + 3e-7;
 }
 
-/* The depth of an EXR: along the camera's axis, of the nearest isosurface, however transparent and whatever volume is
- * in front; infinite elsewhere. */
+/* An EXR's depth is that of the nearest isosurface along the camera's axis, however transparent, even behind a volume;
+ * elsewhere it is infinite. */
 static void depth_is_of_the_nearest_surface(void **context)
 {
     (void)context;

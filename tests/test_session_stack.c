@@ -1,5 +1,5 @@
-/* How much of its stack a step takes, of the calling thread's and of a worker's: less than it is checked for
- * (session_threads.h). The stacks are painted before a step, and looked at after it.
+/* A step takes less stack, of the calling thread's and of a worker's, than it checks for (session_threads.h). The
+ * stacks are painted before a step, and inspected after it.
  *
  * With SMALL_STACKS in the environment OpenMP's are too small, and the step says so. */
 #define _GNU_SOURCE

@@ -1,5 +1,5 @@
-/* Statistics of fields: closed forms and sums by hand; files to the byte the same on any ranks, and gone on with by
- * runs that begin again; images that wait for a condition, or are drawn once. */
+/* Statistics of fields: closed forms and sums by hand; files that are the same to the byte on any ranks, and that
+ * restarted runs continue; images that wait for a condition, or are drawn once. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

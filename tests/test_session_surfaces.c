@@ -183,7 +183,8 @@ static void faces_are_one_by_ids(void **state)
 
 /* ---- pictures of the cube ------------------------------------------------------------------------------------ */
 
-/* Where the ray is in the cube: depths; false where it is not. near: how near it is to an edge or a miss. */
+/* The depths between which the ray is in the cube; false where it misses it. *margin: how near it is to an edge or a
+ * miss. */
 static bool cross_cube(const ray *r, double depths[2], double *margin)
 {
     double in[3], out[3];
@@ -311,7 +312,7 @@ static bool meets_triangle(const ray *r, const double *a, const double *b, const
     return s >= 0 && t >= 0 && s + t <= 1;
 }
 
-/* Where a ray meets a patch: its depth, and the sine of the angle at which it does. */
+/* A ray's hit on a patch: its depth, and the sine of the angle between the two. */
 typedef struct patch_hit {
     double depth, slant;
 } patch_hit;

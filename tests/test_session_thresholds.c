@@ -21,7 +21,7 @@ enum { SIDE = 3, PIXELS = 48 * 36 };
 
 /* ---- faces ---------------------------------------------------------------------------------------------------- */
 
-/* Of corners in any order: a sum of hashes of their places. */
+/* Hashes corners in any order: a sum of hashes of their places. */
 static uint64_t mix(uint64_t h)
 {
     h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
@@ -89,7 +89,7 @@ static face_set find_truth(const test_mesh *mesh, const grid *g, bool is_cell_ce
     return out;
 }
 
-/* Of the pyramids and tets on this rank's faces, whose last vertex is the apex; the sum over all ranks. */
+/* The faces of the pyramids and tets on this rank's faces, whose last vertex is the apex, summed over all ranks. */
 static face_set find_drawn(const insitu_session *session)
 {
     face_set out = {0};
@@ -171,7 +171,7 @@ static void free_picture(caught_picture *picture)
     free(picture->depth);
 }
 
-/* With ghosts: all cells, of which the others' are ghosts. */
+/* Takes this rank's part; with ghosts, all cells, of which the others' are ghosts. */
 static void take_part(const test_mesh *whole, bool with_ghosts, test_mesh *out)
 {
     int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
@@ -224,7 +224,7 @@ static void faces_are_those_around_the_cells_within(void **state)
         for (int way = 0; way < 3; way++) check(kind, way == 1, way == 2);
 }
 
-/* Everything is within, nothing is, and a mesh without the field. */
+/* Tests bounds that hold everything or nothing, and a mesh without the field. */
 static void bounds_may_show_all_or_nothing(void **state)
 {
     (void)state;

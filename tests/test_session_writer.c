@@ -1,5 +1,6 @@
-/* Pictures that rank 0's thread writes while the simulation goes on: the same ones in the same order as those written
- * in the step; what cannot be written is told later, on all ranks; what waits is bounded and outlives its scene. */
+/* Pictures that rank 0's thread writes while the simulation goes on: they are the same, in the same order, as those
+ * written in the step; errors are returned later, on all ranks; waiting pictures are bounded, and outlive their scene.
+ * */
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>
@@ -175,7 +176,7 @@ static void failure_is_told_by_a_later_step_or_the_end(void **state)
     insitu_session *session = open_behind(write_scene(SCENE("", "[16, 12]")), &in, wait_at_gate);
     everywhere(insitu_step(session, 2, 0.5) == INSITU_OK);
     wait_for_passed(3);
-    /* Which step tells is the thread's choice: the last picture is past the gate, but it may not be done yet. */
+    /* The thread decides which step returns the error: the last picture is past the gate, but may not be done yet. */
     insitu_status status = INSITU_OK;
     for (int cycle = 3; cycle < 1000 && !status; cycle += 2) {
         status = insitu_step(session, cycle, 0.5);

@@ -1,6 +1,5 @@
-/* A slice is the isosurface 0 of the vertices' distances from a plane. That it is the plane, and has the colours of the
- * field there, is shown against brute force in double on warped cells of every type; that the plane is one is shown by
- * its closed form. */
+/* A slice is the isosurface 0 of the vertices' distances from a plane. Brute force in double on warped cells of every
+ * type shows that it has the right place and colours; a closed form shows that it is a plane. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -23,7 +22,7 @@ static double distance(const double position[3])
     return normal[0] * position[0] + normal[1] * position[1] + normal[2] * position[2] - 0.1;
 }
 
-/* Of cells with 1/4 of the cube's half a side the fixture's own bound on depths, 2e-6 cells or 5e-7 × conditioning, is
+/* Cells are 1/4 of the cube's half side. The fixture's own bound on depths, 2e-6 cells or 5e-7 × conditioning, is then
  * below 1e-5 of the scene for rays that meet the plane at more than a few degrees. */
 static void assert_on_plane(const render_fixture *f, const drawn_frame *drawn, const char *what)
 {

@@ -1,5 +1,5 @@
-/* What the tests of steps of the opacity share: functions with a step or a steep ramp, cells, and pictures against the
- * integral. */
+/* Shared by the tests of steps of the opacity: functions with a step or a steep ramp, cells, and comparisons of
+ * pictures with the integral. */
 #ifndef TEST_STEP_FIXTURE_H
 #define TEST_STEP_FIXTURE_H
 

@@ -1,7 +1,7 @@
 /* Every allocation of a session's life fails in turn, on one rank or on all: as it is created, as meshes and fields are
- * set and drawn, as its scene is edited. What comes of it is an error on all ranks or the picture, to the bit; and the
- * next step draws the picture, whatever failed before. The heap that fails is the process's own, so that what libyaml
- * and the C library ask for is of it. */
+ * set and drawn, as its scene is edited. The result is an error on all ranks or the picture, to the bit; and the next
+ * step draws the picture, whatever failed before. The heap that fails is the process's own, which libyaml and the C
+ * library use too. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 #include "memory.h"
 #include "test_session_fixture.h"
 
-/* Between the allocations that are tried: each case begins at its own. */
+/* Distance between the allocations that are tried; each case begins at its own. */
 static int stride = 97;
 /* The one that fails, or did last. */
 static int64_t allocation;
@@ -113,7 +113,7 @@ typedef struct picture_set {
     caught_picture pictures[MAX_CAUGHT];
 } picture_set;
 
-/* Of deep pictures; others have none. */
+/* Compares the samples of deep pictures; others have none. */
 static bool have_same_samples(const caught_picture *a, const caught_picture *b, size_t pixels)
 {
     if (!a->first || !b->first) return a->first == b->first;
@@ -155,7 +155,7 @@ static bool are_of(const picture_set *set)
     return are_all;
 }
 
-/* As everywhere(), with the allocation that failed. */
+/* As everywhere(), naming the allocation that failed. */
 #define at_allocation(condition) everywhere(name_allocation((condition)))
 static bool name_allocation(bool is_well)
 {
@@ -194,7 +194,7 @@ static void arm(const failure *f)
     if (f->is_armed) heap_arm(f->n, false);
 }
 
-/* Whether it was beyond the last allocation on every rank. */
+/* Tells whether the allocation was beyond the last one on every rank. */
 static bool disarm(const failure *f)
 {
     int is_over = !f->is_armed || heap_disarm() < f->n;

@@ -1,5 +1,5 @@
-/* Steps of the opacity in scenes of more than a cell: in lattices of cells whose field is curved, where max_error holds
- * of all of a ray's cells together; and in one of several volumes, which are mixed. */
+/* Steps of the opacity in scenes of many cells: in lattices of cells with curved fields, where max_error holds for all
+ * of a ray's cells together; and in a scene of several volumes, which are mixed. */
 #include "test_effort.h"
 #include "test_step_fixture.h"
 
@@ -51,10 +51,10 @@ static void lattices_of_curved_cells(void **state)
 
 /* ---- volumes that are mixed ---- */
 
-/* Two volumes by the step, which is a cell, over one field: the first one's opacity is level but for a step, the second
- * one's throughout. A field off its chord changes nothing but at the step, whose stretches are halved: a share of the
- * mixing's 0.4 RENDER_MIXING_ERROR by length and another by what is absorbed (kernel_cell_segments.h), beside what
- * mixing itself may cost. */
+/* Two volumes over one field, by steps of a cell: the first one's opacity is constant except for a step, the second
+ * one's constant. A field off its chord matters only at the step, whose stretches are halved: its error is a share of
+ * the mixing's 0.4 RENDER_MIXING_ERROR by length and another by absorption (kernel_cell_segments.h), beside the error
+ * of mixing itself. */
 static double judge_mixed(const test_mesh *mesh, fixture_camera camera, double unit)
 {
     static const float colours[12] = {0.9f, 0.2f, 0.1f, 0.9f, 0.2f, 0.1f, 0.1f, 0.4f, 0.9f, 0.1f, 0.4f, 0.9f};

@@ -1,6 +1,6 @@
-/* What the VTK adaptor hands over: VTK's own pointers where it may, right conversions where it must. The session is a
+/* The VTK adaptor hands over VTK's own pointers where it may, and right conversions where it must. The session is a
  * stub that records. Volumes of split and reordered cells are compared with those computed here from the corner
- * positions; everything else is compared element by element with what VTK holds. */
+ * positions; everything else is compared element by element with VTK's arrays. */
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -571,7 +571,7 @@ void ghost_flags_follow_cells_left_out(void **)
     for (int i = 0; i < 2; i++) assert_int_equal(integer_at(f.mesh().mesh.ghosts, i), expected[i]);
 }
 
-/* Of hexes alone, whose types and offsets are not given. */
+/* The volume of a mesh of hexes only, whose types and offsets are not given. */
 double whole_volume(insitu_mesh mesh)
 {
     double sum = 0;

@@ -1,5 +1,5 @@
-/* AMR by the VTK adaptor: each place of the domain is drawn by one cell, the finest there. The oracle is a point in
- * each cell, looked for in the bounds of the finer grids, and the volume of what is left, which is the domain's. */
+/* AMR by the VTK adaptor: each place of the domain is drawn by one cell, the finest there. The oracle looks for a point
+ * of each cell in the bounds of the finer grids, and compares the volume of the drawn cells with the domain's. */
 #include <array>
 #include <cmath>
 #include <string>
@@ -50,7 +50,7 @@ struct fixture {
 struct block {
     unsigned level;
     std::array<int, 3> low, cells;
-    int ratio; // of its level's cells to those of level 0
+    int ratio; // of level 0's cells to those of its level
 };
 
 const std::array<double, 3> origin = {-3, 1, 0.5}, spacing = {1, 0.5, 0.25}; // of level 0
@@ -81,7 +81,7 @@ vtkSmartPointer<vtkUniformGrid> grid_of(const block &b, bool is_flat = false)
 
 enum class given { spacings, ratios };
 
-enum class held { all, some }; // grids: on a rank that has some, those of level 1 and the first one are another's
+enum class held { all, some }; // held by a rank; where some, the grids of level 1 and the first one are another rank's
 
 vtkSmartPointer<vtkOverlappingAMR> make_amr(given what, bool is_flat = false, held grids = held::all)
 {
@@ -106,7 +106,7 @@ vtkSmartPointer<vtkOverlappingAMR> make_amr(given what, bool is_flat = false, he
     return amr;
 }
 
-/* Whether a finer block covers the middle of the cell of block b. */
+/* Tells whether a finer block covers the middle of the cell of block b. */
 bool is_covered(const block &b, const std::array<int, 3> &cell, bool is_flat)
 {
     for (const block &finer : blocks) {

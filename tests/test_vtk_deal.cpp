@@ -1,5 +1,5 @@
-/* Dealing cells out to ranks: every cell on exactly one rank whatever the partition, its points bitwise as they were,
- * its values with it. */
+/* Dealing cells out to ranks: by any partition every cell is on exactly one rank, with the same points, bit for bit,
+ * and its values. */
 #include <cstdint>
 #include <map>
 #include <string>

@@ -1,5 +1,5 @@
-/* What insitu-render's readers make of files of every format: the cells and values that are in them, and, of files that
- * are cut short, an error or the same cells and values, never others.
+/* insitu-render's readers get from files of every format the cells and values that are in them; from files that are cut
+ * short they get an error or the same cells and values, never others.
  *
  *     test_vtk_files [random cuts of each file] */
 #include <cstdint>
@@ -144,7 +144,7 @@ void every_format_gives_its_cells_and_values(void **)
     }
 }
 
-/* "" or what a cut file was taken for. */
+/* "" or the wrong contents that were read from a cut file. */
 std::string taken_for(const sample &s)
 {
     try {
@@ -328,7 +328,7 @@ void wrong_series_are_refused_by_what_is_wrong(void **)
                    "none.vtu: No such file");
 }
 
-/* As VTK's own writer and others leave grids without cells. */
+/* Files of grids without cells, as VTK's own writer and others write them. */
 void grids_without_cells_are_no_errors(void **)
 {
     const std::string head = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>",

@@ -3,8 +3,8 @@
  *
  *     test_vtk_formats <insitu-render> <mpiexec> [percent...]
  *
- * Percents are where to cut, each file on one rank and on two. Unless told, at 95, and a fifth of the runs alone: programs
- * start slowly, and test_vtk_files cuts each file within one. */
+ * Each file is cut at these percents, on one rank and on two. By default it is cut at 95, and only a fifth of the runs
+ * is done: programs start slowly, and test_vtk_files cuts each file within one. */
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -164,7 +164,7 @@ void steps_of_series_are_chosen_by_number(void **)
     expect(run_tool(1, "--info run.pvd"), 0, "times  3: 3 .. 9");
 }
 
-/* What lies in hidden cells, and at points that no other cell has, is no part of what --info says. */
+/* --info leaves out hidden cells, and points that no other cell has. */
 void info_leaves_hidden_cells_out(void **)
 {
     const auto data = structured(lattice::curved);

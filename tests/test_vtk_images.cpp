@@ -1,7 +1,7 @@
 /* insitu-render on real files: alone and on ranks it must draw the same pictures. An isosurface's pixels (depth and
- * colour) are bitwise the same on any partition; a volume's differ by the rounding of "over" in another order. Its
- * bound of 1e-6 in linear light is what the library promises: with the few tens of merges of a pixel at float rounding
- * (6e-8) of values up to 1 there is no room for an error of another kind.
+ * colour) are bitwise the same on any partition; a volume's differ by the rounding of "over" in another order. Their
+ * bound of 1e-6 in linear light is the library's promise: a pixel's few tens of merges, each with a float rounding
+ * (6e-8) of values up to 1, leave no room for errors of another kind.
  *
  *     test_vtk_images <insitu-render> <mpiexec>, with the data's folder in INSITU_TEST_DATA; 77 where that is not set
  */
@@ -166,7 +166,7 @@ void expect_same_pictures(const subject &s, const std::string &alone, const std:
     }
 }
 
-/* The smallest surface here is that of the notch's stress, of some 20 pixels. */
+/* The smallest surface here is that of the notch's stress, with some 20 pixels. */
 void expect_something_to_see(const subject &s, const std::string &folder)
 {
     const auto step = static_cast<size_t>(s.shown_in);
@@ -267,7 +267,7 @@ void info_counts_the_mixed_lattice(void **)
         assert_true(r.says(text));
 }
 
-/* NetCDF reads what is missing at the end of a file as zeros. */
+/* NetCDF reads zeros where the end of a file is missing. */
 void exodus_cut_short_is_refused(void **)
 {
     const std::string folder = fresh_folder("vtk_cut");

@@ -1,4 +1,4 @@
-/* Running programs and looking at what they say, for the tests of insitu-render. */
+/* Runs programs and checks their output, for the tests of insitu-render. */
 #ifndef TEST_VTK_RUN_H
 #define TEST_VTK_RUN_H
 

@@ -219,8 +219,8 @@ void write_parallel_lattices(const std::string &folder)
                       "<PPoints><PDataArray type=\"Float32\" NumberOfComponents=\"3\"/></PPoints>", piece + "vts\"/>");
 }
 
-/* In C binary. VTK's writer wants numbers of blocks; it writes a .case too, but closes that only when the program ends.
- */
+/* Writes C binary files. VTK's writer needs numbers of blocks; it writes a .case too, but closes it only when the
+ * program ends. */
 void write_ensight(const std::string &folder, vtkUnstructuredGrid *grid)
 {
     vtkNew<vtkUnstructuredGrid> numbered;
@@ -339,7 +339,7 @@ std::string lines_of(vtkDataArray *values, int component)
     return text.str();
 }
 
-/* As text; each number of a point or cell in a line of its own. */
+/* Writes text files, with each number of a point or cell in a line of its own. */
 void write_ensight_text(const std::string &folder, vtkUnstructuredGrid *grid)
 {
     std::ostringstream cells;

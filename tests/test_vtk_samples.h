@@ -13,7 +13,7 @@ class vtkUnstructuredGrid;
 /* A lattice of 6 × 5 × 4 points as VTK has it: coordinates by axes, by one array an axis, by a list of points. */
 enum class lattice { image, rectilinear, curved };
 
-/* With the point field "x", and the cell field "c", which counts cells. */
+/* A grid with the point field "x", and the cell field "c", which counts cells. */
 vtkSmartPointer<vtkDataSet> structured(lattice kind);
 
 /* The same as a list of hexahedra, made from the lattice's indices alone. */
@@ -33,8 +33,8 @@ std::vector<sample> write_samples(const std::string &folder);
 
 void write_vtu(const std::string &path, vtkUnstructuredGrid *grid);
 
-/* A box of one cube and, beside it, two wedges whose triangles together are the cube's face: so the cube has seven
- * faces. As an OpenFOAM case in folder, with the fields p at the times 0 and 0.5: the cell's number, and twice that. */
+/* Writes an OpenFOAM case to folder: a cube and, beside it, two wedges whose triangles together are the cube's face, so
+ * that the cube has seven faces. The field p is the cell's number at time 0, and twice that at 0.5. */
 void write_foam(const std::string &folder);
 
 #endif

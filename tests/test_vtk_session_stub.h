@@ -1,4 +1,4 @@
-/* A session that only records what it is given, to see what the VTK adaptor hands over. */
+/* A session that only records its input, to check what the VTK adaptor hands over. */
 #ifndef TEST_VTK_SESSION_STUB_H
 #define TEST_VTK_SESSION_STUB_H
 

@@ -1,5 +1,5 @@
-/* insitu-render from outside: what it says of good files and of bad ones, alone and on ranks. Files are written here,
- * so that what they hold is known.
+/* Tests insitu-render from outside: its output for good and bad files, alone and on ranks. The test writes the files,
+ * so it knows their contents.
  *
  *     test_vtk_tool <insitu-render> <mpiexec> */
 #include <filesystem>

@@ -62,7 +62,7 @@ static int run(const char *end, const char *folder)
     return 0;
 }
 
-/* From its first bytes to its last chunk. */
+/* Tells whether a PNG is whole, from its first bytes to its last chunk. */
 static int is_whole_png(const char *path)
 {
     static const unsigned char begin[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'}, end[4] = {'I', 'E', 'N', 'D'};
