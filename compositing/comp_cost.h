@@ -18,7 +18,7 @@ typedef struct comp_machine {
  * */
 extern const comp_machine comp_usual_machine;
 
-/* What the busiest rank has to send: its load. */
+/* The load of the busiest rank. */
 typedef struct comp_load {
     int64_t fragments;
     double bytes; /* that a fragment takes on its way (comp_block.h) */

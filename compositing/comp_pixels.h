@@ -1,4 +1,4 @@
-/* From one owner's fragments to its finished pixels. */
+/* Makes an owner's fragments into its finished pixels. */
 #ifndef COMP_COMP_PIXELS_H
 #define COMP_COMP_PIXELS_H
 

@@ -1,4 +1,4 @@
-/* For the makers of test meshes alone: to fill the arrays of a test_mesh, which must have room. */
+/* Functions for the makers of test meshes: they fill the arrays of a test_mesh, which must have room. */
 #ifndef TEST_MESH_MAKE_H
 #define TEST_MESH_MAKE_H
 

@@ -260,7 +260,7 @@ static void sheets_are_planes_on_any_ranks(void **state)
         }
 }
 
-/* Of the block's 24 outer faces 4 are taken by shells, of which there are 12. */
+/* 4 of the block's 24 outer faces are replaced by shells, of which there are 12. */
 static void shells_take_the_place_of_faces(void **state)
 {
     (void)state;

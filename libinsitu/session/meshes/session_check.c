@@ -269,7 +269,7 @@ static cell_fault check_cell(const session_mesh *mesh, int64_t cell, face_room *
     return grid_is_ghost(g, cell) ? CELL_GOOD : check_coordinates(g, vertices, count, place);
 }
 
-/* As it stands in the array, which may be of int64. */
+/* The type as it stands in the array, which may be of int64. */
 static long long given_type(const grid *g, int64_t cell)
 {
     if (!g->cell_types || g->cell_types_bytes < 8) return grid_cell_type(g, cell);
@@ -292,7 +292,7 @@ static const char *type_name(int type)
     }
 }
 
-/* As the caller has the cell: a polyhedron may be read as another type. */
+/* The name of the type that the caller gave: a polyhedron may be read as another type. */
 static const char *given_name(const session_mesh *mesh, int64_t cell)
 {
     return type_name(session_given_type(mesh, cell));

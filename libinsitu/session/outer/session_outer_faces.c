@@ -242,7 +242,7 @@ static bool pack_keys(const face_search *s, const session_box *boxes, int box_co
     return is_done;
 }
 
-/* For each key that came: how often it came. */
+/* Answers for each key how often it came. */
 static bool answer_keys(const session_mail *in, int ranks, session_mail *reply)
 {
     const int64_t count = in->total / KEY_WORDS;

@@ -15,7 +15,7 @@ typedef struct session_picture {
     size_t bytes;
 } session_picture;
 
-/* At least so many bytes; NULL where there is no memory. What they hold is undefined. */
+/* Reserves at least so many bytes, with undefined contents; NULL where there is no memory. */
 float *session_reserve_picture(session_picture *picture, size_t bytes);
 
 void session_drop_picture(session_picture *picture);

@@ -88,7 +88,7 @@ static mmbvh_builder choose_builder(const session_mesh *mesh, const mmbvh_select
     return !selection && mesh->full_tree_steps == 1 ? MMBVH_MORTON : MMBVH_SAH;
 }
 
-/* Over the selection, or over all cells where that is NULL. */
+/* Builds a tree over the selection, or over all cells if that is NULL. */
 static insitu_status build_tree(const tree_update *u, session_mesh *mesh, const mmbvh_selection *selection,
                                 base_error *error)
 {

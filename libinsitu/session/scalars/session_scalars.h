@@ -33,7 +33,7 @@ session_scalar *session_add_scalar(session_mesh *mesh);
 
 /* Is it the vertices' distance from a plane? */
 bool session_is_distance(const session_scalar *scalar);
-/* For messages. */
+/* The scalar's name for messages. */
 const char *session_scalar_name(const session_mesh *mesh, const session_scalar *scalar);
 
 /* The values of a scalar. */

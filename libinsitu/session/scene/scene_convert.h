@@ -17,7 +17,7 @@ typedef struct scene_colour_points {
     bool is_banded; /* each colour is that of a band */
 } scene_colour_points;
 
-/* To unit length; false for a zero vector. */
+/* Scales v to unit length; false for a zero vector. */
 bool scene_normalize(double v[3]);
 /* Unit vectors count as parallel within a millionth of a radian. */
 bool scene_is_parallel(const double a[3], const double b[3]);

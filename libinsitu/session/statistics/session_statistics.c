@@ -62,7 +62,7 @@ typedef struct sum_basis {
     bool is_second;
 } sum_basis;
 
-/* From 0 at the least value to 1 at the greatest; without overflow. */
+/* A value's share of the range, from 0 at low to 1 at high, without overflow. */
 static double share_of_range(double value, double low, double high)
 {
     const double share = high > low ? (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) : 0;

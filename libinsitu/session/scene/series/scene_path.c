@@ -30,7 +30,7 @@ typedef struct cubic_points {
     bool has_first, has_last;
 } cubic_points;
 
-/* At point i, 1 or 2. */
+/* The slope at point i, 1 or 2. */
 static double slope_at(const cubic_points *p, int i)
 {
     const double before = p->at[i] - p->at[i - 1], after = p->at[i + 1] - p->at[i];
