@@ -455,7 +455,7 @@ contains
         call refused(session, 'offsets of a patch')
         call session%set_field('m', 'p', insitu_borrow(cell_values), status, centring=INSITU_CELL, &
             patches=[insitu_patch(insitu_borrow(wall_values), first_face=3)])
-        call refused(session, 'patch 0: tells faces by their numbers')
+        call refused(session, 'patch 0: names faces by their numbers')
         places(5) = 0
         call session%set_field('m', 'p', insitu_borrow(vector), status, index=insitu_borrow(places))
         call session%step(0, 0.0_real64, status)

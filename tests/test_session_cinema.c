@@ -452,8 +452,8 @@ static void warnings_of_swept_isovalues_are_told_once(void **state)
         assert_int_equal(hand_over(session, &in), INSITU_OK);
         everywhere(insitu_step(session, cycle, cycle) == INSITU_OK);
         const char *warnings = insitu_last_report(session)->warnings;
-        everywhere((strstr(warnings, "at 1e+06 is not there") != NULL) == (cycle == 0));
-        everywhere((strstr(warnings, "at 2e+06 is not there") != NULL) == (cycle == 0));
+        everywhere((strstr(warnings, "at 1e+06 is empty") != NULL) == (cycle == 0));
+        everywhere((strstr(warnings, "at 2e+06 is empty") != NULL) == (cycle == 0));
     }
     insitu_destroy(&session);
     input_free(&in);

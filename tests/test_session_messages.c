@@ -117,7 +117,7 @@ static const struct warning_case {
      IMAGE("[24, 16]", "", "{isosurface: {field: f, values: [0.1, 7e5]}}", ""),
      TEST_HEXES,
      NULL,
-     {"image \"a\": the isosurface of \"f\" at 700000 is not there: the field is from -"}},
+     {"image \"a\": the isosurface of \"f\" at 700000 is empty: the field goes from -"}},
     {"an isovalue too low, of a full tree",
      "tree: full\n" IMAGE("[24, 16]", "", SURFACE ", {isosurface: {field: f, values: [-3]}}", ""),
      TEST_TETS,
@@ -132,7 +132,7 @@ static const struct warning_case {
      plain,
      TEST_HEXES,
      centre_on_cells,
-     {"\"f\" at 0.1 is not there: the field is from 5 to 5"}},
+     {"\"f\" at 0.1 is empty: the field goes from 5 to 5"}},
     {"a logarithm of nothing",
      IMAGE("[24, 16]", "", "{surface: {colour_by: {field: f, scale: log}}}", ""),
      TEST_HEXES,
@@ -231,7 +231,7 @@ static void warnings_come_back_with_what_they_are_about(void **context)
 {
     (void)context;
     static const bool is_bad[] = {true, true, false, true, true}, is_told[] = {true, false, false, true, false};
-    static const char *const words[3] = {"the isosurface of \"f\" at 0.1 is not there: the field is from 5 to 5"};
+    static const char *const words[3] = {"the isosurface of \"f\" at 0.1 is empty: the field goes from 5 to 5"};
     static const char *const none[3] = {NULL};
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(plain));
     session_input in;

@@ -241,7 +241,7 @@ static const fault faults[] = {
     {vertices_two, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 has fewer than three vertices"}},
     {vertices_beyond, INSITU_ERROR_FIELD, false, {"patch 1: its face 0 has vertices beyond the connectivity"}},
     {vertices_uneven, INSITU_ERROR_FIELD, true, {"patch 1: has 7 connectivity indices, no multiple of its 2 faces"}},
-    {offsets_alone, INSITU_ERROR_FIELD, true, {"patch 0: offsets are given, and connectivity is not"}},
+    {offsets_alone, INSITU_ERROR_FIELD, true, {"patch 0: offsets are given without connectivity"}},
     {told_twice, INSITU_ERROR_FIELD, true, {"patch 1: faces and connectivity are given"}},
     {numbers_of_floats, INSITU_ERROR_ARGUMENT, true, {"patch 0: faces are of element type 1, not int32 or int64"}},
     {no_values, INSITU_ERROR_FIELD, true, {"patch 0: values are not given"}},
@@ -298,7 +298,7 @@ static void hexes_want_vertices(void **state)
     input.field.patches = patches;
     input.field.patch_count = 1;
     everywhere(hand_over(session, &input) == INSITU_ERROR_FIELD);
-    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "patch 0: tells faces by their numbers",
+    told_everywhere(session, insitu_step(session, 0, 0), INSITU_ERROR_FIELD, "patch 0: names faces by their numbers",
                     "the mesh has none");
     insitu_destroy(&session);
     input_free(&input);

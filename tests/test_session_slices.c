@@ -260,7 +260,7 @@ static void planes_beside_the_data_are_warned_of(void **state)
     session_input part = {0};
     input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     caught_picture picture = draw(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 2], offset: 1.5}"))),
-                                  &part, "a plane of its slices meets no cell: they are -2.5 to -0.5 from it");
+                                  &part, "a plane of its slices meets no cell: cells are -2.5 to -0.5 from it");
     free_picture(&picture);
     input_free(&part);
 }

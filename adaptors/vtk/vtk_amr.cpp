@@ -110,8 +110,9 @@ vtkSmartPointer<vtkUnsignedCharArray> refined_flags(vtkOverlappingAMR *amr, unsi
     const box own = cells_of(amr->GetAMRBox(level, number), 1);
     const int64_t ratio = ratio_to_next(amr, level);
     if (finer > 0 && (own.cells() != data->GetNumberOfCells() || ratio < 1)) {
-        count.warn(what + ": the AMR's boxes, spacings or ratios are not set, or are not those of its grids: which of "
-                          "its cells are refined is taken from their ghost flags alone");
+        count.warn(what +
+                   ": the AMR's boxes, spacings or ratios are not set, or are not those of its grids: only ghost "
+                   "flags tell which of its cells are refined");
         return flags;
     }
     for (unsigned i = 0; i < finer; i++) {

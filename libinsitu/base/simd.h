@@ -371,7 +371,7 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
-/* Stores the lanes of m one after the other at to, which has room for a whole vector; returns how many. */
+/* The lanes of m one after the other, to where there is room for all; returns how many. */
 SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 {
 #if defined(SIMD_AVX512)

@@ -10,7 +10,7 @@
 !
 ! Arrays are borrowed as they are, with their strides: nothing is copied. They must stay where they are until the next
 ! step has returned or they are set again, whichever is later; give them the attribute target, and pass no expressions.
-! Indices count from 1. insitu.h says more of each argument; docs/fortran.md is the page about this file.
+! Indices count from 1. insitu.h tells more about each argument; docs/fortran.md is the page about this file.
 module insitu
     use, intrinsic :: iso_c_binding
     use, intrinsic :: iso_fortran_env, only: int32, int64, int8, real32, real64
@@ -45,8 +45,8 @@ module insitu
         type(insitu_array) :: lists, sizes
     end type insitu_face_lists
 
-    ! Values of a field of cells on faces of the boundary: insitu_patch(insitu_borrow(values), first_face=n). The faces are
-    ! told in one of three ways: a range, their numbers, or their vertices: a list, with offsets, or (vertices, faces).
+    ! A cell field's values on faces of the boundary: insitu_patch(insitu_borrow(values), first_face=n). The faces are
+    ! named by a range, by their numbers, or by their vertices (a list with offsets, or a matrix (vertices, faces)).
     type, public :: insitu_patch
         type(insitu_array) :: values
         integer :: first_face = 0
@@ -104,7 +104,7 @@ module insitu
         type(c_ptr) :: patches
     end type c_field
 
-    ! What the last step did, on this rank: as insitu_report in insitu.h.
+    ! Report of the last step on this rank: as insitu_report in insitu.h.
     type, bind(C), public :: insitu_report
         integer(c_int64_t) :: cycle = 0
         real(c_double) :: time = 0
@@ -133,8 +133,8 @@ module insitu
         real(real32), pointer, contiguous :: depth(:, :) => null()   ! (width, height); huge or infinite: nothing
     end type insitu_picture
 
-    ! Makes the values of a field, in the steps that need them: values = insitu_borrow(...), of an array that stays until
-    ! the step has returned. It may communicate (insitu_fill in insitu.h); status: INSITU_OK, or any other to fail.
+    ! Makes the values of a field in the steps that need them: values = insitu_borrow(...), of an array that stays until
+    ! the step has returned. It may communicate (insitu_fill in insitu.h). status: INSITU_OK, or any other to fail.
     abstract interface
         subroutine insitu_fill(values, status)
             import :: insitu_array
@@ -144,14 +144,14 @@ module insitu
     end interface
     public :: insitu_fill
 
-    ! What C is given beside the function that it calls: these stay where they are until the session ends.
+    ! The data that C passes to the function that it calls. It stays where it is until the session ends.
     type :: fill_record
         character(:), allocatable :: mesh, field
         procedure(insitu_fill), pointer, nopass :: fill => null()
         type(fill_record), pointer :: next => null()
     end type fill_record
 
-    ! Of a mesh that was handed over: how long the index of a field must be.
+    ! Sizes of a mesh that was handed over: they tell how long the index of a field must be.
     type :: mesh_size
         character(:), allocatable :: name
         integer(c_int64_t) :: vertices = 0, cells = 0, corners = 0
@@ -162,7 +162,7 @@ module insitu
     type, public :: insitu_session
         private
         type(c_ptr) :: handle = c_null_ptr
-        character(:), allocatable :: own_error ! of an argument that C was not told
+        character(:), allocatable :: own_error ! about an argument that was not passed to C
         type(mesh_size), allocatable :: sizes(:)
         type(fill_record), pointer :: fills => null()
     contains
@@ -511,8 +511,8 @@ contains
         call self%text_integer(comm%MPI_VAL, scene_text, status)
     end subroutine text_f08
 
-    ! The first of the arguments that C cannot be told of; '' where there is none. row: as row_of(), 0 where there must be
-    ! no gaps.
+    ! Describes the first argument that cannot be passed to C; '' if there is none. row: as row_of(), 0 where there must
+    ! be no gaps.
     function find_fault(points, connectivity, row, lists, face_lists) result(out)
         type(insitu_array), intent(in) :: points(3), connectivity, lists(:)
         integer(c_int64_t), intent(in) :: row
@@ -541,10 +541,10 @@ contains
         mesh%face_sizes = as_c(face_lists%sizes, nothing)
     end subroutine take_lists
 
-    ! This rank's part of a mesh. connectivity: a list, or (corners, cells), of cells of one type also some first rows of
-    ! a matrix; in VTK's order, or in vertex_order. faces, face_offsets: the faces' vertices, and
-    ! where each begins, of polyhedra, whose connectivity is of faces; or face_lists instead. Every index and offset counts
-    ! from 1, or from index_base.
+    ! Hand over this rank's part of a mesh. connectivity is a list, or a matrix (corners, cells), for cells of one type
+    ! also its first rows; vertices are in VTK's order, or in vertex_order. The connectivity of polyhedra lists faces:
+    ! then faces and face_offsets are the faces' vertices and where each face begins, or face_lists replaces them. All
+    ! indices and offsets count from 1, or from index_base.
     subroutine set_mesh(self, name, points, connectivity, status, cell_type, cell_types, offsets, faces, face_offsets, &
         ghosts, vertex_ids, changed, index_base, keep_polyhedra, vertex_order, face_lists)
         class(insitu_session), intent(inout) :: self
@@ -610,9 +610,9 @@ contains
             merge(mesh%cell_count * corners, mesh%connectivity_count, corners > 0), corners))
     end subroutine set_mesh
 
-    ! This rank's part of a mesh of finite volumes: faces' vertices, and where each begins, or a list for each face; of each
-    ! face the cell that owns it, and the neighbour beyond. Faces on the boundary have 0 for a neighbour (index_base - 1),
-    ! or are the last ones, beyond the neighbours.
+    ! Hand over this rank's part of a finite-volume mesh: faces' vertices and where each face begins, or a list for each
+    ! face; and for each face the cell that owns it and the neighbour beyond. Faces on the boundary have 0 (index_base -
+    ! 1) as neighbour, or come last, beyond the neighbours.
     subroutine set_faces_by_offsets(self, name, points, faces, face_offsets, owner, neighbour, cell_count, status, ghosts, &
         vertex_ids, changed, index_base, keep_polyhedra)
         class(insitu_session), intent(inout) :: self
@@ -665,7 +665,7 @@ contains
             index_base, keep_polyhedra)
     end subroutine set_faces_by_lists
 
-    ! mesh has its faces.
+    ! Hands over a mesh that has its faces already.
     subroutine set_owned(self, mesh, name, points, owner, neighbour, cell_count, status, ghosts, vertex_ids, changed, &
         index_base, keep_polyhedra)
         class(insitu_session), intent(inout) :: self
@@ -796,10 +796,10 @@ contains
         status = c_set_mesh(self%handle, as_c_text(name), c_null_ptr)
     end subroutine remove_mesh
 
-    ! This rank's part of a field: a list, or (components, tuples). index: which tuple each vertex, cell or corner has, from
-    ! 1, or from the mesh's index_base; of corners a list, or (corners, cells), also some first rows of a matrix. corner_row:
-    ! of corners, tuples (or entries of a list index) from the first of a cell to that of the next. patches: of cells, the
-    ! values on the boundary.
+    ! Hand over this rank's part of a field: a list, or a matrix (components, tuples). index: the tuple that each
+    ! vertex, cell or corner has, from 1 or from the mesh's index_base; for corners a list, or a matrix (corners,
+    ! cells), also its first rows. corner_row, for corners: tuples (or entries of a list index) from the first of a cell
+    ! to that of the next. patches, for cells: the values on the boundary.
     subroutine set_field(self, mesh, name, values, status, centring, changed, index, corner_row, patches)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
@@ -901,7 +901,7 @@ contains
         end do
     end subroutine put_patches
 
-    ! What C calls: the caller's procedure, whose array it is told of.
+    ! C calls this: it runs the caller's procedure, and gives C its array.
     function run_fill(data, field) bind(C) result(status)
         type(c_ptr), value :: data
         type(c_field), intent(inout) :: field
@@ -921,7 +921,7 @@ contains
         field%values%stride = values%stride
     end function run_fill
 
-    ! The record of the field, a new one where it has none.
+    ! The record of the field, a new one if it has none.
     function record_of(self, mesh, name) result(out)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
@@ -938,7 +938,7 @@ contains
         self%fills => out
     end function record_of
 
-    ! This rank's part of a field whose values fill makes, in the steps that need them, of so many components.
+    ! Hand over this rank's part of a field of so many components, whose values fill makes in the steps that need them.
     subroutine set_filled_field(self, mesh, name, fill, status, centring, components)
         class(insitu_session), intent(inout) :: self
         character(*), intent(in) :: mesh, name
@@ -961,7 +961,7 @@ contains
         status = c_set_field(self%handle, as_c_text(mesh), field)
     end subroutine set_filled_field
 
-    ! From now on keep each step's pictures in memory, on rank 0, or no longer. Collective; rank 0's keep counts.
+    ! Turn on or off that rank 0 keeps each step's pictures in memory. Collective; rank 0's keep counts.
     subroutine keep_pictures(self, keep, status)
         class(insitu_session), intent(inout) :: self
         logical, intent(in) :: keep
@@ -970,7 +970,7 @@ contains
         status = c_keep_pictures(self%handle, merge(1_c_int, 0_c_int, keep))
     end subroutine keep_pictures
 
-    ! Those of the last step; none on other ranks, and where none are kept.
+    ! The pictures of the last step; none on other ranks, or where none are kept.
     function pictures(self) result(out)
         class(insitu_session), intent(in) :: self
         type(insitu_picture), allocatable :: out(:)
@@ -989,7 +989,7 @@ contains
         end do
     end function pictures
 
-    ! Draw what is due. Collective; after an error, which every rank has, the session stays usable.
+    ! Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable.
     subroutine step(self, cycle, time, status)
         class(insitu_session), intent(inout) :: self
         integer, intent(in) :: cycle
@@ -999,7 +999,7 @@ contains
         status = c_step(self%handle, int(cycle, c_int64_t), real(time, c_double))
     end subroutine step
 
-    ! What the last step did. All zero before the first.
+    ! The report of the last step. All zero before the first.
     function report(self) result(out)
         class(insitu_session), intent(in) :: self
         type(insitu_report) :: out
@@ -1011,7 +1011,7 @@ contains
         out = last
     end function report
 
-    ! Why the last call failed.
+    ! The reason why the last call failed.
     function error(self) result(out)
         class(insitu_session), intent(in) :: self
         character(:), allocatable :: out

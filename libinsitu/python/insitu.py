@@ -152,8 +152,8 @@ class _Picture(ctypes.Structure):
     ]
 
 
-# Values of a field of cells on faces of the boundary, as many tuples as faces, which are told in one of three ways:
-# first_face, of a range; faces, their numbers; or connectivity, their vertices: a list, with offsets, or faces x vertices.
+# A cell field's values on faces of the boundary, as many tuples as faces. The faces are named by one of first_face (a
+# range), faces (their numbers) and connectivity (their vertices: a list with offsets, or faces x vertices).
 Patch = collections.namedtuple("Patch", "values first_face faces connectivity offsets", defaults=(0, None, None, None))
 
 # image: its name in the scene; rgba: height x width x 4, linear and premultiplied; depth: height x width, inf: nothing.
@@ -358,9 +358,9 @@ class Session:
                  face_offsets=None, owner=None, neighbour=None, cell_count=None, ghosts=None, vertex_ids=None, index_base=0,
                  keep_polyhedra=False, vertex_order=ORDER_VTK, changed=CHANGED_ALL):
         """Hand over this rank's part of a mesh. Local. faces: the faces' vertices (face_connectivity of insitu.h),
-        or a list of arrays, one a face, without face_offsets. Of
-        cells of one type connectivity may be the first columns of a table: nodes[:, :8]. In place of connectivity,
-        cell_type, cell_types and offsets: owner, neighbour and cell_count, of finite volumes."""
+        or a list of arrays, one a face, without face_offsets. For cells of one type, connectivity may be the first
+        columns of a table: nodes[:, :8]. Finite-volume codes may give owner, neighbour and cell_count instead of
+        connectivity, cell_type, cell_types and offsets."""
         mesh, held = _Mesh(), []
         _library.insitu_mesh_defaults(ctypes.byref(mesh))
         axes, mesh.vertex_count, held = _axes(coordinates)
@@ -405,13 +405,13 @@ class Session:
 
     def set_field(self, mesh, name, values, *, index=None, centring=VERTEX, corner_row=0, components=1,
                   patches=(), changed=CHANGED_ALL):
-        """Hand over this rank's part of a field: values of n tuples, or n x components. index: which of the tuples each
-        vertex, cell or corner has, from the mesh's index_base on; of corners the first columns of a table will do:
-        dofs[:, :8]. corner_row: of corners, values (or entries of index) from one cell's first to the next one's.
-        patches: of cells, the values on the boundary, each a Patch.
+        """Hand over this rank's part of a field: values of n tuples, or n x components. index: the tuple that each
+        vertex, cell or corner has, from the mesh's index_base on; for corners it may be the first columns of a table:
+        dofs[:, :8]. corner_row, for corners: values (or entries of index) from one cell's first to the next one's.
+        patches, for cells: the values on the boundary, each a Patch.
 
-        values may be a callable that returns them, of so many components: it is called by the steps that need the field,
-        on all ranks in the same order. Local."""
+        values may be a callable that returns them, with so many components: the steps that need the field call it, on
+        all ranks in the same order. Local."""
         field, held, borrowed = _Field(), [], _Array()
         _library.insitu_field_defaults(ctypes.byref(field))
         field.name, field.centring, field.changed = name.encode(), centring, changed
@@ -432,7 +432,7 @@ class Session:
         self._hand_over(_library.insitu_set_field, mesh, field, name, held)
 
     def step(self, cycle, time):
-        """Draw what is due. Collective; after an error, which every rank has, the session stays usable."""
+        """Draw the images that are due. Collective; after an error, which every rank gets, the session stays usable."""
         status = _library.insitu_step(self._open(), cycle, time)
         self._retired.clear()
         self._made.clear()
@@ -445,19 +445,19 @@ class Session:
 
     @property
     def report(self):
-        """What the last step did, as a dict with the keys of insitu_report."""
+        """The report of the last step, as a dict with the keys of insitu_report."""
         report = _library.insitu_last_report(self._open()).contents
         values = {key: getattr(report, key) for key, _ in _Report._fields_}
         return {key: (value or b"").decode(errors="replace") if kind is ctypes.c_char_p else value
                 for (key, kind), value in zip(_Report._fields_, values.values())}
 
     def keep_pictures(self, keep=True):
-        """From now on keep the pictures of each step in memory, on rank 0. Collective; rank 0's keep counts."""
+        """Turn on or off that rank 0 keeps each step's pictures in memory. Collective; rank 0's keep counts."""
         _check(_library.insitu_keep_pictures(self._open(), bool(keep)), self._session, True)
 
     @property
     def pictures(self):
-        """Those of the last step, a list of Picture: copies, which stay. Empty on other ranks, and where none are kept."""
+        """The last step's pictures, a list of Picture: copies, which stay. Empty on other ranks, or where none are kept."""
         count = ctypes.c_int()
         kept = _library.insitu_last_pictures(self._open(), ctypes.byref(count))
         return [Picture(kept[i].image.decode(),
@@ -487,7 +487,7 @@ class Session:
         return self._session
 
     def _hand_over(self, call, mesh, description, key, arrays):
-        """What was borrowed before stays so until a step has returned; where the call is refused, for as long as this."""
+        """Those borrowed before are held until a step has returned, or with these if the call is refused."""
         fields = self._held.setdefault(mesh, {})
         before = fields.get(key, [])
         fields[key] = before + arrays
@@ -526,7 +526,7 @@ class Session:
 
     @staticmethod
     def _expect_counts(mesh, counts):
-        """Lengths that the C interface is not told, and would read beyond."""
+        """Check lengths that the C interface does not get, and would read beyond."""
         cells, vertices, faces = mesh.cell_count, mesh.vertex_count, mesh.face_count
         for key, expected in [("offsets", cells + 1), ("ghosts", cells), ("vertex_ids", vertices), ("owner", faces)]:
             if key in counts and counts[key] != expected:

@@ -48,7 +48,7 @@ static void use_common_kernels(int level, session_report *report)
 {
     render_isa_limit(level);
     if (level < render_isa_level())
-        session_text_add(&report->warnings, "kernels are %s, the best that all ranks have, where %s ones would do",
+        session_text_add(&report->warnings, "kernels are %s, the best that all ranks have; this rank has %s",
                          cpu_isa_name((cpu_isa)level), cpu_isa_name((cpu_isa)render_isa_level()));
 }
 

@@ -125,7 +125,7 @@ static insitu_status take_over(session_table *t, const char *old, int64_t cycle,
     const scene_database *database = t->database;
     if (strncmp(old, t->text, t->size) != 0)
         return base_fail(error, INSITU_ERROR_IO,
-                         "cinema: %.300s/data.csv: is there with other columns, expected \"%.*s\" (move or delete the "
+                         "cinema: %.300s/data.csv: exists with other columns, expected \"%.*s\" (move or delete the "
                          "folder to begin anew)",
                          database->path, (int)t->size - 1, t->text);
     table_line line = {t, true};

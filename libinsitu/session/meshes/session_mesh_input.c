@@ -137,11 +137,11 @@ static insitu_status check_face_lists(const insitu_mesh *mesh, base_error *error
     const insitu_array *lists = &mesh->face_lists;
     if (!lists->data) {
         if (!mesh->face_sizes.data) return INSITU_OK;
-        return base_fail(error, INSITU_ERROR_MESH, "face sizes are given, and face lists are not");
+        return base_fail(error, INSITU_ERROR_MESH, "face sizes are given without face lists");
     }
     if (mesh->face_offsets.data || mesh->face_connectivity.data)
         return base_fail(error, INSITU_ERROR_MESH,
-                         "face lists and %s are given: faces have their vertices by one of them",
+                         "face lists and %s are given: give faces their vertices by one of them",
                          mesh->face_offsets.data ? "face offsets" : "face vertex indices");
     if (!is_allowed(lists->type, SESSION_ALLOW_INTEGERS))
         return base_fail(error, INSITU_ERROR_ARGUMENT, "face lists are of element type %d, not int32 or int64",
@@ -161,20 +161,20 @@ static insitu_status check_owner(const insitu_mesh *mesh, base_error *error)
 {
     if (!mesh->owner.data) {
         if (!mesh->neighbour.data) return INSITU_OK;
-        return base_fail(error, INSITU_ERROR_MESH, "neighbours of faces are given, and owners are not");
+        return base_fail(error, INSITU_ERROR_MESH, "neighbours of faces are given without owners");
     }
     if (mesh->neighbour_count > mesh->face_count)
         return base_fail(error, INSITU_ERROR_MESH, "neighbour_count is %lld, more than face_count, %lld",
                          (long long)mesh->neighbour_count, (long long)mesh->face_count);
     if (mesh->cell_type != INSITU_POLYHEDRON)
-        return base_fail(error, INSITU_ERROR_MESH, "cell_type is %d, owners of faces are for %d, polyhedra",
+        return base_fail(error, INSITU_ERROR_MESH, "cell_type is %d, but owners of faces are for %d, polyhedra",
                          (int)mesh->cell_type, (int)INSITU_POLYHEDRON);
     const char *other = mesh->connectivity.data ? "connectivity indices"
                         : mesh->offsets.data    ? "offsets"
                         : mesh->cell_types.data ? "cell types"
                                                 : NULL;
     if (other)
-        return base_fail(error, INSITU_ERROR_MESH, "owners of faces and %s are given: cells are made of one of them",
+        return base_fail(error, INSITU_ERROR_MESH, "owners of faces and %s are given: give cells by one of them",
                          other);
     return INSITU_OK;
 }
@@ -223,7 +223,7 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
     if (mesh->cell_count == 0 || mesh->owner.data) return INSITU_OK;
     if (mesh->cell_types.data) {
         if (!mesh->offsets.data)
-            return base_fail(error, INSITU_ERROR_MESH, "offsets are not given, cell types are: mixed cells need both");
+            return base_fail(error, INSITU_ERROR_MESH, "cell types are given without offsets: mixed cells need both");
         return INSITU_OK;
     }
     if (mesh->cell_type == INSITU_POLYHEDRON && !mesh->offsets.data)

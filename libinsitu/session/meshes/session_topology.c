@@ -215,8 +215,8 @@ static insitu_status check_sides(const session_mesh *mesh, int64_t face, const i
                          mesh->name, at, cells[0] + base, base, last, base);
     if (cells[1] < -1 || cells[1] > last - base)
         return base_fail(error, INSITU_ERROR_MESH,
-                         "mesh \"%s\": face %lld: its neighbour %lld is outside %lld..%lld (index_base is %lld), and "
-                         "not %lld as of a boundary's face",
+                         "mesh \"%s\": face %lld: its neighbour %lld is outside %lld..%lld (index_base is %lld), "
+                         "nor is it %lld, as on the boundary",
                          mesh->name, at, cells[1] + base, base, last, base, base - 1);
     if (cells[0] == cells[1])
         return base_fail(error, INSITU_ERROR_MESH, "mesh \"%s\": face %lld: its owner and its neighbour are both %lld",

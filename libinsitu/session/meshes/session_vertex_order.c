@@ -28,15 +28,14 @@ static void warn_of_order(session_report *report, const char *mesh, const int64_
         "themselves, so that little of the cells is seen; VTK's order goes around each quad; set "
         "vertex_order of the mesh to INSITU_ORDER_LEXICOGRAPHIC, or, where it is that already, to INSITU_ORDER_VTK",
         mesh);
-    session_warn(
-        report, &(session_warning){WARNING_ORDER, NULL, mesh, 1}, are_flat,
-        "mesh \"%s\": %lld of %lld cells have no volume and are not seen: look at the order of their vertices, "
-        "which is to be VTK's, and at the coordinates",
-        mesh, flat, drawn);
+    session_warn(report, &(session_warning){WARNING_ORDER, NULL, mesh, 1}, are_flat,
+                 "mesh \"%s\": %lld of %lld cells have no volume and are not seen: check the order of their vertices, "
+                 "which must be VTK's, and the coordinates",
+                 mesh, flat, drawn);
     session_warn(
         report, &(session_warning){WARNING_ORDER, NULL, mesh, 2}, are_inverted,
-        "mesh \"%s\": %lld of %lld cells are left-handed, which is drawn right if that is all: look at the order "
-        "of their vertices, which is to be VTK's, and at the axes",
+        "mesh \"%s\": %lld of %lld cells are left-handed, which is drawn right if that is all: check the order "
+        "of their vertices, which must be VTK's, and the axes",
         mesh, inverted, drawn);
 }
 

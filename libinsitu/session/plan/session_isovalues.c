@@ -128,7 +128,7 @@ static void warn_of_values(session_report *report, const planned_surface *s)
         const session_warning warning = isovalue_warning(s, v);
         const bool has_values = low <= high || !s->is_news;
         session_warn(report, &warning, has_values && is_outside(value, &s->range),
-                     "image \"%s\": the isosurface of \"%s\" at %g is not there: the field is from %g to %g",
+                     "image \"%s\": the isosurface of \"%s\" at %g is empty: the field goes from %g to %g",
                      s->image->name, s->layer->field.name, value, low, high);
     }
 }

@@ -111,16 +111,16 @@ static insitu_status check_patch(const session_mesh *mesh, const insitu_patch *p
         return base_fail(error, INSITU_ERROR_FIELD, "has a component stride of %lld bytes, no multiple of its %lld",
                          (long long)patch->component_stride_bytes, (long long)size);
     if (has_vertices && patch->faces.data)
-        return base_fail(error, INSITU_ERROR_FIELD, "faces and connectivity are given: faces are told by one of them");
+        return base_fail(error, INSITU_ERROR_FIELD, "faces and connectivity are given: name faces by one of them");
     if (patch->offsets.data && !has_vertices)
-        return base_fail(error, INSITU_ERROR_FIELD, "offsets are given, and connectivity is not");
+        return base_fail(error, INSITU_ERROR_FIELD, "offsets are given without connectivity");
     if (has_vertices && !patch->offsets.data && patch->connectivity_count % patch->count != 0)
         return base_fail(error, INSITU_ERROR_FIELD,
                          "has %lld connectivity indices, no multiple of its %lld faces, and no offsets",
                          (long long)patch->connectivity_count, (long long)patch->count);
     if (!has_vertices && !mesh->given.face_count)
         return base_fail(error, INSITU_ERROR_FIELD,
-                         "tells faces by their numbers, and the mesh has none: their vertices are to be given");
+                         "names faces by their numbers, but the mesh has none: give their vertices");
     const long long base = mesh->given.index_base, last = mesh->given.face_count - 1 + base;
     if (!has_vertices && !patch->faces.data &&
         (patch->first_face < base || patch->first_face > last || patch->count - 1 > last - patch->first_face))
@@ -309,7 +309,7 @@ static insitu_status check_filled(const session_mesh *mesh, const insitu_field *
     values.fill = NULL;
     if (filled->centring != promised->centring || filled->component_count != promised->component_count)
         return base_fail(
-            error, INSITU_ERROR_FIELD, "its fill made centring %d of %d, and %d components of %d: they are to stay",
+            error, INSITU_ERROR_FIELD, "its fill made centring %d of %d, and %d components of %d: both must stay",
             (int)filled->centring, (int)promised->centring, filled->component_count, promised->component_count);
     return check_field(mesh, &values, error);
 }

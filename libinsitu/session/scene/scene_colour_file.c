@@ -69,7 +69,7 @@ static insitu_status read_point(const colour_file *f, const yaml_node_t *list, i
             return bad_place(f, first, "RGBPoints: a colour is outside of 0 to 1");
     }
     *p = (colour_point){numbers[0], {numbers[1], numbers[2], numbers[3]}};
-    if (i > 0 && p->at < p[-1].at) return bad_place(f, first, "RGBPoints: values fall, expected that they rise");
+    if (i > 0 && p->at < p[-1].at) return bad_place(f, first, "RGBPoints: values fall, expected rising ones");
     return INSITU_OK;
 }
 
@@ -84,7 +84,7 @@ static insitu_status read_points(const colour_file *f, const yaml_node_t *list, 
     insitu_status status = INSITU_OK;
     for (int i = 0; i < out->count && !status; i++) status = read_point(f, list, i, out);
     if (!status && !(out->items[0].at < out->items[out->count - 1].at))
-        status = bad_place(f, list, "RGBPoints: all values are the same, expected that they rise");
+        status = bad_place(f, list, "RGBPoints: all values are the same, expected rising ones");
     return status;
 }
 

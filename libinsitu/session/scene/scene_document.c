@@ -69,8 +69,7 @@ static const char *event_fault(const yaml_event_t *event, int *depth, int *docum
     }
     if (anchor) return "an anchor (&) is not allowed in a scene, expected the value alone";
     if (tag) return "a tag (!) is not allowed in a scene, expected the value alone";
-    return *depth > SCENE_MAX_DEPTH ? "lists and mappings stand in each other too deep, expected at most 16 levels"
-                                    : NULL;
+    return *depth > SCENE_MAX_DEPTH ? "lists and mappings are nested too deep, expected at most 16 levels" : NULL;
 }
 
 static insitu_status scan_events(const scene_document *d, const char *text, size_t size)

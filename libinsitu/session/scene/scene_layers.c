@@ -258,7 +258,7 @@ static insitu_status convert_clip_of(const scene_document *d, const char *path, 
     const insitu_status status = scene_convert_layer_clip(d, path, in->volume->clip, out, &volume->clips);
     if (status || volume->clips == out->volumes[0].clips) return status;
     return scene_bad(d, path, in->volume->clip ? "clip" : "",
-                     "cuts otherwise than the first volume does, expected all volumes of an image to have one clip");
+                     "the first volume is clipped differently, expected one clip for all volumes of an image");
 }
 
 /* The layer was the last to be made of its kind. */

@@ -65,7 +65,7 @@ static insitu_status begin_file(const char *path, new_lines *lines, base_error *
     if (text && *text) {
         if (strncmp(text, lines->header, header) != 0 || text[header] != '\n')
             status = base_fail(error, INSITU_ERROR_IO,
-                               "statistics: %.300s: is there with other columns, expected \"%.200s\" (move or delete "
+                               "statistics: %.300s: exists with other columns, expected \"%.200s\" (move or delete "
                                "it to begin anew)",
                                path, lines->header);
         else

@@ -139,7 +139,7 @@ static void warn_of_scale(const session_layer_basis *basis, const scene_field *f
 {
     const session_warning warning = {WARNING_SCALE, basis->image->name, field->name, 0};
     session_warn(basis->report, &warning, is_true,
-                 "image \"%s\": the field \"%s\" has no value above 0, and scale: log shows such values alone: all of "
+                 "image \"%s\": the field \"%s\" has no value above 0, but scale: log shows only such values: all of "
                  "it lies below the range",
                  basis->image->name, field->name);
 }
@@ -285,7 +285,7 @@ static void warn_of_plane(const session_layer_basis *basis, const scene_image *i
     const session_warning warning = {WARNING_PLANE, image->name, NULL, surface};
     const double reach = SESSION_BORDER_SHARE * basis->half_diagonal;
     session_warn(basis->report, &warning, low <= high && (low > reach || high < -reach),
-                 "image \"%s\": a plane of its slices meets no cell: they are %g to %g from it, along its normal",
+                 "image \"%s\": a plane of its slices meets no cell: cells are %g to %g from it, along its normal",
                  image->name, low, high);
 }
 

@@ -109,7 +109,7 @@ static insitu_status check_time(const session_extent *e, const char *scene_path,
     if (!(seconds > image->max_seconds)) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_SCENE,
                      "%s:%d: image \"%s\" would take some %.1e samples at a step of %g, about %.2g s on %d ranks of %d "
-                     "threads; its max_seconds is %g: expected a larger step, or more of that",
+                     "threads; its max_seconds is %g: expected a larger step or max_seconds",
                      scene_path, image->line, image->name, samples, view->step, seconds, e->rank_count, threads,
                      image->max_seconds);
 }
