@@ -148,8 +148,7 @@ typedef struct insitu_mesh {
      * field is trilinear in a hex, but linear on tets about its centre in a polyhedron. Faces of four vertices are
      * bilinear patches in both, so no seam is left beside other polyhedra. Set 1 for hexes that are folded or have a
      * corner pushed in. Memory, counted in bytes_copied: 32 bytes a hex, 4 a face of each polyhedron that stays one,
-     * and, unless all cells are of one type, 5 a cell; twice as much where there are more than 2^31 vertices or faces.
-     * */
+     * and, unless all cells are of one type, 5 a cell; twice that beyond 2^31 vertices or faces. */
     int keep_polyhedra; /* 0 by default, or 1 */
     /* The order of each cell's vertices in connectivity; it does not concern polyhedra and polygons. Cells whose order
      * differs from VTK's, and cells in rows, are copied once for each topology: 4 bytes for each entry of connectivity
