@@ -11,7 +11,7 @@ enum { BENCH_ICET_STRATEGIES = 5 };
 typedef struct bench_icet bench_icet;
 
 /* One rank's picture: height × width × 4 premultiplied colours and, for surfaces, depths from 0 to 1, bottom row first.
- * */
+ */
 typedef struct bench_icet_picture {
     int width, height;
     const float *rgba, *depth; /* depth NULL: blended in order */

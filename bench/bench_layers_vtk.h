@@ -12,7 +12,7 @@ extern "C" {
 typedef enum bench_layer { BENCH_LAYER_SLICE, BENCH_LAYER_SURFACE, BENCH_LAYER_CLIPPED, BENCH_LAYER_COUNT } bench_layer;
 
 /* Tells whether VTK is in this program, and an X server's window to draw in; otherwise nothing else here may be called.
- * */
+ */
 bool bench_layers_vtk_is_there(void);
 
 typedef struct bench_layers_vtk bench_layers_vtk;

@@ -70,7 +70,7 @@ typedef struct comp_statistics {
  * ranks, pixels are merged by comp_merge_folded_pixel(). The list is always emptied and its memory given back. An error
  * on one rank (memory) is an error on all, and so is one that *error holds before the call: so a rank that could make
  * no fragments reports it here. threads is this rank's number; 0: as many as OpenMP would take. statistics may be NULL.
- * */
+ */
 insitu_status comp_composite(const comp_group *group, fragment_list *items, const float background[4], int threads,
                              image *out, comp_statistics *statistics, base_error *error);
 

@@ -15,7 +15,7 @@ typedef struct comp_machine {
 } comp_machine;
 
 /* A present-day cluster: 10 GB/s a rank, a microsecond of overhead, two of latency; half of these times within a node.
- * */
+ */
 extern const comp_machine comp_usual_machine;
 
 /* The load of the busiest rank. */

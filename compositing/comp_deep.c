@@ -1,6 +1,6 @@
 /* Samples are cut by the rule of merging (comp_merge_cut()), so flat and deep pictures follow one rule. From each
  * owner, rank 0 first receives which pixels have how many samples, and then the samples, right into their final place.
- * */
+ */
 #include "comp_deep.h"
 
 #include <string.h>

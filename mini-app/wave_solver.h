@@ -43,7 +43,7 @@ typedef struct wave_totals {
 } wave_totals;
 
 /* Makes the local arrays. False where memory ran out: ranks must agree on that before the next collective call. Local.
- * */
+ */
 bool wave_solver_create(const wave_setup *setup, const wave_mesh *mesh, MPI_Comm comm, wave_solver *solver);
 void wave_solver_free(wave_solver *solver);
 

@@ -1,6 +1,6 @@
 /* The proof of a whole tree. One walk goes in the order in which the nodes must be numbered, and anything not where it
  * is expected is a violation. So every node and entry is met exactly once, and no broken tree makes the walk endless.
- * */
+ */
 #include "mmbvh.h"
 
 #include <inttypes.h>

@@ -1,6 +1,6 @@
 /* Vectors of four floats (three axes and a spare lane, or four values) and of two doubles. Every processor that the
  * library is built for has them without an instruction set flag, so trees need no kernels of several instruction sets.
- * */
+ */
 #ifndef MMBVH_VEC4_H
 #define MMBVH_VEC4_H
 

@@ -40,7 +40,7 @@ static void *allocate(int64_t count, size_t size)
 }
 
 /* Makes the brick between columns low and high in a row; a line on the hull has no other bricks' corners in its middle.
- * */
+ */
 static brick make_brick(const wall *w, int row, int64_t low, int64_t high)
 {
     brick b = {.count = 0};

@@ -1,6 +1,6 @@
 /* Pictures that rank 0's thread writes while the simulation goes on: they are the same, in the same order, as those
  * written in the step; errors are returned later, on all ranks; waiting pictures are bounded, and outlive their scene.
- * */
+ */
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>

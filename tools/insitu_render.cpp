@@ -3,7 +3,7 @@
  *
  * One rank may fail where others do not, as on a file that only it cannot read. So after each local part all ranks
  * agree that none failed before anything collective follows; if one did, all throw its message, and rank 0 prints it.
- * */
+ */
 #include <chrono>
 #include <climits>
 #include <cstdio>

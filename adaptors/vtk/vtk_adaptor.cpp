@@ -119,7 +119,7 @@ bool has_field(const part &p, const std::string &name)
 }
 
 /* Tells whether an array becomes a field: it is numeric, has a name and the right length, and is no flag of VTK's own.
- * */
+ */
 bool is_field(vtkDataArray *array, vtkIdType expected, const std::string &what, tally &count)
 {
     const std::string name = array && array->GetName() ? array->GetName() : "";

@@ -7,7 +7,7 @@
  * A field has one component stride, so the blocks of an SOA array must lie evenly in memory to be borrowed; coordinates
  * are three arrays of their own, and may lie anywhere. All others (shorts, characters, unsigned integers, bits, arrays
  * computed on access) are copied: integers to an integer type that holds every value, if there is one, else to double.
- * */
+ */
 #include "vtk_arrays.h"
 
 #include <cstring>

@@ -1,6 +1,6 @@
 /* The numbers of statuses do not say which is worse, but any fixed choice among several failures will do. The largest
  * status, from the lowest rank that has it, is the maximum of one number: so the same reduction has room for another.
- * */
+ */
 #include "comp_agree.h"
 
 insitu_status comp_mpi_status(int code, base_error *error)

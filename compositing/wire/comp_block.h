@@ -10,7 +10,7 @@
  * ...
  *
  * The remainders are those of bit patterns, as whole numbers modulo 2^32: no float is rounded, and NaN keeps its bits.
- * */
+ */
 #ifndef COMP_COMP_BLOCK_H
 #define COMP_COMP_BLOCK_H
 

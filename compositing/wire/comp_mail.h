@@ -51,7 +51,7 @@ typedef struct comp_writer {
 } comp_writer;
 
 /* Room for so many bytes of a parcel for the owner, or NULL: no memory. expected is how many bytes may follow in all.
- * */
+ */
 unsigned char *comp_writer_room(comp_writer *writer, uint32_t owner, size_t bytes, size_t expected);
 
 /* Ends what was written there at end; it holds so many records. */

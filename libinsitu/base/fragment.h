@@ -23,7 +23,7 @@ typedef struct fragment {
 /* Kinds of fragments. Single samples are FRAGMENT_VOLUME + FRAGMENT_LAYER times the volume (0 .. 3). Those within
  * rounding of their cell's begin or end, where the cell before or behind may have the same sample, add FRAGMENT_EARLY
  * or FRAGMENT_LATE. Other stretches of volumes are FRAGMENT_VOLUME; hits are FRAGMENT_SURFACE + surface id (0, 1, ...).
- * */
+ */
 enum { FRAGMENT_VOLUME = 0, FRAGMENT_EARLY = 1, FRAGMENT_LATE = 2, FRAGMENT_LAYER = 4, FRAGMENT_SURFACE = 16 };
 
 /* A growing list, memory from memory.h. */

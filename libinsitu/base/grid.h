@@ -106,7 +106,7 @@ static inline int grid_cell_type(const grid *g, int64_t cell)
 }
 
 /* The cell's vertex indices, in VTK's order; returns how many. It has none for polyhedra and polygons: see grid_walk.
- * */
+ */
 static inline int grid_cell_vertices(const grid *g, int64_t cell, int64_t vertices[GRID_MAX_CELL_VERTICES])
 {
     const int count = grid_type_vertices(grid_cell_type(g, cell));

@@ -14,7 +14,7 @@ namespace render_tool
 {
 
 /* "" or why the file cannot be read as data: it is missing, a directory or not readable, or no reader has its ending.
- * */
+ */
 std::string why_not_data(const std::string &path);
 
 /* The endings that are read, for help texts: ".vtu .pvtu ...". */

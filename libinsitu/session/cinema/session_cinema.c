@@ -215,7 +215,7 @@ static void write_table(FILE *file, const void *what)
 }
 
 /* Tells whether a byte must be escaped in a script's text. Bytes above 0x7f need not be: the page's scripts are UTF-8.
- * */
+ */
 static bool is_escaped(unsigned char byte)
 {
     return byte == '"' || byte == '\\' || byte < 0x20;

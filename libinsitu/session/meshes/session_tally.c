@@ -114,7 +114,7 @@ MMBVH_INLINE bool has_usual_root(double x)
 }
 
 /* Approximates the cube root to 0.033 by a third of the bits, since a double's bits are its logarithm to within 0.09.
- * */
+ */
 MMBVH_INLINE double cube_root_begin(double x)
 {
     uint64_t bits;

@@ -305,7 +305,7 @@ static bool read_ring(const session_mesh *mesh, int64_t face, face_ring *ring)
 }
 
 /* Finds the unused face on the edge between ends, and the vertices that follow each of them on it; -1: there is none.
- * */
+ */
 static int find_side(const face_ring *rings, int count, unsigned used, const int64_t ends[2], int64_t above[2])
 {
     for (int f = 0; f < count; f++) {

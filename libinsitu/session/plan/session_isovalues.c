@@ -83,7 +83,7 @@ static int list_surfaces(const session_plan *plan, planned_surface *out)
 }
 
 /* Reduces the ranges over all ranks, together with errors from before; on an error the ranges mean nothing. Collective.
- * */
+ */
 static insitu_status reduce_ranges(const session_meshes *meshes, const session_team *team, planned_surface *surfaces,
                                    int count, bool of_all_cells, base_error *error)
 {

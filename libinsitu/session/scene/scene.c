@@ -135,7 +135,7 @@ static insitu_status convert_layers_in_turn(const scene_document *d, const scene
 }
 
 /* Put the views of orbits behind the first ones, beginning with the last image, because only behind it there is room.
- * */
+ */
 static void add_views(scene *s, int picture_count)
 {
     int end = picture_count;

@@ -13,7 +13,7 @@ typedef enum scene_sampling_method { SCENE_SAMPLES, SCENE_SEGMENTS } scene_sampl
 typedef enum scene_interpolation { SCENE_BY_CELL, SCENE_BY_VERTEX } scene_interpolation;
 
 /* The scalar of a field: the magnitude, or component n. Default: component 0 if the field has one, else the magnitude.
- * */
+ */
 enum { SCENE_COMPONENT_DEFAULT = -2, SCENE_COMPONENT_MAGNITUDE = -1 };
 
 /* A field as a layer shows it: on some of the meshes. */

@@ -1,5 +1,5 @@
 /* Turns the schema's structs into struct scene: defaults are filled in, and what the schema cannot express is checked.
- * */
+ */
 #ifndef SCENE_SCENE_CONVERT_H
 #define SCENE_SCENE_CONVERT_H
 
@@ -95,7 +95,7 @@ insitu_status scene_convert_colour_by(const scene_document *d, const char *path,
 scene_material scene_convert_material(const scene_file_material *in);
 
 /* Adds the clips to the image's list and to the set, a bit for each entry of the list. in is NULL where there are none.
- * */
+ */
 insitu_status scene_convert_clip(const scene_document *d, const char *path, const scene_file_clip *in,
                                  scene_image *image, uint32_t *set);
 /* The set of a layer: that of all layers, and its own. */

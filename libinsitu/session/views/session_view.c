@@ -1,5 +1,5 @@
 /* Turns the scene's view into the renderer's numbers. It is arithmetic on what all ranks have, so nothing is exchanged.
- * */
+ */
 #include "session_view.h"
 
 #include <math.h>
