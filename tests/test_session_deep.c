@@ -1,5 +1,5 @@
-/* Deep pictures: the samples of every pixel are in order and without overlaps, and blended in double they are the flat
- * picture; for surfaces they are those of one rank to the bit, on any partition. */
+/* Deep pictures: of every pixel what lies behind each other, in order and without overlaps, which blended in double are
+ * the flat picture; of surfaces, the samples of one rank to the bit, on any partition. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
