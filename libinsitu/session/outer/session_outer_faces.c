@@ -6,7 +6,7 @@
  * Shells are faces that are always kept. One that lies on a cell's outer face replaces it, so that only one is drawn
  * there.
  *
- * Faces that a rank has once, but that lie in other ranks' boxes, go to rank hash(key) % ranks, which counts them for
+ * Of the faces that a rank has once, those in other ranks' boxes go to rank hash(key) % ranks, which counts them for
  * all. */
 #include "session_outer_faces.h"
 
@@ -211,7 +211,7 @@ static int home_of(const session_key *key, int ranks)
     return (int)(session_key_hash(key) % (uint64_t)ranks);
 }
 
-/* Packs the keys of faces in other ranks' boxes by their home ranks; order tells each key's face. */
+/* The keys of faces in other ranks' boxes by their homes; order: which face each is of. */
 static bool pack_keys(const face_search *s, const session_box *boxes, int box_count, int ranks, session_mail *mail,
                       int64_t **order)
 {

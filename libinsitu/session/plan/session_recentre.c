@@ -242,7 +242,7 @@ static void write_record(const vertex_groups *groups, int64_t group, uint64_t *r
     memcpy(record + RECORD_HEAD, groups->values.values + groups->values.starts[group], (size_t)count * sizeof(double));
 }
 
-/* Packs shared groups into records, sorted by their home ranks. */
+/* Shared groups sorted by their home ranks into records. */
 static bool pack_records(const vertex_groups *groups, int ranks, shared_groups *shared)
 {
     session_mail *mail = &shared->mail;

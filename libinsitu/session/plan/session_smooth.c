@@ -200,7 +200,7 @@ static bool find_places(const smooth_work *work, bool by_id, double (**out)[3])
     return true;
 }
 
-/* Writes to each rank the keys in its box. numbers are the keys' numbers, in the order of the mail. */
+/* To each rank the keys in its box. numbers: of the keys, in the order of the mail. */
 static bool write_questions(const smooth_work *work, const session_team *team, const rank_box *boxes,
                             const double (*places)[3], session_mail *out, int64_t **numbers)
 {

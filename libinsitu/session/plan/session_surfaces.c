@@ -51,7 +51,7 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
     return count;
 }
 
-/* Finds the faces that some rank does not know. Collective. */
+/* Which faces are not known on some rank. Collective. */
 static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
                                 const session_team *team, int *stale, base_error *error)
 {

@@ -22,7 +22,7 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 /* NULL: the mesh has no distances from the plane. */
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
 
-/* Compute the distances in use that are out of date. They depend on a vertex's coordinates alone, so all ranks have the
+/* Compute the distances in use that are out of date: from a vertex's own coordinates alone, so that all ranks have the
  * same. Collective. */
 insitu_status session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
 

@@ -1,4 +1,4 @@
-/* Finds which vertices are the same, and which of them other ranks may have. */
+/* Which vertices are one, and which of them other ranks may have. */
 #ifndef SESSION_NEIGHBOURS_H
 #define SESSION_NEIGHBOURS_H
 
@@ -20,7 +20,7 @@ typedef struct session_box {
 insitu_status session_gather_boxes(const session_team *team, const session_mesh *mesh, double margin,
                                    session_box *boxes, int *count, base_error *error);
 
-/* Tells whether the vertex is in any of the boxes. */
+/* Is the vertex in any of the boxes? */
 bool session_is_in_boxes(const session_mesh *mesh, int64_t vertex, const session_box *boxes, int count);
 
 #endif
