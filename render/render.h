@@ -118,10 +118,46 @@ typedef enum render_root {
 
 typedef enum render_normal {
     RENDER_GRADIENT,    /* of the cell that holds the hit */
-    RENDER_DIFFERENCES, /* central ones (thesis, 4.3.4), over this rank's cells: one-sided where a sample is in none of
-                           them, the cell's gradient where an axis has neither. May differ by the partition. */
+    RENDER_DIFFERENCES, /* central ones (thesis, 4.3.4): one-sided where a sample is in no cell, the cell's gradient
+                           where an axis has neither. Over this rank's cells, or with the job's waiting over those of
+                           all */
     RENDER_VERTEX /* gradients that the caller gives at the vertices, interpolated in the hit's cell as values are */
 } render_normal;
+
+enum { RENDER_DIFFERENCE_SAMPLES = 6 };
+
+/* A hit of RENDER_DIFFERENCES that waits for samples of other ranks (render_differences.h). 16 bytes. */
+typedef struct render_waiting_hit {
+    uint32_t pixel, kind; /* as its fragment will have them */
+    float t, reach;       /* of its samples, before and behind it along each axis; scaled units */
+} render_waiting_hit;
+
+/* What it looks like: the cell's gradient in camera axes, and the colour before light falls on it. */
+typedef struct render_waiting_look {
+    float normal[3], colour[3];
+} render_waiting_look;
+
+/* Growing lists of as many of both, memory from memory.h. */
+typedef struct render_waiting_list {
+    render_waiting_hit *items;
+    render_waiting_look *looks;
+    int64_t count, capacity;
+} render_waiting_list;
+
+/* The samples about a hit: before and behind it along the first axis, the second, the third. 32 bytes. */
+typedef struct render_samples_about {
+    uint32_t found, unused; /* a bit a sample: a cell holds its point */
+    float values[RENDER_DIFFERENCE_SAMPLES];
+} render_samples_about;
+
+/* The transmittance of fragments that keep the places of hits that wait while a frame is traced. */
+#define RENDER_WAITS 2.0f
+
+/* The ends of each surface's field over all ranks, low > high where no rank has it; and where hits go to wait. */
+typedef struct render_waiting {
+    double ranges[RENDER_MAX_ISOVALUES][2];
+    render_waiting_list list;
+} render_waiting;
 
 /* Gradients at a part's vertices, of any length. Every vertex of the cells that the layer's isovalues cross has one. */
 typedef struct render_vertex_gradients {
@@ -245,6 +281,8 @@ typedef struct render_job {
     int surface_count; /* isovalues of all surface layers together: at most RENDER_MAX_ISOVALUES */
     render_paint paint;
     const render_occlusion *occlusion; /* of RENDER_UNLIT */
+    render_waiting *waiting; /* NULL: RENDER_DIFFERENCES are found at once; else its hits are added to the list and make
+                                no fragments, but those of polyhedra. Not with RENDER_VALUES */
     render_traversal traversal;
     render_active_cells *active; /* NULL: nothing is kept */
     const render_volume_layer *volumes;

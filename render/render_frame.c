@@ -2,6 +2,7 @@
  * picture's middle costs far more than its border. */
 #include <math.h>
 #include <omp.h>
+#include <string.h>
 #include <time.h>
 
 #include "error.h"
@@ -70,6 +71,47 @@ static void trace_tiles(const kernel_table *kernels, const kernel_frame *frame, 
     render_folding_free(&fold);
 }
 
+/* ---- hits that wait ------------------------------------------------------------------------------------------ */
+
+static bool grow_list(render_waiting_list *list, int64_t capacity)
+{
+    render_waiting_hit *items = base_realloc(list->items, (size_t)capacity * sizeof *items);
+    if (items) list->items = items;
+    render_waiting_look *looks = base_realloc(list->looks, (size_t)capacity * sizeof *looks);
+    if (looks) list->looks = looks;
+    if (!items || !looks) return false;
+    list->capacity = capacity;
+    return true;
+}
+
+static bool grow_waiting(render_waiting_list *list)
+{
+    return grow_list(list, list->capacity + list->capacity / 2 + 1024);
+}
+
+static bool append_waiting(render_waiting_list *to, const render_waiting_list *from)
+{
+    const int64_t count = to->count + from->count;
+    if (!from->count) return true;
+    if (count > to->capacity && !grow_list(to, count)) return false;
+    memcpy(to->items + to->count, from->items, (size_t)from->count * sizeof *to->items);
+    memcpy(to->looks + to->count, from->looks, (size_t)from->count * sizeof *to->looks);
+    to->count = count;
+    return true;
+}
+
+/* Takes away what kept the places of hits that wait. */
+static void drop_places(fragment_list *list, int64_t first)
+{
+    fragment *to = list->items + first;
+    for (int64_t i = first; i < list->count; i++)
+        if (list->items[i].kind < FRAGMENT_SURFACE || list->items[i].transmittance != RENDER_WAITS)
+            *to++ = list->items[i];
+    list->count = to - list->items;
+}
+
+/* ---- threads ------------------------------------------------------------------------------------------------- */
+
 /* Threads' states; false where memory ran out. */
 static bool begin_threads(const kernel_frame *frame, const frame_end *end, kernel_thread *states, int threads)
 {
@@ -87,6 +129,7 @@ static bool begin_threads(const kernel_frame *frame, const frame_end *end, kerne
                                     .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                     .find_polyhedron = polyhedra_find,
                                     .polyhedron_scratch = polyhedra_scratch,
+                                    .grow_waiting = grow_waiting,
                                     .now = now};
         if (states[i].memory) kernels->begin(&states[i]);
         has_memory = has_memory && states[i].memory && (!has_polyhedra || states[i].polyhedra);
@@ -94,7 +137,7 @@ static bool begin_threads(const kernel_frame *frame, const frame_end *end, kerne
     return has_memory;
 }
 
-static bool end_threads(kernel_thread *states, int threads, render_statistics *statistics)
+static bool end_threads(const render_job *job, kernel_thread *states, int threads, render_statistics *statistics)
 {
     bool has_memory = true;
     double surface = 0, volume = 0;
@@ -102,6 +145,9 @@ static bool end_threads(kernel_thread *states, int threads, render_statistics *s
         polyhedra_free(states[i].polyhedra);
         base_free(states[i].memory);
         has_memory = has_memory && !states[i].out_of_memory;
+        if (has_memory && job->waiting) has_memory = append_waiting(&job->waiting->list, &states[i].waiting);
+        base_free(states[i].waiting.items);
+        base_free(states[i].waiting.looks);
         surface = fmax(surface, states[i].surface_seconds);
         volume = fmax(volume, states[i].volume_seconds);
         statistics->map_failures += states[i].map_failures;
@@ -138,7 +184,7 @@ static bool trace_frame(kernel_frame *frame, const frame_end *end, int threads, 
     }
     render_candidates_free(frame);
     render_active_cells_end(frame);
-    has_memory = end_threads(states, threads, statistics) && has_memory;
+    has_memory = end_threads(job, states, threads, statistics) && has_memory;
     base_free(states);
     return has_memory;
 }
@@ -156,7 +202,10 @@ static bool trace_to_list(kernel_frame *frame, fragment_writer *writers, int thr
     if (!fragment_pieces_begin(&pieces, out, expected_fragments(frame->job))) return false;
     for (int i = 0; i < threads; i++) writers[i] = (fragment_writer){.pieces = &pieces, .piece = -1};
     const bool is_traced = trace_frame(frame, &(frame_end){.writers = writers}, threads, statistics);
-    return fragment_pieces_end(&pieces, writers, threads) && is_traced;
+    const int64_t first = out->count;
+    const bool is_whole = fragment_pieces_end(&pieces, writers, threads);
+    if (frame->job->waiting) drop_places(out, first);
+    return is_whole && is_traced;
 }
 
 static bool trace_to_taker(kernel_frame *frame, const frame_end *end, int threads, render_statistics *statistics)

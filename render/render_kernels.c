@@ -9,6 +9,7 @@
 #include "kernel_cell.h"
 #include "kernel_cell_cache.h"
 #include "kernel_cell_values.h"
+#include "kernel_differences.h"
 #include "kernel_finder.h"
 #include "kernel_hexes.h"
 #include "kernel_hits.h"
@@ -362,4 +363,5 @@ static void begin(kernel_thread *thread)
 }
 
 const kernel_table KERNEL_TABLE = {SIMD_WIDTH,      sizeof(kernel_memory), begin,         trace_tile,
-                                   find_candidates, write_active,          kernel_occlude};
+                                   find_candidates, write_active,          kernel_occlude,
+                                   kernel_sample_waiting, kernel_light_waiting};

@@ -131,20 +131,30 @@ static void prepare_camera(kernel_frame *f)
         }
 }
 
-/* 1 over the width of the field's range on all parts, to a power of two. */
-static double value_scale(const render_job *job, const render_surface_layer *layer)
+void render_surface_range(const render_job *job, int surface, double range[2])
 {
-    float low = INFINITY, high = -INFINITY;
+    range[0] = INFINITY;
+    range[1] = -INFINITY;
     for (int i = 0; i < job->part_count; i++) {
-        const mmbvh_ranges *r = &layer->field.ranges[i];
+        const mmbvh_ranges *r = &job->surfaces[surface].field.ranges[i];
         if (!r->low || !job->parts[i].tree->node_count) continue;
         float ends[2];
         memcpy(&ends[0], r->low, sizeof ends[0]);
         memcpy(&ends[1], r->high, sizeof ends[1]);
-        low = fminf(low, ends[0]);
-        high = fmaxf(high, ends[1]);
+        range[0] = fmin(range[0], (double)ends[0]);
+        range[1] = fmax(range[1], (double)ends[1]);
     }
-    const double width = (double)high - (double)low;
+}
+
+/* 1 over the width of the field's range on all parts, of all ranks where differences ask these, to a power of two. */
+static double value_scale(const render_job *job, int surface)
+{
+    double range[2];
+    if (job->waiting)
+        memcpy(range, job->waiting->ranges[surface], sizeof range);
+    else
+        render_surface_range(job, surface, range);
+    const double width = range[1] - range[0];
     return width > 0 && isfinite(width) ? ldexp(1, -ilogb(width)) : 1;
 }
 
@@ -179,7 +189,7 @@ static void prepare_surfaces(kernel_frame *f)
                 s->first_kind = kind;
                 s->own_clips = job->clip_count ? layer->clips & ~f->common_clips : 0;
                 prepare_isovalues(&s->interest, layer);
-                if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, layer);
+                if (layer->normal == RENDER_DIFFERENCES) s->value_scale = value_scale(job, i);
                 f->needs_packets = f->needs_packets || layer->normal == RENDER_DIFFERENCES;
                 if (layer->colour_map) prepare_transfer(&s->colour, layer->colour_map, 1);
                 f->opaque_count += is_opaque;

@@ -11,4 +11,7 @@
 insitu_status render_prepare(const render_job *job, kernel_frame *frame, base_error *error);
 void render_unprepare(kernel_frame *frame);
 
+/* The ends of the surface's field on this rank's parts, low > high where it is on none. */
+void render_surface_range(const render_job *job, int surface, double range[2]);
+
 #endif

@@ -39,11 +39,22 @@ LET_BE(Gather,
        (const void *from, int count, MPI_Datatype type, void *to, int to_count, MPI_Datatype to_type, int root,
         MPI_Comm comm),
        (from, count, type, to, to_count, to_type, root, comm))
+LET_BE(Iallreduce,
+       (const void *from, void *to, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm, MPI_Request *request),
+       (from, to, count, type, op, comm, request))
+LET_BE(Iprobe, (int rank, int tag, MPI_Comm comm, int *found, MPI_Status *status), (rank, tag, comm, found, status))
 LET_BE(Irecv, (void *to, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm, MPI_Request *request),
        (to, count, type, rank, tag, comm, request))
 LET_BE(Isend, (const void *from, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm, MPI_Request *request),
        (from, count, type, rank, tag, comm, request))
+LET_BE(Issend, (const void *from, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm, MPI_Request *request),
+       (from, count, type, rank, tag, comm, request))
+LET_BE(Recv, (void *to, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm, MPI_Status *status),
+       (to, count, type, rank, tag, comm, status))
 LET_BE(Send, (const void *from, int count, MPI_Datatype type, int rank, int tag, MPI_Comm comm),
        (from, count, type, rank, tag, comm))
+LET_BE(Test, (MPI_Request * request, int *is_over, MPI_Status *status), (request, is_over, status))
+LET_BE(Testall, (int count, MPI_Request requests[], int *are_over, MPI_Status statuses[]),
+       (count, requests, are_over, statuses))
 LET_BE(Wait, (MPI_Request * request, MPI_Status *status), (request, status))
 LET_BE(Waitall, (int count, MPI_Request requests[], MPI_Status statuses[]), (count, requests, statuses))

@@ -37,7 +37,7 @@ static const char full_scene[] =
 
 static const char edited_scene[] = "threads: 1\nimages:\n" IMAGE(
     "e", "[24, 16]",
-    "      - isosurface: {field: f, values: [0.2]}\n"
+    "      - isosurface: {field: f, values: [0.2], normals: differences}\n"
     "      - slice: {field: c, planes: [{normal: [1, 2, 3]}], clip: {sphere: {centre: [0, 0, 0], radius: 0.5}}}\n"
     "      - surface: {opacity: 0.5, colour_by: {field: c, discrete: 4,\n"
     "          map: {colours: [[0, 0, 1], [1, 1, 1], [1, 0, 0]]},\n"

@@ -279,6 +279,9 @@ typedef struct kernel_thread {
     fragment_list *out;
     /* Make room for more items in out; false where memory ran out. */
     bool (*reserve)(fragment_list *list, int64_t more);
+    /* Hits that wait for other ranks' samples; and room for more of them, false where memory ran out. */
+    render_waiting_list waiting;
+    bool (*grow_waiting)(render_waiting_list *list);
     bool out_of_memory;
     int64_t map_failures;
     /* The tile's polyhedra (render_polyhedra.h); NULL where no mesh has any. */
@@ -307,6 +310,12 @@ typedef struct kernel_table {
                          kernel_active_writer *writer, bool (*grow)(kernel_active_writer *writer));
     /* Closes the bundle's rays that meet an opaque surface. */
     void (*occlude)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle);
+    /* Samples this rank's cells about all hits. */
+    void (*sample_waiting)(const kernel_frame *frame, kernel_thread *thread, const render_waiting_hit *hits,
+                           render_samples_about *out, int64_t count);
+    /* Makes out[i] of the list's hit i, first <= i < first + count, by its samples[i]. */
+    void (*light_waiting)(const kernel_frame *frame, kernel_thread *thread, const render_waiting_list *list,
+                          const render_samples_about *samples, int64_t first, int64_t count, fragment *out);
 } kernel_table;
 
 extern const kernel_table kernel_table_plain, kernel_table_sse42, kernel_table_avx2, kernel_table_avx512;

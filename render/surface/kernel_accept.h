@@ -11,6 +11,7 @@
 #include "kernel_clip.h"
 #include "kernel_colour.h"
 #include "kernel_crossings.h"
+#include "kernel_differences.h"
 #include "kernel_edges.h"
 #include "kernel_hits.h"
 #include "kernel_map.h"
@@ -20,147 +21,6 @@
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
-
-/* Normals by central differences (thesis, section 4.3.4): the field half an offset before and behind the hit along each
- * axis. Which cell holds a point is asked of the tree, as a ray of no length: with inverse directions of 1 the box test
- * of kernel_packet.h tells whether the point is in the box. In a leaf, the line through the point along the tile's
- * depth axis meets the cells as any ray does, by the same exact decisions, and the point belongs to the one whose
- * interval [t_in, t_out) holds its depth: to one cell of a mesh or none.
- *
- * The samples are the field less the isovalue, so that the hit's own value is 0. */
-
-/* The field at one point of each ray. */
-typedef struct kernel_probe {
-    const kernel_surface *surface;
-    int layer; /* for the cache */
-    double isovalue;
-    vf z; /* of the points */
-    vm found;
-    vf sample;
-} kernel_probe;
-
-/* f: the values less the isovalue, of one scale in all cells. */
-SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
-{
-    for (int i = 0; i < c->count; i++) {
-        const double v = (c->values[i] - probe->isovalue) * probe->surface->value_scale;
-        c->f[i] = (float)(v < -1e18 ? -1e18 : v > 1e18 ? 1e18 : v);
-    }
-}
-
-SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
-{
-    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    const bool is_tet = c->type == GRID_TET;
-    int count = 1;
-    if (is_tet)
-        kernel_tet_interval(p, c, rays, false, &list[0]);
-    else
-        count = kernel_poly_intervals(p, c, rays, false, list);
-    for (int n = 0; n < count; n++) {
-        const kernel_interval *i = &list[n];
-        const vm own = vm_andnot(vm_and(i->mask, vf_lt(probe->z, i->t_out)), vf_lt(probe->z, i->t_in));
-        if (!vm_any(own)) continue;
-        const vf along = (probe->z - i->t_in) / (i->t_out - i->t_in);
-        vf value = i->v_in + along * (i->v_out - i->v_in);
-        if (!is_tet) {
-            kernel_map map;
-            kernel_map_setup(&map, c);
-            value = kernel_value_at(p, &map, i, own, probe->z);
-        }
-        probe->sample = vf_select(own, value, probe->sample);
-        probe->found = vm_or(probe->found, own);
-    }
-}
-
-static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays)
-{
-    kernel_probe *probe = state;
-    const render_field *field = &probe->surface->layer->field;
-    for (int n = 0; n < count; n++) {
-        const vm open = vm_andnot(rays, probe->found);
-        if (!vm_any(open)) return;
-        kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
-        if (!c->is_finite || c->type == GRID_POLYHEDRON) continue;
-        const bool is_fresh = !c->is_placed;
-        if (is_fresh) kernel_cell_place(c, p, p->frame->job->parts[part].cells);
-        if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
-        kernel_probe_cell(p, probe, c, open);
-    }
-}
-
-/* Sample at the rays' points t moved by offset along a world axis (scaled units). Returns the rays whose point is in a
- * cell. */
-SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
-{
-    const render_camera *c = &p->frame->job->camera;
-    const float right = (float)c->right[axis], up = (float)c->up[axis], forward = (float)c->forward[axis];
-    const vf zero = vf_set(0);
-    kernel_packet points = *p;
-    points.active = rays;
-    points.is_pencil = false;
-    points.origin_x = (p->origin_x + p->slope_x * t) + offset * (right - p->tile->shear_x * forward);
-    points.origin_y = (p->origin_y + p->slope_y * t) + offset * (up - p->tile->shear_y * forward);
-    points.slope_x = points.slope_y = zero;
-    for (int a = 0; a < 3; a++) {
-        points.inverse[a] = vf_set(1);
-        points.shift[a] = (t + p->shift[a]) / p->inverse[a];
-    }
-    points.shift[axis] += offset;
-    probe->z = t + offset * forward;
-    probe->found = vm_none();
-    probe->sample = zero;
-    const kernel_descent descent = {NULL, zero, &zero, kernel_probe_leaf, probe};
-    kernel_trace_parts(&points, &probe->surface->layer->field, &descent);
-    return probe->found;
-}
-
-/* Replace the cells' gradients in normal (camera axes) on the rays of hit by differences over reach before and behind:
- * one-sided where one sample is in no cell; not where both of an axis are, nor where there is no reach. s: one of
- * the frame's. */
-SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
-                                    vf normal[3])
-{
-    const kernel_frame *f = p->frame;
-    kernel_probe probe = {.surface = s,
-                          .layer = f->surface_count + f->volume_count + (int)(s - f->surfaces),
-                          .isovalue = s->layer->values[value]};
-    vf g[3];
-    hit = vm_and(hit, vf_lt(vf_set(0), reach));
-    vm whole = hit;
-    for (int a = 0; a < 3; a++) {
-        const vm before = kernel_probe_at(p, &probe, hit, t, a, -reach);
-        const vf low = vf_select(before, probe.sample, vf_set(0));
-        const vm behind = kernel_probe_at(p, &probe, hit, t, a, reach);
-        const vf high = vf_select(behind, probe.sample, vf_set(0));
-        g[a] = (high - low) * vf_select(vm_and(before, behind), vf_set(1), vf_set(2));
-        whole = vm_and(whole, vm_or(before, behind));
-    }
-    const double *axes[3] = {f->job->camera.right, f->job->camera.up, f->job->camera.forward};
-    for (int k = 0; k < 3; k++) {
-        const vf sum = (g[0] * (float)axes[k][0] + g[1] * (float)axes[k][1]) + g[2] * (float)axes[k][2];
-        normal[k] = vf_select(whole, sum, normal[k]);
-    }
-}
-
-/* Half the offset of differences in scaled units: by the cell's size, the cube root of its box's volume, or of its
- * longest side where that is flat. */
-SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
-                                          const kernel_cell *c)
-{
-    double volume = 1, longest = 0;
-    for (int a = 0; a < 3; a++) {
-        double low = c->world[0][a], high = low;
-        for (int i = 1; i < c->count; i++) {
-            low = c->world[i][a] < low ? c->world[i][a] : low;
-            high = c->world[i][a] > high ? c->world[i][a] : high;
-        }
-        volume *= high - low;
-        longest = high - low > longest ? high - low : longest;
-    }
-    const double size = volume > 0 ? cbrt(volume) : longest;
-    return (float)(0.5 * layer->difference * size * p->frame->job->space.scale);
-}
 
 /* Normals out of gradients at the vertices: the three components are interpolated in the hit's cell just as values are,
  * so that they go on from cell to cell without a jump, and so does the light on the surface.
@@ -372,6 +232,38 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
+/* Puts hits that other ranks may have samples about among those that wait, and in the place of each a fragment by which
+ * volumes are cut. colour: unlit. Returns the others. */
+static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const kernel_surface *s, int value, vm hit,
+                                                      vf t, vf reach, const vf normal[3], const vf colour[3])
+{
+    render_waiting_list *list = &p->thread->waiting;
+    const vm waits = vm_and(hit, vf_lt(vf_set(0), reach));
+    if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_waiting(list)) {
+        p->thread->out_of_memory = true;
+        return vm_none();
+    }
+    const kernel_fragments place = {t, t, {colour[0], colour[1], colour[2]}, vf_set(RENDER_WAITS), vf_set(0)};
+    kernel_emit(p, waits, s->first_kind + (uint32_t)value, &place);
+    for (unsigned left = vm_bits(waits); left; left &= left - 1) {
+        const int i = __builtin_ctz(left);
+        list->items[list->count] = (render_waiting_hit){p->pixel[i], s->first_kind + (uint32_t)value, t[i], reach[i]};
+        list->looks[list->count++] = (render_waiting_look){{normal[0][i], normal[1][i], normal[2][i]},
+                                                           {colour[0][i], colour[1][i], colour[2][i]}};
+    }
+    return vm_andnot(hit, waits);
+}
+
+/* Gives hits their normals by differences, of cells that are all here; or returns those alone that have theirs, and
+ * lets the others wait. */
+SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach, vf normal[3],
+                             const vf colour[3])
+{
+    if (p->frame->job->waiting) return kernel_wait(p, s, value, hit, t, reach, normal, colour);
+    kernel_differences(p, s, value, hit, t, reach, normal);
+    return hit;
+}
+
 /* The places of hits: the depth, a vector along the normal (or the coordinates that kernel_vertex_normals() makes one
  * of), and the value that the surface is coloured by. */
 typedef struct kernel_hit_places {
@@ -407,9 +299,9 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
         if (__builtin_expect(vm_any(tied), 0)) {
             vf own[3] = {normal[0], normal[1], normal[2]};
-            if (by_differences) kernel_differences(p, s, value, tied, t, reach, own);
+            const vm ready = by_differences ? kernel_differ(p, s, value, tied, t, reach, own, colour) : tied;
             if (by_vertices) kernel_vertex_normals(p, s, tied, t, &cells, own);
-            kernel_emit_tied(p, s, value, tied, t, own, colour);
+            kernel_emit_tied(p, s, value, ready, t, own, colour);
             hit = vm_andnot(hit, tied);
         }
         p->t_far = vf_select(hit, t, p->t_far);
@@ -427,14 +319,14 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
         return;
     }
-    if (by_differences) kernel_differences(p, s, value, hit, t, reach, normal);
+    kernel_hits_cut(hits, hit, t);
+    if (by_differences) hit = kernel_differ(p, s, value, hit, t, reach, normal, colour);
     if (by_vertices) kernel_vertex_normals(p, s, hit, t, &cells, normal);
     const float opacity = s->layer->opacity;
     kernel_fragments f = {t, t, {colour[0], colour[1], colour[2]}, vf_set(1 - opacity), vf_set(0)};
     kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), &f);
     for (int a = 0; a < 3; a++) f.colour[a] *= opacity;
     kernel_emit(p, hit, s->first_kind + (uint32_t)value, &f);
-    kernel_hits_cut(hits, hit, t);
 }
 
 /* Rays on which the sign changes between the interval's faces. */

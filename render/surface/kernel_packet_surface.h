@@ -81,13 +81,16 @@ SIMD_INLINE void kernel_trace_surfaces(kernel_packet *p, kernel_hits *hits)
     }
 }
 
-/* Normals by differences of the nearest opaque hits of a surface. */
-SIMD_INLINE void kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
+/* Normals by differences of the nearest opaque hits of a surface. Returns those that have theirs. */
+SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface *s, vm rays, kernel_hits *hits)
 {
+    vm ready = vm_none();
     for (int value = 0; value < s->layer->value_count; value++) {
         const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
-        if (vm_any(mine)) kernel_differences(p, s, value, mine, p->t_far, hits->reach, hits->normal);
+        if (!vm_any(mine)) continue;
+        ready = vm_or(ready, kernel_differ(p, s, value, mine, p->t_far, hits->reach, hits->normal, hits->colour));
     }
+    return ready;
 }
 
 /* Writes the nearest opaque hits, lit, as fragments. */
@@ -97,14 +100,49 @@ SIMD_INLINE void kernel_emit_opaque(kernel_packet *p, kernel_hits *hits)
         const kernel_surface *s = &p->frame->surfaces[n];
         const vf first = vf_set((float)s->first_kind);
         const vm mine = vm_and(vf_le(first, hits->kind), vf_lt(hits->kind, first + (float)s->layer->value_count));
-        const vm write = vm_and(hits->found, mine);
+        vm write = vm_and(hits->found, mine);
         if (!vm_any(write)) continue;
-        if (s->layer->normal == RENDER_DIFFERENCES) kernel_opaque_differences(p, s, write, hits);
+        if (s->layer->normal == RENDER_DIFFERENCES) write = kernel_opaque_differences(p, s, write, hits);
         if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, write, p->t_far, &hits->cells, hits->normal);
         kernel_fragments lit = {
             p->t_far, p->t_far, {hits->colour[0], hits->colour[1], hits->colour[2]}, vf_set(0), hits->kind};
         kernel_paint(p, s, hits->normal, hits->kind, &lit);
         kernel_emit(p, write, 0, &lit);
+    }
+}
+
+/* Lights hits that waited, by the samples of all ranks. out: as many fragments. */
+static void kernel_light_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_list *list,
+                                 const render_samples_about *samples, int64_t first, int64_t count, fragment *out)
+{
+    kernel_waiting_run run;
+    kernel_waiting_begin(&run);
+    for (int64_t i = first; i < first + count; i += run.count) {
+        kernel_samples_about about;
+        vf normal[3], colour[3];
+        kernel_waiting_take(&run, f, thread, list->items + i, first + count - i);
+        for (int a = 0; a < 3; a++) {
+            normal[a] = colour[a] = vf_set(0);
+            for (int n = 0; n < run.count; n++) {
+                normal[a][run.lanes[n]] = list->looks[i + n].normal[a];
+                colour[a][run.lanes[n]] = list->looks[i + n].colour[a];
+            }
+        }
+        kernel_load_about(&run, samples + i, &about);
+        kernel_differentiate(&run.packet, &about, run.rays, normal);
+        const float opacity = run.surface->layer->opacity;
+        const vf kind = vf_set((float)((int)run.surface->first_kind + run.value));
+        kernel_fragments lit = {
+            run.t, run.t, {colour[0], colour[1], colour[2]}, vf_set(opacity < 1 ? 1 - opacity : 0), kind};
+        kernel_paint(&run.packet, run.surface, normal, kind, &lit);
+        for (int a = 0; a < 3 && opacity < 1; a++) lit.colour[a] *= opacity;
+        for (int n = 0; n < run.count; n++) {
+            const int lane = run.lanes[n];
+            out[i + n] =
+                (fragment){list->items[i + n].pixel, lit.t_in[lane],
+                           lit.t_out[lane],          {lit.colour[0][lane], lit.colour[1][lane], lit.colour[2][lane]},
+                           lit.transmittance[lane],  list->items[i + n].kind};
+        }
     }
 }
 

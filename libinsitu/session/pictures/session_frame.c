@@ -12,7 +12,9 @@
 
 #include "comp_tiles.h"
 #include "memory.h"
+#include "render_differences.h"
 #include "session_agree.h"
+#include "session_differences.h"
 #include "session_light.h"
 
 static void add_to_frame(session_frame *frame, const render_statistics *rendered, int64_t fragments,
@@ -41,6 +43,21 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     return session_agree(t->comm, error);
 }
 
+/* All ranks trace; where normals are by differences, they ask each other for samples. What fails otherwise is in *error
+ * alone. */
+static insitu_status trace(const session_frame_target *t, const render_job *job, fragment_list *fragments,
+                           render_statistics *rendered, base_error *error)
+{
+    int ranks = 1;
+    MPI_Comm_size(t->comm, &ranks);
+    render_waiting waiting = {0};
+    render_job traced = *job;
+    traced.waiting = ranks > 1 && render_has_differences(job) ? &waiting : NULL;
+    if (job->part_count > 0 && !error->status) render_frame(&traced, fragments, rendered, error);
+    if (!traced.waiting) return INSITU_OK;
+    return session_differ_fragments(t->comm, &traced, fragments, &rendered->surface_ms, error);
+}
+
 static insitu_status light(const session_frame_target *t, const render_job *job, fragment_list *fragments,
                            render_statistics *rendered, base_error *error)
 {
@@ -60,8 +77,8 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
     fragment_list fragments = {0};
     render_statistics rendered = {0};
     comp_statistics composited = {0};
-    if (job->part_count > 0 && !error->status) render_frame(job, &fragments, &rendered, error);
-    insitu_status status = is_unlit ? light(t, job, &fragments, &rendered, error) : INSITU_OK;
+    insitu_status status = trace(t, job, &fragments, &rendered, error);
+    if (!status && is_unlit) status = light(t, job, &fragments, &rendered, error);
     if (status) {
         base_free(fragments.items);
         return status;

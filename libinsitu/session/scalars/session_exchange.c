@@ -1,5 +1,5 @@
-/* MPI counts are ints: words are 8 bytes, so that a rank may send and receive 16 GiB in one exchange; beyond that it is
- * an error on all ranks, not an overflow. */
+/* MPI counts are ints: words are 8 bytes, so that a rank may send another 16 GiB at once; beyond that it is an error on
+ * all ranks, not an overflow. */
 #include "session_exchange.h"
 
 #include <string.h>
@@ -66,75 +66,165 @@ void session_mail_free(session_mail *mail)
     *mail = (session_mail){0};
 }
 
-/* counts and starts as MPI has them, of both directions. */
-typedef struct mail_places {
-    int *out_counts, *out_starts, *in_counts, *in_starts; /* in one block, from out_counts */
-} mail_places;
+/* ---- mail ------------------------------------------------------------------------------------------------------ */
 
-static bool places_create(mail_places *places, int ranks)
-{
-    places->out_counts = base_calloc((size_t)ranks * 4, sizeof(int));
-    if (!places->out_counts) return false;
-    places->out_starts = places->out_counts + ranks;
-    places->in_counts = places->out_starts + ranks;
-    places->in_starts = places->in_counts + ranks;
-    return true;
-}
+/* Messages are found as they come (Hoefler et al. 2010): sends are synchronous, so that a rank whose sends are complete
+ * knows that theirs have arrived, and joins a reduction; when that is complete all have. */
+typedef struct letter {
+    struct letter *next;
+    int from;
+    int64_t count;
+    uint64_t words[];
+} letter;
 
-static bool fill_places(const int64_t *counts, int ranks, int *mpi_counts, int *starts, int64_t *total)
+typedef struct delivery {
+    MPI_Comm comm;
+    int tag, rank, ranks;
+    int send_count;
+    MPI_Request *sends;
+    letter *letters;
+} delivery;
+
+static insitu_status start_sends(delivery *d, const session_mail *out, base_error *error)
 {
-    *total = 0;
-    for (int rank = 0; rank < ranks; rank++) {
-        if (counts[rank] > INT32_MAX - *total) return false;
-        mpi_counts[rank] = (int)counts[rank];
-        starts[rank] = (int)*total;
-        *total += counts[rank];
+    const uint64_t *words = out->words;
+    int receivers = 0;
+    for (int r = 0; r < d->ranks; r++) {
+        receivers += out->counts[r] > 0;
+        if (out->counts[r] > INT32_MAX)
+            return base_fail(error, INSITU_ERROR_MEMORY, "more than 16 GiB of data for a rank at once");
     }
-    return true;
+    d->sends = base_alloc((size_t)(receivers + 1) * sizeof(MPI_Request));
+    if (!d->sends) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for messages to %d ranks", receivers);
+    for (int n = 0; n < d->ranks; n++) {
+        const int64_t count = out->counts[n];
+        if (count && n != d->rank && !error->status) {
+            session_mpi(error,
+                        MPI_Issend(words, (int)count, MPI_UINT64_T, n, d->tag, d->comm, &d->sends[d->send_count]),
+                        "MPI_Issend");
+            d->send_count += !error->status;
+        }
+        words += count;
+    }
+    return error->status;
 }
 
-static insitu_status prepare_in(const session_mail *out, session_mail *in, mail_places *places, int ranks,
-                                base_error *error)
+static letter *letter_create(delivery *d, int from, int64_t count)
 {
-    int64_t out_total = 0;
-    if (!fill_places(out->counts, ranks, places->out_counts, places->out_starts, &out_total) ||
-        !fill_places(in->counts, ranks, places->in_counts, places->in_starts, &in->total))
-        return base_fail(error, INSITU_ERROR_MEMORY, "more than 16 GiB of data between ranks at once");
-    in->words = base_alloc((size_t)in->total * sizeof *in->words);
-    if (!in->words)
-        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks",
-                         (long long)in->total * 8);
-    return INSITU_OK;
+    letter *l = base_alloc(sizeof *l + (size_t)count * sizeof *l->words);
+    if (!l) return NULL;
+    l->from = from;
+    l->count = count;
+    l->next = d->letters;
+    return d->letters = l;
 }
 
-static insitu_status exchange(MPI_Comm comm, const session_mail *out, session_mail *in, mail_places *places,
-                              base_error *error)
+/* Where there is no room, the sender is told that its message has come, and the rest of it is dropped. */
+static void receive(delivery *d, const MPI_Status *found, base_error *error)
 {
-    int ranks = 1;
-    MPI_Comm_size(comm, &ranks);
-    in->counts = base_calloc((size_t)ranks, sizeof *in->counts);
-    if (!places_create(places, ranks) || !in->counts)
-        base_fail(error, INSITU_ERROR_MEMORY, "no memory for counts of %d ranks", ranks);
-    insitu_status status = session_agree(comm, error);
-    if (status) return status;
-    status =
-        session_mpi(error, MPI_Alltoall(out->counts, 1, MPI_INT64_T, in->counts, 1, MPI_INT64_T, comm), "MPI_Alltoall");
-    if (status) return status;
-    prepare_in(out, in, places, ranks, error);
-    status = session_agree(comm, error);
-    if (status) return status;
-    return session_mpi(error,
-                       MPI_Alltoallv(out->words, places->out_counts, places->out_starts, MPI_UINT64_T, in->words,
-                                     places->in_counts, places->in_starts, MPI_UINT64_T, comm),
-                       "MPI_Alltoallv");
+    int count = 0;
+    MPI_Get_count(found, MPI_UINT64_T, &count);
+    letter *l = error->status ? NULL : letter_create(d, found->MPI_SOURCE, count);
+    const int code = MPI_Recv(l ? l->words : NULL, l ? count : 0, MPI_UINT64_T, found->MPI_SOURCE, d->tag, d->comm,
+                              MPI_STATUS_IGNORE);
+    if (l)
+        session_mpi(error, code, "MPI_Recv");
+    else if (!error->status)
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks", (long long)count * 8);
+}
+
+/* Receives until all ranks' messages have come. *failed: the lowest rank that had failed before; ranks: none. */
+static insitu_status receive_all(delivery *d, int *failed, base_error *error)
+{
+    int own = error->status ? d->rank : d->ranks, has_joined = 0, is_over = 0;
+    base_error lost = {0}; /* in receiving */
+    MPI_Request all = MPI_REQUEST_NULL;
+    insitu_status status = INSITU_OK;
+    while (!status && !is_over) {
+        MPI_Status found;
+        int has_come = 0;
+        status = session_mpi(error, MPI_Iprobe(MPI_ANY_SOURCE, d->tag, d->comm, &has_come, &found), "MPI_Iprobe");
+        if (!status && has_come) receive(d, &found, &lost);
+        if (has_come || status) continue;
+        if (has_joined) {
+            status = session_mpi(error, MPI_Test(&all, &is_over, MPI_STATUS_IGNORE), "MPI_Test");
+            continue;
+        }
+        status =
+            session_mpi(error, MPI_Testall(d->send_count, d->sends, &has_joined, MPI_STATUSES_IGNORE), "MPI_Testall");
+        if (!status && has_joined)
+            status =
+                session_mpi(error, MPI_Iallreduce(&own, failed, 1, MPI_INT, MPI_MIN, d->comm, &all), "MPI_Iallreduce");
+    }
+    if (!status && !error->status) *error = lost;
+    return status;
+}
+
+/* This rank's words for itself are a letter, too. */
+static void keep_own(delivery *d, const session_mail *out, base_error *error)
+{
+    const uint64_t *words = out->words;
+    for (int r = 0; r < d->rank; r++) words += out->counts[r];
+    const int64_t count = out->counts[d->rank];
+    if (!count) return;
+    letter *l = letter_create(d, d->rank, count);
+    if (l)
+        memcpy(l->words, words, (size_t)count * sizeof *words);
+    else
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data", (long long)count * 8);
+}
+
+/* Puts letters in the order of ranks. */
+static void open_letters(const delivery *d, session_mail *in, base_error *error)
+{
+    int64_t *starts = base_calloc((size_t)d->ranks + 1, sizeof *starts);
+    in->counts = base_calloc((size_t)d->ranks, sizeof *in->counts);
+    for (const letter *l = d->letters; l && !error->status; l = l->next) in->total += l->count;
+    in->words = base_alloc((size_t)(in->total + 1) * sizeof *in->words);
+    if (!starts || !in->counts || !in->words) {
+        base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld bytes of data between ranks",
+                  (long long)in->total * 8);
+        in->total = 0;
+    }
+    for (const letter *l = d->letters; l && !error->status; l = l->next) in->counts[l->from] = l->count;
+    for (int r = 0; r < d->ranks && !error->status; r++) starts[r + 1] = starts[r] + in->counts[r];
+    for (const letter *l = d->letters; l && !error->status; l = l->next)
+        memcpy(in->words + starts[l->from], l->words, (size_t)l->count * sizeof *l->words);
+    base_free(starts);
+}
+
+static void free_delivery(delivery *d)
+{
+    while (d->letters) {
+        letter *next = d->letters->next;
+        base_free(d->letters);
+        d->letters = next;
+    }
+    base_free(d->sends);
+}
+
+insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const session_mail *out, session_mail *in,
+                                   base_error *error)
+{
+    delivery d = {.comm = comm, .tag = tag};
+    int failed = 0;
+    *in = (session_mail){0};
+    MPI_Comm_rank(comm, &d.rank);
+    MPI_Comm_size(comm, &d.ranks);
+    if (!error->status) start_sends(&d, out, error);
+    if (!error->status) keep_own(&d, out, error);
+    insitu_status status = receive_all(&d, &failed, error);
+    if (!status && failed < d.ranks) status = session_agree(comm, error);
+    if (!status) open_letters(&d, in, error);
+    free_delivery(&d);
+    if (status) session_mail_free(in);
+    return status;
 }
 
 insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, session_mail *in, base_error *error)
 {
-    mail_places places = {0};
-    *in = (session_mail){0};
-    const insitu_status status = exchange(comm, out, in, &places, error);
-    base_free(places.out_counts);
+    insitu_status status = session_mail_deliver(comm, SESSION_MAIL_THERE, out, in, error);
+    if (!status) status = session_agree(comm, error);
     if (status) session_mail_free(in);
     return status;
 }

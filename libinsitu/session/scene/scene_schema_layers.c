@@ -200,7 +200,7 @@ DEFINE_MAPPING(colour_by, "colour_by", COLOUR_BY_KEYS);
       .help =                                                                                                          \
           "What light falls on: the `gradient` of the cell that is hit, which changes from cell to cell, or "          \
           "smooth: gradients at each `vertex`, over its cells on all ranks, interpolated within cells; or central "    \
-          "`differences` about the hit, slower and over the cells of one rank, so that ranks' borders may show.",      \
+          "`differences` about the hit, in the cells of all ranks, slower.",                                           \
       .by_default = "`gradient`")                                                                                      \
     X(CYAML_FIELD_FLOAT_PTR("difference", OPTIONAL, scene_file_isosurface, difference),                                \
       .help = "Distance between the two samples of a difference, in sizes of the cell that is hit.",                   \

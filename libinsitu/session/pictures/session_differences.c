@@ -1,0 +1,223 @@
+/* The rank that has a hit by differences asks its own cells for the six samples about it, and every rank whose cells'
+ * box one of the six points is in. A question is the hit, 16 bytes; its answer the samples, 32 bytes. In a partition
+ * into blocks hits near the faces between blocks alone have questions to ask.
+ *
+ *     rank A   hits -> own samples -> questions to ranks by their boxes ........... and all samples -> light
+ *     rank B                          questions -> own samples -> answers
+ *
+ * Hits go in rounds, so that no rank holds more than a round's mail. */
+#include "session_differences.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "render_differences.h"
+#include "session_agree.h"
+#include "session_exchange.h"
+
+enum {
+    ROUND_HITS = 1 << 18,
+    QUESTION_WORDS = sizeof(render_waiting_hit) / 8,
+    ANSWER_WORDS = sizeof(render_samples_about) / 8
+};
+
+typedef struct differing {
+    MPI_Comm comm;
+    const render_job *job;
+    render_waiting_list *list;
+    int rank, ranks;
+    int64_t rounds;
+    /* Ranks that may have samples about any of this rank's hits, and their boxes. */
+    int near_count;
+    int *near;
+    render_sampled_box *boxes;
+    /* Of a round. */
+    int64_t first, count;
+    render_samples_about *samples;
+    int64_t *asked; /* the hits that are asked about, in the order of the mail */
+} differing;
+
+/* ---- what ranks know of each other --------------------------------------------------------------------------- */
+
+/* Greatest ends of the surfaces' fields, the lower ones negated; the most rounds; has any rank failed? */
+enum { SHARED_ROUNDS = 2 * RENDER_MAX_ISOVALUES, SHARED_FAILURE, SHARED };
+
+static insitu_status share_ranges(differing *d, base_error *error)
+{
+    double shared[SHARED] = {0}, ranges[RENDER_MAX_ISOVALUES][2];
+    for (int i = 0; i < RENDER_MAX_ISOVALUES; i++) shared[2 * i] = shared[2 * i + 1] = -INFINITY;
+    render_differences_ranges(d->job, ranges);
+    for (int i = 0; i < d->job->surface_count; i++) {
+        shared[2 * i] = -ranges[i][0];
+        shared[2 * i + 1] = ranges[i][1];
+    }
+    shared[SHARED_ROUNDS] = (double)((d->list->count + ROUND_HITS - 1) / ROUND_HITS);
+    shared[SHARED_FAILURE] = error->status != INSITU_OK;
+    insitu_status status =
+        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, shared, SHARED, MPI_DOUBLE, MPI_MAX, d->comm), "MPI_Allreduce");
+    if (status) return status;
+    if (shared[SHARED_FAILURE] > 0) return session_agree(d->comm, error);
+    for (int i = 0; i < RENDER_MAX_ISOVALUES; i++) {
+        d->job->waiting->ranges[i][0] = -shared[2 * i];
+        d->job->waiting->ranges[i][1] = shared[2 * i + 1];
+    }
+    d->rounds = (int64_t)shared[SHARED_ROUNDS];
+    return INSITU_OK;
+}
+
+/* Hits are in this rank's box, and their samples no farther from it than the farthest reach. */
+static void keep_near(differing *d)
+{
+    const render_sampled_box *own = &d->boxes[d->rank];
+    double reach = 0;
+    for (int64_t i = 0; i < d->list->count; i++) reach = fmax(reach, (double)d->list->items[i].reach);
+    reach = (reach * 1.001 + 1e-4) / d->job->space.scale;
+    for (int r = 0; r < d->ranks; r++) {
+        bool is_near = r != d->rank;
+        for (int a = 0; a < 3; a++)
+            is_near = is_near && d->boxes[r].lower[a] <= own->upper[a] + reach &&
+                      own->lower[a] - reach <= d->boxes[r].upper[a];
+        if (is_near) d->near[d->near_count++] = r;
+    }
+}
+
+static insitu_status share_boxes(differing *d, base_error *error)
+{
+    const render_sampled_box own = render_differences_box(d->job);
+    const int doubles = sizeof own / sizeof(double);
+    const insitu_status status = session_mpi(
+        error, MPI_Allgather(&own, doubles, MPI_DOUBLE, d->boxes, doubles, MPI_DOUBLE, d->comm), "MPI_Allgather");
+    if (!status) keep_near(d);
+    return status;
+}
+
+/* ---- a round ------------------------------------------------------------------------------------------------- */
+
+/* Fills the mail with the round's questions. False where memory ran out. */
+static bool write_questions(differing *d, session_mail *out)
+{
+    int64_t capacity = d->count + 1;
+    out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
+    out->words = base_alloc((size_t)capacity * QUESTION_WORDS * sizeof *out->words);
+    d->asked = base_alloc((size_t)capacity * sizeof *d->asked);
+    if (!out->counts || !out->words || !d->asked) return false;
+    int64_t questions = 0;
+    for (int n = 0; n < d->near_count; n++)
+        for (int64_t i = 0; i < d->count; i++) {
+            const render_waiting_hit *hit = &d->list->items[d->first + i];
+            if (!render_differences_meet(d->job, hit, &d->boxes[d->near[n]])) continue;
+            if (questions == capacity) {
+                capacity += capacity / 2 + 1024;
+                uint64_t *words = base_realloc(out->words, (size_t)capacity * QUESTION_WORDS * sizeof *words);
+                if (words) out->words = words;
+                int64_t *asked = base_realloc(d->asked, (size_t)capacity * sizeof *asked);
+                if (asked) d->asked = asked;
+                if (!words || !asked) return false;
+            }
+            memcpy(out->words + questions * QUESTION_WORDS, hit, sizeof *hit);
+            d->asked[questions++] = i;
+            out->counts[d->near[n]] += QUESTION_WORDS;
+        }
+    out->total = questions * QUESTION_WORDS;
+    return true;
+}
+
+/* Makes answers of the questions, which words are aligned for. False where memory ran out. */
+static bool write_answers(const differing *d, const session_mail *in, session_mail *out, base_error *error)
+{
+    const int64_t count = in->total / QUESTION_WORDS;
+    out->total = count * ANSWER_WORDS;
+    out->counts = base_calloc((size_t)d->ranks, sizeof *out->counts);
+    out->words = base_alloc((size_t)(out->total + 1) * sizeof *out->words);
+    if (!out->counts || !out->words) return false;
+    for (int r = 0; r < d->ranks; r++) out->counts[r] = in->counts[r] / QUESTION_WORDS * ANSWER_WORDS;
+    render_differences_sample(d->job, (const render_waiting_hit *)(const void *)in->words,
+                              (render_samples_about *)(void *)out->words, count, error);
+    return true;
+}
+
+/* What failed before is told by the next delivery. */
+static insitu_status ask_others(differing *d, base_error *error)
+{
+    session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};
+    if (!write_questions(d, &asked)) session_no_memory(error, d->count * 24, "samples of other ranks");
+    insitu_status status = session_mail_deliver(d->comm, SESSION_MAIL_THERE, &asked, &questions, error);
+    if (!status && !write_answers(d, &questions, &answered, error))
+        session_no_memory(error, questions.total * 16, "samples for other ranks");
+    if (!status) status = session_mail_deliver(d->comm, SESSION_MAIL_BACK, &answered, &answers, error);
+    if (!status && !error->status)
+        for (int64_t i = 0; i < asked.total / QUESTION_WORDS; i++)
+            render_differences_merge(&d->samples[d->asked[i]],
+                                     (const render_samples_about *)(const void *)(answers.words + i * ANSWER_WORDS));
+    session_mail_free(&asked);
+    session_mail_free(&questions);
+    session_mail_free(&answered);
+    session_mail_free(&answers);
+    base_free(d->asked);
+    d->asked = NULL;
+    return status;
+}
+
+static void light_round(const differing *d, fragment_list *fragments, base_error *error)
+{
+    const int64_t count = fragments->count + d->count;
+    if (count > fragments->capacity) {
+        fragment *items = base_realloc(fragments->items, (size_t)count * sizeof *items);
+        if (!items) {
+            session_no_memory(error, count * (int64_t)sizeof *items, "fragments");
+            return;
+        }
+        fragments->items = items;
+        fragments->capacity = count;
+    }
+    if (!render_differences_light(d->job, d->list, d->samples, d->first, d->count, fragments->items + fragments->count,
+                                  error))
+        fragments->count = count;
+}
+
+static insitu_status differ_rounds(differing *d, fragment_list *fragments, base_error *error)
+{
+    insitu_status status = INSITU_OK;
+    for (int64_t round = 0; round < d->rounds && !status; round++) {
+        const int64_t left = d->list->count - d->first;
+        d->count = left < ROUND_HITS ? left : ROUND_HITS;
+        if (!error->status) render_differences_sample(d->job, d->list->items + d->first, d->samples, d->count, error);
+        status = ask_others(d, error);
+        if (!status && !error->status) light_round(d, fragments, error);
+        d->first += d->count;
+    }
+    return status;
+}
+
+static insitu_status differ(differing *d, fragment_list *fragments, base_error *error)
+{
+    const int64_t most = d->list->count < ROUND_HITS ? d->list->count : ROUND_HITS;
+    d->samples = base_alloc((size_t)(most + 1) * sizeof *d->samples);
+    d->boxes = base_alloc((size_t)d->ranks * sizeof *d->boxes);
+    d->near = base_alloc((size_t)d->ranks * sizeof *d->near);
+    if (!d->samples || !d->boxes || !d->near || !render_differences_sort(d->job, d->list))
+        session_no_memory(error, most * 64, "normals by differences");
+    insitu_status status = share_ranges(d, error);
+    if (!status && d->rounds) status = share_boxes(d, error);
+    if (!status) status = differ_rounds(d, fragments, error);
+    base_free(d->samples);
+    base_free(d->boxes);
+    base_free(d->near);
+    return status;
+}
+
+insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
+                                       base_error *error)
+{
+    const double start = MPI_Wtime();
+    differing d = {.comm = comm, .job = job, .list = &job->waiting->list};
+    MPI_Comm_rank(comm, &d.rank);
+    MPI_Comm_size(comm, &d.ranks);
+    const insitu_status status = differ(&d, fragments, error);
+    base_free(d.list->items);
+    base_free(d.list->looks);
+    *d.list = (render_waiting_list){0};
+    *ms += 1e3 * (MPI_Wtime() - start);
+    return status;
+}

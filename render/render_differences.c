@@ -1,0 +1,212 @@
+/* Threads take hits a chunk at a time, so that cells that are fetched for one of them are there for its neighbours. */
+#include "render_differences.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "kernel_types.h"
+#include "memory.h"
+#include "mmbvh.h"
+#include "render_kernels.h"
+#include "render_prepare.h"
+
+enum { CHUNK_HITS = 512, SORTED_HITS = 8192 };
+
+bool render_has_differences(const render_job *job)
+{
+    for (int i = 0; i < job->surface_count; i++)
+        if (job->surfaces[i].normal == RENDER_DIFFERENCES) return job->paint != RENDER_VALUES;
+    return false;
+}
+
+void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2])
+{
+    for (int i = 0; i < job->surface_count; i++) render_surface_range(job, i, ranges[i]);
+}
+
+/* ---- which ranks to ask -------------------------------------------------------------------------------------- */
+
+static void grow_box(render_sampled_box *box, const render_space *s, const mmbvh *tree)
+{
+    float lower[4], upper[4];
+    mmbvh_node_box(tree, 0, lower, upper);
+    for (int a = 0; a < 3; a++) {
+        box->lower[a] = fmin(box->lower[a], (double)lower[a] / s->scale + s->origin[a]);
+        box->upper[a] = fmax(box->upper[a], (double)upper[a] / s->scale + s->origin[a]);
+    }
+}
+
+render_sampled_box render_differences_box(const render_job *job)
+{
+    render_sampled_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (int i = 0; i < job->surface_count; i++) {
+        if (job->surfaces[i].normal != RENDER_DIFFERENCES) continue;
+        for (int part = 0; part < job->part_count; part++)
+            if (job->surfaces[i].field.ranges[part].low && job->parts[part].tree->node_count)
+                grow_box(&out, &job->space, job->parts[part].tree);
+    }
+    return out;
+}
+
+/* Scaled units, of which a scene is about one: points and float32 boxes are off by less. */
+static const double box_margin = 1e-5;
+
+/* The points are on a cross of two reaches' size around the hit: does one of its bars meet the box? */
+bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_sampled_box *box)
+{
+    const uint32_t width = (uint32_t)job->camera.width;
+    const double z = (double)hit->t / job->space.scale + job->space.depth_origin;
+    const double reach = (double)hit->reach / job->space.scale, margin = box_margin / job->space.scale;
+    double base[3], direction[3];
+    int beside = 0, beyond = 0; /* axes along which the hit is not in the box, the arms are not */
+    render_camera_ray(&job->camera, (int)(hit->pixel % width), (int)(hit->pixel / width), base, direction);
+    for (int a = 0; a < 3; a++) {
+        const double at = base[a] + z * direction[a];
+        const double out = fmax(box->lower[a] - margin - at, at - box->upper[a] - margin);
+        beside += !(out <= 0);
+        beyond += !(out <= reach);
+    }
+    return beside <= 1 && beyond == 0;
+}
+
+/* ---- order ----------------------------------------------------------------------------------------------------- */
+
+typedef struct place_of_hit {
+    uint64_t tile; /* and block in it */
+    uint32_t kind, within;
+    int64_t index;
+} place_of_hit;
+
+static int by_place(const void *a, const void *b)
+{
+    const place_of_hit *x = a, *y = b;
+    if (x->tile != y->tile) return x->tile < y->tile ? -1 : 1;
+    if (x->kind != y->kind) return x->kind < y->kind ? -1 : 1;
+    if (x->within != y->within) return x->within < y->within ? -1 : 1;
+    return (x->index > y->index) - (x->index < y->index);
+}
+
+static place_of_hit place_of(const render_camera *camera, const render_waiting_hit *hit, int64_t index)
+{
+    const uint32_t x = hit->pixel % (uint32_t)camera->width, y = hit->pixel / (uint32_t)camera->width;
+    const uint64_t tile = (uint64_t)(y / KERNEL_TILE) << 16 | x / KERNEL_TILE;
+    const uint32_t block = y % KERNEL_TILE / KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_TILE / KERNEL_BLOCK;
+    return (place_of_hit){tile << 8 | block, hit->kind, y % KERNEL_BLOCK * KERNEL_BLOCK + x % KERNEL_BLOCK, index};
+}
+
+static void put_in_order(const render_camera *camera, render_waiting_list *list, int64_t first, int64_t count,
+                         place_of_hit *places, render_waiting_list *room)
+{
+    for (int64_t i = 0; i < count; i++) places[i] = place_of(camera, &list->items[first + i], i);
+    memcpy(room->items, list->items + first, (size_t)count * sizeof *room->items);
+    memcpy(room->looks, list->looks + first, (size_t)count * sizeof *room->looks);
+    qsort(places, (size_t)count, sizeof *places, by_place);
+    for (int64_t i = 0; i < count; i++) {
+        list->items[first + i] = room->items[places[i].index];
+        list->looks[first + i] = room->looks[places[i].index];
+    }
+}
+
+bool render_differences_sort(const render_job *job, render_waiting_list *list)
+{
+    const int64_t most = list->count < SORTED_HITS ? list->count : SORTED_HITS;
+    place_of_hit *places = base_alloc((size_t)(most + 1) * sizeof *places);
+    render_waiting_list room = {.items = base_alloc((size_t)(most + 1) * sizeof *room.items),
+                                .looks = base_alloc((size_t)(most + 1) * sizeof *room.looks)};
+    const bool has_room = places && room.items && room.looks;
+    for (int64_t first = 0; first < list->count && has_room; first += most) {
+        const int64_t left = list->count - first;
+        put_in_order(&job->camera, list, first, left < most ? left : most, places, &room);
+    }
+    base_free(places);
+    base_free(room.items);
+    base_free(room.looks);
+    return has_room;
+}
+
+/* ---- samples and light ----------------------------------------------------------------------------------------- */
+
+/* What threads do with a chunk of hits. */
+typedef struct chunk_work {
+    kernel_frame frame;
+    const render_waiting_hit *hits;
+    render_samples_about *samples;
+    const render_waiting_list *list; /* to light; NULL: to sample */
+    const render_samples_about *merged;
+    fragment *out;
+} chunk_work;
+
+static bool thread_begin(kernel_thread *thread)
+{
+    const kernel_table *kernels = render_kernels();
+    *thread = (kernel_thread){.memory = base_alloc(kernels->memory_bytes)};
+    if (thread->memory) kernels->begin(thread);
+    return thread->memory;
+}
+
+static void work_on(chunk_work *work, kernel_thread *thread, int64_t first, int64_t count)
+{
+    const kernel_table *kernels = render_kernels();
+    if (work->list)
+        kernels->light_waiting(&work->frame, thread, work->list, work->merged, first, count, work->out);
+    else
+        kernels->sample_waiting(&work->frame, thread, work->hits + first, work->samples + first, count);
+}
+
+static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_t first, int64_t count,
+                                 base_error *error)
+{
+    const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
+    render_job surfaces = *job;
+    bool has_memory = true;
+    surfaces.volume_count = 0;
+    surfaces.separate_samples = surfaces.reproducible = false;
+    insitu_status status = render_prepare(&surfaces, &work->frame, error);
+    if (status != INSITU_OK) return status;
+#pragma omp parallel num_threads(threads) reduction(&& : has_memory)
+    {
+        kernel_thread thread;
+        has_memory = thread_begin(&thread);
+#pragma omp for schedule(dynamic, 1)
+        for (int64_t at = first; at < first + count; at += CHUNK_HITS) {
+            const int64_t left = first + count - at;
+            if (thread.memory) work_on(work, &thread, at, left < CHUNK_HITS ? left : CHUNK_HITS);
+        }
+        base_free(thread.memory);
+    }
+    render_unprepare(&work->frame);
+    if (!has_memory)
+        status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for normals of %lld hits", (long long)count);
+    return status;
+}
+
+insitu_status render_differences_sample(const render_job *job, const render_waiting_hit *hits,
+                                        render_samples_about *out, int64_t count, base_error *error)
+{
+    chunk_work work = {.hits = hits, .samples = out};
+    if (count && !job->part_count) memset(out, 0, (size_t)count * sizeof *out);
+    if (!count || !job->part_count) return INSITU_OK;
+    return work_on_all(job, &work, 0, count, error);
+}
+
+void render_differences_merge(render_samples_about *into, const render_samples_about *other)
+{
+    for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
+        const uint32_t bit = 1u << k;
+        if (!(other->found & bit) || (into->found & bit && into->values[k] <= other->values[k])) continue;
+        into->values[k] = other->values[k];
+        into->found |= bit;
+    }
+}
+
+insitu_status render_differences_light(const render_job *job, const render_waiting_list *list,
+                                       const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
+                                       base_error *error)
+{
+    /* Hits, samples and fragments are numbered alike: from the first on. */
+    const render_waiting_list some = {list->items + first, list->looks + first, count, count};
+    chunk_work work = {.list = &some, .merged = samples, .out = out};
+    return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;
+}

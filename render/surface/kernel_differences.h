@@ -1,0 +1,308 @@
+/* Normals by central differences. */
+#ifndef RENDER_KERNEL_DIFFERENCES_H
+#define RENDER_KERNEL_DIFFERENCES_H
+
+#include <math.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_cache.h"
+#include "kernel_crossings.h"
+#include "kernel_map.h"
+#include "kernel_packet.h"
+#include "kernel_tile.h"
+#include "kernel_traverse.h"
+#include "kernel_types.h"
+#include "render.h"
+#include "simd.h"
+
+/* Normals by central differences (thesis, section 4.3.4): the field half an offset before and behind the hit along each
+ * axis. Which cell holds a point is asked of the tree, as a ray of no length: with inverse directions of 1 the box test
+ * of kernel_packet.h tells whether the point is in the box. In a leaf, the line through the point along the tile's
+ * depth axis meets the cells as any ray does, by the same exact decisions, and the point belongs to the one whose
+ * interval [t_in, t_out) holds its depth: to one cell of a mesh or none.
+ *
+ * The samples are the field less the isovalue, so that the hit's own value is 0. Where cells overlap, several hold a
+ * point: the least of their values is the sample, whichever of them is asked first and on whichever rank.
+ *
+ * Where other ranks have cells, their samples count too. Then hits wait for their normals (render_differences.h), and
+ * the second half of this file samples, and lights, those of any pixels, in tiles and packets as they were hit by. */
+
+/* The field at one point of each ray. */
+typedef struct kernel_probe {
+    const kernel_surface *surface;
+    int layer; /* for the cache */
+    double isovalue;
+    vf z; /* of the points */
+    vm found;
+    vf sample;
+} kernel_probe;
+
+/* f: the values less the isovalue, of one scale in all cells. */
+SIMD_INLINE void kernel_probe_values(const kernel_probe *probe, kernel_cell *c)
+{
+    for (int i = 0; i < c->count; i++) {
+        const double v = (c->values[i] - probe->isovalue) * probe->surface->value_scale;
+        c->f[i] = (float)(v < -1e18 ? -1e18 : v > 1e18 ? 1e18 : v);
+    }
+}
+
+SIMD_INLINE void kernel_probe_cell(kernel_packet *p, kernel_probe *probe, const kernel_cell *c, vm rays)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    const bool is_tet = c->type == GRID_TET;
+    int count = 1;
+    if (is_tet)
+        kernel_tet_interval(p, c, rays, false, &list[0]);
+    else
+        count = kernel_poly_intervals(p, c, rays, false, list);
+    for (int n = 0; n < count; n++) {
+        const kernel_interval *i = &list[n];
+        const vm own = vm_andnot(vm_and(i->mask, vf_lt(probe->z, i->t_out)), vf_lt(probe->z, i->t_in));
+        if (!vm_any(own)) continue;
+        const vf along = (probe->z - i->t_in) / (i->t_out - i->t_in);
+        vf value = i->v_in + along * (i->v_out - i->v_in);
+        if (!is_tet) {
+            kernel_map map;
+            kernel_map_setup(&map, c);
+            value = kernel_value_at(p, &map, i, own, probe->z);
+        }
+        const vm is_number = vm_and(own, vf_eq(value, value));
+        const vm taken = vm_and(is_number, vm_or(vm_not(probe->found), vf_lt(value, probe->sample)));
+        probe->sample = vf_select(taken, value, probe->sample);
+        probe->found = vm_or(probe->found, taken);
+    }
+}
+
+/* Rays whose point may be in the cell: in its box in tile space, widened by more than all rounding. */
+SIMD_INLINE vm kernel_probe_in_box(const kernel_packet *p, const kernel_probe *probe, const kernel_cell *c, vm rays)
+{
+    const float *const places[3] = {c->x, c->y, c->z};
+    const vf points[3] = {p->origin_x, p->origin_y, probe->z};
+    for (int a = 0; a < 3; a++) {
+        float low = places[a][0], high = low;
+        for (int i = 1; i < c->count; i++) {
+            low = places[a][i] < low ? places[a][i] : low;
+            high = places[a][i] > high ? places[a][i] : high;
+        }
+        const float pad = 1e-5f * ((fabsf(low) + fabsf(high)) + (high - low));
+        rays = vm_and(rays, vm_and(vf_le(vf_set(low - pad), points[a]), vf_le(points[a], vf_set(high + pad))));
+    }
+    return rays;
+}
+
+static void kernel_probe_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays)
+{
+    kernel_probe *probe = state;
+    const render_field *field = &probe->surface->layer->field;
+    for (int n = 0; n < count; n++) {
+        kernel_cell *c = kernel_cell_find(p, probe->layer, part, &field->fields[part], cells[n]);
+        if (!c->is_finite || c->type == GRID_POLYHEDRON) continue;
+        const bool is_fresh = !c->is_placed;
+        if (is_fresh) kernel_cell_place(c, p, p->frame->job->parts[part].cells);
+        if (is_fresh || probe->surface->layer->value_count > 1) kernel_probe_values(probe, c);
+        const vm near = kernel_probe_in_box(p, probe, c, rays);
+        if (vm_any(near)) kernel_probe_cell(p, probe, c, near);
+    }
+}
+
+/* Sample at the rays' points t moved by offset along a world axis (scaled units). Returns the rays whose point is in a
+ * cell. */
+SIMD_INLINE vm kernel_probe_at(const kernel_packet *p, kernel_probe *probe, vm rays, vf t, int axis, vf offset)
+{
+    const render_camera *c = &p->frame->job->camera;
+    const float right = (float)c->right[axis], up = (float)c->up[axis], forward = (float)c->forward[axis];
+    const vf zero = vf_set(0);
+    kernel_packet points = *p;
+    points.active = rays;
+    points.is_pencil = false;
+    points.origin_x = (p->origin_x + p->slope_x * t) + offset * (right - p->tile->shear_x * forward);
+    points.origin_y = (p->origin_y + p->slope_y * t) + offset * (up - p->tile->shear_y * forward);
+    points.slope_x = points.slope_y = zero;
+    for (int a = 0; a < 3; a++) {
+        points.inverse[a] = vf_set(1);
+        points.shift[a] = (t + p->shift[a]) / p->inverse[a];
+    }
+    points.shift[axis] += offset;
+    probe->z = t + offset * forward;
+    probe->found = vm_none();
+    probe->sample = zero;
+    const kernel_descent descent = {NULL, zero, &zero, kernel_probe_leaf, probe};
+    kernel_trace_parts(&points, &probe->surface->layer->field, &descent);
+    return probe->found;
+}
+
+/* The samples of a packet's hits: before and behind along the first axis, along the second, along the third. */
+typedef struct kernel_samples_about {
+    vm found[RENDER_DIFFERENCE_SAMPLES];
+    vf values[RENDER_DIFFERENCE_SAMPLES];
+} kernel_samples_about;
+
+/* Samples over reach about the hits at t. s: one of the frame's. */
+static __attribute__((noinline)) void kernel_sample_about(const kernel_packet *p, const kernel_surface *s, int value,
+                                                          vm hit, vf t, vf reach, kernel_samples_about *out)
+{
+    const kernel_frame *f = p->frame;
+    kernel_probe probe = {.surface = s,
+                          .layer = f->surface_count + f->volume_count + (int)(s - f->surfaces),
+                          .isovalue = s->layer->values[value]};
+    for (int i = 0; i < RENDER_DIFFERENCE_SAMPLES; i++) {
+        out->found[i] = kernel_probe_at(p, &probe, hit, t, i / 2, i % 2 ? reach : -reach);
+        out->values[i] = probe.sample + 0.0f; /* of -0 and 0 neither is the lesser: 0 */
+    }
+}
+
+/* Replace the cells' gradients in normal (camera axes) on the rays of hit by the samples' differences: one-sided where
+ * one sample is in no cell; not where both of an axis are. */
+SIMD_INLINE void kernel_differentiate(const kernel_packet *p, const kernel_samples_about *about, vm hit, vf normal[3])
+{
+    const render_camera *c = &p->frame->job->camera;
+    const double *axes[3] = {c->right, c->up, c->forward};
+    vf g[3];
+    for (int a = 0; a < 3; a++) {
+        const vm before = about->found[2 * a], behind = about->found[2 * a + 1];
+        const vf low = vf_select(before, about->values[2 * a], vf_set(0));
+        const vf high = vf_select(behind, about->values[2 * a + 1], vf_set(0));
+        g[a] = (high - low) * vf_select(vm_and(before, behind), vf_set(1), vf_set(2));
+        hit = vm_and(hit, vm_or(before, behind));
+    }
+    for (int k = 0; k < 3; k++) {
+        const vf sum = (g[0] * (float)axes[k][0] + g[1] * (float)axes[k][1]) + g[2] * (float)axes[k][2];
+        normal[k] = vf_select(hit, sum, normal[k]);
+    }
+}
+
+/* Both of these, where there is a reach. */
+SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
+                                    vf normal[3])
+{
+    kernel_samples_about about;
+    hit = vm_and(hit, vf_lt(vf_set(0), reach));
+    kernel_sample_about(p, s, value, hit, t, reach, &about);
+    kernel_differentiate(p, &about, hit, normal);
+}
+
+/* Half the offset of differences in scaled units: by the cell's size, the cube root of its box's volume, or of its
+ * longest side where that is flat. */
+SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
+                                          const kernel_cell *c)
+{
+    double volume = 1, longest = 0;
+    for (int a = 0; a < 3; a++) {
+        double low = c->world[0][a], high = low;
+        for (int i = 1; i < c->count; i++) {
+            low = c->world[i][a] < low ? c->world[i][a] : low;
+            high = c->world[i][a] > high ? c->world[i][a] : high;
+        }
+        volume *= high - low;
+        longest = high - low > longest ? high - low : longest;
+    }
+    const double size = volume > 0 ? cbrt(volume) : longest;
+    return (float)(0.5 * layer->difference * size * p->frame->job->space.scale);
+}
+
+/* ---- hits that wait ---- */
+
+/* Some of a list of hits: of one packet and one isovalue, each on its own lane. */
+typedef struct kernel_waiting_run {
+    kernel_tile tile; /* kept from run to run */
+    kernel_packet packet;
+    const kernel_surface *surface;
+    int value, count;
+    int lanes[SIMD_WIDTH];
+    vm rays;
+    vf t, reach;
+} kernel_waiting_run;
+
+SIMD_INLINE void kernel_waiting_begin(kernel_waiting_run *run)
+{
+    run->tile.x0 = run->tile.y0 = -1;
+}
+
+SIMD_INLINE int kernel_waiting_lane(int x, int y)
+{
+    return y % KERNEL_PACKET_ROWS * KERNEL_PACKET_COLUMNS + x % KERNEL_PACKET_COLUMNS;
+}
+
+SIMD_INLINE void kernel_waiting_surface(kernel_waiting_run *run, const kernel_frame *f, uint32_t kind)
+{
+    for (int n = 0; n < f->surface_count; n++) {
+        const kernel_surface *s = &f->surfaces[n];
+        if (kind < s->first_kind || kind - s->first_kind >= (uint32_t)s->layer->value_count) continue;
+        run->surface = s;
+        run->value = (int)(kind - s->first_kind);
+    }
+}
+
+/* Sets up the run that begins with the first of the hits; its length becomes run->count. */
+static void kernel_waiting_take(kernel_waiting_run *run, const kernel_frame *f, kernel_thread *thread,
+                                const render_waiting_hit *hits, int64_t count)
+{
+    const uint32_t width = (uint32_t)f->job->camera.width, kind = hits->kind;
+    const int x = (int)(hits->pixel % width), y = (int)(hits->pixel / width);
+    const int x0 = x - x % KERNEL_PACKET_COLUMNS, y0 = y - y % KERNEL_PACKET_ROWS;
+    float t[SIMD_WIDTH] = {0}, reach[SIMD_WIDTH] = {0};
+    unsigned bits = 0;
+    if (x - x % KERNEL_TILE != run->tile.x0 || y - y % KERNEL_TILE != run->tile.y0) {
+        kernel_tile_setup(&run->tile, f, x - x % KERNEL_TILE, y - y % KERNEL_TILE);
+        kernel_tile_rays(&run->tile, f);
+        thread->serial++;
+    }
+    kernel_waiting_surface(run, f, kind);
+    for (run->count = 0; run->count < count; run->count++) {
+        const render_waiting_hit *hit = &hits[run->count];
+        const int column = (int)(hit->pixel % width) - x0, row = (int)(hit->pixel / width) - y0;
+        if (hit->kind != kind || column < 0 || column >= KERNEL_PACKET_COLUMNS || row < 0 || row >= KERNEL_PACKET_ROWS)
+            break;
+        const int lane = kernel_waiting_lane(column, row);
+        if (bits >> lane & 1) break;
+        bits |= 1u << lane;
+        run->lanes[run->count] = lane;
+        t[lane] = hit->t;
+        reach[lane] = hit->reach;
+    }
+    run->rays = vm_from_bits(bits);
+    run->t = vf_load(t);
+    run->reach = vf_load(reach);
+    kernel_packet_begin(&run->packet, f, &run->tile, thread, x0, y0);
+    kernel_packet_complete(&run->packet);
+}
+
+/* Samples this rank's cells about all hits. */
+static void kernel_sample_waiting(const kernel_frame *f, kernel_thread *thread, const render_waiting_hit *hits,
+                                  render_samples_about *out, int64_t count)
+{
+    kernel_waiting_run run;
+    kernel_waiting_begin(&run);
+    for (int64_t i = 0; i < count; i += run.count) {
+        kernel_samples_about about;
+        kernel_waiting_take(&run, f, thread, hits + i, count - i);
+        kernel_sample_about(&run.packet, run.surface, run.value, run.rays, run.t, run.reach, &about);
+        for (int n = 0; n < run.count; n++) {
+            render_samples_about *own = &out[i + n];
+            *own = (render_samples_about){0, 0, {0}};
+            for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
+                const bool is_found = vm_bits(about.found[k]) >> run.lanes[n] & 1;
+                own->found |= (uint32_t)is_found << k;
+                own->values[k] = is_found ? about.values[k][run.lanes[n]] : 0;
+            }
+        }
+    }
+}
+
+SIMD_INLINE void kernel_load_about(const kernel_waiting_run *run, const render_samples_about *samples,
+                                   kernel_samples_about *out)
+{
+    for (int k = 0; k < RENDER_DIFFERENCE_SAMPLES; k++) {
+        float values[SIMD_WIDTH] = {0};
+        unsigned found = 0;
+        for (int n = 0; n < run->count; n++) {
+            values[run->lanes[n]] = samples[n].values[k];
+            found |= (samples[n].found >> k & 1) << run->lanes[n];
+        }
+        out->found[k] = vm_from_bits(found);
+        out->values[k] = vf_load(values);
+    }
+}
+
+#endif
