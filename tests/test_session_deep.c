@@ -1,5 +1,5 @@
 /* Deep pictures: of every pixel what lies behind each other, in order and without overlaps, which blended in double are
- * the flat picture; of surfaces, the samples of one rank to the bit, on any partition. */
+ * the flat picture; of surfaces and of reproducible volumes, the samples of one rank to the bit, on any partition. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,23 +18,30 @@ enum { SIDE = 3, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT };
 #define SLICE "      - slice: {field: f, opacity: 0.7, planes: [{normal: [1, 0.2, 0.1]}]}\n"
 #define VOLUME "      - volume: {field: f, opacity: [[0, 0.1], [0.5, 0.2], [0.5, 0.9], [1, 0.4]]}\n"
 #define SAMPLES "    sampling: {method: samples}\n"
+#define REPRODUCIBLE(more) "    sampling: {" more ", reproducible: true}\n"
 
 typedef struct deep_case {
     const char *name, *scene;
     bool is_of_surfaces;
+    bool is_reproducible; /* the same on any partition, to the bit */
 } deep_case;
 
 static const deep_case cases[] = {
-    {"surfaces", SCENE(CLEAR SOLID SLICE, ""), true},
-    {"surfaces, antialias", SCENE(CLEAR SOLID SLICE, "    antialias: 4\n"), true},
-    {"volume", SCENE(VOLUME, ""), false},
-    {"volume, clear surfaces", SCENE(VOLUME CLEAR, ""), false},
-    {"volume, all", SCENE(VOLUME CLEAR SOLID SLICE, "    sampling: {max_error: 0.001}\n"), false},
-    {"samples", SCENE(VOLUME CLEAR SOLID, SAMPLES), false},
-    {"segments", SCENE(VOLUME CLEAR, "    sampling: {method: segments}\n"), false},
-    {"two volumes", SCENE(VOLUME VOLUME CLEAR, SAMPLES), false},
-    {"two volumes, max_error", SCENE(VOLUME VOLUME SOLID, "    sampling: {max_error: 0.01}\n"), false},
-    {"nothing", SCENE("      - isosurface: {field: f, values: [1000]}\n", ""), true},
+    {"surfaces", SCENE(CLEAR SOLID SLICE, ""), true, false},
+    {"surfaces, antialias", SCENE(CLEAR SOLID SLICE, "    antialias: 4\n"), true, false},
+    {"volume", SCENE(VOLUME, ""), false, false},
+    {"volume, clear surfaces", SCENE(VOLUME CLEAR, ""), false, false},
+    {"volume, all", SCENE(VOLUME CLEAR SOLID SLICE, "    sampling: {max_error: 0.001}\n"), false, false},
+    {"samples", SCENE(VOLUME CLEAR SOLID, SAMPLES), false, false},
+    {"segments", SCENE(VOLUME CLEAR, "    sampling: {method: segments}\n"), false, false},
+    {"two volumes", SCENE(VOLUME VOLUME CLEAR, SAMPLES), false, false},
+    {"two volumes, max_error", SCENE(VOLUME VOLUME SOLID, "    sampling: {max_error: 0.01}\n"), false, false},
+    {"volume, reproducible", SCENE(VOLUME, REPRODUCIBLE("max_error: 0.01")), false, true},
+    {"volume, all, reproducible", SCENE(VOLUME CLEAR SOLID SLICE, REPRODUCIBLE("max_error: 0.001")), false, true},
+    {"samples, reproducible", SCENE(VOLUME CLEAR SOLID, REPRODUCIBLE("method: samples")), false, true},
+    {"segments, reproducible", SCENE(VOLUME CLEAR, REPRODUCIBLE("method: segments")), false, true},
+    {"two volumes, reproducible", SCENE(VOLUME VOLUME CLEAR, REPRODUCIBLE("method: samples")), false, true},
+    {"nothing", SCENE("      - isosurface: {field: f, values: [1000]}\n", ""), true, false},
 };
 enum { CASES = sizeof cases / sizeof *cases, ANTIALIASED = 1 };
 
@@ -104,6 +111,11 @@ static bool are_the_same(const caught_picture *a, const caught_picture *b)
            memcmp(a->samples, b->samples, (size_t)a->first[PIXELS] * sizeof *a->samples) == 0;
 }
 
+static bool is_the_same_flat(const caught_picture *a, const caught_picture *b)
+{
+    return memcmp(a->rgba, b->rgba, 4 * PIXELS * sizeof *a->rgba) == 0;
+}
+
 /* ---- pictures ------------------------------------------------------------------------------------------------- */
 
 typedef struct two_pictures {
@@ -145,6 +157,8 @@ static bool judge_case(const deep_case *c, const session_input *whole, const ses
     is_well = is_well && (is_averaged || is_the_flat_picture(&alone.deep, &alone.flat, c->name));
     if (is_well && c->is_of_surfaces)
         is_well = has_depths(&ours.deep, &ours.flat) && are_the_same(&ours.deep, &alone.deep);
+    if (is_well && c->is_reproducible)
+        is_well = is_the_same_flat(&ours.flat, &alone.flat) && are_the_same(&ours.deep, &alone.deep);
     free_pictures(&ours);
     free_pictures(&alone);
     return is_well;
