@@ -32,6 +32,10 @@ target_link_libraries(test_deep_file PRIVATE
   insitu_flags insitu ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY} PkgConfig::CMOCKA)
 insitu_add_mpi_test(deep_file test_deep_file 1 3 TIMEOUT 120 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 
+add_executable(test_homes test_homes.c)
+target_link_libraries(test_homes PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
+add_test(NAME homes COMMAND test_homes)
+
 insitu_session_program(test_session_collectives)
 insitu_add_mpi_test(session_collectives test_session_collectives 2 5 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_smooth)

@@ -99,6 +99,7 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     insitu_status status = INSITU_OK;
     if (changes->of_cells) status = session_check_meshes(&s->meshes, team, error);
     if (changes->of_cells && !status) status = session_update_space(&s->space, &s->meshes, team->comm, error);
+    if (changes->of_cells) session_forget_homes(&s->catalogue);
     if (changes->of_names && !status)
         status = session_update_catalogue(&s->catalogue, &s->meshes, team, changes->are_names_shared, error);
     if ((changes->of_cells || changes->of_names) && !status)
@@ -106,15 +107,17 @@ static insitu_status draw_due_images(insitu_session *s, const session_changes *c
     if (!status) status = session_tear_meshes(&s->meshes, &s->catalogue, basis.scene, team, error);
     if (!status) update_events(s, &basis, &of_events);
     if (!status) status = session_make_plan(&basis, &s->meshes, team, &s->report, &plan, error);
-    if (!status) status = session_recentre(&plan, &s->meshes, team, extent->half_diagonal, error);
+    if (!status && (plan.recentring_count || plan.surface_count || session_is_smooth(&plan)))
+        status = session_update_homes(&s->catalogue, &s->meshes, extent->half_diagonal, team, error);
+    if (!status) status = session_recentre(&plan, &s->meshes, team, error);
     if (!status) status = session_smooth(&plan, &s->catalogue, &s->meshes, team, extent, error);
     if (!status) session_compare_checksums(&s->meshes, team->threads, &s->report);
-    if (!status && plan.slice_count) status = session_update_distances(&s->meshes, team, error);
-    if (!status && plan.surface_count)
-        status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, extent->half_diagonal, error);
+    if (!status && plan.slice_count) session_update_distances(&s->meshes, team, error);
+    if (!status && plan.surface_count) status = session_update_surfaces(&plan, &s->catalogue, &s->meshes, team, error);
     s->report.numbers.prepare_ms = milliseconds_since(start);
-    if (!status) { /* their failure is told by the reduction after them */
-        session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
+    if (!status) { /* their failure, and what the phases above left, is told by the reduction after them */
+        if (!error->status)
+            session_update_trees(&s->trees, &s->meshes, &s->space, basis.scene->tree, team, &s->report.numbers, error);
         status = session_check_isovalues(&plan, &s->meshes, team, &s->report, error);
     }
     if (!status) status = session_draw_images(&drawing, &plan, error);

@@ -69,6 +69,7 @@ void session_catalogue_free(session_catalogue *catalogue)
         for (int f = 0; f < mesh->field_count; f++) base_free(mesh->fields[f].name);
         base_free(mesh->fields);
         base_free(mesh->name);
+        session_homes_free(&mesh->homes);
     }
     base_free(catalogue->meshes);
     *catalogue = (session_catalogue){0};
@@ -276,4 +277,24 @@ insitu_status session_update_catalogue(session_catalogue *catalogue, session_mes
     *catalogue = found;
     meshes->are_names_changed = false;
     return INSITU_OK;
+}
+
+/* ---- homes ----------------------------------------------------------------------------------------------------- */
+
+insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
+                                   const session_team *team, base_error *error)
+{
+    for (int i = 0; i < catalogue->mesh_count; i++) {
+        session_catalogue_mesh *mesh = &catalogue->meshes[i];
+        if (mesh->homes.is_known) continue;
+        const insitu_status status = session_homes_find(&mesh->homes, session_find_mesh(meshes, mesh->name),
+                                                        mesh->has_ids, half_diagonal, team, error);
+        if (status) return status;
+    }
+    return INSITU_OK;
+}
+
+void session_forget_homes(session_catalogue *catalogue)
+{
+    for (int i = 0; i < catalogue->mesh_count; i++) session_homes_free(&catalogue->meshes[i].homes);
 }

@@ -2,6 +2,7 @@
 #ifndef SESSION_CATALOGUE_H
 #define SESSION_CATALOGUE_H
 
+#include "session_homes.h"
 #include "session_mesh.h"
 #include "session_team.h"
 
@@ -22,6 +23,7 @@ typedef struct session_catalogue_mesh {
     bool has_ids;   /* all of these give vertex ids */
     int field_count;
     session_catalogue_field *fields;
+    session_homes homes; /* this rank's view of the parts; known where it has been asked for since cells changed */
 } session_catalogue_mesh;
 
 typedef struct session_catalogue {
@@ -34,6 +36,12 @@ typedef struct session_catalogue {
 insitu_status session_update_catalogue(session_catalogue *catalogue, session_meshes *meshes, const session_team *team,
                                        bool is_shared, base_error *error);
 void session_catalogue_free(session_catalogue *catalogue);
+
+/* Finds the homes of all meshes where they are not known. half_diagonal: of the scene. Collective, agreed. */
+insitu_status session_update_homes(session_catalogue *catalogue, const session_meshes *meshes, double half_diagonal,
+                                   const session_team *team, base_error *error);
+/* Call this on all ranks where cells have changed on any. Local. */
+void session_forget_homes(session_catalogue *catalogue);
 
 /* A hash of this rank's names: equal on two ranks when their tables say the same. Local. */
 uint64_t session_names_hash(const session_meshes *meshes);

@@ -6,8 +6,8 @@
  * Shells are faces that are always kept. One that lies on a cell's outer face replaces it, so that only one is drawn
  * there.
  *
- * Of the faces that a rank has once, those in other ranks' boxes go to rank hash(key) % ranks, which counts them for
- * all. */
+ * Of the faces that a rank has once, those in other ranks' boxes go to their home (session_homes.h), which counts them
+ * for all. */
 #include "session_outer_faces.h"
 
 #include <string.h>
@@ -197,31 +197,35 @@ static insitu_status search_own(face_search *s, const session_outer *outer, bool
 
 enum { KEY_WORDS = 3 };
 
-static bool is_face_in_boxes(const session_mesh *mesh, const session_face *face, const session_box *boxes, int count)
+/* The home of a face whose vertices are all in other ranks' boxes; -1: it is this rank's alone. Its home is that of its
+ * first vertex in an order by hashes, which all ranks have. */
+static int home_of(const face_search *s, const session_homes *homes, int64_t face)
 {
-    const session_cell_faces faces = session_faces_of_cell(&mesh->cells, face->cell);
-    const session_face_loop loop = session_face_of(&faces, face->face);
-    for (int64_t i = 0; i < loop.size; i++)
-        if (!session_is_in_boxes(mesh, session_face_vertex(&loop, i), boxes, count)) return false;
-    return true;
-}
-
-static int home_of(const session_key *key, int ranks)
-{
-    return (int)(session_key_hash(key) % (uint64_t)ranks);
+    const session_cell_faces faces = session_faces_of_cell(&s->mesh->cells, s->faces[face].cell);
+    const session_face_loop loop = session_face_of(&faces, s->faces[face].face);
+    int64_t first = session_face_vertex(&loop, 0);
+    double point[1][3];
+    for (int64_t i = 0; i < loop.size; i++) {
+        const int64_t vertex = session_face_vertex(&loop, i);
+        grid_vertex(&s->mesh->cells, vertex, point[0]);
+        if (!session_homes_share(homes, point[0])) return -1;
+        if (s->hashes[vertex] < s->hashes[first]) first = vertex;
+    }
+    grid_vertex(&s->mesh->cells, first, point[0]);
+    const session_key key = session_vertex_key(s->mesh, first, homes->by_id);
+    return session_home(homes, (const double(*)[3])point, 1, session_key_hash(&s->keys[face]), (int64_t)key.words[0]);
 }
 
 /* The keys of faces in other ranks' boxes by their homes; order: which face each is of. */
-static bool pack_keys(const face_search *s, const session_box *boxes, int box_count, int ranks, session_mail *mail,
-                      int64_t **order)
+static bool pack_keys(const face_search *s, const session_homes *homes, int ranks, session_mail *mail, int64_t **order)
 {
     int64_t *places = base_calloc((size_t)ranks + 1, sizeof *places);
-    bool *is_shared = base_calloc((size_t)s->count, sizeof *is_shared);
+    int *home = base_alloc((size_t)(s->count + 1) * sizeof *home);
     mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
-    bool is_done = places && is_shared && mail->counts;
+    bool is_done = places && home && mail->counts;
     for (int64_t i = 0; i < s->count && is_done; i++) {
-        is_shared[i] = is_face_in_boxes(s->mesh, &s->faces[i], boxes, box_count);
-        if (is_shared[i]) places[home_of(&s->keys[i], ranks) + 1]++;
+        home[i] = home_of(s, homes, i);
+        if (home[i] >= 0) places[home[i] + 1]++;
     }
     for (int rank = 0; rank < ranks && is_done; rank++) {
         mail->counts[rank] = KEY_WORDS * places[rank + 1];
@@ -232,13 +236,13 @@ static bool pack_keys(const face_search *s, const session_box *boxes, int box_co
     *order = base_alloc((size_t)mail->total * sizeof **order);
     is_done = is_done && mail->words && *order;
     for (int64_t i = 0; i < s->count && is_done; i++) {
-        if (!is_shared[i]) continue;
-        const int64_t place = places[home_of(&s->keys[i], ranks)]++;
+        if (home[i] < 0) continue;
+        const int64_t place = places[home[i]]++;
         memcpy(mail->words + KEY_WORDS * place, s->keys[i].words, KEY_WORDS * sizeof *mail->words);
         (*order)[place] = i;
     }
     base_free(places);
-    base_free(is_shared);
+    base_free(home);
     return is_done;
 }
 
@@ -277,11 +281,12 @@ static insitu_status exchange_keys(face_search *s, const session_mail *mail, con
                                    const session_team *team, base_error *error)
 {
     session_mail in = {0}, reply = {0}, answers = {0};
-    insitu_status status = session_mail_exchange(team->comm, mail, &in, error);
+    insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, mail, &in, error);
     if (status) return status;
-    if (!answer_keys(&in, team->ranks, &reply)) session_no_memory(error, in.total * 24, "faces that ranks share");
-    status = session_agree(team->comm, error);
-    if (!status) status = session_mail_exchange(team->comm, &reply, &answers, error);
+    if (!error->status && !answer_keys(&in, team->ranks, &reply))
+        session_no_memory(error, in.total * 24, "faces that ranks share");
+    status = session_mail_deliver(team->comm, SESSION_MAIL_BACK, &reply, &answers, error);
+    if (!status) status = session_agree(team->comm, error);
     if (!status) drop_shared(s, &answers, order);
     session_mail_free(&in);
     session_mail_free(&reply);
@@ -289,34 +294,26 @@ static insitu_status exchange_keys(face_search *s, const session_mail *mail, con
     return status;
 }
 
-static insitu_status search_shared(face_search *s, double margin, const session_team *team, base_error *error)
+static insitu_status search_shared(face_search *s, const session_homes *homes, const session_team *team,
+                                   base_error *error)
 {
     session_mail mail = {0};
     int64_t *order = NULL;
-    int box_count = 0;
-    session_box *boxes = base_alloc((size_t)team->ranks * sizeof *boxes);
-    if (!boxes) session_no_memory(error, team->ranks * (int64_t)sizeof *boxes, "boxes of ranks");
-    insitu_status status = session_agree(team->comm, error);
-    if (!status) status = session_gather_boxes(team, s->mesh, margin, boxes, &box_count, error);
-    if (!status) {
-        if (!pack_keys(s, boxes, box_count, team->ranks, &mail, &order))
-            session_no_memory(error, s->count * 40, "faces that ranks share");
-        status = session_agree(team->comm, error);
-    }
-    if (!status) status = exchange_keys(s, &mail, order, team, error);
+    if (!error->status && !pack_keys(s, homes, team->ranks, &mail, &order))
+        session_no_memory(error, s->count * 40, "faces that ranks share");
+    const insitu_status status = exchange_keys(s, &mail, order, team, error);
     session_mail_free(&mail);
     base_free(order);
-    base_free(boxes);
     return status;
 }
 
-insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, bool by_id, double half_diagonal,
+insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, const session_homes *homes,
                                        const session_team *team, base_error *error)
 {
     face_search search = {.mesh = mesh, .threads = team->threads};
-    search_own(&search, outer, by_id, error);
-    insitu_status status = session_agree(team->comm, error);
-    if (!status && team->ranks > 1) status = search_shared(&search, by_id ? 1e-6 * half_diagonal : 0, team, error);
+    search_own(&search, outer, homes->by_id, error);
+    const insitu_status status =
+        team->ranks > 1 ? search_shared(&search, homes, team, error) : session_agree(team->comm, error);
     if (!status && mesh) {
         session_drop_outer(outer, true);
         outer->face_count = search.count;

@@ -2,13 +2,14 @@
 #ifndef SESSION_OUTER_FACES_H
 #define SESSION_OUTER_FACES_H
 
+#include "session_homes.h"
 #include "session_mesh.h"
 #include "session_team.h"
 
-/* Fill in the outer's faces. Two faces are one where their vertices are: by global ids (by_id), else where the bits of
- * their coordinates are equal; so a face that meets several smaller ones is outer, and so are these. mesh and outer
- * NULL: this rank has no part of it. half_diagonal: of the global bounds. Collective. */
-insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, bool by_id, double half_diagonal,
+/* Fill in the outer's faces. Two faces are one where their vertices are: by global ids, else where the bits of their
+ * coordinates are equal; so a face that meets several smaller ones is outer, and so are these. mesh and outer NULL:
+ * this rank has no part of it. homes: known. Collective, agreed. */
+insitu_status session_find_outer_faces(const session_mesh *mesh, session_outer *outer, const session_homes *homes,
                                        const session_team *team, base_error *error);
 
 #endif

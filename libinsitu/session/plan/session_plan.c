@@ -218,7 +218,8 @@ static bool plan_recentrings(const session_catalogue *catalogue, session_plan *p
         for (int n = 0; n < image->slice_count && is_planned; n++)
             is_planned = add_recentrings(catalogue, plan, &image->slices[n].field);
     }
-    return is_planned;
+    plan->stale = base_calloc((size_t)plan->recentring_count + 1, sizeof *plan->stale);
+    return is_planned && plan->stale;
 }
 
 /* ---- the whole ----------------------------------------------------------------------------------------------- */
@@ -295,6 +296,7 @@ void session_plan_free(session_plan *plan)
 {
     base_free(plan->images);
     base_free(plan->recentrings);
+    base_free(plan->stale);
     *plan = (session_plan){0};
 }
 

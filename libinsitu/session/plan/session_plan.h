@@ -21,6 +21,7 @@ typedef struct session_plan {
     int slice_count, surface_count; /* of all of them, those of an orbit's views once */
     int recentring_count;
     session_recentring *recentrings;
+    int *stale;         /* of each: for session_recentre() */
     int64_t cell_count; /* drawn ones of all ranks */
     base_error refusal; /* of the first due image that cannot be drawn */
 } session_plan;

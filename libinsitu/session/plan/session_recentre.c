@@ -8,11 +8,11 @@
  * would look different on one rank and on two.
  *
  *     local:  vertices -> groups of equal keys -> values of incident cells, group by group -> means
- *     shared: groups inside another rank's box  --(key, values)-->  rank hash(key) % ranks: merged by key, means
+ *     shared: groups inside another rank's box  --(key, values)-->  their home (session_homes.h): merged by key, means
  *             means  <-------------------------------------------
  *
- * The boxes are of the drawn cells of the mesh; with ids they are widened a little, since ids may be equal where
- * coordinates differ in their last bits. */
+ * Ranks wait for each other twice a field. What fails goes with that to all; what fails in receiving the means, with
+ * the next phase. */
 #include "session_recentre.h"
 
 #include <stdlib.h>
@@ -224,9 +224,12 @@ typedef struct shared_groups {
     session_mail mail;
 } shared_groups;
 
-static int home_of(const session_key *key, int ranks)
+static int home_of(const session_mesh *mesh, const session_homes *homes, const vertex_groups *groups, int64_t group)
 {
-    return (int)(session_key_hash(key) % (uint64_t)ranks);
+    const session_key *key = &groups->keys.keys[group];
+    double point[1][3];
+    grid_vertex(&mesh->cells, groups->vertex[group], point[0]);
+    return session_home(homes, (const double(*)[3])point, 1, session_key_hash(key), (int64_t)key->words[0]);
 }
 
 static int64_t value_count(const value_groups *values, int64_t group)
@@ -243,18 +246,20 @@ static void write_record(const vertex_groups *groups, int64_t group, uint64_t *r
 }
 
 /* Shared groups sorted by their home ranks into records. */
-static bool pack_records(const vertex_groups *groups, int ranks, shared_groups *shared)
+static bool pack_records(const session_mesh *mesh, const session_homes *homes, const vertex_groups *groups, int ranks,
+                         shared_groups *shared)
 {
     session_mail *mail = &shared->mail;
     int64_t *places = base_calloc((size_t)ranks * 2, sizeof *places);
     int64_t *ordered = base_alloc((size_t)shared->count * sizeof *ordered);
+    int *home = base_alloc((size_t)(shared->count + 1) * sizeof *home);
     mail->counts = base_calloc((size_t)ranks, sizeof *mail->counts);
-    if (!places || !ordered || !mail->counts) goto fail;
+    if (!places || !ordered || !home || !mail->counts) goto fail;
     int64_t *orders = places + ranks;
     for (int64_t i = 0; i < shared->count; i++) {
-        const int home = home_of(&groups->keys.keys[shared->groups[i]], ranks);
-        mail->counts[home] += RECORD_HEAD + value_count(&groups->values, shared->groups[i]);
-        if (home + 1 < ranks) orders[home + 1]++;
+        home[i] = home_of(mesh, homes, groups, shared->groups[i]);
+        mail->counts[home[i]] += RECORD_HEAD + value_count(&groups->values, shared->groups[i]);
+        if (home[i] + 1 < ranks) orders[home[i] + 1]++;
     }
     for (int rank = 1; rank < ranks; rank++) {
         places[rank] = places[rank - 1] + mail->counts[rank - 1];
@@ -265,28 +270,32 @@ static bool pack_records(const vertex_groups *groups, int ranks, shared_groups *
     if (!mail->words) goto fail;
     for (int64_t i = 0; i < shared->count; i++) {
         const int64_t group = shared->groups[i];
-        const int home = home_of(&groups->keys.keys[group], ranks);
-        write_record(groups, group, mail->words + places[home]);
-        places[home] += RECORD_HEAD + value_count(&groups->values, group);
-        ordered[orders[home]++] = group;
+        write_record(groups, group, mail->words + places[home[i]]);
+        places[home[i]] += RECORD_HEAD + value_count(&groups->values, group);
+        ordered[orders[home[i]]++] = group;
     }
     base_free(shared->groups);
     shared->groups = ordered;
     base_free(places);
+    base_free(home);
     return true;
 fail:
     base_free(places);
+    base_free(home);
     base_free(ordered);
     return false;
 }
 
-static bool find_shared(const session_mesh *mesh, const vertex_groups *groups, const session_box *boxes, int box_count,
+static bool find_shared(const session_mesh *mesh, const vertex_groups *groups, const session_homes *homes,
                         shared_groups *out)
 {
     out->groups = base_alloc((size_t)groups->keys.count * sizeof *out->groups);
     if (!out->groups) return false;
-    for (int64_t group = 0; group < groups->keys.count; group++)
-        if (session_is_in_boxes(mesh, groups->vertex[group], boxes, box_count)) out->groups[out->count++] = group;
+    for (int64_t group = 0; group < groups->keys.count; group++) {
+        double point[3];
+        grid_vertex(&mesh->cells, groups->vertex[group], point);
+        if (session_homes_share(homes, point)) out->groups[out->count++] = group;
+    }
     return true;
 }
 
@@ -361,37 +370,28 @@ static insitu_status exchange_means(const session_team *team, const shared_group
                                     base_error *error)
 {
     session_mail in = {0}, reply = {0}, means = {0};
-    insitu_status status = session_mail_exchange(team->comm, &shared->mail, &in, error);
+    insitu_status status = session_mail_deliver(team->comm, SESSION_MAIL_THERE, &shared->mail, &in, error);
     if (status) return status;
-    if (!merge_records(&in, team->ranks, team->threads, &reply))
+    if (!error->status && !merge_records(&in, team->ranks, team->threads, &reply))
         session_no_memory(error, in.total * 24, "values at vertices that ranks share");
     session_mail_free(&in);
-    status = session_agree(team->comm, error);
-    if (status == INSITU_OK) status = session_mail_exchange(team->comm, &reply, &means, error);
+    status = session_mail_deliver(team->comm, SESSION_MAIL_BACK, &reply, &means, error);
     session_mail_free(&reply);
-    if (status) return status;
-    for (int64_t i = 0; i < shared->count; i++)
+    for (int64_t i = 0; i < shared->count && !status && !error->status; i++)
         memcpy(&groups->values.means[shared->groups[i]], &means.words[i], sizeof(double));
     session_mail_free(&means);
-    return INSITU_OK;
+    return status;
 }
 
-static insitu_status merge_shared(const session_team *team, const session_mesh *mesh, double margin,
+/* mesh: NULL where there is none of it here. */
+static insitu_status merge_shared(const session_team *team, const session_mesh *mesh, const session_homes *homes,
                                   vertex_groups *groups, base_error *error)
 {
     shared_groups shared = {0};
-    int box_count = 0;
-    session_box *boxes = base_alloc((size_t)team->ranks * sizeof *boxes);
-    if (!boxes) session_no_memory(error, team->ranks * (int64_t)sizeof *boxes, "boxes of ranks");
-    insitu_status status = session_agree(team->comm, error);
-    if (!status) status = session_gather_boxes(team, mesh, margin, boxes, &box_count, error);
-    if (!status) {
-        if (!find_shared(mesh, groups, boxes, box_count, &shared) || !pack_records(groups, team->ranks, &shared))
-            session_no_memory(error, groups->keys.count * 40, "values at vertices that ranks share");
-        status = session_agree(team->comm, error);
-    }
-    if (!status) status = exchange_means(team, &shared, groups, error);
-    base_free(boxes);
+    if (!error->status &&
+        (!find_shared(mesh, groups, homes, &shared) || !pack_records(mesh, homes, groups, team->ranks, &shared)))
+        session_no_memory(error, groups->keys.count * 40, "values at vertices that ranks share");
+    const insitu_status status = exchange_means(team, &shared, groups, error);
     base_free(shared.groups);
     session_mail_free(&shared.mail);
     return status;
@@ -421,7 +421,7 @@ static void spread_means(const vertex_groups *groups, const grid_field *own, int
 }
 
 static insitu_status recentre(const session_recentring *item, const session_meshes *meshes, const session_team *team,
-                              double half_diagonal, base_error *error)
+                              base_error *error)
 {
     session_mesh *mesh = session_find_mesh(meshes, item->mesh->name);
     session_scalar *scalar = scalar_of(mesh, item);
@@ -439,9 +439,9 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     } else {
         make_groups(NULL, -1, NULL, by_id, team->threads, &groups, error);
     }
-    insitu_status status = session_agree(team->comm, error);
-    if (!status && team->ranks > 1) status = merge_shared(team, mesh, by_id ? 1e-6 * half_diagonal : 0, &groups, error);
-    if (!status && scalar) {
+    const insitu_status status = team->ranks > 1 ? merge_shared(team, mesh, &item->mesh->homes, &groups, error)
+                                                 : session_agree(team->comm, error);
+    if (!status && !error->status && scalar) {
         spread_means(&groups, &field, mesh->cells.vertex_count, scalar->vertex_values, team->threads);
         scalar->are_values_stale = false;
         scalar->is_suspect = true;
@@ -450,24 +450,25 @@ static insitu_status recentre(const session_recentring *item, const session_mesh
     return status;
 }
 
-insitu_status session_recentre(const session_plan *plan, const session_meshes *meshes, const session_team *team,
-                               double half_diagonal, base_error *error)
+/* Whose values are stale on some rank. Collective. */
+static insitu_status find_stale(const session_plan *plan, const session_meshes *meshes, const session_team *team,
+                                int *stale, base_error *error)
 {
-    if (plan->recentring_count == 0) return INSITU_OK;
-    const size_t count = (size_t)plan->recentring_count;
-    int *stale = base_calloc(count, sizeof *stale);
-    if (!stale) session_no_memory(error, (int64_t)(count * sizeof *stale), "flags");
-    insitu_status status = session_agree(team->comm, error);
-    for (size_t i = 0; i < count && !status; i++) {
+    const int count = plan->recentring_count;
+    for (int i = 0; i < count; i++) {
         const session_recentring *item = &plan->recentrings[i];
         const session_scalar *scalar = scalar_of(session_find_mesh(meshes, item->mesh->name), item);
         stale[i] = scalar && scalar->are_values_stale;
     }
-    if (!status)
-        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, (int)count, MPI_INT, MPI_MAX, team->comm),
-                             "MPI_Allreduce");
-    for (size_t i = 0; i < count && !status; i++)
-        if (stale[i]) status = recentre(&plan->recentrings[i], meshes, team, half_diagonal, error);
-    base_free(stale);
+    return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+}
+
+insitu_status session_recentre(const session_plan *plan, const session_meshes *meshes, const session_team *team,
+                               base_error *error)
+{
+    if (plan->recentring_count == 0) return INSITU_OK;
+    insitu_status status = find_stale(plan, meshes, team, plan->stale, error);
+    for (int i = 0; i < plan->recentring_count && !status; i++)
+        if (plan->stale[i]) status = recentre(&plan->recentrings[i], meshes, team, error);
     return status;
 }

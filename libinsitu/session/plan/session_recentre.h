@@ -6,9 +6,10 @@
 #include "session_team.h"
 
 /* Fill the recentred arrays of the plan that are out of date on any rank. A vertex gets the mean of the finite values
- * of its cells that are no ghosts, over all ranks; NaN where there are none. half_diagonal: of the global bounds.
- * Collective. */
+ * of its cells that are no ghosts, over all ranks; NaN where there are none. The homes of the catalogue's meshes
+ * must be known. What fails on this rank at the very end is in *error alone, for the next phase to agree on.
+ * Collective, else agreed. */
 insitu_status session_recentre(const session_plan *plan, const session_meshes *meshes, const session_team *team,
-                               double half_diagonal, base_error *error);
+                               base_error *error);
 
 #endif

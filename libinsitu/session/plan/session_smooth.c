@@ -100,7 +100,7 @@ static void items_free(smooth_items *items)
     base_free(items->items);
 }
 
-static bool is_asked_for(const session_plan *plan)
+bool session_is_smooth(const session_plan *plan)
 {
     for (int i = 0; i < plan->image_count; i++)
         for (int n = 0; n < plan->images[i]->isosurface_count; n++)
@@ -164,27 +164,11 @@ static insitu_status begin_work(const smooth_item *item, const session_meshes *m
 
 /* ---- what ranks ask of each other ---------------------------------------------------------------------------- */
 
-typedef struct rank_box {
-    double lower[3], upper[3];
-} rank_box;
-
-static bool is_in(const rank_box *box, const double point[3])
+static bool is_in(const session_box *box, const double point[3])
 {
     for (int a = 0; a < 3; a++)
         if (!(box->lower[a] <= point[a] && point[a] <= box->upper[a])) return false;
     return true;
-}
-
-/* The boxes of all ranks' drawn cells, widened by the margin. Collective. */
-static insitu_status gather_boxes(const session_team *team, const session_mesh *mesh, double margin, rank_box *boxes,
-                                  base_error *error)
-{
-    rank_box mine = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (int a = 0; a < 3 && mesh && mesh->drawn_count; a++) {
-        mine.lower[a] = mesh->lower[a] - margin;
-        mine.upper[a] = mesh->upper[a] + margin;
-    }
-    return session_mpi(error, MPI_Allgather(&mine, 6, MPI_DOUBLE, boxes, 6, MPI_DOUBLE, team->comm), "MPI_Allgather");
 }
 
 /* A vertex of each of this rank's keys. */
@@ -201,22 +185,23 @@ static bool find_places(const smooth_work *work, bool by_id, double (**out)[3])
 }
 
 /* To each rank the keys in its box. numbers: of the keys, in the order of the mail. */
-static bool write_questions(const smooth_work *work, const session_team *team, const rank_box *boxes,
+static bool write_questions(const smooth_work *work, const session_team *team, const session_homes *homes,
                             const double (*places)[3], session_mail *out, int64_t **numbers)
 {
     int64_t total = 0, at = 0;
     out->counts = base_calloc((size_t)team->ranks, sizeof *out->counts);
     if (!out->counts) return false;
-    for (int rank = 0; rank < team->ranks; rank++)
-        for (int64_t i = 0; i < work->own_count && rank != team->rank; i++)
-            out->counts[rank] += is_in(&boxes[rank], places[i]);
+    for (int n = 0; n < homes->near_count; n++)
+        for (int64_t i = 0; i < work->own_count && homes->near[n] != team->rank; i++)
+            out->counts[homes->near[n]] += is_in(&homes->boxes[n], places[i]);
     for (int rank = 0; rank < team->ranks; rank++) total += out->counts[rank];
     out->words = base_alloc((size_t)(total ? total : 1) * KEY_WORDS * sizeof *out->words);
     *numbers = base_alloc((size_t)(total ? total : 1) * sizeof **numbers);
     if (!out->words || !*numbers) return false;
-    for (int rank = 0; rank < team->ranks; rank++) {
+    for (int n = 0; n < homes->near_count; n++) {
+        const int rank = homes->near[n];
         for (int64_t i = 0; i < work->own_count && out->counts[rank]; i++) {
-            if (!is_in(&boxes[rank], places[i])) continue;
+            if (!is_in(&homes->boxes[n], places[i])) continue;
             memcpy(out->words + at * KEY_WORDS, work->keys.keys[i].words, KEY_WORDS * sizeof *out->words);
             (*numbers)[at++] = i;
         }
@@ -287,30 +272,37 @@ static session_gradient_basis basis_of(const smooth_work *work, const session_ex
     return (session_gradient_basis){&work->mesh->cells, &work->values, work->entries, ldexp(1, exponent), threads};
 }
 
-/* Collective: numbers are rounded below the largest of all ranks. */
+/* What is added up, and the largest numbers of this rank's. */
+static bool begin_sums(const session_team *team, const session_extent *extent, bool by_id, smooth_work *work,
+                       session_gradient_basis *basis, session_cell_list *list, double largest[2])
+{
+    const int64_t count = work->keys.count;
+    work->sums = base_calloc((size_t)(count ? count : 1), sizeof *work->sums);
+    if (!work->sums) return false;
+    if (!work->mesh || !count) return true;
+    if (!find_entries(work, by_id, team->threads)) return false;
+    *basis = basis_of(work, extent, team->threads);
+    return session_list_cells(basis, list) && session_largest_gradients(basis, list, largest);
+}
+
+/* Numbers are rounded below the largest of all ranks. Where a rank has failed before, all return its error; what fails
+ * behind the reduction is in *error alone. Collective. */
 static insitu_status make_sums(const session_team *team, const session_extent *extent, bool by_id, smooth_work *work,
                                base_error *error)
 {
     session_cell_list list = {0};
     session_gradient_basis basis = {0};
-    double largest[2] = {0, 0};
-    const int64_t count = work->keys.count;
-    bool is_made = true;
-    work->sums = base_calloc((size_t)(count ? count : 1), sizeof *work->sums);
-    if (work->mesh && work->sums && count) {
-        is_made = find_entries(work, by_id, team->threads);
-        basis = basis_of(work, extent, team->threads);
-        is_made = is_made && session_list_cells(&basis, &list) && session_largest_gradients(&basis, &list, largest);
-    }
-    if (!work->sums || !is_made) session_no_memory(error, count * 100, "gradients at vertices");
-    insitu_status status = session_agree(team->comm, error);
-    if (!status)
-        status = session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, team->comm),
-                             "MPI_Allreduce");
+    double largest[3] = {0, 0, 0}; /* the last: has a rank failed? */
+    if (!error->status && !begin_sums(team, extent, by_id, work, &basis, &list, largest))
+        session_no_memory(error, work->keys.count * 100, "gradients at vertices");
+    largest[2] = error->status != INSITU_OK;
+    insitu_status status =
+        session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, team->comm), "MPI_Allreduce");
+    if (!status && largest[2] > 0) status = session_agree(team->comm, error);
     if (!status && list.count && !session_add_gradients(&basis, &list, largest, work->sums))
-        session_no_memory(error, count * 100, "gradients at vertices");
+        session_no_memory(error, work->keys.count * 100, "gradients at vertices");
     base_free(list.cells);
-    return status ? status : session_agree(team->comm, error);
+    return status;
 }
 
 static bool write_answers(const smooth_work *work, const session_mail *questions, const int64_t *numbers, int ranks,
@@ -341,7 +333,6 @@ static void add_answers(const session_mail *answers, const int64_t *numbers, smo
 
 /* The letters of an item's exchange. */
 typedef struct smooth_mail {
-    rank_box *boxes;
     double (*places)[3];
     session_mail questions, asked, answers, answered;
     int64_t *own_numbers, *asked_numbers;
@@ -349,7 +340,6 @@ typedef struct smooth_mail {
 
 static void mail_free(smooth_mail *mail)
 {
-    base_free(mail->boxes);
     base_free(mail->places);
     session_mail_free(&mail->questions);
     session_mail_free(&mail->asked);
@@ -359,32 +349,28 @@ static void mail_free(smooth_mail *mail)
     base_free(mail->asked_numbers);
 }
 
-static insitu_status ask(const smooth_item *item, const session_team *team, double margin, smooth_work *work,
-                         smooth_mail *mail, base_error *error)
+static insitu_status ask(const smooth_item *item, const session_team *team, smooth_work *work, smooth_mail *mail,
+                         base_error *error)
 {
-    const bool by_id = item->mesh->has_ids;
-    mail->boxes = base_alloc((size_t)team->ranks * sizeof *mail->boxes);
-    if (!mail->boxes || !find_places(work, by_id, &mail->places))
-        session_no_memory(error, work->own_count * 24, "gradients at vertices");
-    insitu_status status = session_agree(team->comm, error);
-    if (!status) status = gather_boxes(team, work->mesh, margin, mail->boxes, error);
-    if (!status && !write_questions(work, team, mail->boxes, (const double(*)[3])mail->places, &mail->questions,
-                                    &mail->own_numbers))
+    const session_homes *homes = &item->mesh->homes;
+    if (!error->status &&
+        (!find_places(work, homes->by_id, &mail->places) ||
+         !write_questions(work, team, homes, (const double(*)[3])mail->places, &mail->questions, &mail->own_numbers)))
         session_no_memory(error, work->own_count * 24, "gradients at vertices that ranks share");
-    if (!status) status = session_agree(team->comm, error);
-    if (!status) status = session_mail_exchange(team->comm, &mail->questions, &mail->asked, error);
-    if (!status && !read_questions(&mail->asked, work, &mail->asked_numbers))
+    const insitu_status status =
+        session_mail_deliver(team->comm, SESSION_MAIL_THERE, &mail->questions, &mail->asked, error);
+    if (!status && !error->status && !read_questions(&mail->asked, work, &mail->asked_numbers))
         session_no_memory(error, mail->asked.total * 24, "gradients at vertices that ranks share");
-    return status ? status : session_agree(team->comm, error);
+    return status;
 }
 
 static insitu_status answer(const session_team *team, smooth_work *work, smooth_mail *mail, base_error *error)
 {
-    if (!write_answers(work, &mail->asked, mail->asked_numbers, team->ranks, &mail->answers))
+    if (!error->status && !write_answers(work, &mail->asked, mail->asked_numbers, team->ranks, &mail->answers))
         session_no_memory(error, mail->asked.total * 24, "gradients at vertices that ranks share");
-    insitu_status status = session_agree(team->comm, error);
-    if (!status) status = session_mail_exchange(team->comm, &mail->answers, &mail->answered, error);
-    if (!status) add_answers(&mail->answered, mail->own_numbers, work);
+    const insitu_status status =
+        session_mail_deliver(team->comm, SESSION_MAIL_BACK, &mail->answers, &mail->answered, error);
+    if (!status && !error->status) add_answers(&mail->answered, mail->own_numbers, work);
     return status;
 }
 
@@ -408,17 +394,14 @@ static insitu_status end_work(smooth_work *work, base_error *error)
 static insitu_status smooth(const smooth_item *item, const session_meshes *meshes, const session_team *team,
                             const session_extent *extent, base_error *error)
 {
-    const bool by_id = item->mesh->has_ids;
     smooth_work work = {0};
     smooth_mail mail = {0};
-    begin_work(item, meshes, team->threads, &work, error);
-    insitu_status status = session_agree(team->comm, error);
-    if (!status && team->ranks > 1)
-        status = ask(item, team, by_id ? 1e-6 * extent->half_diagonal : 0, &work, &mail, error);
-    if (!status) status = make_sums(team, extent, by_id, &work, error);
+    insitu_status status = INSITU_OK;
+    if (!error->status) begin_work(item, meshes, team->threads, &work, error);
+    if (team->ranks > 1) status = ask(item, team, &work, &mail, error);
+    if (!status) status = make_sums(team, extent, item->mesh->has_ids, &work, error);
     if (!status && team->ranks > 1) status = answer(team, &work, &mail, error);
-    if (!status && work.mesh) end_work(&work, error);
-    if (!status) status = session_agree(team->comm, error);
+    if (!status && !error->status && work.mesh) end_work(&work, error);
     mail_free(&mail);
     base_free(work.entries);
     base_free(work.sums);
@@ -430,7 +413,7 @@ insitu_status session_smooth(const session_plan *plan, const session_catalogue *
                              const session_team *team, const session_extent *extent, base_error *error)
 {
     smooth_items items = {0};
-    if (!is_asked_for(plan)) return INSITU_OK;
+    if (!session_is_smooth(plan)) return INSITU_OK;
     if (!list_items(plan, catalogue, &items)) session_no_memory(error, 64, "the plan of gradients at vertices");
     insitu_status status = session_agree(team->comm, error);
     for (int i = 0; i < items.count && !status; i++) status = smooth(&items.items[i], meshes, team, extent, error);

@@ -7,8 +7,12 @@
 
 /* Compute, for the isosurfaces of the plan that ask for it, the gradients at the vertices of the cells that they cross:
  * over the cells around each on all ranks, to the same bits on any partition. Vertices are one where recentring takes
- * them as one. extent: the global bounds. Collective. */
+ * them as one. extent: the global bounds. The homes of the catalogue's meshes must be known. What fails on this
+ * rank at the very end is in *error alone, for the next phase to agree on. Collective, else agreed. */
 insitu_status session_smooth(const session_plan *plan, const session_catalogue *catalogue, const session_meshes *meshes,
                              const session_team *team, const session_extent *extent, base_error *error);
+
+/* Does an isosurface of the plan ask for it? */
+bool session_is_smooth(const session_plan *plan);
 
 #endif

@@ -51,25 +51,31 @@ static int list_wishes(const session_plan *plan, const session_catalogue *catalo
     return count;
 }
 
-/* Which faces are not known on some rank. Collective. */
+/* Are there faces that are not known on some rank? Where a rank has failed before, all return its error. Collective. */
 static insitu_status find_stale(const session_meshes *meshes, const surface_wish *wishes, int count,
-                                const session_team *team, int *stale, base_error *error)
+                                const session_team *team, int *stale, bool *is_any, base_error *error)
 {
+    int own[2] = {error->status != INSITU_OK, 0}, all[2] = {0, 0}; /* has failed; has some */
     for (int i = 0; i < count; i++) {
         session_mesh *mesh;
         const session_outer *outer = find_own(meshes, &wishes[i], &mesh);
         stale[i] = outer && session_is_outer_stale(mesh, outer);
+        own[1] = own[1] || stale[i];
     }
+    insitu_status status =
+        session_mpi(error, MPI_Allreduce(own, all, 2, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
+    if (!status && all[0]) status = session_agree(team->comm, error);
+    *is_any = all[1];
+    if (status || !all[1]) return status;
     return session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, stale, count, MPI_INT, MPI_MAX, team->comm), "MPI_Allreduce");
 }
 
 static insitu_status find_faces(const session_meshes *meshes, const surface_wish *wish, const session_team *team,
-                                double half_diagonal, base_error *error)
+                                base_error *error)
 {
     session_mesh *mesh;
     session_outer *outer = find_own(meshes, wish, &mesh);
-    const insitu_status status =
-        session_find_outer_faces(outer ? mesh : NULL, outer, wish->mesh->has_ids, half_diagonal, team, error);
+    const insitu_status status = session_find_outer_faces(outer ? mesh : NULL, outer, &wish->mesh->homes, team, error);
     if (!status && outer) session_set_outer_fresh(mesh, outer);
     return status;
 }
@@ -96,23 +102,21 @@ static void make_meshes(const session_meshes *meshes, base_error *error)
 }
 
 insitu_status session_update_surfaces(const session_plan *plan, const session_catalogue *catalogue,
-                                      const session_meshes *meshes, const session_team *team, double half_diagonal,
-                                      base_error *error)
+                                      const session_meshes *meshes, const session_team *team, base_error *error)
 {
     const size_t most = (size_t)plan->surface_count * (size_t)catalogue->mesh_count;
     int count = 0, *stale = base_calloc(most, sizeof *stale);
     surface_wish *wishes = base_calloc(most, sizeof *wishes);
-    if (!stale || !wishes) session_no_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
-    insitu_status status = session_agree(team->comm, error);
-    if (!status) {
+    bool is_any = false;
+    if (!stale || !wishes)
+        session_no_memory(error, (int64_t)(most * (sizeof *stale + sizeof *wishes)), "surfaces");
+    else
         count = list_wishes(plan, catalogue, wishes);
-        status = find_stale(meshes, wishes, count, team, stale, error);
-    }
-    for (int i = 0; i < count && !status; i++)
-        if (stale[i]) status = find_faces(meshes, &wishes[i], team, half_diagonal, error);
+    insitu_status status = find_stale(meshes, wishes, count, team, stale, &is_any, error);
+    for (int i = 0; i < count && !status && is_any; i++)
+        if (stale[i]) status = find_faces(meshes, &wishes[i], team, error);
     base_free(stale);
     base_free(wishes);
-    if (status) return status;
-    make_meshes(meshes, error);
-    return session_agree(team->comm, error);
+    if (!status) make_meshes(meshes, error);
+    return status;
 }

@@ -107,7 +107,7 @@ static bool update_distance(const session_mesh *mesh, session_scalar *scalar, in
     return true;
 }
 
-insitu_status session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error)
+void session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error)
 {
     for (int i = 0; i < meshes->count && !error->status; i++) {
         const session_mesh *mesh = meshes->items[i];
@@ -118,7 +118,6 @@ insitu_status session_update_distances(const session_meshes *meshes, const sessi
                 session_no_memory(error, mesh->cells.vertex_count * (int64_t)sizeof(float), "distances from a plane");
         }
     }
-    return session_agree(team->comm, error);
 }
 
 /* A crossing belongs to the cell that reaches the distance from below, so the least distance of all has no crossing. A

@@ -23,8 +23,8 @@ bool session_mark_distance(session_mesh *mesh, const scene_plane *plane, const s
 session_scalar *session_find_distance(const session_mesh *mesh, const scene_plane *plane);
 
 /* Compute the distances in use that are out of date: from a vertex's own coordinates alone, so that all ranks have the
- * same. Collective. */
-insitu_status session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
+ * same. Local. */
+void session_update_distances(const session_meshes *meshes, const session_team *team, base_error *error);
 
 /* The distance at which the plane is drawn, where the data's distances go from low to high over all ranks: 0, or, if
  * the plane lies on their border, as far inside as it takes to be seen. */

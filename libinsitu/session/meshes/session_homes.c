@@ -1,0 +1,178 @@
+#include "session_homes.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "session_agree.h"
+#include "session_mesh.h"
+#include "session_topology.h"
+
+enum { MOST_SAMPLES = 1024 };
+
+/* What ranks tell each other. */
+typedef struct rank_part {
+    session_box box;
+    int64_t first; /* where this rank's share of the ids begins */
+    int64_t has_ids;
+} rank_part;
+
+void session_homes_free(session_homes *homes)
+{
+    base_free(homes->near);
+    base_free(homes->boxes);
+    base_free(homes->firsts);
+    base_free(homes->owners);
+    *homes = (session_homes){0};
+}
+
+static int compare_ids(const void *a, const void *b)
+{
+    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Which of evenly chosen samples of the ids it is does not matter, as long as all ranks know the same. */
+static int64_t quantile(const session_mesh *mesh, const session_team *team)
+{
+    const grid_array ids = session_grid_array(&mesh->given.vertex_ids);
+    const int64_t vertices = mesh->given.vertex_count, count = vertices < MOST_SAMPLES ? vertices : MOST_SAMPLES;
+    int64_t samples[MOST_SAMPLES];
+    for (int64_t i = 0; i < count; i++) samples[i] = grid_array_index(&ids, i * vertices / count);
+    qsort(samples, (size_t)count, sizeof *samples, compare_ids);
+    return samples[(int64_t)((team->rank + 0.5) / team->ranks * (double)count)];
+}
+
+static rank_part part_of(const session_mesh *mesh, bool by_id, double margin, const session_team *team)
+{
+    rank_part out = {{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}, 0, 0};
+    if (!mesh || !mesh->is_given || !mesh->drawn_count) return out;
+    for (int axis = 0; axis < 3; axis++) {
+        out.box.lower[axis] = mesh->lower[axis] - margin;
+        out.box.upper[axis] = mesh->upper[axis] + margin;
+    }
+    out.has_ids = by_id && mesh->given.vertex_count > 0;
+    if (out.has_ids) out.first = quantile(mesh, team);
+    return out;
+}
+
+static bool do_boxes_meet(const session_box *a, const session_box *b)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (!(a->lower[axis] <= b->upper[axis] && b->lower[axis] <= a->upper[axis])) return false;
+    return true;
+}
+
+static bool is_in_box(const session_box *box, const double point[3])
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (!(box->lower[axis] <= point[axis] && point[axis] <= box->upper[axis])) return false;
+    return true;
+}
+
+static bool keep_near(session_homes *homes, const rank_part *parts, int ranks)
+{
+    const session_box *own = &parts[homes->rank].box;
+    for (int rank = 0; rank < ranks; rank++) homes->near_count += do_boxes_meet(&parts[rank].box, own);
+    homes->near = base_alloc((size_t)(homes->near_count + 1) * sizeof *homes->near);
+    homes->boxes = base_alloc((size_t)(homes->near_count + 1) * sizeof *homes->boxes);
+    if (!homes->near || !homes->boxes) return false;
+    for (int rank = 0, at = 0; rank < ranks; rank++) {
+        if (!do_boxes_meet(&parts[rank].box, own)) continue;
+        homes->near[at] = rank;
+        homes->boxes[at++] = parts[rank].box;
+    }
+    return true;
+}
+
+typedef struct id_share {
+    int64_t first;
+    int owner;
+} id_share;
+
+static int compare_shares(const void *a, const void *b)
+{
+    const id_share *x = a, *y = b;
+    if (x->first != y->first) return x->first < y->first ? -1 : 1;
+    return (x->owner > y->owner) - (x->owner < y->owner);
+}
+
+static bool divide_ids(session_homes *homes, const rank_part *parts, int ranks)
+{
+    id_share *shares = base_alloc((size_t)ranks * sizeof *shares);
+    homes->firsts = base_alloc((size_t)ranks * sizeof *homes->firsts);
+    homes->owners = base_alloc((size_t)ranks * sizeof *homes->owners);
+    const bool has_room = shares && homes->firsts && homes->owners;
+    for (int rank = 0; rank < ranks && has_room; rank++)
+        if (parts[rank].has_ids) shares[homes->share_count++] = (id_share){parts[rank].first, rank};
+    if (has_room) qsort(shares, (size_t)homes->share_count, sizeof *shares, compare_shares);
+    for (int i = 0; i < homes->share_count; i++) {
+        homes->firsts[i] = shares[i].first;
+        homes->owners[i] = shares[i].owner;
+    }
+    base_free(shares);
+    return has_room;
+}
+
+insitu_status session_homes_find(session_homes *homes, const session_mesh *mesh, bool by_id, double half_diagonal,
+                                 const session_team *team, base_error *error)
+{
+    session_homes found = {.is_known = true, .by_id = by_id, .rank = team->rank};
+    const rank_part own = part_of(mesh, by_id, by_id ? 1e-6 * half_diagonal : 0, team);
+    rank_part *parts = base_alloc((size_t)team->ranks * sizeof *parts);
+    if (!parts) session_no_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
+    insitu_status status = session_agree(team->comm, error);
+    if (!status)
+        status = session_mpi(error, MPI_Allgather(&own, sizeof own, MPI_BYTE, parts, sizeof own, MPI_BYTE, team->comm),
+                             "MPI_Allgather");
+    if (!status && (!keep_near(&found, parts, team->ranks) || (by_id && !divide_ids(&found, parts, team->ranks))))
+        session_no_memory(error, team->ranks * (int64_t)sizeof *parts, "boxes of ranks");
+    base_free(parts);
+    if (!status) status = session_agree(team->comm, error);
+    if (status) {
+        session_homes_free(&found);
+        return status;
+    }
+    session_homes_free(homes);
+    *homes = found;
+    return INSITU_OK;
+}
+
+bool session_homes_share(const session_homes *homes, const double point[3])
+{
+    for (int i = 0; i < homes->near_count; i++)
+        if (homes->near[i] != homes->rank && is_in_box(&homes->boxes[i], point)) return true;
+    return false;
+}
+
+static int home_by_id(const session_homes *homes, int64_t id)
+{
+    int low = 0, high = homes->share_count;
+    while (high - low > 1) {
+        const int middle = low + (high - low) / 2;
+        if (homes->firsts[middle] <= id)
+            low = middle;
+        else
+            high = middle;
+    }
+    return homes->owners[low];
+}
+
+static bool are_in_box(const session_box *box, const double (*points)[3], int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!is_in_box(box, points[i])) return false;
+    return true;
+}
+
+int session_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id)
+{
+    int among = 0;
+    if (homes->by_id) return home_by_id(homes, id);
+    for (int i = 0; i < homes->near_count; i++) among += are_in_box(&homes->boxes[i], points, count);
+    int left = among ? (int)(hash % (uint64_t)among) : 0;
+    for (int i = 0; i < homes->near_count; i++)
+        if (are_in_box(&homes->boxes[i], points, count) && left-- == 0) return homes->near[i];
+    return homes->rank;
+}

@@ -1,0 +1,115 @@
+/* Homes of what ranks share (session_homes.h), by arithmetic, as of many ranks without MPI: all that have a thing know
+ * the same home, which is one of their neighbours; so a rank sends to few, however many ranks there are. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "session_homes.h"
+
+enum { SIDE = 12, RANKS = SIDE * SIDE * SIDE, MOST_NEAR = 27, MOST_SHARES = 64 };
+
+/* Rank (i, j, k) of a block partition has the unit cube there. Its neighbours, itself among them. */
+typedef struct block_rank {
+    session_homes homes;
+    int near[MOST_NEAR];
+    session_box boxes[MOST_NEAR];
+} block_rank;
+
+static void block_create(block_rank *b, int rank)
+{
+    const int at[3] = {rank % SIDE, rank / SIDE % SIDE, rank / SIDE / SIDE};
+    int count = 0;
+    for (int other = 0; other < RANKS; other++) {
+        const int there[3] = {other % SIDE, other / SIDE % SIDE, other / SIDE / SIDE};
+        if (abs(there[0] - at[0]) > 1 || abs(there[1] - at[1]) > 1 || abs(there[2] - at[2]) > 1) continue;
+        b->near[count] = other;
+        for (int a = 0; a < 3; a++) {
+            b->boxes[count].lower[a] = there[a];
+            b->boxes[count].upper[a] = there[a] + 1;
+        }
+        count++;
+    }
+    b->homes = (session_homes){.is_known = true, .rank = rank, .near_count = count, .near = b->near, .boxes = b->boxes};
+}
+
+static uint64_t hash_of(const double point[3])
+{
+    uint64_t h = 1469598103934665603u;
+    for (int a = 0; a < 3; a++) h = (h ^ (uint64_t)(point[a] * 8 + 0.5)) * 1099511628211u;
+    return h ^ h >> 29;
+}
+
+/* Every vertex on a block's sides, on a lattice of eighths: whoever of its neighbours has it says the same. */
+static int count_homes(const block_rank *own, block_rank *neighbours, int neighbour_count, int64_t *shared)
+{
+    bool is_home[RANKS] = {false};
+    const double *low = own->homes.boxes[0].lower;
+    int homes = 0;
+    for (int n = 0; n < own->homes.near_count; n++)
+        if (own->near[n] == own->homes.rank) low = own->boxes[n].lower;
+    for (int v = 0; v < 9 * 9 * 9; v++) {
+        const double point[1][3] = {{low[0] + v % 9 / 8.0, low[1] + v / 9 % 9 / 8.0, low[2] + v / 81 / 8.0}};
+        if (!session_homes_share(&own->homes, point[0])) continue;
+        const int home = session_home(&own->homes, point, 1, hash_of(point[0]), 0);
+        (*shared)++;
+        homes += !is_home[home];
+        is_home[home] = true;
+        for (int n = 0; n < neighbour_count; n++) {
+            const session_box *box = NULL;
+            for (int k = 0; k < neighbours[n].homes.near_count; k++)
+                if (neighbours[n].near[k] == neighbours[n].homes.rank) box = &neighbours[n].boxes[k];
+            bool has_it = true;
+            for (int a = 0; a < 3; a++) has_it = has_it && box->lower[a] <= point[0][a] && point[0][a] <= box->upper[a];
+            if (has_it) assert_int_equal(session_home(&neighbours[n].homes, point, 1, hash_of(point[0]), 0), home);
+        }
+    }
+    return homes;
+}
+
+static void homes_by_coordinates_are_near_and_the_same_for_all(void **state)
+{
+    static const int ranks[] = {0, SIDE / 2, SIDE * SIDE / 2 + SIDE / 2, RANKS / 2 + SIDE * SIDE / 2 + SIDE / 2,
+                                RANKS - 1};
+    (void)state;
+    for (size_t i = 0; i < sizeof ranks / sizeof *ranks; i++) {
+        block_rank own, *neighbours = calloc(MOST_NEAR, sizeof *neighbours);
+        int64_t shared = 0;
+        assert_non_null(neighbours);
+        block_create(&own, ranks[i]);
+        for (int n = 0; n < own.homes.near_count; n++) block_create(&neighbours[n], own.near[n]);
+        const int homes = count_homes(&own, neighbours, own.homes.near_count, &shared);
+        assert_true(shared > 100);
+        assert_true(homes > 1 && homes <= own.homes.near_count);
+        free(neighbours);
+    }
+}
+
+/* Shares begin where they begin; ids before the first belong to it, too. */
+static void homes_by_id_are_the_shares_owners(void **state)
+{
+    (void)state;
+    int64_t firsts[MOST_SHARES];
+    int owners[MOST_SHARES];
+    session_homes homes = {
+        .is_known = true, .by_id = true, .rank = 3, .share_count = MOST_SHARES, .firsts = firsts, .owners = owners};
+    for (int i = 0; i < MOST_SHARES; i++) {
+        firsts[i] = 100 * i + 40;
+        owners[i] = (i * 37) % MOST_SHARES;
+    }
+    const double nowhere[1][3] = {{0, 0, 0}};
+    for (int64_t id = -50; id < 100 * MOST_SHARES + 200; id++) {
+        int expected = 0;
+        while (expected + 1 < MOST_SHARES && firsts[expected + 1] <= id) expected++;
+        assert_int_equal(session_home(&homes, nowhere, 1, 0, id), owners[expected]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(homes_by_coordinates_are_near_and_the_same_for_all),
+                                       cmocka_unit_test(homes_by_id_are_the_shares_owners)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
