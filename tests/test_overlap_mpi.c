@@ -107,6 +107,9 @@ typedef struct staged {
     render_volume_layer volumes[2];
 } staged;
 
+/* Of surfaces alone, whose normals are by differences. */
+static bool is_by_differences;
+
 static void stage(staged *s, const test_mesh *mesh, const drawing *d)
 {
     fixture_create(&s->f, mesh, 1, (test_layout){.wide_coordinates = true, .wide_values = true}, 2.0 / SIDE, 1,
@@ -124,6 +127,11 @@ static void stage(staged *s, const test_mesh *mesh, const drawing *d)
     s->f.job.integration = d->max_error > 0 ? RENDER_SEGMENTS : RENDER_SAMPLES;
     s->f.job.max_error = d->max_error;
     s->f.job.extent = 2 * sqrt(3);
+    if (is_by_differences) {
+        s->f.surfaces[0].normal = RENDER_DIFFERENCES;
+        s->f.surfaces[0].difference = 1;
+        s->f.job.volume_count = 0;
+    }
     if (d->scene != TWO_VOLUMES) return;
     s->second = s->f.transfer;
     s->second.opacity_count = 2;
@@ -375,6 +383,29 @@ static void turns_make_the_same_bits(void **state)
     assert_everywhere(overlaps > 500 && is_same);
 }
 
+/* Several cells hold a sample's point: the least of their values counts, on whichever ranks they are. */
+static void differences_among_overlapping_cells_are_the_same_bits(void **state)
+{
+    static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_TETS, TEST_MIXED};
+    (void)state;
+    is_by_differences = true;
+    for (int i = 0; i < 6; i++) {
+        const drawing d = {i % 2 ? TRANSPARENT_VOLUME : OPAQUE_VOLUME, CAMERA_OUTSIDE, 0, MANY, 0, false};
+        test_mesh mesh;
+        image ours, alone = {0};
+        interpenetrating(kinds[i / 2], &mesh);
+        draw_shares(&mesh, TEST_RANDOM, &d, &ours);
+        if (my_rank == 0) draw(&mesh, &d, MPI_COMM_SELF, true, &alone);
+        const bool is_same = my_rank != 0 || (!memcmp(alone.rgba, ours.rgba, 4 * PIXELS * sizeof(float)) &&
+                                              !memcmp(alone.depth, ours.depth, PIXELS * sizeof(float)));
+        free_image(&ours);
+        if (my_rank == 0) free_image(&alone);
+        test_mesh_free(&mesh);
+        assert_everywhere(is_same);
+    }
+    is_by_differences = false;
+}
+
 /* ---- meshes without overlaps --------------------------------------------------------------------------------- */
 
 static void nothing_overlaps(const test_mesh *mesh, test_partition_kind partition, double max_error, const char *what)
@@ -430,6 +461,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(segments_of_two_volumes_are_as_integrated),
         cmocka_unit_test(tangled_lattices_are_the_same_everywhere),
         cmocka_unit_test(turns_make_the_same_bits),
+        cmocka_unit_test(differences_among_overlapping_cells_are_the_same_bits),
         cmocka_unit_test(conforming_meshes_have_no_overlap),
         cmocka_unit_test(a_cell_does_not_overlap_itself),
     };
