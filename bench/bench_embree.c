@@ -195,6 +195,39 @@ void bench_embree_trace(bench_embree *e, const render_camera *camera, float *dep
         }
 }
 
+static void occlude_packet(bench_embree *e, const bench_embree_ray *rays, int count, bool *blocked)
+{
+    struct RTCRay16 packet;
+    struct RTCIntersectContext context;
+    _Alignas(64) int valid[16];
+    rtcInitIntersectContext(&context);
+    for (int i = 0; i < 16; i++) {
+        const bench_embree_ray *ray = &rays[i < count ? i : 0];
+        valid[i] = i < count ? -1 : 0;
+        packet.org_x[i] = ray->origin[0];
+        packet.org_y[i] = ray->origin[1];
+        packet.org_z[i] = ray->origin[2];
+        packet.dir_x[i] = ray->direction[0];
+        packet.dir_y[i] = ray->direction[1];
+        packet.dir_z[i] = ray->direction[2];
+        packet.tnear[i] = 0;
+        packet.tfar[i] = ray->far;
+        packet.time[i] = 0;
+        packet.mask[i] = 0xffffffffu;
+        packet.id[i] = 0;
+        packet.flags[i] = 0;
+    }
+    rtcOccluded16(valid, e->scene, &context, &packet);
+    for (int i = 0; i < count; i++) blocked[i] = packet.tfar[i] < 0;
+}
+
+void bench_embree_occlude(bench_embree *e, const bench_embree_ray *rays, int64_t count, bool *blocked)
+{
+#pragma omp parallel for schedule(dynamic, 64) num_threads(e->threads)
+    for (int64_t first = 0; first < count; first += 16)
+        occlude_packet(e, rays + first, (int)(count - first < 16 ? count - first : 16), blocked + first);
+}
+
 /* ---- the builder over cells ---- */
 
 static struct RTCBuildPrimitive box_of(const grid *cells, int64_t cell)

@@ -21,6 +21,14 @@ void bench_embree_build(bench_embree *embree, const float *xyz, int64_t triangle
  * infinity; normals the triangle's normal (pixels × 3, not of unit length, of either sign). */
 void bench_embree_trace(bench_embree *embree, const render_camera *camera, float *depths, float *normals);
 
+/* A ray of unit length's direction that ends after far. */
+typedef struct bench_embree_ray {
+    float origin[3], direction[3], far;
+} bench_embree_ray;
+
+/* Which of the rays meet a triangle, by packets of 16 in the order given. */
+void bench_embree_occlude(bench_embree *embree, const bench_embree_ray *rays, int64_t count, bool *blocked);
+
 typedef enum bench_embree_builder {
     BENCH_EMBREE_LOW,        /* Morton codes, binary */
     BENCH_EMBREE_MEDIUM,     /* binned SAH, binary, up to 7 cells a leaf: the tree that ours is compared with */

@@ -31,6 +31,12 @@ void bench_embree_trace(bench_embree *embree, const render_camera *camera, float
     abort();
 }
 
+void bench_embree_occlude(bench_embree *embree, const bench_embree_ray *rays, int64_t count, bool *blocked)
+{
+    (void)embree, (void)rays, (void)count, (void)blocked;
+    abort();
+}
+
 void bench_embree_set_cells(bench_embree *embree, const grid *cells)
 {
     (void)embree, (void)cells;

@@ -14,6 +14,7 @@
 #include "kernel_hexes.h"
 #include "kernel_hits.h"
 #include "kernel_occlusion.h"
+#include "kernel_occlusion_rays.h"
 #include "kernel_packet.h"
 #include "kernel_packet_surface.h"
 #include "kernel_prefetch.h"
@@ -362,6 +363,13 @@ static void begin(kernel_thread *thread)
     m->segments.depth = 0;
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH,      sizeof(kernel_memory), begin,         trace_tile,
-                                   find_candidates, write_active,          kernel_occlude,
-                                   kernel_sample_waiting, kernel_light_waiting};
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH,
+                                   sizeof(kernel_memory),
+                                   begin,
+                                   trace_tile,
+                                   find_candidates,
+                                   write_active,
+                                   kernel_occlude,
+                                   kernel_occlude_by_cell,
+                                   kernel_sample_waiting,
+                                   kernel_light_waiting};

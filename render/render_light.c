@@ -1,10 +1,4 @@
-/* Hits' rays in the spaces that kernels want them in (rays/kernel_bundle.h), and hits' colours.
- *
- * The rays of a hemisphere lie on a spiral of equal steps in area, projected upwards from the disk below (Malley's
- * method), so that they are spread as the cosine asks: the share that is open is what the sky gives. Pixels turn the
- * spiral by angles that differ from all their neighbours' (interleaved gradient noise, Jimenez 2014), and move its
- * begin; both depend on the pixel and on the number among the frames that are averaged alone, so a surface that
- * stands still has the same samples at every step. */
+/* Hits' rays in the spaces that kernels want them in (kernel_occluders.h, kernel_bundle.h), and hits' colours. */
 #include "render_light.h"
 
 #include <math.h>
@@ -17,70 +11,17 @@
 #include "kernel_types.h"
 #include "memory.h"
 #include "mmbvh.h"
+#include "render_hits.h"
 #include "render_kernels.h"
+#include "render_occluders.h"
 #include "render_polyhedra.h"
 #include "render_prepare.h"
 
 /* ---- one hit ------------------------------------------------------------------------------------------------- */
 
-typedef struct axes {
-    double right[3], up[3], forward[3];
-} axes;
-
-/* A hit in the scene: where its rays begin, the normal with two directions across it, and the way to the eye. */
-typedef struct place {
-    double start[3], view[3];
-    axes a;
-} place;
-
-static double dot(const double a[3], const double b[3])
+static hit_place place_of(const render_job *job, const render_hit *hit)
 {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void normalize(double v[3])
-{
-    const double length = sqrt(dot(v, v));
-    for (int a = 0; a < 3; a++) v[a] /= length;
-}
-
-/* Finds two unit vectors across a third (Duff et al. 2017). */
-static axes axes_around(const double n[3])
-{
-    const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
-    return (axes){
-        {1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]}, {b, sign + n[1] * n[1] * a, -n[1]}, {n[0], n[1], n[2]}};
-}
-
-static void unfold_normal(const float folded[2], double n[3])
-{
-    const double u = (double)folded[0], v = (double)folded[1];
-    n[0] = u;
-    n[1] = v;
-    n[2] = 1 - fabs(u) - fabs(v);
-    if (n[2] < 0) {
-        n[0] = (1 - fabs(v)) * (u < 0 ? -1 : 1);
-        n[1] = (1 - fabs(u)) * (v < 0 ? -1 : 1);
-    }
-    normalize(n);
-}
-
-static place place_of(const render_job *job, const render_hit *hit)
-{
-    const render_camera *c = &job->camera;
-    const uint32_t width = (uint32_t)c->width;
-    const double z = (double)hit->t / job->space.scale + job->space.depth_origin, lift = RENDER_LIFT / job->space.scale;
-    double base[3], direction[3], n[3];
-    place out;
-    render_camera_ray(c, (int)(hit->pixel % width), (int)(hit->pixel / width), base, direction);
-    unfold_normal(hit->normal, n);
-    out.a = axes_around(n);
-    for (int a = 0; a < 3; a++) {
-        out.start[a] = base[a] + z * direction[a] + lift * n[a];
-        out.view[a] = -direction[a];
-    }
-    normalize(out.view);
-    return out;
+    return hit_place_of(job, hit->pixel, hit->t, hit->normal, RENDER_LIFT);
 }
 
 /* Returns the layer that the fragment was hit on. */
@@ -108,78 +49,102 @@ bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, re
     if (!isfinite(f->t_out) || !isfinite(f->transmittance)) return false; /* a gradient that is no number */
     *hit = (render_hit){f->pixel, f->t_in, {f->t_out, f->transmittance}};
     *rays = (render_hit_rays){all_samples(job->occlusion->samples), 0, 0};
-    unfold_normal(hit->normal, n);
+    hit_normal(hit->normal, n);
     for (int i = 0; i < job->light_count; i++)
-        if (job->occlusion->lights >> i & 1 && dot(n, job->lights[i].direction) > 0) rays->lights |= 1u << i;
+        if (job->occlusion->lights >> i & 1 && hit_dot(n, job->lights[i].direction) > 0) rays->lights |= 1u << i;
     return rays->samples || rays->lights;
 }
 
-/* ---- the hemisphere ------------------------------------------------------------------------------------------ */
-
-typedef struct hemisphere {
-    double cosine, sine; /* of the pixel's turn */
-    double begin;        /* 0 .. 1, of the spiral's first step */
-} hemisphere;
-
-static double part_of(double x)
+void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
+                        double directions[RENDER_MAX_SAMPLES][3])
 {
-    return x - floor(x);
-}
-
-static hemisphere hemisphere_of(const render_job *job, uint32_t pixel)
-{
-    const uint32_t width = (uint32_t)job->camera.width;
-    const double x = pixel % width + 5.588238 * job->frame, y = pixel / width + 5.588238 * job->frame;
-    const double turn = part_of(52.9829189 * part_of(0.06711056 * x + 0.00583715 * y)) * 6.283185307179586;
-    return (hemisphere){cos(turn), sin(turn), render_jitter(pixel, (uint32_t)job->frame)};
-}
-
-/* The golden angle's cosine and sine. */
-static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
-
-/* The directions of a hit's samples, z along the normal, unit length. The last of them are kept off the horizon, where
- * what is rounding across the surface would be a long way. */
-static void sample_directions(const hemisphere *h, int count, double out[RENDER_MAX_SAMPLES][3])
-{
-    double x = h->cosine, y = h->sine;
-    for (int k = 0; k < count; k++) {
-        const double share = fmin((k + h->begin) / count, 1 - 1.0 / 1024), radius = sqrt(share), turned = x;
-        out[k][0] = radius * x;
-        out[k][1] = radius * y;
-        out[k][2] = sqrt(1 - share);
-        x = golden[0] * turned - golden[1] * y;
-        y = golden[1] * turned + golden[0] * y;
-    }
+    const hit_place p = place_of(job, hit);
+    memcpy(start, p.start, sizeof p.start);
+    hit_directions(job, hit->pixel, &p.a, directions);
 }
 
 /* ---- tracing ------------------------------------------------------------------------------------------------- */
 
 /* A thread takes so many hits at once, and keeps the cells that it has fetched for one of them for the others. */
-enum { CHUNK_HITS = 256 };
+enum { CHUNK_HITS = 64, CHUNK_RAYS = CHUNK_HITS * (RENDER_MAX_SAMPLES + RENDER_MAX_LIGHTS) };
 
 /* Cells of a light's lattice to a scaled unit. */
 enum { LIGHT_TILES = 32 };
 
-/* A ray towards a light, in that light's scaled axes. */
-typedef struct light_ray {
-    int32_t column, row; /* of the lattice */
-    int hit;             /* in the chunk */
-    double at[3];
-} light_ray;
+struct render_occluders {
+    const kernel_table *kernels;
+    render_job job; /* as it was given */
+    render_job surfaces;
+    kernel_frame frame; /* of the surfaces alone */
+    kernel_occluders trees;
+    int threads;
+};
+
+/* Which of a chunk's rays: of a hit, into the hemisphere, or from RENDER_MAX_SAMPLES on towards a light. */
+typedef struct ray_name {
+    int16_t hit, number;
+} ray_name;
 
 /* What a thread traces with. Its frame is a copy whose job is its own, so that the camera can be moved from space to
  * space. */
 typedef struct tracer {
+    const render_occluders *of;
     const kernel_table *kernels;
     const render_job *job; /* as it was given */
     render_job moved;
     kernel_frame frame;
     kernel_thread thread;
     kernel_bundle bundle;
-    light_ray light_rays[CHUNK_HITS];
+    kernel_straights straights;
+    kernel_straight rays[CHUNK_RAYS];
+    ray_name names[CHUNK_RAYS];
 } tracer;
 
-static void tracer_look(tracer *t, const double eye[3], const axes *a, bool is_orthographic)
+static bool grow_doubts(kernel_straights *s)
+{
+    const int64_t capacity = s->capacity + s->capacity / 2 + 1024;
+    kernel_doubt *doubts = base_realloc(s->doubts, (size_t)capacity * sizeof *doubts);
+    if (!doubts) return false;
+    s->doubts = doubts;
+    s->capacity = capacity;
+    return true;
+}
+
+/* ---- rays on their own */
+
+static void add_ray(tracer *t, int hit, int number, const double start[3], const double direction[3], double far)
+{
+    const render_space *space = &t->job->space;
+    const int i = t->straights.count++;
+    kernel_straight *ray = &t->rays[i];
+    t->names[i] = (ray_name){(int16_t)hit, (int16_t)number};
+    for (int a = 0; a < 3; a++) {
+        ray->origin[a] = (float)((start[a] - space->origin[a]) * space->scale);
+        ray->direction[a] = (float)direction[a];
+    }
+    ray->far = (float)far;
+    ray->is_open = true;
+}
+
+static void add_hit(tracer *t, int i, const render_hit *hit, const render_hit_rays *rays)
+{
+    const render_occlusion *o = t->job->occlusion;
+    const hit_place p = place_of(t->job, hit);
+    double samples[RENDER_MAX_SAMPLES][3];
+    if (rays->samples) hit_directions(t->job, hit->pixel, &p.a, samples);
+    for (uint64_t left = rays->samples; left; left &= left - 1) {
+        const int k = __builtin_ctzll(left);
+        add_ray(t, i, k, p.start, samples[k], o->radius * t->job->space.scale);
+    }
+    for (uint32_t left = rays->lights; left; left &= left - 1) {
+        const int light = __builtin_ctz(left);
+        add_ray(t, i, RENDER_MAX_SAMPLES + light, p.start, t->job->lights[light].direction, INFINITY);
+    }
+}
+
+/* ---- rays that a cell is asked of */
+
+static void tracer_look(tracer *t, const double eye[3], const hit_axes *a, bool is_orthographic)
 {
     render_camera *c = &t->moved.camera;
     memcpy(c->eye, eye, sizeof c->eye);
@@ -194,15 +159,15 @@ static void tracer_look(tracer *t, const double eye[3], const axes *a, bool is_o
     }
 }
 
-static void trace_hemisphere(tracer *t, const render_hit *hit, render_hit_rays *rays)
+/* Makes the bundle a hit's hemisphere. */
+static void look_at_hemisphere(tracer *t, const render_hit *hit)
 {
     const render_occlusion *o = t->job->occlusion;
     const render_space *space = &t->job->space;
-    const place p = place_of(t->job, hit);
-    const hemisphere h = hemisphere_of(t->job, hit->pixel);
+    const hit_place p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
     double directions[RENDER_MAX_SAMPLES][3];
-    sample_directions(&h, o->samples, directions);
+    hit_hemisphere(t->job, hit->pixel, directions);
     tracer_look(t, p.start, &p.a, false);
     b->tile.centre_x = b->tile.centre_y = 0;
     b->tile.radius = 0;
@@ -219,109 +184,145 @@ static void trace_hemisphere(tracer *t, const render_hit *hit, render_hit_rays *
         }
     }
     b->count = o->samples;
-    b->open = rays->samples;
-    t->kernels->occlude(&t->frame, &t->thread, b);
-    rays->samples = b->open;
 }
 
-static int by_lattice(const void *a, const void *b)
+/* Makes the bundle a hit's ray to a light. */
+static void look_at_light(tracer *t, const render_hit *hit, int light)
 {
-    const light_ray *x = a, *y = b;
-    if (x->row != y->row) return x->row < y->row ? -1 : 1;
-    if (x->column != y->column) return x->column < y->column ? -1 : 1;
-    return (x->hit > y->hit) - (x->hit < y->hit);
-}
-
-static int collect_light_rays(tracer *t, int light, const axes *a, const render_hit *hits, const render_hit_rays *rays,
-                              int count)
-{
+    const hit_axes a = hit_axes_around(t->job->lights[light].direction);
     const render_space *space = &t->job->space;
-    int n = 0;
-    for (int i = 0; i < count; i++) {
-        if (!(rays[i].lights >> light & 1)) continue;
-        const place p = place_of(t->job, &hits[i]);
-        light_ray *ray = &t->light_rays[n++];
-        double from[3];
-        for (int k = 0; k < 3; k++) from[k] = (p.start[k] - space->origin[k]) * space->scale;
-        ray->at[0] = dot(a->right, from);
-        ray->at[1] = dot(a->up, from);
-        ray->at[2] = dot(a->forward, from);
-        ray->column = (int32_t)floor(ray->at[0] * LIGHT_TILES);
-        ray->row = (int32_t)floor(ray->at[1] * LIGHT_TILES);
-        ray->hit = i;
-    }
-    qsort(t->light_rays, (size_t)n, sizeof *t->light_rays, by_lattice);
-    return n;
-}
-
-/* Traces rays that lie in one cell of the lattice. */
-static void trace_light_tile(tracer *t, int light, const axes *a, const light_ray *list, int count,
-                             render_hit_rays *rays)
-{
+    const hit_place p = place_of(t->job, hit);
     kernel_bundle *b = &t->bundle;
-    const double centre[2] = {(list->column + 0.5) / LIGHT_TILES, (list->row + 0.5) / LIGHT_TILES};
-    b->tile.centre_x = centre[0] / t->job->space.scale;
-    b->tile.centre_y = centre[1] / t->job->space.scale;
+    double from[3];
+    for (int k = 0; k < 3; k++) from[k] = (p.start[k] - space->origin[k]) * space->scale;
+    const double x = hit_dot(a.right, from), y = hit_dot(a.up, from);
+    const double centre[2] = {(floor(x * LIGHT_TILES) + 0.5) / LIGHT_TILES,
+                              (floor(y * LIGHT_TILES) + 0.5) / LIGHT_TILES};
+    tracer_look(t, space->origin, &a, true);
+    b->tile.centre_x = centre[0] / space->scale;
+    b->tile.centre_y = centre[1] / space->scale;
     b->tile.radius = 0.5F / LIGHT_TILES;
-    for (int i = 0; i < count; i++) {
-        const light_ray *ray = &list[i];
-        b->origin_x[i] = (float)(ray->at[0] - centre[0]);
-        b->origin_y[i] = (float)(ray->at[1] - centre[1]);
-        b->slope_x[i] = b->slope_y[i] = 0;
-        b->t_near[i] = (float)ray->at[2];
-        b->t_far[i] = INFINITY;
-        for (int k = 0; k < 3; k++) {
-            b->rays[i].base[k] = ray->at[0] * a->right[k] + ray->at[1] * a->up[k];
-            b->rays[i].direction[k] = a->forward[k];
-        }
+    b->origin_x[0] = (float)(x - centre[0]);
+    b->origin_y[0] = (float)(y - centre[1]);
+    b->slope_x[0] = b->slope_y[0] = 0;
+    b->t_near[0] = (float)hit_dot(a.forward, from);
+    b->t_far[0] = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        b->rays[0].base[k] = x * a.right[k] + y * a.up[k];
+        b->rays[0].direction[k] = a.forward[k];
     }
-    b->count = count;
-    b->open = all_samples(count);
-    t->kernels->occlude(&t->frame, &t->thread, b);
-    for (int i = 0; i < count; i++)
-        if (!(b->open >> i & 1)) rays[list[i].hit].lights &= ~(1u << light);
+    b->count = 1;
 }
 
-static void trace_light(tracer *t, int light, const render_hit *hits, render_hit_rays *rays, int count)
+static int by_ray(const void *a, const void *b)
 {
-    const axes a = axes_around(t->job->lights[light].direction);
-    const int n = collect_light_rays(t, light, &a, hits, rays, count);
-    tracer_look(t, t->job->space.origin, &a, true);
-    for (int first = 0, end; first < n; first = end) {
-        const light_ray *from = &t->light_rays[first];
-        for (end = first + 1; end < n && end - first < KERNEL_BUNDLE_RAYS; end++)
-            if (t->light_rays[end].row != from->row || t->light_rays[end].column != from->column) break;
-        trace_light_tile(t, light, &a, from, end - first, rays);
+    const kernel_doubt *x = a, *y = b;
+    if (x->ray != y->ray) return x->ray < y->ray ? -1 : 1;
+    return (x->occluder > y->occluder) - (x->occluder < y->occluder);
+}
+
+static void ask_cell(tracer *t, int32_t occluder)
+{
+    t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
+}
+
+/* Asks the cells of a hit's doubts, of which there are count, of the rays into the hemisphere. */
+static void settle_hemisphere(tracer *t, const render_hit *hit, const kernel_doubt *doubts, int64_t count)
+{
+    uint64_t open = 0;
+    int32_t ray_of[RENDER_MAX_SAMPLES];
+    look_at_hemisphere(t, hit);
+    for (int64_t i = 0; i < count; i++) {
+        const int k = t->names[doubts[i].ray].number;
+        ray_of[k] = doubts[i].ray;
+        if (t->rays[doubts[i].ray].is_open) open |= (uint64_t)1 << k;
+    }
+    const uint64_t asked = open;
+    for (int64_t i = 0; i < count && open; i++) {
+        t->bundle.open = 0;
+        for (int64_t j = i; j < count; j++)
+            if (doubts[j].occluder == doubts[i].occluder)
+                t->bundle.open |= (uint64_t)1 << t->names[doubts[j].ray].number;
+        t->bundle.open &= open;
+        if (!(t->bundle.open >> t->names[doubts[i].ray].number & 1)) continue;
+        const uint64_t before = t->bundle.open;
+        ask_cell(t, doubts[i].occluder);
+        open &= ~(before & ~t->bundle.open);
+    }
+    for (uint64_t closed = asked & ~open; closed; closed &= closed - 1)
+        t->rays[ray_of[__builtin_ctzll(closed)]].is_open = false;
+}
+
+static void settle_light(tracer *t, const render_hit *hit, const kernel_doubt *doubt)
+{
+    kernel_straight *ray = &t->rays[doubt->ray];
+    if (!ray->is_open) return;
+    look_at_light(t, hit, t->names[doubt->ray].number - RENDER_MAX_SAMPLES);
+    t->bundle.open = 1;
+    ask_cell(t, doubt->occluder);
+    ray->is_open = t->bundle.open;
+}
+
+static void settle_doubts(tracer *t, const render_hit *hits)
+{
+    kernel_straights *s = &t->straights;
+    qsort(s->doubts, (size_t)s->doubt_count, sizeof *s->doubts, by_ray);
+    for (int64_t first = 0, end; first < s->doubt_count; first = end) {
+        const kernel_doubt *from = &s->doubts[first];
+        const ray_name name = t->names[from->ray];
+        for (end = first + 1; end < s->doubt_count && name.number < RENDER_MAX_SAMPLES; end++) {
+            const ray_name next = t->names[s->doubts[end].ray];
+            if (next.hit != name.hit || next.number >= RENDER_MAX_SAMPLES) break;
+        }
+        if (name.number < RENDER_MAX_SAMPLES)
+            settle_hemisphere(t, &hits[name.hit], from, end - first);
+        else
+            settle_light(t, &hits[name.hit], from);
     }
 }
 
 static void trace_chunk(tracer *t, const render_hit *hits, render_hit_rays *rays, int count)
 {
+    kernel_straights *s = &t->straights;
     t->thread.serial++;
     if (t->thread.polyhedra) polyhedra_reset(t->thread.polyhedra);
-    for (int light = 0; light < t->job->light_count; light++)
-        if (t->job->occlusion->lights >> light & 1) trace_light(t, light, hits, rays, count);
-    for (int i = 0; i < count; i++)
-        if (rays[i].samples) trace_hemisphere(t, &hits[i], &rays[i]);
+    s->count = 0;
+    s->doubt_count = 0;
+    for (int i = 0; i < count; i++) add_hit(t, i, &hits[i], &rays[i]);
+    t->kernels->occlude(&t->frame, &t->thread, &t->of->trees, s);
+    if (s->doubt_count) settle_doubts(t, hits);
+    for (int i = 0; i < s->count; i++) {
+        const ray_name name = t->names[i];
+        if (t->rays[i].is_open) continue;
+        if (name.number < RENDER_MAX_SAMPLES)
+            rays[name.hit].samples &= ~((uint64_t)1 << name.number);
+        else
+            rays[name.hit].lights &= ~(1u << (name.number - RENDER_MAX_SAMPLES));
+    }
 }
 
-static tracer *tracer_create(const kernel_table *kernels, const kernel_frame *frame, const render_job *job)
+/* ---- threads */
+
+static tracer *tracer_create(const render_occluders *of)
 {
     bool has_polyhedra = false;
     tracer *t = base_calloc(1, sizeof *t);
     if (!t) return NULL;
-    for (int i = 0; i < job->part_count; i++) has_polyhedra = has_polyhedra || grid_has_faces(job->parts[i].cells);
-    t->kernels = kernels;
-    t->job = job;
-    t->moved = *frame->job;
-    t->frame = *frame;
+    for (int i = 0; i < of->job.part_count; i++)
+        has_polyhedra = has_polyhedra || grid_has_faces(of->job.parts[i].cells);
+    t->of = of;
+    t->kernels = of->kernels;
+    t->job = &of->job;
+    t->moved = of->surfaces;
+    t->frame = of->frame;
     t->frame.job = &t->moved;
     t->frame.depth_shift = t->moved.space.depth_origin = 0;
-    t->thread = (kernel_thread){.memory = base_alloc(kernels->memory_bytes),
+    t->straights = (kernel_straights){.rays = t->rays, .grow = grow_doubts};
+    t->thread = (kernel_thread){.memory = base_alloc(t->kernels->memory_bytes),
                                 .polyhedra = has_polyhedra ? polyhedra_create() : NULL,
                                 .find_polyhedron = polyhedra_find,
                                 .polyhedron_scratch = polyhedra_scratch};
-    if (t->thread.memory) kernels->begin(&t->thread);
+    if (t->thread.memory) t->kernels->begin(&t->thread);
     if (t->thread.memory && (t->thread.polyhedra || !has_polyhedra)) return t;
     polyhedra_free(t->thread.polyhedra);
     base_free(t->thread.memory);
@@ -336,19 +337,17 @@ static bool tracer_free(tracer *t)
     const bool is_well = !t->thread.out_of_memory;
     polyhedra_free(t->thread.polyhedra);
     base_free(t->thread.memory);
+    base_free(t->straights.doubts);
     base_free(t);
     return is_well;
 }
 
-static bool trace_all(const kernel_frame *frame, const render_job *job, const render_hit *hits, render_hit_rays *rays,
-                      int64_t count)
+static bool trace_all(const render_occluders *of, const render_hit *hits, render_hit_rays *rays, int64_t count)
 {
-    const kernel_table *kernels = render_kernels();
-    const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
     bool is_well = true;
-#pragma omp parallel num_threads(threads) reduction(&& : is_well)
+#pragma omp parallel num_threads(of->threads) reduction(&& : is_well)
     {
-        tracer *t = tracer_create(kernels, frame, job);
+        tracer *t = tracer_create(of);
 #pragma omp for schedule(dynamic, 1)
         for (int64_t first = 0; first < count; first += CHUNK_HITS) {
             const int64_t left = count - first;
@@ -360,20 +359,47 @@ static bool trace_all(const kernel_frame *frame, const render_job *job, const re
     return is_well;
 }
 
-insitu_status render_occlude(const render_job *job, const render_hit *hits, render_hit_rays *rays, int64_t count,
+static insitu_status prepare(render_occluders *of, base_error *error)
+{
+    of->surfaces = of->job;
+    of->surfaces.volume_count = 0;
+    of->surfaces.separate_samples = of->surfaces.reproducible = false;
+    const insitu_status status = render_prepare(&of->surfaces, &of->frame, error);
+    if (status) return status;
+    of->kernels = render_kernels();
+    of->threads = of->job.threads > 0 ? of->job.threads : omp_get_max_threads();
+    return occluders_build(&of->frame, of->kernels->width, of->threads, &of->trees, error);
+}
+
+insitu_status render_occluders_create(const render_job *job, render_occluders **out, base_error *error)
+{
+    *out = NULL;
+    if (!job->part_count) return INSITU_OK;
+    render_occluders *of = base_calloc(1, sizeof *of);
+    if (!of) return base_fail(error, INSITU_ERROR_MEMORY, "no memory for what blocks rays from hits");
+    of->job = *job;
+    const insitu_status status = prepare(of, error);
+    if (status)
+        render_occluders_free(of);
+    else
+        *out = of;
+    return status;
+}
+
+void render_occluders_free(render_occluders *of)
+{
+    if (!of) return;
+    if (of->kernels) render_unprepare(&of->frame);
+    occluders_free(&of->trees);
+    base_free(of);
+}
+
+insitu_status render_occlude(const render_occluders *of, const render_hit *hits, render_hit_rays *rays, int64_t count,
                              base_error *error)
 {
-    kernel_frame frame;
-    render_job surfaces = *job;
-    surfaces.volume_count = 0;
-    surfaces.separate_samples = surfaces.reproducible = false;
-    if (!count || !job->part_count) return INSITU_OK;
-    insitu_status status = render_prepare(&surfaces, &frame, error);
-    if (status != INSITU_OK) return status;
-    if (!trace_all(&frame, job, hits, rays, count))
-        status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the rays of %lld hits", (long long)count);
-    render_unprepare(&frame);
-    return status;
+    if (!count || !of || !(of->trees.triangles.node_count || of->trees.slabs.node_count)) return INSITU_OK;
+    if (trace_all(of, hits, rays, count)) return INSITU_OK;
+    return base_fail(error, INSITU_ERROR_MEMORY, "no memory for the rays of %lld hits", (long long)count);
 }
 
 /* ---- which ranks to ask -------------------------------------------------------------------------------------- */
@@ -434,17 +460,10 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
                           const render_box *boxes, int count, render_box_taker *take, void *state)
 {
     const render_occlusion *o = job->occlusion;
-    const place p = place_of(job, hit);
+    const hit_place p = place_of(job, hit);
     const double margin = box_margin / job->space.scale;
     double samples[RENDER_MAX_SAMPLES][3];
-    if (rays->samples) {
-        const hemisphere h = hemisphere_of(job, hit->pixel);
-        sample_directions(&h, o->samples, samples);
-        for (int k = 0; k < o->samples; k++) {
-            const double d[3] = {samples[k][0], samples[k][1], samples[k][2]};
-            for (int a = 0; a < 3; a++) samples[k][a] = d[0] * p.a.right[a] + d[1] * p.a.up[a] + d[2] * p.a.forward[a];
-        }
-    }
+    if (rays->samples) hit_directions(job, hit->pixel, &p.a, samples);
     for (int i = 0; i < count; i++) {
         render_hit_rays met = {0, 0, 0};
         for (uint32_t left = rays->lights; left; left &= left - 1) {
@@ -464,8 +483,8 @@ void render_rays_to_boxes(const render_job *job, const render_hit *hit, const re
 /* ---- colours ------------------------------------------------------------------------------------------------- */
 
 /* Does what kernel_shade() does, by the open lights alone and in double. */
-static void shade(const render_job *job, const render_material *m, const place *p, uint32_t lights, double diffuse[3],
-                  double specular[3])
+static void shade(const render_job *job, const render_material *m, const hit_place *p, uint32_t lights,
+                  double diffuse[3], double specular[3])
 {
     const double *n = p->a.forward;
     for (int a = 0; a < 3; a++) diffuse[a] = (double)m->ambient, specular[a] = 0;
@@ -474,8 +493,8 @@ static void shade(const render_job *job, const render_material *m, const place *
         const float *c = job->lights[i].colour;
         double half[3] = {p->view[0] + l[0], p->view[1] + l[1], p->view[2] + l[2]};
         if (!(lights >> i & 1)) continue;
-        const double length = sqrt(dot(half, half)), nl = fmax(dot(n, l), 0);
-        const double nh = length > 0 ? fmax(dot(n, half) / length, 0) : 0;
+        const double length = sqrt(hit_dot(half, half)), nl = fmax(hit_dot(n, l), 0);
+        const double nh = length > 0 ? fmax(hit_dot(n, half) / length, 0) : 0;
         const double shine = nh > 0 ? exp2(log2(fmax(nh, 1e-20)) * (double)m->shininess) : 0;
         for (int a = 0; a < 3; a++) {
             diffuse[a] += nl * (double)m->diffuse * (double)c[a];
@@ -499,7 +518,7 @@ void render_light_fragment(const render_job *job, const render_hit_rays *open, f
         return;
     }
     const render_occlusion *o = job->occlusion;
-    const place p = place_of(job, &hit);
+    const hit_place p = place_of(job, &hit);
     const double sky = o->samples ? (double)__builtin_popcountll(open->samples) / o->samples : 1;
     shade(job, &layer->material, &p, open->lights | ~o->lights, diffuse, specular);
     const double opacity = layer->opacity >= 1 ? 1 : (double)layer->opacity;

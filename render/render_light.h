@@ -44,10 +44,22 @@ typedef struct render_box {
 /* The hit of an unlit fragment of the job, with the rays it has. False: it is lit without any. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
-/* Closes the rays that are blocked by this rank's opaque surfaces. Local; rays are in an undefined state on an error.
- */
-insitu_status render_occlude(const render_job *job, const render_hit *hits, render_hit_rays *rays, int64_t count,
-                             base_error *error);
+/* Where the hit's rays begin, and the directions of its samples, of unit length; scene units. */
+void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
+                        double directions[RENDER_MAX_SAMPLES][3]);
+
+/* What may block rays of the job's hits on this rank. */
+typedef struct render_occluders render_occluders;
+
+/* Finds it, once for all hits of a frame: the cells that opaque surfaces cross. The job, without its occlusion and
+ * camera, is to stay as it is until they are freed. On success *out is NULL where there is nothing. Local. */
+insitu_status render_occluders_create(const render_job *job, render_occluders **out, base_error *error);
+void render_occluders_free(render_occluders *occluders);
+
+/* Closes the rays that are blocked by this rank's opaque surfaces; occluders may be NULL. Local; rays are in an
+ * undefined state on an error. */
+insitu_status render_occlude(const render_occluders *occluders, const render_hit *hits, render_hit_rays *rays,
+                             int64_t count, base_error *error);
 
 /* Around all cells of this rank that may block. */
 render_box render_occluder_box(const render_job *job);

@@ -15,6 +15,7 @@ trap 'rm -f "$csv" "$page"' EXIT
 small='--runs 1 --shrink 8'
 "$1/bench_render" $small tets:4 hexes:4 >"$csv"
 "$1/bench_peers" $small tets:4 >>"$csv" 2>/dev/null
+"$1/bench_light" $small tets:4 >>"$csv" 2>/dev/null
 "$1/bench_steps" $small tets:4 >>"$csv" 2>/dev/null
 "$1/bench_volumes" $small hexes:4 >>"$csv" # hexes: VTK's mappers take none
 for table in sizes groups; do "$1/bench_tables" $table $small tets:4 >>"$csv"; done
@@ -35,7 +36,7 @@ LC_ALL=C awk -F, '
         if ($10 != group) bad("groups change the picture")
     }
     END {
-        count = split("bench_peers, build sah:bench_steps, isosurface new values:bench_steps, isosurfaces moved vertices:" \
+        count = split("bench_peers, build sah:bench_light, sky trace rate:bench_steps, isosurface new values:bench_steps, isosurfaces moved vertices:" \
             "bench_steps, isosurface new mesh:bench_volumes, volume new values:bench_tables sizes, process peak:" \
             "bench_tables groups, volume group 32", wanted, ":")
         for (i = 1; i <= count; i++)

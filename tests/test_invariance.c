@@ -3,9 +3,10 @@
  *     ranks (mpiexec's) x block, Morton, random, checkerboard, a rank without cells x 0 to 2 layers of ghost cells
  *     x hexes, tets, polyhedra, mixed cells x the images below
  *
- * Each part lists its cells' vertices and faces its own way. Rank 0 draws the whole mesh alone and compares. Surfaces are
- * the same to the bit, in depth and colour, and so are volumes that are to be reproducible; other volumes to 1e-6, which
- * is what compositing promises. Of all, how often they are the same to the bit and what they are off by is told. */
+ * Each part lists its cells' vertices and faces its own way. Rank 0 draws the whole mesh alone and compares. Surfaces
+ * are the same to the bit, in depth and colour, and so are volumes that are to be reproducible; other volumes to 1e-6,
+ * which is what compositing promises. Of all, how often they are the same to the bit and what they are off by is told.
+ */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -34,6 +35,7 @@ typedef struct image_case {
     "      - isosurface: {field: f, values: [-0.4, 0.4], normals: differences, difference: 2.5, opacity: 0.4,\n"       \
     "                     colour_by: {field: c, range: [-1, 1]}}\n"
 #define OTHER "      - volume: {field: f, map: plasma, opacity: [[0, 0.4], [1, 0]]}\n"
+#define LIT "    shadows: true\n    ambient_occlusion: {samples: 8}\n"
 
 static const image_case cases[] = {
     {"gradient", TO_THE_BIT, "      - isosurface: {field: f, values: [0.1]}\n", "", NULL},
@@ -46,6 +48,12 @@ static const image_case cases[] = {
     {"two transparent", TO_THE_BIT, CLEAR, "", NULL},
     {"coloured by cells", TO_THE_BIT,
      "      - isosurface: {field: f, values: [0.1], colour_by: {field: c, range: [-1, 1]}}\n", "", NULL},
+    {"lit", TO_THE_BIT, "      - isosurface: {field: f, values: [0.1], normals: vertex}\n" LIT, "", NULL},
+    {"lit, slice, transparent", TO_THE_BIT,
+     "      - isosurface: {field: f, values: [0.1]}\n"
+     "      - slice: {field: f, planes: [{normal: [0.2, 1, 0.1], point: [0, 0.1, 0]}], material: {ambient: 0.2, "
+     "diffuse: 0.8}}\n" CLEAR LIT,
+     "", NULL},
     {"samples", TO_A_MILLIONTH, VOLUME, "method: samples", NULL},
     {"segments", TO_A_MILLIONTH, VOLUME, "method: segments", NULL},
     {"max_error", TO_A_MILLIONTH, VOLUME, "max_error: 0.01", NULL},
@@ -375,10 +383,11 @@ static void pictures_do_not_depend_on_the_partition(void **state)
     }
     insitu_destroy(&session);
     for (int i = 0; i < CASES && own_rank == 0; i++)
-        printf("%d ranks, %s: %d of %d to the bit, %d depths differ, off by %.2g; PNG channels off by one: %lld, by more: "
-               "%lld\n",
-               rank_count, cases[i].name, tallies[i].same, tallies[i].pictures, tallies[i].depths, tallies[i].worst,
-               (long long)tallies[i].codes[0], (long long)tallies[i].codes[1]);
+        printf(
+            "%d ranks, %s: %d of %d to the bit, %d depths differ, off by %.2g; PNG channels off by one: %lld, by more: "
+            "%lld\n",
+            rank_count, cases[i].name, tallies[i].same, tallies[i].pictures, tallies[i].depths, tallies[i].worst,
+            (long long)tallies[i].codes[0], (long long)tallies[i].codes[1]);
     everywhere(are_well);
 }
 

@@ -195,7 +195,10 @@ static void judge_mesh(const test_mesh *mesh, fixture_camera camera, float conta
         hits h;
         fixture_use_set(set);
         take_hits(&f, &h);
-        assert_int_equal(render_occlude(&f.job, h.hits, h.open, h.count, &error), INSITU_OK);
+        render_occluders *occluders;
+        assert_int_equal(render_occluders_create(&f.job, &occluders, &error), INSITU_OK);
+        assert_int_equal(render_occlude(occluders, h.hits, h.open, h.count, &error), INSITU_OK);
+        render_occluders_free(occluders);
         for (int64_t i = 0; i < h.count; i++)
             if (test_is_whole() || i % (set + 1 == fixture_set_count() ? 2 : 7) == 0)
                 judge_hit(&f, mesh, &h, i, what, &t);

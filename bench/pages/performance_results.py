@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import page
 
-SECTIONS = {"render": "render", "peers": "peers", "steps": "steps", "volumes": "volumes", "layers": "layers",
-            "tables sizes": "tables",
+SECTIONS = {"render": "render", "peers": "peers", "light": "light", "steps": "steps", "volumes": "volumes",
+            "layers": "layers", "tables sizes": "tables",
             "tables groups": "tables", "tables steps": "tables", "scaling": "scaling"}
 NONE = "–"
 

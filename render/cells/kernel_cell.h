@@ -509,7 +509,7 @@ SIMD_INLINE void kernel_poly_lines(kernel_cell *c, const kernel_frame *f, const 
     c->least[0] = c->type == GRID_HEX ? (float)INFINITY : kernel_blur_least(most); /* hexes hardly have triangles */
 }
 
-static void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
+static __attribute__((unused)) void kernel_cell_lines(kernel_cell *c, const kernel_frame *f, const kernel_tile *tile)
 {
     if (c->has_lines) return;
     c->has_lines = true;

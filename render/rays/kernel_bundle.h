@@ -27,27 +27,6 @@ typedef struct kernel_bundle {
     kernel_clip_ray rays[KERNEL_BUNDLE_RAYS]; /* tree space */
 } kernel_bundle;
 
-/* Planes of boxes are met at plane * inverse - shift, as in kernel_packet_tree_rays(). */
-static inline void kernel_bundle_tree_rays(kernel_packet *p, const kernel_bundle *b, int first, int count)
-{
-    double size = 0;
-    for (int a = 0; a < 3; a++) {
-        float inverses[SIMD_WIDTH], shifts[SIMD_WIDTH];
-        for (int i = 0; i < SIMD_WIDTH; i++) {
-            const kernel_clip_ray *ray = &b->rays[first + (i < count ? i : 0)];
-            const double along = ray->direction[a], base = ray->base[a];
-            const double inverse = (double)(float)(1 / (fabs(along) < 1e-12 ? 1e-12 : along));
-            inverses[i] = (float)inverse;
-            shifts[i] = (float)(base * inverse);
-            size = fabs(base) > size ? fabs(base) : size;
-        }
-        p->inverse[a] = vf_load(inverses);
-        p->shift[a] = vf_load(shifts);
-        p->centre_direction[a] = (float)b->rays[first].direction[a];
-    }
-    p->pad = 16 * 6e-8f * ((float)size + 2);
-}
-
 SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
 {
     float lanes[SIMD_WIDTH];
@@ -72,7 +51,6 @@ static inline void kernel_bundle_packet(kernel_packet *p, const kernel_frame *f,
     p->t_near = kernel_bundle_load(b->t_near + first, count);
     p->t_far = kernel_bundle_load(b->t_far + first, count);
     p->u = p->v = vf_set(0);
-    kernel_bundle_tree_rays(p, b, first, count);
 }
 
 #endif

@@ -294,6 +294,9 @@ typedef struct kernel_thread {
 } kernel_thread;
 
 struct kernel_bundle;
+struct kernel_occluder;
+struct kernel_occluders;
+struct kernel_straights;
 
 /* The functions that one instruction set's object exports. */
 typedef struct kernel_table {
@@ -308,8 +311,12 @@ typedef struct kernel_table {
     /* Keep what the surface's isovalues cross of the subtree, whether or not it shows in the picture. */
     void (*write_active)(const kernel_frame *frame, kernel_thread *thread, const kernel_subtree *subtree,
                          kernel_active_writer *writer, bool (*grow)(kernel_active_writer *writer));
-    /* Closes the bundle's rays that meet an opaque surface. */
-    void (*occlude)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle);
+    /* Closes the rays that an opaque surface blocks for certain, and notes cells that others are to be asked of. */
+    void (*occlude)(const kernel_frame *frame, kernel_thread *thread, const struct kernel_occluders *occluders,
+                    struct kernel_straights *rays);
+    /* Closes the bundle's rays that the cell blocks. */
+    void (*occlude_by_cell)(const kernel_frame *frame, kernel_thread *thread, struct kernel_bundle *bundle,
+                            const struct kernel_occluder *occluder);
     /* Samples this rank's cells about all hits. */
     void (*sample_waiting)(const kernel_frame *frame, kernel_thread *thread, const render_waiting_hit *hits,
                            render_samples_about *out, int64_t count);

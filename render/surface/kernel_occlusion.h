@@ -14,11 +14,11 @@
 #include "kernel_cell_values.h"
 #include "kernel_crossings.h"
 #include "kernel_map.h"
+#include "kernel_occluders.h"
 #include "kernel_packet.h"
 #include "kernel_polyhedron.h"
 #include "kernel_roots.h"
 #include "kernel_surface.h"
-#include "kernel_traverse.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "render_polyhedra.h"
@@ -157,22 +157,21 @@ static void kernel_occlusion_polyhedron(kernel_packet *p, const kernel_occlusion
 }
 
 /* Cells stay in the cache, in order, from bundle to bundle; each bundle moves them into its own space. */
-static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, int part, uint32_t index, vm rays)
+static void kernel_occlusion_polyhedra(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
-    const render_surface_layer *layer = o->surface->layer;
+    const int part = occluder->part;
+    const double value = o->surface->layer->values[occluder->value];
     polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells,
-                                               &layer->field.fields[part], part, o->layer, index);
+                                               &o->surface->layer->field.fields[part], part, o->layer, occluder->cell);
     if (!c) p->thread->out_of_memory = true;
     if (!c || !c->is_finite) return;
     c->has_slopes = c->is_placed = false;
     o->world = c->world;
     o->vertex_count = c->vertex_count;
-    for (int value = 0; value < layer->value_count; value++) {
-        if (!kernel_polyhedron_straddles(c, layer->values[value])) continue;
-        if (!c->is_placed) kernel_polyhedron_place(c, p);
-        kernel_polyhedron_relative(c, layer->values[value]);
-        kernel_occlusion_polyhedron(p, o, c, rays);
-    }
+    if (!kernel_polyhedron_straddles(c, value)) return;
+    kernel_polyhedron_place(c, p);
+    kernel_polyhedron_relative(c, value);
+    kernel_occlusion_polyhedron(p, o, c, p->active);
 }
 
 SIMD_INLINE void kernel_occlusion_place(const kernel_packet *p, kernel_cell *c, int part)
@@ -185,45 +184,38 @@ SIMD_INLINE void kernel_occlusion_place(const kernel_packet *p, kernel_cell *c, 
     c->has_lines = c->has_normal = false;
 }
 
-static void kernel_occlusion_leaf(kernel_packet *p, void *state, int part, const uint32_t *cells, int count, vm rays)
+/* The rays of the packet that the cell's surface blocks end. */
+static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
-    kernel_occlusion *o = state;
     const render_surface_layer *layer = o->surface->layer;
-    for (int n = 0; n < count; n++) {
-        const vm open = vm_and(rays, p->active);
-        if (!vm_any(open)) return;
-        kernel_cell *c = kernel_cell_find(p, o->layer, part, &layer->field.fields[part], cells[n]);
-        if (c->type == GRID_POLYHEDRON) {
-            kernel_occlusion_polyhedra(p, o, part, cells[n], open);
-            continue;
-        }
-        if (!c->is_finite) continue;
-        o->world = c->world;
-        o->vertex_count = c->count;
-        for (int value = 0; value < layer->value_count; value++) {
-            if (!kernel_cell_straddles(c, layer->values[value])) continue;
-            kernel_occlusion_place(p, c, part);
-            kernel_cell_relative(c, layer->values[value]);
-            if (c->type == GRID_TET)
-                kernel_occlusion_tet(p, o, c, vm_and(open, p->active));
-            else
-                kernel_occlusion_poly(p, o, c, vm_and(open, p->active));
-        }
+    kernel_cell *c =
+        kernel_cell_find(p, o->layer, occluder->part, &layer->field.fields[occluder->part], occluder->cell);
+    if (c->type == GRID_POLYHEDRON) {
+        kernel_occlusion_polyhedra(p, o, occluder);
+        return;
     }
+    if (!c->is_finite) return;
+    o->world = c->world;
+    o->vertex_count = c->count;
+    kernel_occlusion_place(p, c, occluder->part);
+    kernel_cell_relative(c, layer->values[occluder->value]);
+    if (c->type == GRID_TET)
+        kernel_occlusion_tet(p, o, c, p->active);
+    else
+        kernel_occlusion_poly(p, o, c, p->active);
 }
 
-/* Closes the bundle's rays that meet an opaque surface of this rank. */
-static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, kernel_bundle *b)
+/* Closes the bundle's open rays that the cell blocks. */
+static void kernel_occlude_by_cell(const kernel_frame *f, kernel_thread *thread, kernel_bundle *b,
+                                   const kernel_occluder *occluder)
 {
     for (int first = 0; first < b->count; first += SIMD_WIDTH) {
         kernel_packet p;
+        kernel_occlusion o = {&f->surfaces[occluder->surface], occluder->surface, b, first, NULL, 0};
+        if (!(b->open >> first & (((uint64_t)1 << SIMD_WIDTH) - 1))) continue;
         kernel_bundle_packet(&p, f, thread, b, first);
         const unsigned asked = vm_bits(p.active);
-        for (int n = 0; n < f->opaque_count && vm_any(p.active); n++) {
-            kernel_occlusion o = {&f->surfaces[n], n, b, first, NULL, 0};
-            const kernel_descent descent = {&f->surfaces[n].interest, p.t_near, &p.t_far, kernel_occlusion_leaf, &o};
-            kernel_trace_parts(&p, &f->surfaces[n].layer->field, &descent);
-        }
+        kernel_occlusion_cell(&p, &o, occluder);
         b->open &= ~((uint64_t)(asked & ~vm_bits(p.active)) << first);
     }
 }

@@ -25,7 +25,8 @@ typedef struct lighting {
     MPI_Comm comm;
     const render_job *job;
     int rank, ranks;
-    render_box *boxes; /* of all ranks */
+    render_occluders *occluders; /* of this rank */
+    render_box *boxes;           /* of all ranks */
     int64_t count;
     int64_t *fragments; /* whose hits these are */
     render_hit *hits;
@@ -163,7 +164,7 @@ static insitu_status answer(const lighting *l, session_mail *in, base_error *err
     render_hit_rays *rays = NULL;
     const int64_t count = in->total / ASKED_WORDS;
     if (read_mail(in, &hits, &rays))
-        render_occlude(l->job, hits, rays, count, error);
+        render_occlude(l->occluders, hits, rays, count, error);
     else
         session_no_memory(error, in->total * 8, "rays of other ranks");
     if (!error->status && rays) memcpy(in->words, rays, (size_t)count * sizeof *rays);
@@ -246,7 +247,7 @@ static insitu_status light_rounds(lighting *l, fragment_list *fragments, base_er
     insitu_status status = agree_to_go_on(l, fragments->count > 0, &goes_on, error);
     while (!status && goes_on) {
         at = collect_hits(l, fragments, at);
-        render_occlude(l->job, l->hits, l->rays, l->count, error);
+        render_occlude(l->occluders, l->hits, l->rays, l->count, error);
         status = session_agree(l->comm, error);
         if (!status && l->ranks > 1) status = ask_others(l, error);
         if (!status) shade_hits(l, fragments);
@@ -266,7 +267,10 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, frag
     l.fragments = base_alloc((size_t)(most + 1) * sizeof *l.fragments);
     l.hits = base_alloc((size_t)(most + 1) * sizeof *l.hits);
     l.rays = base_alloc((size_t)(most + 1) * sizeof *l.rays);
-    if (!l.fragments || !l.hits || !l.rays) session_no_memory(error, most * 40, "hits that are lit");
+    if (!l.fragments || !l.hits || !l.rays)
+        session_no_memory(error, most * 40, "hits that are lit");
+    else
+        render_occluders_create(job, &l.occluders, error);
     insitu_status status = session_agree(comm, error);
     if (!status) status = share_boxes(&l, error);
     if (!status) status = light_rounds(&l, fragments, error);
@@ -274,6 +278,7 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, frag
     base_free(l.hits);
     base_free(l.rays);
     base_free(l.boxes);
+    render_occluders_free(l.occluders);
     *ms += 1e3 * (MPI_Wtime() - start);
     return status;
 }

@@ -1,0 +1,108 @@
+/* The rays of a hemisphere lie on a spiral of equal steps in area, projected upwards from the disk below (Malley's
+ * method), so that they are spread as the cosine asks: the share that is open is what the sky gives. Pixels turn the
+ * spiral by angles that differ from all their neighbours' (interleaved gradient noise, Jimenez 2014), and move its
+ * begin; both depend on the pixel and on the number among the frames that are averaged alone, so a surface that
+ * stands still has the same samples at every step. */
+#include "render_hits.h"
+
+#include <math.h>
+
+#include "render.h"
+
+static void normalize(double v[3])
+{
+    const double length = sqrt(hit_dot(v, v));
+    for (int a = 0; a < 3; a++) v[a] /= length;
+}
+
+/* Finds two unit vectors across a third (Duff et al. 2017). */
+hit_axes hit_axes_around(const double n[3])
+{
+    const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
+    return (hit_axes){
+        {1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]}, {b, sign + n[1] * n[1] * a, -n[1]}, {n[0], n[1], n[2]}};
+}
+
+void hit_normal(const float folded[2], double n[3])
+{
+    const double u = (double)folded[0], v = (double)folded[1];
+    n[0] = u;
+    n[1] = v;
+    n[2] = 1 - fabs(u) - fabs(v);
+    if (n[2] < 0) {
+        n[0] = (1 - fabs(v)) * (u < 0 ? -1 : 1);
+        n[1] = (1 - fabs(u)) * (v < 0 ? -1 : 1);
+    }
+    normalize(n);
+}
+
+hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift)
+{
+    const render_camera *c = &job->camera;
+    const uint32_t width = (uint32_t)c->width;
+    const double z = (double)t / job->space.scale + job->space.depth_origin, above = lift / job->space.scale;
+    double base[3], direction[3], n[3];
+    hit_place out;
+    render_camera_ray(c, (int)(pixel % width), (int)(pixel / width), base, direction);
+    hit_normal(normal, n);
+    out.a = hit_axes_around(n);
+    for (int a = 0; a < 3; a++) {
+        out.start[a] = base[a] + z * direction[a] + above * n[a];
+        out.view[a] = -direction[a];
+    }
+    normalize(out.view);
+    return out;
+}
+
+/* ---- the hemisphere ------------------------------------------------------------------------------------------ */
+
+typedef struct hemisphere {
+    double cosine, sine; /* of the pixel's turn */
+    double begin;        /* 0 .. 1, of the spiral's first step */
+} hemisphere;
+
+static double part_of(double x)
+{
+    return x - floor(x);
+}
+
+static hemisphere hemisphere_of(const render_job *job, uint32_t pixel)
+{
+    const uint32_t width = (uint32_t)job->camera.width;
+    const double x = pixel % width + 5.588238 * job->frame, y = pixel / width + 5.588238 * job->frame;
+    const double turn = part_of(52.9829189 * part_of(0.06711056 * x + 0.00583715 * y)) * 6.283185307179586;
+    return (hemisphere){cos(turn), sin(turn), render_jitter(pixel, (uint32_t)job->frame)};
+}
+
+/* The golden angle's cosine and sine. */
+static const double golden[2] = {-0.7373688780783197, 0.6754902942615239};
+
+/* The directions of a hit's samples, z along the normal, unit length. The last of them are kept off the horizon, where
+ * what is rounding across the surface would be a long way. */
+static void spread(const hemisphere *h, int count, double (*out)[3])
+{
+    double x = h->cosine, y = h->sine;
+    for (int k = 0; k < count; k++) {
+        const double share = fmin((k + h->begin) / count, 1 - 1.0 / 1024), radius = sqrt(share), turned = x;
+        out[k][0] = radius * x;
+        out[k][1] = radius * y;
+        out[k][2] = sqrt(1 - share);
+        x = golden[0] * turned - golden[1] * y;
+        y = golden[1] * turned + golden[0] * y;
+    }
+}
+
+void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3])
+{
+    const hemisphere h = hemisphere_of(job, pixel);
+    spread(&h, job->occlusion->samples, out);
+}
+
+void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, double (*out)[3])
+{
+    hit_hemisphere(job, pixel, out);
+    for (int k = 0; k < job->occlusion->samples; k++) {
+        const double d[3] = {out[k][0], out[k][1], out[k][2]};
+        for (int i = 0; i < 3; i++) out[k][i] = d[0] * a->right[i] + d[1] * a->up[i] + d[2] * a->forward[i];
+    }
+}

@@ -1,0 +1,36 @@
+/* A hit's place in the scene, and the directions of its rays into the hemisphere above it. */
+#ifndef RENDER_RENDER_HITS_H
+#define RENDER_RENDER_HITS_H
+
+#include "render.h"
+
+typedef struct hit_axes {
+    double right[3], up[3], forward[3];
+} hit_axes;
+
+/* Where the hit's rays begin, the way to the eye, and the normal with two directions across it. */
+typedef struct hit_place {
+    double start[3], view[3];
+    hit_axes a;
+} hit_place;
+
+static inline double hit_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Finds two unit vectors across a third, which is forward. */
+hit_axes hit_axes_around(const double n[3]);
+
+/* The unit normal that a fragment has in two numbers. */
+void hit_normal(const float folded[2], double n[3]);
+
+/* Of a hit at depth t of the pixel's ray; its rays begin lift scaled units above it. */
+hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift);
+
+/* The directions of the job's samples of the pixel, occlusion->samples of unit length: with z along the normal, */
+void hit_hemisphere(const render_job *job, uint32_t pixel, double (*out)[3]);
+/* and in the scene's axes. */
+void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, double (*out)[3]);
+
+#endif

@@ -1,0 +1,204 @@
+/* Rays and hexes in pairs, one a lane: does the hex's surface block the ray? Where the ray crosses two faces, the
+ * values there tell in most cases; what is left is in doubt, and asked of the cell as primary rays ask it. A face is
+ * crossed by the operations of kernel_hex_rays.h on places that are the ray's and the vertex's alone, so that of two
+ * hexes that share the face, on whichever ranks, one has what the other leaves. */
+#ifndef RENDER_KERNEL_OCCLUSION_HEXES_H
+#define RENDER_KERNEL_OCCLUSION_HEXES_H
+
+#include <string.h>
+
+#include "kernel_bounds_hexes.h"
+#include "kernel_hex_rays.h"
+#include "kernel_map.h"
+#include "kernel_occluders.h"
+#include "kernel_placed_hexes.h"
+#include "kernel_shapes.h"
+#include "kernel_wide.h"
+#include "simd.h"
+
+typedef struct kernel_hex_pairs {
+    int count;
+    int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
+    float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
+    kernel_placed_hexes placed;
+} kernel_hex_pairs;
+
+SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occluder)
+{
+    if (s->doubt_count == s->capacity && !s->grow(s)) return false;
+    s->doubts[s->doubt_count++] = (kernel_doubt){ray, occluder};
+    return true;
+}
+
+/* Rays in lanes: the origin and the shear along each one's own axes. */
+typedef struct kernel_plumb_lanes {
+    int32_t index[3][SIMD_WIDTH]; /* where the record has the coordinate along kx, ky, kz of its first vertex */
+    float origin[3][SIMD_WIDTH], shear[2][SIMD_WIDTH], stretch[SIMD_WIDTH], far[SIMD_WIDTH];
+} kernel_plumb_lanes;
+
+SIMD_INLINE void kernel_pair_ray(const kernel_straight *ray, int32_t record, int lane, kernel_plumb_lanes *out)
+{
+    kernel_plumb p;
+    kernel_plumb_axes(ray, &p);
+    const int axes[3] = {p.kx, p.ky, p.kz};
+    for (int a = 0; a < 3; a++) {
+        out->index[a][lane] = record * KERNEL_HEX_RECORD_WORDS + axes[a];
+        out->origin[a][lane] = ray->origin[axes[a]];
+    }
+    out->shear[0][lane] = p.shear_x;
+    out->shear[1][lane] = p.shear_y;
+    out->stretch[lane] = p.stretch;
+    out->far[lane] = ray->far;
+}
+
+SIMD_INLINE vi kernel_load_ints(const int32_t *from)
+{
+    vi out;
+    memcpy(&out, from, sizeof out);
+    return out;
+}
+
+/* Vertices as their rays see them: across it x and y, with the ray at the origin, and along it the distance. */
+SIMD_INLINE void kernel_pairs_place(kernel_hex_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays,
+                                    vi record)
+{
+    kernel_placed_hexes *h = &pairs->placed;
+    for (int i = 0; i < 8; i++) {
+        vf at[3];
+        for (int a = 0; a < 3; a++)
+            at[a] = vf_gather(hexes, kernel_load_ints(rays->index[a]) + 4 * i) - vf_load(rays->origin[a]);
+        vf_store(h->at[0][i], at[0] - at[2] * vf_load(rays->shear[0]));
+        vf_store(h->at[1][i], at[1] - at[2] * vf_load(rays->shear[1]));
+        vf_store(h->at[2][i], at[2] * vf_load(rays->stretch));
+        vf_store(h->at[3][i], vf_gather(hexes, record + (4 * i + 3)));
+    }
+    for (int face = 0; face < KERNEL_HEX_FACES; face++)
+        vf_store((float *)(void *)(h->quads + face * SIMD_WIDTH),
+                 vf_gather(hexes, record + (KERNEL_HEX_RECORD_QUADS + face)));
+    vf_store((float *)(void *)h->turned, vf_gather(hexes, record + KERNEL_HEX_RECORD_TURNED));
+}
+
+/* The edge function of the ray itself, its sign exact: products of float32 are, in double. */
+SIMD_INLINE void kernel_pairs_line(kernel_placed_hexes *h, int n, const vf from[2], const vf to[2])
+{
+    vf c = vf_set(0);
+    for (int half = 0; half < 2; half++)
+        kernel_half_put(&c, half,
+                        kernel_half_of(&from[0], half) * kernel_half_of(&to[1], half) -
+                            kernel_half_of(&to[0], half) * kernel_half_of(&from[1], half));
+    vf_store(h->c[n], c);
+    vf_store(h->cu[n], vf_set(0));
+    vf_store(h->cv[n], vf_set(0));
+}
+
+SIMD_INLINE void kernel_pairs_lines(kernel_placed_hexes *h)
+{
+    const vi turned = kernel_load_ints(h->turned);
+    vf at[8][2];
+    for (int i = 0; i < 8; i++)
+        for (int a = 0; a < 2; a++) at[i][a] = vf_load(h->at[a][i]);
+    for (int n = 0; n < KERNEL_HEX_EDGES; n++)
+        kernel_pairs_line(h, n, at[kernel_shapes[0].edges[n][0]], at[kernel_shapes[0].edges[n][1]]);
+    for (int face = 0; face < KERNEL_HEX_FACES; face++) {
+        const signed char *loop = kernel_shapes[0].faces[face].vertices;
+        const vm odd = vm_sign(turned << (31 - face));
+        vf from[2], to[2];
+        for (int a = 0; a < 2; a++) {
+            from[a] = vf_select(odd, at[loop[1]][a], at[loop[0]][a]);
+            to[a] = vf_select(odd, at[loop[3]][a], at[loop[2]][a]);
+        }
+        kernel_pairs_line(h, KERNEL_HEX_EDGES + face, from, to);
+    }
+    vf_store(h->doubt, vf_set(0));
+}
+
+/* What is known of pairs: blocked, or in doubt; the others are open. */
+typedef struct kernel_pair_verdict {
+    vm blocked, doubt;
+} kernel_pair_verdict;
+
+/* L at the distance. */
+SIMD_INLINE vf kernel_pairs_level(const kernel_hex_pairs *pairs, vf t)
+{
+    return vf_load(pairs->level) + vf_load(pairs->rise) * t;
+}
+
+/* L is farther from 0 than where the surface is, on one side all the way. */
+SIMD_INLINE vm kernel_pairs_clear(const kernel_hex_pairs *pairs, vf from, vf to)
+{
+    const vf first = kernel_pairs_level(pairs, from), last = kernel_pairs_level(pairs, to);
+    const vf thick = vf_load(pairs->thickness);
+    return vm_or(vf_lt(thick, vf_min(first, last)), vf_lt(vf_max(first, last), -thick));
+}
+
+/* The field is monotone along the ray, and at neither end so near 0 that what it jumps by at faces may matter. */
+static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_hex_pairs *pairs, const kernel_hex_place ends[2])
+{
+    static const kernel_beam beam = {.spread = 0};
+    kernel_hexes_bounds bounds;
+    kernel_hexes_bound((const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
+    const vf jump = vf_load(bounds.jump);
+    return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].v), vf_abs(ends[1].v))));
+}
+
+SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_hex_pairs *pairs, vm active, vf far)
+{
+    const vf zero = vf_set(0), reach = vf_load(pairs->reach);
+    kernel_hex_packet p = {.active = active, .u = zero, .v = zero, .far = far, .rays = {zero, zero, zero, zero}};
+    kernel_hex_crossed crossed;
+    kernel_hex_place face[2], ends[2];
+    int32_t lanes[SIMD_WIDTH];
+    for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
+    p.lane = kernel_load_ints(lanes);
+    kernel_hex_faces(&pairs->placed, &p, &crossed);
+    kernel_pair_verdict out = {vm_none(), crossed.alone};
+    if (!vm_any(crossed.two)) return out;
+    p.active = crossed.two;
+    kernel_hex_cross(&pairs->placed, &p, crossed.first | crossed.last << 3, face);
+    const vm swap = vf_lt(face[1].t, face[0].t);
+    kernel_hex_place_select(swap, &face[1], &face[0], &ends[0]);
+    kernel_hex_place_select(swap, &face[0], &face[1], &ends[1]);
+    const vf from = vf_max(ends[0].t, reach), to = vf_min(ends[1].t, far);
+    const vm near = vm_and(crossed.two, vf_le(from, to));
+    const vm change = vm_xor(vf_lt(ends[0].v, zero), vf_lt(ends[1].v, zero));
+    /* Of a change the root lies where the counted part is left out, if at all there. */
+    const vm before = vm_or(vf_eq(from, ends[0].t), kernel_pairs_clear(pairs, ends[0].t, from));
+    const vm behind = vm_or(vm_and(vf_eq(to, ends[1].t), vf_lt(to, far)), kernel_pairs_clear(pairs, to, ends[1].t));
+    out.blocked = vm_and(near, vm_and(change, vm_and(before, behind)));
+    const vm whole = vm_and(vf_eq(from, ends[0].t), vf_eq(to, ends[1].t));
+    const vm clear = vm_andnot(kernel_pairs_clear(pairs, from, to), vm_and(change, whole));
+    vm doubt = vm_andnot(vm_andnot(near, out.blocked), clear);
+    if (vm_any(doubt)) doubt = vm_andnot(doubt, vm_andnot(kernel_pairs_monotone(pairs, ends), change));
+    out.doubt = vm_or(out.doubt, doubt);
+    return out;
+}
+
+static __attribute__((noinline)) bool kernel_pairs_run(const kernel_occluders *o, kernel_straights *s,
+                                                       kernel_hex_pairs *pairs)
+{
+    kernel_plumb_lanes rays;
+    int32_t record[SIMD_WIDTH];
+    bool is_well = true;
+    if (!pairs->count) return true;
+    for (int i = 0; i < SIMD_WIDTH; i++) {
+        const int from = i < pairs->count ? i : 0;
+        record[i] = o->cells[pairs->occluder[from]].record;
+        kernel_pair_ray(&s->rays[pairs->ray[from]], record[i], i, &rays);
+        record[i] *= KERNEL_HEX_RECORD_WORDS;
+    }
+    kernel_pairs_place(pairs, o->hexes, &rays, kernel_load_ints(record));
+    kernel_pairs_lines(&pairs->placed);
+    const vm active = vm_from_bits((1u << pairs->count) - 1);
+    const kernel_pair_verdict verdict = kernel_pairs_judge(pairs, active, vf_load(rays.far));
+    for (unsigned bits = vm_bits(verdict.blocked); bits; bits &= bits - 1)
+        s->rays[pairs->ray[__builtin_ctz(bits)]].is_open = false;
+    for (unsigned bits = vm_bits(vm_and(verdict.doubt, active)); bits; bits &= bits - 1) {
+        const int i = __builtin_ctz(bits);
+        if (s->rays[pairs->ray[i]].is_open)
+            is_well = kernel_doubts_add(s, pairs->ray[i], pairs->occluder[i]) && is_well;
+    }
+    pairs->count = 0;
+    return is_well;
+}
+
+#endif

@@ -1,0 +1,138 @@
+/* Rays from hits go down the trees of occluders (kernel_occluders.h), each alone. */
+#ifndef RENDER_KERNEL_OCCLUSION_RAYS_H
+#define RENDER_KERNEL_OCCLUSION_RAYS_H
+
+#include "kernel_clip.h"
+#include "kernel_occluders.h"
+#include "kernel_occlusion_hexes.h"
+#include "kernel_types.h"
+#include "mmbvh.h"
+#include "render.h"
+#include "simd.h"
+
+/* Nodes, and leaves as ~leaf, that a ray is still to go to. */
+enum { KERNEL_PATH_STACK = MMBVH_MAX_DEPTH * (SIMD_WIDTH - 1) + 1 };
+
+typedef struct kernel_path {
+    const kernel_occluder_tree *tree;
+    int top;
+    int32_t stack[KERNEL_PATH_STACK];
+} kernel_path;
+
+SIMD_INLINE void kernel_path_begin(kernel_path *path, const kernel_occluder_tree *tree)
+{
+    path->tree = tree;
+    path->top = tree->node_count > 0;
+    path->stack[0] = 0;
+}
+
+/* Returns the next leaf that the ray may meet, or -1. */
+SIMD_INLINE int32_t kernel_path_next(kernel_path *path, const kernel_plumb *p)
+{
+    while (path->top) {
+        const int64_t at = path->stack[--path->top];
+        if (at < 0) return (int32_t)~at;
+        const int32_t *children = path->tree->children + at * SIMD_WIDTH;
+        vf low, high;
+        unsigned met = vm_bits(kernel_plumb_boxes(p, path->tree->boxes + at * (6 * SIMD_WIDTH), &low, &high));
+        for (; met; met &= met - 1) path->stack[path->top++] = children[__builtin_ctz(met)];
+    }
+    return -1;
+}
+
+/* Does a clip leave any of the places on the ray? */
+static __attribute__((noinline, cold)) bool kernel_straight_kept(const kernel_frame *f, const kernel_straight *ray,
+                                                                 const int32_t *surfaces, unsigned met, vf t)
+{
+    kernel_clip_ray line;
+    for (int a = 0; a < 3; a++) {
+        line.base[a] = (double)ray->origin[a];
+        line.direction[a] = (double)ray->direction[a];
+    }
+    for (; met; met &= met - 1) {
+        const int i = __builtin_ctz(met);
+        const uint32_t clips = f->surfaces[surfaces[i]].layer->clips;
+        if (kernel_clip_keeps(f->job, clips, &line, (double)t[i])) return true;
+    }
+    return false;
+}
+
+static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_tree *tree, const kernel_straight *ray)
+{
+    kernel_path path;
+    kernel_plumb p;
+    kernel_plumb_begin(ray, tree->size, &p);
+    kernel_path_begin(&path, tree);
+    for (int64_t leaf; (leaf = kernel_path_next(&path, &p)) >= 0;) {
+        vf t;
+        const unsigned met =
+            vm_bits(kernel_plumb_triangles(&p, tree->leaves + leaf * (KERNEL_TRIANGLE_ROWS * SIMD_WIDTH), &t));
+        if (!met) continue;
+        if (!f->job->clip_count || kernel_straight_kept(f, ray, tree->sources + leaf * SIMD_WIDTH, met, t)) return true;
+    }
+    return false;
+}
+
+/* ---- slabs --------------------------------------------------------------------------------------------------- */
+
+/* What the leaf's cells know in lanes. */
+typedef struct kernel_leaf_lanes {
+    float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH];
+} kernel_leaf_lanes;
+
+static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_hex_pairs *pairs, int ray,
+                              const kernel_leaf_lanes *lanes, const float *rows, int i, int32_t occluder)
+{
+    if (o->cells[occluder].record < 0) return kernel_doubts_add(s, ray, occluder);
+    const int n = pairs->count++;
+    pairs->ray[n] = ray;
+    pairs->occluder[n] = occluder;
+    pairs->level[n] = lanes->level[i];
+    pairs->rise[n] = lanes->rise[i];
+    pairs->thickness[n] = lanes->thickness[i];
+    pairs->reach[n] = rows[KERNEL_SLAB_REACH * SIMD_WIDTH + i];
+    return pairs->count < SIMD_WIDTH || kernel_pairs_run(o, s, pairs);
+}
+
+static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, kernel_hex_pairs *pairs, int ray)
+{
+    const kernel_occluder_tree *tree = &o->slabs;
+    kernel_path path;
+    kernel_plumb p;
+    bool is_well = true;
+    kernel_plumb_begin(&s->rays[ray], tree->size, &p);
+    kernel_path_begin(&path, tree);
+    for (int64_t leaf; s->rays[ray].is_open && (leaf = kernel_path_next(&path, &p)) >= 0;) {
+        const float *rows = tree->leaves + leaf * (KERNEL_SLAB_ROWS * SIMD_WIDTH);
+        kernel_leaf_lanes lanes;
+        vf level, rise, thickness;
+        unsigned met = vm_bits(kernel_plumb_slabs(&p, rows, &level, &rise, &thickness));
+        if (!met) continue;
+        vf_store(lanes.level, level);
+        vf_store(lanes.rise, rise);
+        vf_store(lanes.thickness, thickness);
+        for (; met; met &= met - 1) {
+            const int i = __builtin_ctz(met);
+            is_well =
+                kernel_meets_slab(o, s, pairs, ray, &lanes, rows, i, tree->sources[leaf * SIMD_WIDTH + i]) && is_well;
+        }
+    }
+    return is_well;
+}
+
+/* Closes the rays that something blocks for certain, and notes the cells that the others are to be asked of. */
+static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o, kernel_straights *s)
+{
+    kernel_hex_pairs pairs;
+    bool is_well = true;
+    pairs.count = 0;
+    for (int i = 0; i < s->count; i++)
+        if (o->triangles.node_count && kernel_meets_triangles(f, &o->triangles, &s->rays[i]))
+            s->rays[i].is_open = false;
+    for (int i = 0; i < s->count && o->slabs.node_count; i++)
+        if (s->rays[i].is_open) is_well = kernel_meets_slabs(o, s, &pairs, i) && is_well;
+    is_well = kernel_pairs_run(o, s, &pairs) && is_well;
+    if (!is_well) thread->out_of_memory = true;
+}
+
+#endif

@@ -1,0 +1,243 @@
+/* mmbvh's builder makes a binary tree of the pieces' boxes, and nodes are taken together: a node opens its largest
+ * child until it has as many as there are lanes, or all of them fit into leaves. A binary leaf of more is divided. */
+#include "render_occluder_tree.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "mmbvh.h"
+
+enum { MOST_LANES = 16 };
+
+static const float *rows_of(const occluder_pieces *p, int64_t i)
+{
+    return (const float *)(const void *)((const char *)p->first + (size_t)i * p->stride);
+}
+
+static void box_of(const occluder_pieces *p, int64_t i, float *lower, float *upper)
+{
+    const float *rows = rows_of(p, i);
+    for (int a = 0; a < 3; a++) {
+        const bool is_slab = p->rows == KERNEL_SLAB_ROWS;
+        lower[a] = is_slab ? rows[KERNEL_SLAB_LOWER + a] : fminf(fminf(rows[a], rows[3 + a]), rows[6 + a]);
+        upper[a] = is_slab ? rows[KERNEL_SLAB_UPPER + a] : fmaxf(fmaxf(rows[a], rows[3 + a]), rows[6 + a]);
+    }
+}
+
+/* A binary tree on its way to a wide one. */
+typedef struct widening {
+    const occluder_pieces *of;
+    const mmbvh *binary;
+    int64_t *first, *count; /* of the occluder_pieces below each node, among the tree's cells */
+    float *boxes;           /* of each node, lower and upper */
+    int width;
+    kernel_occluder_tree *out;
+} widening;
+
+static void grow_box(float box[6], const float *lower, const float *upper)
+{
+    for (int a = 0; a < 3; a++) {
+        box[a] = fminf(box[a], lower[a]);
+        box[3 + a] = fmaxf(box[3 + a], upper[a]);
+    }
+}
+
+/* Children come after their parents. */
+static void sum_up(widening *w)
+{
+    for (int64_t node = w->binary->node_count - 1; node >= 0; node--) {
+        const int64_t ref = mmbvh_node_ref(w->binary, node), count = mmbvh_node_count(w->binary, node);
+        float *box = w->boxes + 6 * node, lower[3], upper[3];
+        for (int a = 0; a < 3; a++) box[a] = INFINITY, box[3 + a] = -INFINITY;
+        w->first[node] = count ? ref : w->first[ref];
+        w->count[node] = count ? count : w->count[ref] + w->count[ref + 1];
+        for (int64_t n = 0; n < count; n++) {
+            box_of(w->of, w->binary->cells[ref + n], lower, upper);
+            grow_box(box, lower, upper);
+        }
+        for (int64_t n = 0; n < (count ? 0 : 2); n++)
+            grow_box(box, w->boxes + 6 * (ref + n), w->boxes + 6 * (ref + n) + 3);
+    }
+}
+
+static float area_of(const float box[6])
+{
+    const float x = box[3] - box[0], y = box[4] - box[1], z = box[5] - box[2];
+    return x * y + y * z + z * x;
+}
+
+/* Pieces that stand side by side in the binary tree's order: all below a node, or some of a leaf. */
+typedef struct span {
+    int64_t node; /* -1: some of a leaf */
+    int64_t first, count;
+    float box[6];
+} span;
+
+static span span_of(const widening *w, int64_t node)
+{
+    span out = {node, w->first[node], w->count[node], {0}};
+    memcpy(out.box, w->boxes + 6 * node, sizeof out.box);
+    return out;
+}
+
+static span some_of(const widening *w, int64_t first, int64_t count)
+{
+    span out = {-1, first, count, {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
+    float lower[3], upper[3];
+    for (int64_t n = 0; n < count; n++) {
+        box_of(w->of, w->binary->cells[first + n], lower, upper);
+        grow_box(out.box, lower, upper);
+    }
+    return out;
+}
+
+/* Divides a span of more pieces than there are lanes. */
+static void divide(const widening *w, const span *whole, span out[2])
+{
+    const int64_t half = whole->count / 2;
+    if (whole->node >= 0 && !mmbvh_node_count(w->binary, whole->node)) {
+        for (int n = 0; n < 2; n++) out[n] = span_of(w, mmbvh_node_ref(w->binary, whole->node) + n);
+        return;
+    }
+    const span both[2] = {some_of(w, whole->first, half), some_of(w, whole->first + half, whole->count - half)};
+    memcpy(out, both, sizeof both);
+}
+
+/* Divides the largest until there are as many as there are lanes. */
+static int divide_all(const widening *w, const span *whole, span *out)
+{
+    int count = 1;
+    out[0] = *whole;
+    while (count < w->width) {
+        int largest = -1;
+        for (int i = 0; i < count; i++)
+            if (out[i].count > w->width && (largest < 0 || area_of(out[i].box) > area_of(out[largest].box)))
+                largest = i;
+        if (largest < 0) break;
+        span halves[2];
+        divide(w, &out[largest], halves);
+        out[largest] = halves[0];
+        out[count++] = halves[1];
+    }
+    return count;
+}
+
+/* Sources are the pieces' numbers. Lanes without a piece are met by no ray. */
+static int32_t make_leaf(widening *w, const span *of)
+{
+    const int32_t leaf = w->out->leaf_count++;
+    const int rows = w->of->rows, width = w->width;
+    float *to = w->out->leaves + (int64_t)leaf * rows * width;
+    int32_t *sources = w->out->sources + (int64_t)leaf * width;
+    for (int64_t i = 0; i < width; i++) {
+        const bool is_there = i < of->count;
+        const int64_t piece = w->binary->cells[of->first + (is_there ? i : 0)];
+        const float *from = rows_of(w->of, piece);
+        sources[i] = is_there ? (int32_t)piece : -1;
+        for (int row = 0; row < rows; row++) to[row * width + i] = is_there ? from[row] : NAN;
+        for (int row = 0; !is_there && rows == KERNEL_SLAB_ROWS && row < 6; row++)
+            to[row * width + i] = row < 3 ? INFINITY : -INFINITY;
+    }
+    return ~leaf;
+}
+
+static int32_t make_node(widening *w, const span *of)
+{
+    span children[MOST_LANES];
+    const int32_t node = w->out->node_count++;
+    const int count = divide_all(w, of, children), width = w->width;
+    float *boxes = w->out->boxes + (int64_t)node * 6 * width;
+    int32_t *links = w->out->children + (int64_t)node * width;
+    for (int i = 0; i < width; i++)
+        for (int row = 0; row < 6; row++)
+            boxes[row * width + i] = i < count ? children[i].box[row] : row < 3 ? INFINITY : -INFINITY;
+    for (int i = 0; i < width; i++)
+        links[i] = i >= count                      ? 0
+                   : children[i].count <= w->width ? make_leaf(w, &children[i])
+                                                   : make_node(w, &children[i]);
+    return node;
+}
+
+/* Room for what the binary tree may become at most; what is not used is not there. */
+static bool reserve(const widening *w, size_t nodes, size_t leaves)
+{
+    const size_t width = (size_t)w->width;
+    w->out->boxes = base_reserve(nodes * 6 * width * sizeof(float));
+    w->out->children = base_reserve(nodes * width * sizeof(int32_t));
+    w->out->leaves = base_reserve(leaves * (size_t)w->of->rows * width * sizeof(float));
+    w->out->sources = base_reserve(leaves * width * sizeof(int32_t));
+    return w->out->boxes && w->out->children && w->out->leaves && w->out->sources;
+}
+
+static void count_use(const widening *w)
+{
+    const size_t width = (size_t)w->width, nodes = (size_t)w->out->node_count, leaves = (size_t)w->out->leaf_count;
+    base_use(w->out->boxes, nodes * 6 * width * sizeof(float));
+    base_use(w->out->children, nodes * width * sizeof(int32_t));
+    base_use(w->out->leaves, leaves * (size_t)w->of->rows * width * sizeof(float));
+    base_use(w->out->sources, leaves * width * sizeof(int32_t));
+}
+
+static bool widen(widening *w)
+{
+    const size_t nodes = (size_t)w->binary->node_count;
+    w->first = base_alloc(nodes * sizeof *w->first);
+    w->count = base_alloc(nodes * sizeof *w->count);
+    w->boxes = base_alloc(nodes * 6 * sizeof *w->boxes);
+    const bool is_well = w->first && w->count && w->boxes && reserve(w, nodes, nodes + 1);
+    if (is_well) {
+        sum_up(w);
+        const span all = span_of(w, 0);
+        make_node(w, &all);
+        count_use(w);
+        for (int k = 0; k < 6; k++) w->out->size = fmaxf(w->out->size, fabsf(w->boxes[k]));
+    }
+    base_free(w->first);
+    base_free(w->count);
+    base_free(w->boxes);
+    return is_well;
+}
+
+static insitu_status build_boxes(const occluder_pieces *of, int threads, mmbvh *out, base_error *error)
+{
+    const size_t bytes = (size_t)of->count * 3 * sizeof(float);
+    float *lower = base_alloc(bytes), *upper = base_alloc(bytes),
+          *ranges = base_calloc((size_t)of->count * 2, sizeof(float));
+    const mmbvh_options options = {.threads = threads, .layout = MMBVH_REFERENCE, .builder = MMBVH_SAH};
+    insitu_status status = INSITU_OK;
+    if (!lower || !upper || !ranges) {
+        status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for the boxes of %lld pieces of surfaces",
+                           (long long)of->count);
+    } else {
+#pragma omp parallel for num_threads(threads) schedule(static)
+        for (int64_t i = 0; i < of->count; i++) box_of(of, i, lower + 3 * i, upper + 3 * i);
+        status = mmbvh_build_boxes(lower, upper, ranges, of->count, &options, out, error);
+    }
+    base_free(lower);
+    base_free(upper);
+    base_free(ranges);
+    return status;
+}
+
+insitu_status occluder_tree_build(const occluder_pieces *of, int width, int threads, kernel_occluder_tree *out,
+                                  base_error *error)
+{
+    mmbvh binary = {0};
+    widening w = {.of = of, .binary = &binary, .width = width, .out = out};
+    if (!of->count) return INSITU_OK;
+    insitu_status status = build_boxes(of, threads, &binary, error);
+    if (!status && !widen(&w))
+        status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for a tree of %lld pieces of surfaces",
+                           (long long)of->count);
+    mmbvh_free(&binary);
+    return status;
+}
+
+void occluder_tree_free(kernel_occluder_tree *tree)
+{
+    base_free(tree->boxes);
+    base_free(tree->children);
+    base_free(tree->leaves);
+    base_free(tree->sources);
+}

@@ -1,0 +1,478 @@
+/* Threads go through the subtrees of the meshes' trees, and each gathers what its cells hold; the lists are joined, and
+ * render_occluder_tree.c makes trees of them. The order in these is of no consequence (kernel_occluders.h).
+ *
+ * A plane between which and its like a cell's surface lies: L is the linear function that is nearest to the values at
+ * the vertices. Place and value of any point of the cell are means of the vertices' with the same weights, so that
+ * nowhere in it they differ from L by more than at some vertex. */
+#include "render_occluders.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_cell_values.h"
+#include "kernel_interest.h"
+#include "memory.h"
+#include "mmbvh.h"
+#include "render_occluder_tree.h"
+#include "render_subtrees.h"
+
+typedef struct triangle {
+    float rows[KERNEL_TRIANGLE_ROWS];
+    int32_t surface;
+} triangle;
+
+typedef struct slab {
+    float rows[KERNEL_SLAB_ROWS];
+    kernel_occluder cell;
+} slab;
+
+typedef struct hex_record {
+    float words[KERNEL_HEX_RECORD_WORDS];
+} hex_record;
+
+/* A list that grows. */
+typedef struct list {
+    int64_t count, room;
+    void *items;
+} list;
+
+/* What one thread finds, or all of them. */
+typedef struct finds {
+    list triangles, slabs, hexes;
+    bool out_of_memory;
+} finds;
+
+/* A place for one more; NULL where memory ran out. */
+static void *add(finds *f, list *l, size_t size)
+{
+    if (l->count == l->room) {
+        const int64_t room = l->room + l->room / 2 + 256;
+        void *items = base_realloc(l->items, (size_t)room * size);
+        if (!items) {
+            f->out_of_memory = true;
+            return NULL;
+        }
+        l->items = items;
+        l->room = room;
+    }
+    return (char *)l->items + (size_t)l->count++ * size;
+}
+
+static void free_finds(finds *f)
+{
+    base_free(f->triangles.items);
+    base_free(f->slabs.items);
+    base_free(f->hexes.items);
+}
+
+/* ---- a cell --------------------------------------------------------------------------------------------------- */
+
+/* The cell that is looked at, and which of its isovalues. */
+typedef struct subject {
+    finds *into;
+    const kernel_frame *frame;
+    int surface, part, value;
+    uint32_t index;
+    int count; /* of vertices; a polyhedron's come more than once */
+    list places, values;
+    double reach;
+} subject;
+
+static const double *place_of(const subject *s, int i)
+{
+    return (const double *)s->places.items + (ptrdiff_t)3 * i;
+}
+
+static double value_of(const subject *s, int i)
+{
+    return ((const double *)s->values.items)[i];
+}
+
+static void bounds_of(const subject *s, double low[3], double high[3])
+{
+    for (int a = 0; a < 3; a++) low[a] = high[a] = place_of(s, 0)[a];
+    for (int i = 1; i < s->count; i++)
+        for (int a = 0; a < 3; a++) {
+            low[a] = fmin(low[a], place_of(s, i)[a]);
+            high[a] = fmax(high[a], place_of(s, i)[a]);
+        }
+}
+
+/* How near to the hit the cell hides nothing: kernel_occlusion_size(), in tree space. */
+static double reach_of(const subject *s, double contact)
+{
+    double low[3], high[3], volume = 1, longest = 0;
+    if (!(contact > 0)) return 0;
+    bounds_of(s, low, high);
+    for (int a = 0; a < 3; a++) {
+        volume *= high[a] - low[a];
+        longest = fmax(longest, high[a] - low[a]);
+    }
+    return contact * (volume > 0 ? cbrt(volume) : longest);
+}
+
+static bool add_vertex(subject *s, const double world[3], double value)
+{
+    const render_space *space = &s->frame->job->space;
+    double *place = add(s->into, &s->places, 3 * sizeof *place), *kept = add(s->into, &s->values, sizeof *kept);
+    if (!place || !kept) return false;
+    for (int a = 0; a < 3; a++) place[a] = (world[a] - space->origin[a]) * space->scale;
+    *kept = value;
+    s->count++;
+    return true;
+}
+
+static bool straddles(const subject *s, double isovalue)
+{
+    bool below = false, above = false;
+    for (int i = 0; i < s->count; i++) {
+        below = below || value_of(s, i) < isovalue;
+        above = above || value_of(s, i) >= isovalue;
+    }
+    return below && above;
+}
+
+/* ---- tets ------------------------------------------------------------------------------------------------------ */
+
+/* Where the surface crosses the edge between two vertices, the first one first in the order of coordinates. */
+static void cross_edge(const subject *s, double isovalue, int i, int j, float out[3])
+{
+    const double *a = place_of(s, i), *b = place_of(s, j);
+    const double va = value_of(s, i) - isovalue, vb = value_of(s, j) - isovalue, w = va / (va - vb);
+    for (int k = 0; k < 3; k++) out[k] = (float)(a[k] + w * (b[k] - a[k]));
+}
+
+static void add_triangle(subject *s, float a[3], float b[3], float c[3])
+{
+    triangle *t = add(s->into, &s->into->triangles, sizeof *t);
+    if (!t) return;
+    memcpy(t->rows, a, 3 * sizeof *a);
+    memcpy(t->rows + 3, b, 3 * sizeof *b);
+    memcpy(t->rows + 6, c, 3 * sizeof *c);
+    t->rows[KERNEL_TRIANGLE_REACH] = (float)s->reach;
+    t->surface = s->surface;
+}
+
+/* The vertices are in the order of coordinates. */
+static void add_tet(subject *s, double isovalue)
+{
+    float at[4][3];
+    int below[4], above[4], belows = 0, aboves = 0, n = 0;
+    for (int i = 0; i < 4; i++)
+        if (value_of(s, i) < isovalue)
+            below[belows++] = i;
+        else
+            above[aboves++] = i;
+    /* Around the piece: the second vertex below takes those above from the last on. */
+    for (int i = 0; i < belows; i++)
+        for (int k = 0; k < aboves; k++) {
+            const int j = i % 2 ? aboves - 1 - k : k, p = below[i], q = above[j];
+            cross_edge(s, isovalue, p < q ? p : q, p < q ? q : p, at[n++]);
+        }
+    add_triangle(s, at[0], at[1], at[2]);
+    if (n == 4) add_triangle(s, at[0], at[2], at[3]);
+}
+
+/* ---- slabs ----------------------------------------------------------------------------------------------------- */
+
+/* Solves m x = b, m symmetric; zero where it is nearly singular, which leaves the whole cell to the slab. */
+static void solve(double m[3][3], const double b[3], double x[3])
+{
+    double inverse[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+            inverse[k][i] = m[i1][k1] * m[i2][k2] - m[i1][k2] * m[i2][k1];
+        }
+    const double det = m[0][0] * inverse[0][0] + m[0][1] * inverse[1][0] + m[0][2] * inverse[2][0];
+    const double size = m[0][0] + m[1][1] + m[2][2];
+    for (int i = 0; i < 3; i++) {
+        x[i] = 0;
+        if (det > 1e-12 * size * size * size)
+            for (int k = 0; k < 3; k++) x[i] += inverse[i][k] * b[k] / det;
+    }
+}
+
+/* L's gradient; where L is off by the least at the mean of the vertices. Values are less the isovalue, times scale. */
+static void fit(const subject *s, double isovalue, double scale, double gradient[3], double *level)
+{
+    double mean[3] = {0, 0, 0}, value = 0, m[3][3] = {{0}}, b[3] = {0, 0, 0};
+    for (int i = 0; i < s->count; i++) {
+        for (int a = 0; a < 3; a++) mean[a] += place_of(s, i)[a] / s->count;
+        value += (value_of(s, i) - isovalue) * scale / s->count;
+    }
+    for (int i = 0; i < s->count; i++) {
+        double d[3];
+        for (int a = 0; a < 3; a++) d[a] = place_of(s, i)[a] - mean[a];
+        for (int a = 0; a < 3; a++) {
+            b[a] += d[a] * ((value_of(s, i) - isovalue) * scale - value);
+            for (int k = 0; k < 3; k++) m[a][k] += d[a] * d[k];
+        }
+    }
+    solve(m, b, gradient);
+    *level = value;
+    for (int a = 0; a < 3; a++) *level -= gradient[a] * mean[a];
+}
+
+static double scale_of(const subject *s, double isovalue)
+{
+    double largest = 0;
+    for (int i = 0; i < s->count; i++) largest = fmax(largest, fabs(value_of(s, i) - isovalue));
+    return kernel_mirrored_power(largest);
+}
+
+static void fill_slab(const subject *s, double isovalue, slab *out)
+{
+    double low[3], high[3], gradient[3], level, off = 0, steep = 0, size = 0;
+    const double scale = scale_of(s, isovalue);
+    bounds_of(s, low, high);
+    fit(s, isovalue, scale, gradient, &level);
+    for (int i = 0; i < s->count; i++) {
+        double l = level;
+        for (int a = 0; a < 3; a++) l += gradient[a] * place_of(s, i)[a];
+        off = fmax(off, fabs((value_of(s, i) - isovalue) * scale - l));
+    }
+    for (int a = 0; a < 3; a++) {
+        steep += fabs(gradient[a]);
+        size = fmax(size, fmax(fabs(low[a]), fabs(high[a])));
+        out->rows[KERNEL_SLAB_LOWER + a] = (float)low[a];
+        out->rows[KERNEL_SLAB_UPPER + a] = (float)high[a];
+        out->rows[KERNEL_SLAB_GRADIENT + a] = (float)gradient[a];
+    }
+    out->rows[KERNEL_SLAB_LEVEL] = (float)level;
+    /* Values round to 6e-8 of the largest, and roots may be off by KERNEL_ROOT_BAND and what places round by. */
+    out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
+    out->rows[KERNEL_SLAB_BLUR] = (float)(16 * 6e-8 * steep);
+    out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
+}
+
+/* Faces' corners and diagonals as kernel_placed_hexes has them. */
+static void fill_faces(const kernel_cell *c, hex_record *out)
+{
+    int32_t turned = 0;
+    for (int face = 0; face < 6; face++) {
+        const signed char *loop = kernel_shapes[0].faces[face].vertices;
+        int corner[4];
+        kernel_quad_corners(c, loop, corner);
+        const int32_t word = corner[0] | corner[1] << 4 | corner[2] << 8 | corner[3] << 12;
+        if (corner[0] == loop[1] || corner[0] == loop[3]) turned |= 1 << face;
+        memcpy(&out->words[KERNEL_HEX_RECORD_QUADS + face], &word, sizeof word);
+    }
+    memcpy(&out->words[KERNEL_HEX_RECORD_TURNED], &turned, sizeof turned);
+    out->words[KERNEL_HEX_RECORD_WORDS - 1] = 0;
+}
+
+static bool collapses(const kernel_cell *c)
+{
+    for (int face = 0; face < 6; face++) {
+        int corner[4];
+        kernel_quad_corners(c, kernel_shapes[0].faces[face].vertices, corner);
+        if (kernel_quad_collapses(c, corner)) return true;
+    }
+    return false;
+}
+
+/* Returns the number of the hex's record, or -1 where it is for the cell alone. */
+static int32_t add_hex(subject *s, const kernel_cell *c, double isovalue)
+{
+    const double scale = scale_of(s, isovalue);
+    if (s->frame->job->clip_count || collapses(c)) return -1;
+    hex_record *record = add(s->into, &s->into->hexes, sizeof *record);
+    if (!record) return -1;
+    for (int i = 0; i < 8; i++) {
+        for (int a = 0; a < 3; a++) record->words[4 * i + a] = (float)place_of(s, i)[a];
+        record->words[4 * i + 3] = (float)((value_of(s, i) - isovalue) * scale);
+    }
+    fill_faces(c, record);
+    return (int32_t)s->into->hexes.count - 1;
+}
+
+static void add_slab(subject *s, const kernel_cell *c, double isovalue)
+{
+    const int32_t record = c->type == GRID_HEX ? add_hex(s, c, isovalue) : -1;
+    slab *out = add(s->into, &s->into->slabs, sizeof *out);
+    if (!out) return;
+    fill_slab(s, isovalue, out);
+    out->cell = (kernel_occluder){s->surface, s->value, s->part, s->index, record};
+}
+
+/* ---- finding --------------------------------------------------------------------------------------------------- */
+
+/* The vertices of a cell that is no polyhedron, in the order that kernels have them in. */
+static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
+{
+    for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);
+    kernel_cell_order(c);
+    for (int i = 0; i < c->count; i++)
+        if (!add_vertex(s, c->world[i], c->values[i])) return false;
+    return true;
+}
+
+static bool take_polyhedron(subject *s, const grid *g, const grid_field *field)
+{
+    grid_walk walk = grid_walk_cell(g, s->index);
+    int64_t vertex;
+    double world[3];
+    while (grid_walk_next(&walk, &vertex)) {
+        grid_vertex(g, vertex, world);
+        if (!add_vertex(s, world, grid_field_value(field, vertex))) return false;
+    }
+    return s->count > 0;
+}
+
+static void find_in_cell(subject *s)
+{
+    const render_surface_layer *layer = s->frame->surfaces[s->surface].layer;
+    const grid *g = s->frame->job->parts[s->part].cells;
+    const grid_field *field = &layer->field.fields[s->part];
+    kernel_cell c = {.type = 0};
+    kernel_cell_fetch(&c, g, field, s->index);
+    const bool is_polyhedron = c.type == GRID_POLYHEDRON;
+    if (!is_polyhedron && !c.is_finite) return;
+    s->count = 0;
+    s->places.count = s->values.count = 0;
+    if (is_polyhedron ? !take_polyhedron(s, g, field) : !take_vertices(s, &c, g)) return;
+    s->reach = reach_of(s, (double)layer->contact);
+    for (s->value = 0; s->value < layer->value_count; s->value++) {
+        const double isovalue = layer->values[s->value];
+        if (!straddles(s, isovalue)) continue;
+        if (c.type == GRID_TET)
+            add_tet(s, isovalue);
+        else
+            add_slab(s, &c, isovalue);
+    }
+}
+
+static void find_in_subtree(subject *s, const kernel_subtree *subtree)
+{
+    const mmbvh *tree = s->frame->job->parts[subtree->part].tree;
+    const kernel_surface *surface = &s->frame->surfaces[subtree->surface];
+    const mmbvh_ranges *ranges = &surface->layer->field.ranges[subtree->part];
+    int64_t stack[MMBVH_MAX_DEPTH];
+    int top = 0;
+    s->surface = subtree->surface;
+    s->part = subtree->part;
+    stack[top++] = subtree->node;
+    while (top && !s->into->out_of_memory) {
+        const int64_t node = stack[--top], ref = mmbvh_node_ref(tree, node);
+        const int count = mmbvh_node_count(tree, node);
+        if (!kernel_node_shows(&surface->interest, ranges, node)) continue;
+        for (int n = 0; n < count; n++) {
+            s->index = tree->cells[ref + n];
+            find_in_cell(s);
+        }
+        if (count) continue;
+        stack[top++] = ref + 1;
+        stack[top++] = ref;
+    }
+}
+
+static bool list_subtrees(const kernel_frame *frame, render_subtrees *out)
+{
+    const render_job *job = frame->job;
+    if (!render_subtrees_begin(out, (int64_t)frame->opaque_count * job->part_count + 1)) return false;
+    for (int i = 0; i < frame->opaque_count; i++)
+        for (int part = 0; part < job->part_count; part++)
+            if (frame->surfaces[i].layer->field.ranges[part].low && job->parts[part].tree->node_count)
+                render_subtrees_add(out, frame, i, part);
+    return true;
+}
+
+/* Appends one list to another. */
+static bool join(list *to, list *from, size_t size)
+{
+    if (!to->items) {
+        *to = *from;
+        *from = (list){0};
+        return true;
+    }
+    if (!from->count) return true;
+    void *items = base_realloc(to->items, (size_t)(to->count + from->count) * size);
+    if (!items) return false;
+    memcpy((char *)items + (size_t)to->count * size, from->items, (size_t)from->count * size);
+    *to = (list){to->count + from->count, to->count + from->count, items};
+    return true;
+}
+
+static bool join_finds(finds *to, finds *from)
+{
+    const int64_t hexes = to->hexes.count;
+    slab *slabs = from->slabs.items;
+    for (int64_t i = 0; i < from->slabs.count; i++)
+        if (slabs[i].cell.record >= 0) slabs[i].cell.record += (int32_t)hexes;
+    return !from->out_of_memory && join(&to->triangles, &from->triangles, sizeof(triangle)) &&
+           join(&to->slabs, &from->slabs, sizeof(slab)) && join(&to->hexes, &from->hexes, sizeof(hex_record));
+}
+
+static bool find_all(const kernel_frame *frame, const render_subtrees *subtrees, int threads, finds *out)
+{
+    bool is_well = true;
+#pragma omp parallel num_threads(threads) reduction(&& : is_well)
+    {
+        finds own = {0};
+        subject s = {.into = &own, .frame = frame};
+#pragma omp for schedule(dynamic, 1) nowait
+        for (int64_t i = 0; i < subtrees->count; i++) find_in_subtree(&s, &subtrees->items[i]);
+#pragma omp critical(occluders)
+        is_well = join_finds(out, &own);
+        base_free(s.places.items);
+        base_free(s.values.items);
+        free_finds(&own);
+    }
+    return is_well;
+}
+
+/* ---- all of it -------------------------------------------------------------------------------------------------- */
+
+static insitu_status build_trees(const finds *f, int threads, kernel_occluders *out, base_error *error)
+{
+    const triangle *t = f->triangles.items;
+    const slab *s = f->slabs.items;
+    const occluder_pieces triangles = {f->triangles.items, sizeof *t, f->triangles.count, KERNEL_TRIANGLE_ROWS};
+    const occluder_pieces slabs = {f->slabs.items, sizeof *s, f->slabs.count, KERNEL_SLAB_ROWS};
+    insitu_status status = occluder_tree_build(&triangles, out->width, threads, &out->triangles, error);
+    if (!status) status = occluder_tree_build(&slabs, out->width, threads, &out->slabs, error);
+    if (status) return status;
+    out->cells = base_alloc((size_t)f->slabs.count * sizeof *out->cells);
+    if (!out->cells)
+        return base_fail(error, INSITU_ERROR_MEMORY, "no memory for %lld cells", (long long)f->slabs.count);
+    for (int64_t i = 0; i < f->slabs.count; i++) out->cells[i] = s[i].cell;
+    for (int64_t i = 0; i < out->triangles.leaf_count * out->width; i++) {
+        int32_t *source = &out->triangles.sources[i];
+        *source = *source < 0 ? -1 : t[*source].surface;
+    }
+    return INSITU_OK;
+}
+
+insitu_status occluders_build(const kernel_frame *frame, int width, int threads, kernel_occluders *out,
+                              base_error *error)
+{
+    render_subtrees subtrees = {0};
+    finds all = {0};
+    insitu_status status = INSITU_OK;
+    *out = (kernel_occluders){.width = width};
+    if (!list_subtrees(frame, &subtrees) || !find_all(frame, &subtrees, threads, &all))
+        status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for what blocks rays from hits");
+    if (!status && (all.triangles.count > INT32_MAX / 2 || all.slabs.count > INT32_MAX / 64))
+        status = base_fail(error, INSITU_ERROR_MEMORY, "shadows: %lld pieces of surfaces on a rank are too many",
+                           (long long)(all.triangles.count + all.slabs.count));
+    if (!status) status = build_trees(&all, threads, out, error);
+    out->hexes = all.hexes.items;
+    all.hexes.items = NULL;
+    free_finds(&all);
+    base_free(subtrees.items);
+    return status;
+}
+
+void occluders_free(kernel_occluders *occluders)
+{
+    occluder_tree_free(&occluders->triangles);
+    occluder_tree_free(&occluders->slabs);
+    base_free(occluders->cells);
+    base_free(occluders->hexes);
+    *occluders = (kernel_occluders){0};
+}
