@@ -92,7 +92,7 @@ typedef struct kernel_straights {
 
 typedef struct kernel_plumb {
     const kernel_straight *ray;
-    /* Planes are met at plane * inverse - shift; boxes are widened by what that rounds by. */
+    /* Planes are met at plane * inverse + shift; boxes are widened by what that rounds by. */
     vf inverse[3], near_shift[3], far_shift[3];
     int near_row[3], far_row[3];
     int kx, ky, kz; /* kz: the direction's largest axis */
@@ -123,8 +123,8 @@ SIMD_INLINE void kernel_plumb_begin(const kernel_straight *ray, float tree_size,
         const float inverse = 1 / (fabsf(d) < 1e-12f ? least : d), shift = ray->origin[a] * inverse;
         const float pad = 16 * 6e-8f * size * fabsf(inverse);
         p->inverse[a] = vf_set(inverse);
-        p->near_shift[a] = vf_set(shift + pad);
-        p->far_shift[a] = vf_set(shift - pad);
+        p->near_shift[a] = vf_set(-(shift + pad));
+        p->far_shift[a] = vf_set(-(shift - pad));
         p->near_row[a] = (inverse < 0 ? 3 + a : a) * SIMD_WIDTH;
         p->far_row[a] = (inverse < 0 ? a : 3 + a) * SIMD_WIDTH;
     }
@@ -137,8 +137,8 @@ SIMD_INLINE vm kernel_plumb_boxes(const kernel_plumb *p, const float *rows, vf *
     *low = vf_set(0);
     *high = vf_set(p->ray->far);
     for (int a = 0; a < 3; a++) {
-        *low = vf_max(vf_load(rows + p->near_row[a]) * p->inverse[a] - p->near_shift[a], *low);
-        *high = vf_min(vf_load(rows + p->far_row[a]) * p->inverse[a] - p->far_shift[a], *high);
+        *low = vf_max(vf_muladd(vf_load(rows + p->near_row[a]), p->inverse[a], p->near_shift[a]), *low);
+        *high = vf_min(vf_muladd(vf_load(rows + p->far_row[a]), p->inverse[a], p->far_shift[a]), *high);
     }
     return vf_le(*low, *high);
 }

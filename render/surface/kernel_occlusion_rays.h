@@ -10,8 +10,9 @@
 #include "render.h"
 #include "simd.h"
 
-/* Nodes, and leaves as ~leaf, that a ray is still to go to. */
-enum { KERNEL_PATH_STACK = MMBVH_MAX_DEPTH * (SIMD_WIDTH - 1) + 1 };
+/* Nodes, and leaves as ~leaf, that a ray is still to go to: a node has all its children there but the one gone to, and
+ * is no deeper than a binary tree's leaf that is divided once more. */
+enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
 typedef struct kernel_path {
     const kernel_occluder_tree *tree;
