@@ -12,7 +12,7 @@
 
 enum { SAMPLES = 16 };
 
-/* A sixth of the mesh's side, as a scene's default is of its diagonal. */
+/* The radius is a sixth of the mesh's side, about a tenth of its diagonal, as a scene has it by default. */
 static const render_occlusion shadows = {1, 0, 1}, sky = {0, SAMPLES, 1.0 / 3};
 
 /* The rays of one kind. */
