@@ -413,8 +413,10 @@ SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kerne
         hits->normal[a][ray] = hit->normal[a];
         hits->colour[a][ray] = hit->colour[a];
     }
-    hits->cells.part[ray] = hit->part;
-    hits->cells.index[ray] = (int32_t)hit->cell;
+    if (s->layer->normal == RENDER_VERTEX) {
+        hits->cells.part[ray] = hit->part;
+        hits->cells.index[ray] = (int32_t)hit->cell;
+    }
     hits->kind[ray] = (float)((int)s->first_kind + hit->value);
     return 1u << at / (KERNEL_BLOCK * KERNEL_BLOCK);
 }

@@ -55,8 +55,9 @@ SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c,
     }
 }
 
-SIMD_INLINE void kernel_tet_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value,
-                                    vm rays)
+/* A function of its own, so that its vectors stay in registers beside the larger one of other cells. */
+static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kernel_surface_state *state,
+                                                         const kernel_cell *c, int value, vm rays)
 {
     const bool has_colour = state->surface->layer->colour_map != NULL;
     kernel_interval i;
@@ -115,8 +116,8 @@ SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *stat
     } while (kernel_search_on(&s));
 }
 
-SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
-                                     kernel_poly *poly, int value, vm rays)
+static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kernel_surface_state *state,
+                                                          const kernel_cell *c, kernel_poly *poly, int value, vm rays)
 {
     const render_surface_layer *layer = state->surface->layer;
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
@@ -141,8 +142,8 @@ SIMD_INLINE void kernel_poly_surface(kernel_packet *p, kernel_surface_state *sta
 
 /* In a cell that is neither a polyhedron nor without finite values: its surface of an isovalue. The cell is in the
  * frame's coordinates. */
-static __attribute__((noinline)) void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state,
-                                                          const kernel_cell *c, kernel_poly *poly, int value, vm rays)
+SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
+                                     kernel_poly *poly, int value, vm rays)
 {
     if (c->type == GRID_TET)
         kernel_tet_surface(p, state, c, value, rays);
