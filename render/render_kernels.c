@@ -2,6 +2,7 @@
  * its surfaces first, so that volumes know where opaque ones end them. A tile is traced in one traversal, or packet by
  * packet. */
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_batch.h"
 #include "kernel_bins.h"
 #include "kernel_bounds.h"
@@ -33,14 +34,15 @@
 
 /* ---- isosurfaces in the cells that are binned in a tile ---- */
 
-static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const kernel_packed *packed,
-                             const kernel_tile_candidate *candidate, int part, int value, unsigned blocks)
+static void kernel_tile_meet(kernel_tile_trace *t, const kernel_arrays *arrays, const kernel_tile_candidate *candidate,
+                             int part, int value, unsigned blocks)
 {
     const render_surface_layer *layer = t->surface->layer;
     const grid *g = t->frame->job->parts[part].cells;
     kernel_cell *c = t->cell;
-    if (packed->is_tets) {
-        kernel_packed_cell(c, packed, t->frame, &t->tile, candidate->cell);
+    if (arrays->has_lanes && kernel_arrays_type(arrays, candidate->cell) == GRID_TET) {
+        kernel_arrays_fetch(c, arrays, candidate->cell, 4);
+        kernel_tet_place(c, t->frame, &t->tile);
     } else {
         kernel_cell_fetch(c, g, &layer->field.fields[part], candidate->cell);
         if (c->type == GRID_POLYHEDRON) {
@@ -52,12 +54,6 @@ static void kernel_tile_meet(kernel_tile_trace *t, kernel_hexes *hexes, const ke
     kernel_cell_relative(c, layer->values[value]);
     kernel_tile_ready(t, part);
     t->poly->is_set_up = false;
-    if (c->type == GRID_HEX) kernel_poly_setup(t->frame, &t->tile, t->poly, layer, c, value);
-    if (kernel_hexes_take(t, c)) {
-        kernel_hexes_turn(t, hexes, packed, part);
-        kernel_hexes_add(t, hexes, candidate, value);
-        return;
-    }
     kernel_blocks_meet(t, blocks, part, c->index, c, value);
 }
 
@@ -84,7 +80,7 @@ SIMD_INLINE void kernel_candidate_prefetch(const kernel_frame *f, const kernel_t
     for (int at = 0; at < active->vertices * KERNEL_ACTIVE_FLOATS; at += 16) __builtin_prefetch(record + at);
 }
 
-/* Cells whose vertices' indices are being prefetched. */
+/* Cells whose vertices' indices are being prefetched, or that are traced alone. */
 typedef struct kernel_pending {
     int count;
     const kernel_tile_candidate *items[SIMD_WIDTH];
@@ -95,17 +91,40 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
 }
 
+/* Is the cell, of the batch's layer and part, put into a batch? */
+SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b, uint32_t cell)
+{
+    const int type = kernel_arrays_type(&b->arrays, cell);
+    return type == GRID_TET ? b->takes_batches : type == GRID_HEX && kernel_hexes_fit(t, &b->arrays);
+}
+
+/* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
+static void kernel_tile_meet_others(kernel_tile_trace *t, kernel_batch *b, kernel_hexes *h, kernel_pending *others)
+{
+    if (!others->count) return;
+    kernel_batch_end(t, b);
+    kernel_hexes_end(t, h);
+    for (int n = 0; n < others->count; n++) {
+        int part;
+        const int value = kernel_tile_source(t, others->items[n]->source, &part);
+        const unsigned blocks = kernel_candidate_blocks(t, others->items[n]);
+        kernel_batch_turn(t, b, part);
+        if (blocks) kernel_tile_meet(t, &b->arrays, others->items[n], part, value, blocks);
+    }
+    others->count = 0;
+}
+
 /* Prefetches the vertices of all pending cells, then traces them. */
 static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_batch *b, kernel_hexes *h,
-                                                               kernel_pending *w)
+                                                               kernel_pending *w, kernel_pending *others)
 {
     for (int n = 0; n < w->count; n++) {
         int part;
         kernel_tile_source(t, w->items[n]->source, &part);
         if (!b->count) kernel_batch_turn(t, b, part);
-        const bool is_known = b->layer == t->layer && b->part == part;
-        if (kernel_active_of(t->frame, t->layer, part)) continue;                        /* all of it was asked for */
-        if (is_known && (b->takes_batches || kernel_hexes_fit(t, &b->packed))) continue; /* batches ask for theirs */
+        if (kernel_active_of(t->frame, t->layer, part)) continue; /* all of it was asked for */
+        if (b->layer == t->layer && b->part == part && kernel_is_for_batch(t, b, w->items[n]->cell))
+            continue; /* batches ask for theirs */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                  w->items[n]->cell);
     }
@@ -115,13 +134,15 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
         const unsigned blocks = kernel_candidate_blocks(t, w->items[n]);
         if (!blocks) continue;
         kernel_batch_turn(t, b, part);
-        if (b->takes_batches) {
+        const int type = kernel_arrays_type(&b->arrays, w->items[n]->cell);
+        if (type == GRID_TET && b->takes_batches) {
             kernel_batch_add(t, b, w->items[n], value);
-        } else if (kernel_hexes_fit(t, &b->packed)) {
-            kernel_hexes_turn(t, h, &b->packed, part);
+        } else if (type == GRID_HEX && kernel_hexes_fit(t, &b->arrays)) {
+            kernel_hexes_turn(t, h, &b->arrays, part);
             kernel_hexes_wait(t, h, w->items[n], value);
         } else {
-            kernel_tile_meet(t, h, &b->packed, w->items[n], part, value, blocks);
+            if (others->count == SIMD_WIDTH) kernel_tile_meet_others(t, b, h, others);
+            others->items[others->count++] = w->items[n];
         }
     }
     w->count = 0;
@@ -133,7 +154,7 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
 {
     kernel_batch batch;
     kernel_hexes hexes;
-    kernel_pending pending = {0};
+    kernel_pending pending = {0}, others = {0};
     kernel_batch_begin(&batch);
     kernel_hexes_begin(&hexes);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
@@ -145,9 +166,10 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
             pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &batch, &hexes, &pending);
+            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &batch, &hexes, &pending, &others);
         }
-    kernel_tile_meet_pending(t, &batch, &hexes, &pending);
+    kernel_tile_meet_pending(t, &batch, &hexes, &pending, &others);
+    kernel_tile_meet_others(t, &batch, &hexes, &others);
     kernel_batch_end(t, &batch);
     kernel_hexes_end(t, &hexes);
 }

@@ -264,7 +264,7 @@ static void other_meshes_and_layouts_are_not_kept(void **state)
     (void)state;
     static const test_layout wide[4] = {{.wide_coordinates = true},
                                         {.wide_values = true},
-                                        {.wide_indices = true},
+                                        {.with_types = true},
                                         {.wide_coordinates = true, .wide_values = true, .wide_indices = true}};
     for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++)
         for (int layout = -1; layout < 4; layout++) {
@@ -282,6 +282,23 @@ static void other_meshes_and_layouts_are_not_kept(void **state)
             fixture_free(&f);
             render_active_cells_free(kept);
         }
+}
+
+/* A record has numbers, and no indices. */
+static void cells_of_wide_indices_are_kept(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        render_fixture f;
+        render_active_cells *kept = render_active_cells_create();
+        lattice(&f, plain_kinds[i], 4, (test_layout){.wide_indices = true}, test_wave);
+        fixture_add_surface(&f, three_values, 3, 1);
+        f.surfaces[0].root = RENDER_ROBUST;
+        look_around(&f, kept, test_mesh_kind_name(plain_kinds[i]));
+        assert_true(render_active_cells_bytes(kept) > 0);
+        fixture_free(&f);
+        render_active_cells_free(kept);
+    }
 }
 
 /* Layers that need more of a cell than is kept. Tets are kept for any root finder, as they have one root. */
@@ -747,6 +764,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(small_pictures_of_many_cells_draw_the_same),
         cmocka_unit_test(subsets_of_pixels_and_other_traversals_draw_the_same),
         cmocka_unit_test(other_meshes_and_layouts_are_not_kept),
+        cmocka_unit_test(cells_of_wide_indices_are_kept),
         cmocka_unit_test(layers_that_want_more_are_not_kept),
         cmocka_unit_test(layers_of_two_fields_draw_the_same),
         cmocka_unit_test(layers_are_told_apart),

@@ -371,6 +371,79 @@ SIMD_INLINE void vf_gather_pair(const float *base, vi index, vf *first, vf *seco
 #endif
 }
 
+/* Doubles, a lane for each of a half of a vf's; a whole is two of these. */
+typedef double vd __attribute__((vector_size(SIMD_WIDTH * 4)));
+
+/* Gathers the half's doubles at base + index, which count float32. */
+SIMD_INLINE vd vd_gather(const float *base, vi index, int half)
+{
+#if defined(SIMD_AVX512)
+    const __m512i i = (__m512i)index;
+    return (vd)_mm512_i32gather_pd(half ? _mm512_extracti64x4_epi64(i, 1) : _mm512_castsi512_si256(i), base, 4);
+#elif defined(SIMD_AVX2)
+    const __m256i i = (__m256i)index;
+    const __m128i own = half ? _mm256_extracti128_si256(i, 1) : _mm256_castsi256_si128(i);
+    return (vd)_mm256_i32gather_pd((const double *)(const void *)base, own, 4);
+#else
+    double v[SIMD_WIDTH / 2];
+    vd out;
+    for (int i = 0; i < SIMD_WIDTH / 2; i++) memcpy(v + i, base + index[half * SIMD_WIDTH / 2 + i], sizeof *v);
+    memcpy(&out, v, sizeof v);
+    return out;
+#endif
+}
+
+#if defined(SIMD_AVX512)
+
+SIMD_INLINE vm vd_lt(const vd a[2], const vd b[2])
+{
+    const __mmask8 low = _mm512_cmp_pd_mask((__m512d)a[0], (__m512d)b[0], _CMP_LT_OQ);
+    return _mm512_kunpackb(_mm512_cmp_pd_mask((__m512d)a[1], (__m512d)b[1], _CMP_LT_OQ), low);
+}
+SIMD_INLINE vm vd_eq(const vd a[2], const vd b[2])
+{
+    const __mmask8 low = _mm512_cmp_pd_mask((__m512d)a[0], (__m512d)b[0], _CMP_EQ_OQ);
+    return _mm512_kunpackb(_mm512_cmp_pd_mask((__m512d)a[1], (__m512d)b[1], _CMP_EQ_OQ), low);
+}
+SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
+{
+    out[0] = (vd)_mm512_mask_blend_pd((__mmask8)m, (__m512d)b[0], (__m512d)a[0]);
+    out[1] = (vd)_mm512_mask_blend_pd((__mmask8)(m >> 8), (__m512d)b[1], (__m512d)a[1]);
+}
+
+#else
+
+typedef int64_t vd_mask __attribute__((vector_size(SIMD_WIDTH * 4)));
+typedef int32_t vd_narrow_mask __attribute__((vector_size(SIMD_WIDTH * 2)));
+
+SIMD_INLINE vm vm_of_halves(vd_mask first, vd_mask second)
+{
+    const vd_narrow_mask halves[2] = {__builtin_convertvector(first, vd_narrow_mask),
+                                      __builtin_convertvector(second, vd_narrow_mask)};
+    vm out;
+    memcpy(&out, halves, sizeof out);
+    return out;
+}
+SIMD_INLINE vm vd_lt(const vd a[2], const vd b[2])
+{
+    return vm_of_halves(a[0] < b[0], a[1] < b[1]);
+}
+SIMD_INLINE vm vd_eq(const vd a[2], const vd b[2])
+{
+    return vm_of_halves(a[0] == b[0], a[1] == b[1]);
+}
+SIMD_INLINE void vd_select(vm m, const vd a[2], const vd b[2], vd out[2])
+{
+    vd_narrow_mask halves[2];
+    memcpy(halves, &m, sizeof m);
+    for (int half = 0; half < 2; half++) {
+        const vd_mask own = __builtin_convertvector(halves[half], vd_mask);
+        out[half] = (vd)(((vd_mask)a[half] & own) | ((vd_mask)b[half] & ~own));
+    }
+}
+
+#endif
+
 /* The lanes of m one after the other, to where there is room for all; returns how many. */
 SIMD_INLINE int vf_compress(float *to, vm m, vf v)
 {

@@ -310,24 +310,4 @@ static __attribute__((noinline)) void kernel_hexes_bound(const float at[4][8][SI
     for (int half = 0; half < 2; half++) kernel_half_bounds(at, half, beam, out);
 }
 
-/* Puts the bounds of a cell that has them already. Of its planes only those that face the viewer are used. */
-SIMD_INLINE void kernel_hexes_bounds_put(kernel_hexes_bounds *out, int lane, const kernel_bounds *b, const float z[8])
-{
-    float near = z[0], far = z[0], size = fabsf(z[0]);
-    for (int i = 1; i < 8; i++) {
-        near = simd_min(near, z[i]);
-        far = simd_max(far, z[i]);
-        size = simd_max(fabsf(z[i]), size);
-    }
-    for (int i = 0; i < 3; i++) {
-        for (int a = 0; a < 3; a++) out->normal[i][a][lane] = a == 2;
-        out->low[i][lane] = (near - z[0]) - 1e-5f * size;
-        out->high[i][lane] = (far - z[0]) + 1e-5f * size;
-    }
-    out->jump[lane] = b->is_monotone ? b->jump : -1;
-    out->level[lane] = b->level;
-    for (int a = 0; a < 3; a++) out->gradient[a][lane] = b->gradient[a];
-    out->thickness[lane] = b->coarsest == 1 ? b->thickness : (float)INFINITY;
-}
-
 #endif

@@ -1,6 +1,6 @@
-/* Tets of a packed mesh, one a lane, placed for a tile and given their lines: the operations of kernel_tet_place(),
+/* Tets, one a lane, placed for a tile and given their lines: the operations of kernel_tet_place(),
  * kernel_cell_order() and kernel_tet_lines(), and so the same bits, for as many tets at once as a vector has lanes.
- * Vertices are put in order first, by coordinates that float32 has as they are, so that all else comes in order. What
+ * Vertices are put in order first, so that all else comes in order. What
  * is computed in double is computed in two halves. */
 #ifndef RENDER_KERNEL_PLACED_H
 #define RENDER_KERNEL_PLACED_H
@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_shapes.h"
 #include "kernel_types.h"
@@ -17,7 +18,7 @@
 
 /* Lane by lane what kernel_cell has; f is for the caller to set. */
 typedef struct kernel_placed {
-    vf world[3][4], values[4]; /* as they were handed over */
+    kernel_whole world[3][4], values[4]; /* as they were handed over */
     vf at[3][4], f[4];
     vf c[KERNEL_TET_EDGES], cu[KERNEL_TET_EDGES], cv[KERNEL_TET_EDGES], bound[KERNEL_TET_EDGES];
     vf doubt, least[4];
@@ -25,37 +26,35 @@ typedef struct kernel_placed {
 
 /* Vertices on their way into order. */
 typedef struct kernel_ordered {
-    vf at[3];
+    kernel_taken at[3];
     vi vertex;
 } kernel_ordered;
 
 /* In the lanes in which b is before a, they change places. */
-SIMD_INLINE void kernel_ordered_swap(kernel_ordered *a, kernel_ordered *b)
+SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_ordered *b)
 {
-    vm before = vf_lt(b->at[2], a->at[2]);
-    for (int axis = 1; axis >= 0; axis--)
-        before = vm_or(vf_lt(b->at[axis], a->at[axis]), vm_and(vf_eq(b->at[axis], a->at[axis]), before));
-    const kernel_ordered was = *a;
-    for (int axis = 0; axis < 3; axis++) {
-        a->at[axis] = vf_select(before, b->at[axis], was.at[axis]);
-        b->at[axis] = vf_select(before, was.at[axis], b->at[axis]);
-    }
-    a->vertex = vi_select(before, b->vertex, was.vertex);
-    b->vertex = vi_select(before, was.vertex, b->vertex);
+    const vm before = kernel_taken_before(is_narrow, b->at, a->at);
+    const vi was = a->vertex;
+    for (int axis = 0; axis < 3; axis++) kernel_taken_swap(is_narrow, before, &a->at[axis], &b->at[axis]);
+    a->vertex = vi_select(before, b->vertex, was);
+    b->vertex = vi_select(before, was, b->vertex);
 }
 
-/* Neighbours alone change places, and equal ones do not: vertices in one place stay as they came. Lanes from count on
- * are as the first. */
-SIMD_INLINE void kernel_ordered_fetch(const kernel_packed *p, int32_t vertices[4][SIMD_WIDTH], int count,
-                                      kernel_ordered spots[4])
+/* Neighbours alone change places, and equal ones do not: vertices in one place stay as they came. */
+SIMD_INLINE void kernel_ordered_fetch(kernel_placed *out, const kernel_arrays *p, bool is_narrow,
+                                      int32_t (*const vertices)[SIMD_WIDTH])
 {
+    kernel_ordered spots[4];
     for (int i = 0; i < 4; i++) {
-        for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
         memcpy(&spots[i].vertex, vertices[i], sizeof spots[i].vertex);
-        for (int a = 0; a < 3; a++) spots[i].at[a] = vf_gather(p->coordinates[a], spots[i].vertex * p->stride);
+        kernel_arrays_place(p, is_narrow, spots[i].vertex, spots[i].at);
     }
     for (int last = 3; last > 0; last--)
-        for (int i = 0; i < last; i++) kernel_ordered_swap(&spots[i], &spots[i + 1]);
+        for (int i = 0; i < last; i++) kernel_ordered_swap(is_narrow, &spots[i], &spots[i + 1]);
+    for (int i = 0; i < 4; i++) {
+        out->values[i] = kernel_numbers_take(&p->values, spots[i].vertex);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &spots[i].at[a]);
+    }
 }
 
 /* kernel_tet_place(). */
@@ -65,7 +64,7 @@ SIMD_INLINE void kernel_placed_spots(kernel_placed *out, const kernel_frame *f, 
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
             kernel_half d[3], at[3];
-            for (int a = 0; a < 3; a++) d[a] = kernel_half_of(&out->world[a][i], half) - eye[a];
+            for (int a = 0; a < 3; a++) d[a] = out->world[a][i].half[half] - eye[a];
             for (int a = 0; a < 3; a++)
                 at[a] = f->scaled_axes[a][0] * d[0] + f->scaled_axes[a][1] * d[1] + f->scaled_axes[a][2] * d[2];
             const kernel_half depth = f->job->camera.is_orthographic ? f->job->space.scale + 0 * at[2] : at[2];
@@ -120,17 +119,17 @@ SIMD_INLINE void kernel_placed_lines(kernel_placed *out, const kernel_frame *f, 
     }
 }
 
-/* Lane by lane the four vertices of count tets; lanes from count on are set to the first's. */
-static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_packed *p,
+/* Lane by lane count tets and their four vertices; vertices' lanes from count on are set to the first's. */
+static __attribute__((noinline)) void kernel_place_tets(kernel_placed *out, const kernel_arrays *p,
                                                         const kernel_frame *f, const kernel_tile *tile,
                                                         int32_t vertices[4][SIMD_WIDTH], int count)
 {
-    kernel_ordered spots[4];
-    kernel_ordered_fetch(p, vertices, count, spots);
-    for (int i = 0; i < 4; i++) {
-        out->values[i] = vf_gather(p->values, spots[i].vertex * p->value_stride);
-        for (int a = 0; a < 3; a++) out->world[a][i] = spots[i].at[a];
-    }
+    for (int i = 0; i < 4; i++)
+        for (int n = count; n < SIMD_WIDTH; n++) vertices[i][n] = vertices[i][0];
+    if (p->has_narrow_places)
+        kernel_ordered_fetch(out, p, true, vertices);
+    else
+        kernel_ordered_fetch(out, p, false, vertices);
     kernel_placed_spots(out, f, tile);
     kernel_placed_lines(out, f, tile);
 }
@@ -157,8 +156,8 @@ SIMD_INLINE void kernel_placed_cell(const kernel_placed *placed, int n, kernel_c
 SIMD_INLINE void kernel_placed_exactly(const kernel_placed *placed, int n, kernel_cell *c)
 {
     for (int i = 0; i < 4; i++) {
-        c->values[i] = (double)placed->values[i][n];
-        for (int a = 0; a < 3; a++) c->world[i][a] = (double)placed->world[a][i][n];
+        c->values[i] = kernel_whole_lane(&placed->values[i], n);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&placed->world[a][i], n);
     }
 }
 

@@ -1,4 +1,4 @@
-/* Hexes of a packed mesh, one a lane, placed for a tile and given their lines: the operations of
+/* Hexes, one a lane, placed for a tile and given their lines: the operations of
  * kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_poly_lines(), and so the same bits, for as
  * many hexes at once as a vector has lanes. Vertices are turned into the order of coordinates first, so that all else
  * comes in order. What is computed in double is computed in two halves. */
@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_shapes.h"
 #include "kernel_types.h"
@@ -30,7 +31,8 @@ typedef struct kernel_placed_hexes {
     int32_t turned[SIMD_WIDTH];                   /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
     int32_t quads[KERNEL_HEX_FACES * SIMD_WIDTH]; /* face by face: kernel_quad_corners(), four bits each */
     /* for kernel_placed_hex_cell() */
-    float bound[KERNEL_HEX_LINES][SIMD_WIDTH], world[3][8][SIMD_WIDTH];
+    float bound[KERNEL_HEX_LINES][SIMD_WIDTH];
+    kernel_whole world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
 } kernel_placed_hexes;
 
@@ -38,18 +40,12 @@ typedef struct kernel_placed_hexes {
 
 /* Vertices on their way into order, by the bits of x, y, z that kernel_cell_turn() has for them. */
 typedef struct kernel_turned_hexes {
-    vf at[3][8], rank[8];
+    kernel_taken at[8][3];
+    vf rank[8];
     vi vertex[8];
 } kernel_turned_hexes;
 
 static const signed char kernel_hex_bits[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* of a vertex; and back */
-
-SIMD_INLINE vm kernel_lanes_before(const vf at[3][8], int i, int j)
-{
-    vm before = vf_lt(at[2][i], at[2][j]);
-    for (int a = 1; a >= 0; a--) before = vm_or(vf_lt(at[a][i], at[a][j]), vm_and(vf_eq(at[a][i], at[a][j]), before));
-    return before;
-}
 
 SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
 {
@@ -58,31 +54,31 @@ SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
     *b = vf_select(lanes, was, *b);
 }
 
-SIMD_INLINE void kernel_turned_swap(kernel_turned_hexes *h, vm lanes, int i, int j)
+SIMD_INLINE void kernel_turned_swap(kernel_turned_hexes *h, bool is_narrow, vm lanes, int i, int j)
 {
     const vi was = h->vertex[i];
-    for (int a = 0; a < 3; a++) kernel_vf_swap(lanes, &h->at[a][i], &h->at[a][j]);
+    for (int a = 0; a < 3; a++) kernel_taken_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
     kernel_vf_swap(lanes, &h->rank[i], &h->rank[j]);
     h->vertex[i] = vi_select(lanes, h->vertex[j], was);
     h->vertex[j] = vi_select(lanes, was, h->vertex[j]);
 }
 
 /* kernel_rank_positions(), of vertices as they came. */
-SIMD_INLINE void kernel_turned_rank(kernel_turned_hexes *h)
+SIMD_INLINE void kernel_turned_rank(kernel_turned_hexes *h, bool is_narrow)
 {
     const vf zero = vf_set(0), one = vf_set(1);
     for (int i = 0; i < 8; i++) h->rank[kernel_hex_bits[i]] = vf_set((float)i);
     for (int i = 0; i < 8; i++)
         for (int j = i + 1; j < 8; j++) {
             const int k = kernel_hex_bits[i], l = kernel_hex_bits[j];
-            const vf after = vf_select(kernel_lanes_before((const vf(*)[8])h->at, l, k), one, zero);
+            const vf after = vf_select(kernel_taken_before(is_narrow, h->at[l], h->at[k]), one, zero);
             h->rank[k] += after;
             h->rank[l] -= after;
         }
 }
 
 /* kernel_cell_turn(): the least vertex to bits 0, then the axes in the order of its neighbours. */
-SIMD_INLINE void kernel_turned_turn(kernel_turned_hexes *h)
+SIMD_INLINE void kernel_turned_turn(kernel_turned_hexes *h, bool is_narrow)
 {
     vm turn[3] = {vm_none(), vm_none(), vm_none()};
     for (int b = 1; b < 8; b++) {
@@ -92,24 +88,52 @@ SIMD_INLINE void kernel_turned_turn(kernel_turned_hexes *h)
     }
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 8; b++)
-            if (!(b >> a & 1)) kernel_turned_swap(h, turn[a], b, b | 1 << a);
+            if (!(b >> a & 1)) kernel_turned_swap(h, is_narrow, turn[a], b, b | 1 << a);
     for (int k = 0; k < 3; k++) {
         const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high); /* 0 and 1, 1 and 2, 0 and 1 */
         const vm swap = vf_lt(h->rank[high], h->rank[low]);
-        kernel_turned_swap(h, swap, low, high);
-        kernel_turned_swap(h, swap, low | other, high | other);
+        kernel_turned_swap(h, is_narrow, swap, low, high);
+        kernel_turned_swap(h, is_narrow, swap, low | other, high | other);
     }
 }
 
-SIMD_INLINE void kernel_turned_fetch(kernel_turned_hexes *h, const kernel_packed *p, int32_t vertices[8][SIMD_WIDTH])
+/* Lanes with two neighbouring vertices in one place: kernel_quad_collapses() of some face. */
+SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_hexes *h, bool is_narrow)
 {
+    vm out = vm_none();
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 8; b++) {
+            const int c = b | 1 << a;
+            vm same = vm_all_lanes();
+            if (b == c) continue;
+            for (int axis = 0; axis < 3; axis++)
+                same = vm_and(same, kernel_taken_eq(is_narrow, &h->at[b][axis], &h->at[c][axis]));
+            out = vm_or(out, same);
+        }
+    return out;
+}
+
+/* Sets the vertices, their places and ranks; returns the lanes of which some face is a triangle. */
+SIMD_INLINE vm kernel_turned_fetch(kernel_placed_hexes *out, const kernel_arrays *p, bool is_narrow,
+                                   int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
+{
+    kernel_turned_hexes h;
     for (int i = 0; i < 8; i++) {
         const int b = kernel_hex_bits[i];
-        memcpy(&h->vertex[b], vertices[i], sizeof h->vertex[b]);
-        for (int a = 0; a < 3; a++) h->at[a][b] = vf_gather(p->coordinates[a], h->vertex[b] * p->stride);
+        memcpy(&h.vertex[b], vertices[i], sizeof h.vertex[b]);
+        kernel_arrays_place(p, is_narrow, h.vertex[b], h.at[b]);
     }
-    kernel_turned_rank(h);
-    kernel_turned_turn(h);
+    kernel_turned_rank(&h, is_narrow);
+    kernel_turned_turn(&h, is_narrow);
+    for (int i = 0; i < 8; i++) {
+        const int b = kernel_hex_bits[i];
+        const vi own_rank = vi_from_vf(h.rank[b]);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &h.at[b][a]);
+        rank[i] = h.rank[b];
+        memcpy(out->rank[i], &own_rank, sizeof own_rank);
+        memcpy(out->vertex[i], &h.vertex[b], sizeof h.vertex[b]);
+    }
+    return kernel_turned_collapsed(&h, is_narrow);
 }
 
 /* ---- places and values ---- */
@@ -129,23 +153,14 @@ SIMD_INLINE void kernel_half_place(const kernel_frame *f, const kernel_tile *til
     kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
 }
 
-SIMD_INLINE void kernel_lanes_place(const kernel_frame *f, const kernel_tile *tile, const vf world[3], vf out[3])
-{
-    for (int half = 0; half < 2; half++) {
-        kernel_half at[3];
-        for (int a = 0; a < 3; a++) at[a] = kernel_half_of(&world[a], half);
-        kernel_half_place(f, tile, at, half, out);
-    }
-}
-
 /* kernel_cell_relative() of eight values. */
-SIMD_INLINE void kernel_lanes_relative(const vf values[8], const double isovalues[SIMD_WIDTH], vf out[8])
+SIMD_INLINE void kernel_lanes_relative(const kernel_whole values[8], const double isovalues[SIMD_WIDTH], vf out[8])
 {
     for (int half = 0; half < 2; half++) {
         kernel_half isovalue, v[8], largest = {0};
         memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
         for (int i = 0; i < 8; i++) {
-            v[i] = kernel_half_of(&values[i], half) - isovalue;
+            v[i] = values[i].half[half] - isovalue;
             largest = kernel_half_max(kernel_half_abs(v[i]), largest);
         }
         /* kernel_mirrored_power() */
@@ -250,48 +265,32 @@ SIMD_INLINE void kernel_placed_hex_lines(kernel_placed_hexes *out, const kernel_
 
 /* ---- all of it ---- */
 
-/* Lanes with two neighbouring vertices in one place: kernel_quad_collapses() of some face. */
-SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_hexes *h)
-{
-    vm out = vm_none();
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 8; b++) {
-            const int c = b | 1 << a;
-            if (b == c) continue;
-            const vm same = vm_and(vf_eq(h->at[0][b], h->at[0][c]), vf_eq(h->at[1][b], h->at[1][c]));
-            out = vm_or(out, vm_and(same, vf_eq(h->at[2][b], h->at[2][c])));
-        }
-    return out;
-}
-
 /* The eight vertices of hexes, lane by lane. Returns the lanes of which some face is a triangle. */
-static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out, const kernel_packed *p,
+static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out, const kernel_arrays *p,
                                                        const kernel_frame *f, const kernel_tile *tile,
                                                        int32_t vertices[8][SIMD_WIDTH],
                                                        const double isovalues[SIMD_WIDTH])
 {
-    kernel_turned_hexes h;
-    vf values[8], relative[8], rank[8];
-    kernel_turned_fetch(&h, p, vertices);
+    kernel_whole values[8];
+    vf relative[8], rank[8];
+    const vm collapsed = p->has_narrow_places ? kernel_turned_fetch(out, p, true, vertices, rank)
+                                              : kernel_turned_fetch(out, p, false, vertices, rank);
     for (int i = 0; i < 8; i++) {
-        const int b = kernel_hex_bits[i];
-        const vf world[3] = {h.at[0][b], h.at[1][b], h.at[2][b]};
-        const vi own_rank = vi_from_vf(h.rank[b]);
+        vi vertex;
         vf at[3];
-        values[i] = vf_gather(p->values, h.vertex[b] * p->value_stride);
-        kernel_lanes_place(f, tile, world, at);
-        for (int a = 0; a < 3; a++) {
-            vf_store(out->world[a][i], world[a]);
-            vf_store(out->at[a][i], at[a]);
+        memcpy(&vertex, out->vertex[i], sizeof vertex);
+        values[i] = kernel_numbers_take(&p->values, vertex);
+        for (int half = 0; half < 2; half++) {
+            const kernel_half world[3] = {out->world[0][i].half[half], out->world[1][i].half[half],
+                                          out->world[2][i].half[half]};
+            kernel_half_place(f, tile, world, half, at);
         }
-        rank[i] = h.rank[b];
-        memcpy(out->rank[i], &own_rank, sizeof own_rank);
-        memcpy(out->vertex[i], &h.vertex[b], sizeof h.vertex[b]);
+        for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
     kernel_lanes_relative(values, isovalues, relative);
     for (int i = 0; i < 8; i++) vf_store(out->at[3][i], relative[i]);
     kernel_placed_hex_lines(out, f, tile, rank);
-    return kernel_turned_collapsed(&h);
+    return collapsed;
 }
 
 /* ---- one cell ---- */
@@ -317,7 +316,7 @@ static __attribute__((noinline)) void kernel_placed_hex_cell(const kernel_placed
         c->z[i] = h->at[2][i][n];
         c->f[i] = h->at[3][i][n];
         c->rank[i] = h->rank[i][n];
-        for (int a = 0; a < 3; a++) c->world[i][a] = (double)h->world[a][i][n];
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&h->world[a][i], n);
     }
     for (int i = 0; i < KERNEL_HEX_LINES; i++) {
         const bool is_edge = i < KERNEL_HEX_EDGES;
@@ -327,39 +326,6 @@ static __attribute__((noinline)) void kernel_placed_hex_cell(const kernel_placed
         if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_hex_flip(&c->lines[i]);
     }
     c->least[0] = (float)INFINITY;
-}
-
-/* A placed cell with its lines into lane n, from which it need not come back. */
-static __attribute__((noinline)) void kernel_placed_hex_put(kernel_placed_hexes *h, int n, const kernel_cell *c)
-{
-    const kernel_shape *shape = &kernel_shapes[0];
-    h->doubt[n] = 0;
-    h->turned[n] = 0;
-    for (int i = 0; i < 8; i++) {
-        h->at[0][i][n] = c->x[i];
-        h->at[1][i][n] = c->y[i];
-        h->at[2][i][n] = c->z[i];
-        h->at[3][i][n] = c->f[i];
-    }
-    for (int face = 0; face < KERNEL_HEX_FACES; face++) {
-        const signed char *loop = shape->faces[face].vertices;
-        int corner[4], first = 0;
-        kernel_quad_corners(c, loop, corner);
-        while (loop[first] != corner[0]) first++;
-        h->turned[n] |= (first & 1) << face;
-        h->quads[face * SIMD_WIDTH + n] = corner[0] | corner[1] << 4 | corner[2] << 8 | corner[3] << 12;
-    }
-    for (int i = 0; i < KERNEL_HEX_LINES; i++) {
-        const bool is_edge = i < KERNEL_HEX_EDGES;
-        const int face = is_edge ? 0 : i - KERNEL_HEX_EDGES, turn = h->turned[n] >> face & 1;
-        const signed char *ends = is_edge ? shape->edges[i] : shape->faces[face].vertices + turn;
-        kernel_line line = c->lines[i];
-        if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_hex_flip(&line);
-        h->c[i][n] = line.c;
-        h->cu[i][n] = line.cu;
-        h->cv[i][n] = line.cv;
-        h->doubt[n] = simd_max(line.bound, h->doubt[n]);
-    }
 }
 
 #endif

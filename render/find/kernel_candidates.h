@@ -17,8 +17,9 @@
 
 #include "grid.h"
 #include "kernel_active_cells.h"
-#include "kernel_candidate_polys.h"
-#include "kernel_candidate_tets.h"
+#include "kernel_arrays.h"
+#include "kernel_candidate_surfaces.h"
+#include "kernel_candidate_volumes.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
 #include "kernel_interest.h"
@@ -28,88 +29,79 @@
 #include "mmbvh.h"
 #include "simd.h"
 
-/* Finds the candidates among the cells that wait for their vertices. */
-static void kernel_find_pending(kernel_finder *s)
+/* Finds the candidates among the cells of a type that wait for their vertices. */
+static void kernel_find_pending(kernel_finder *s, kernel_cells *c)
 {
+    if (!c->count) return;
+    kernel_cells_fill(c);
     if (s->writer)
-        kernel_activate_pending(s);
-    else if (!s->surface && (s->packed.is_hexes || s->packed.is_tets))
-        kernel_find_packed_volume(s, s->packed.is_hexes ? 8 : 4);
-    else if (s->packed.is_hexes)
-        kernel_find_packed_hexes(s);
-    else if (s->packed.is_tets)
-        kernel_find_packed_tets(s);
+        kernel_activate_pending(s, c);
+    else if (!s->surface)
+        kernel_find_volumes(s, c);
+    else if (c->type == GRID_TET)
+        kernel_find_tets(s, c);
     else
-        kernel_find_any_tets(s);
+        kernel_find_polys(s, c);
+    c->count = 0;
 }
 
 /* ---- leaves ---- */
 
-/* Makes the queued cells of a packed mesh pending, and prefetches their vertices. */
-static void kernel_find_queued_packed(kernel_finder *s)
+/* Looks for a cell that is not for lanes. */
+static __attribute__((noinline)) void kernel_find_one(kernel_finder *s, uint32_t cell)
 {
-    const kernel_packed *p = &s->packed;
-    const int count = p->is_hexes ? 8 : 4;
-    for (int n = 0; n < s->queued_count; n++) {
-        s->tets.cell[n] = s->queued[n];
-        for (int i = 0; i < count; i++) {
-            s->tets.packed[i][n] = kernel_packed_vertex(p, s->queued[n], count, i);
-            kernel_packed_prefetch(p, s->tets.packed[i][n]);
-        }
-    }
-    s->tets.count = s->queued_count;
-    s->queued_count = 0;
+    kernel_found_fetch(s, cell);
+    if (s->cell.type == GRID_POLYHEDRON)
+        kernel_find_polyhedron(s, cell);
+    else if (!s->surface)
+        kernel_find_volume(s);
+    else
+        for (int value = 0; value < s->surface->layer->value_count; value++) kernel_find_alone(s, &s->cell, value);
 }
 
-/* Looks for cells whose connectivity has come. Tets become pending until their vertices come; others are looked for
- * now. */
+/* Makes the queued cells, whose connectivity has come, pending, and prefetches their vertices. Those that have waited
+ * for theirs are looked for before. */
 static void kernel_find_queued(kernel_finder *s)
 {
-    if (s->packed.is_tets || s->packed.is_hexes) {
-        kernel_find_queued_packed(s);
-        return;
-    }
-    const grid *g = s->frame->job->parts[s->part].cells;
-    const grid_field *field = &s->field->fields[s->part];
-    if (!s->surface || g->cell_type != GRID_TET)
-        for (int n = 0; n < s->queued_count; n++) kernel_prefetch_vertices(g, field, s->queued[n]);
-    for (int n = 0; n < s->queued_count; n++) {
-        const uint32_t cell = s->queued[n];
-        if (s->surface && grid_cell_type(g, cell) == GRID_TET) {
-            int64_t *vertices = s->tets.vertices[s->tets.count];
-            s->tets.cell[s->tets.count++] = cell;
-            grid_cell_vertices(g, cell, vertices);
-            for (int i = 0; i < 4; i++) kernel_prefetch_vertex(g, field, vertices[i]);
+    const kernel_arrays *p = &s->arrays;
+    for (int n = 0, end; n < s->queued_count; n = end) {
+        const int type = kernel_arrays_type(p, s->queued[n]);
+        end = n + 1;
+        if (type == GRID_POLYHEDRON || !p->has_lanes) {
+            kernel_find_one(s, s->queued[n]);
             continue;
         }
-        kernel_cell_fetch(&s->cell, g, field, cell);
-        if (s->cell.type == GRID_POLYHEDRON)
-            kernel_find_polyhedron(s, cell);
-        else
-            kernel_find_cell(s);
+        kernel_cells *c = &s->pending[kernel_found_number(type)];
+        if (c->count == SIMD_WIDTH) kernel_find_pending(s, c);
+        const int room = SIMD_WIDTH - c->count, last = room < s->queued_count - n ? n + room : s->queued_count;
+        while (end < last && kernel_arrays_type(p, s->queued[end]) == type) end++;
+        for (int k = n; k < end; k++) c->cell[c->count + k - n] = s->queued[k];
+        kernel_arrays_cells(p, s->queued + n, end - n, c->vertices, c->vertex, c->count);
+        c->count += end - n;
     }
     s->queued_count = 0;
 }
 
 static void kernel_find_leaf(kernel_finder *s, const uint32_t *cells, int count)
 {
-    const grid *g = s->frame->job->parts[s->part].cells;
-    const int vertices = g->offsets.data ? 0 : grid_type_vertices(g->cell_type);
+    const grid *g = s->arrays.cells;
+    const bool is_plain = !g->offsets.data && !g->cell_types;
+    const char *indices = g->connectivity.data;
+    const int64_t stride = g->connectivity.stride * grid_type_vertices(g->cell_type);
     for (int n = 0; n < count; n++) {
-        if (s->queued_count == SIMD_WIDTH) {
-            kernel_find_pending(s);
-            kernel_find_queued(s);
-        }
+        if (s->queued_count == SIMD_WIDTH) kernel_find_queued(s);
         s->queued[s->queued_count++] = cells[n];
-        if (vertices) __builtin_prefetch(g->connectivity.data + (int64_t)cells[n] * vertices * g->connectivity.stride);
+        if (is_plain)
+            __builtin_prefetch(indices + cells[n] * stride);
+        else
+            kernel_prefetch_indices(g, cells[n]);
     }
 }
 
 static void kernel_find_rest(kernel_finder *s)
 {
-    kernel_find_pending(s);
     kernel_find_queued(s);
-    kernel_find_pending(s);
+    for (int i = 0; i < KERNEL_FOUND_TYPES; i++) kernel_find_pending(s, &s->pending[i]);
     kernel_find_all_crossed(s);
 }
 
@@ -205,24 +197,21 @@ static void kernel_find_candidates(kernel_finder *s, int64_t root)
 static void kernel_activate_subtree(kernel_finder *s, int64_t root)
 {
     kernel_active_writer *k = s->writer;
-    k->vertices = s->packed.is_hexes ? 8 : 4;
-    k->is_refused = k->is_refused || !(s->packed.is_tets || s->packed.is_hexes);
+    const kernel_arrays *p = &s->arrays;
+    const bool is_one_type = p->type == GRID_TET || p->type == GRID_HEX;
+    k->vertices = grid_type_vertices(p->type);
+    k->is_refused = k->is_refused || !(p->has_lanes && p->is_narrow && is_one_type && !p->own);
     if (!k->is_refused) kernel_find_candidates(s, root);
 }
 
 /* Finds the candidates among count active records, from the first on. */
 static void kernel_find_active(kernel_finder *s, int64_t first, int64_t count)
 {
-    const int vertices = s->packed.is_hexes ? 8 : 4;
-    for (int64_t at = first, end = first + count; at < end && !s->list->is_full; at += SIMD_WIDTH) {
-        s->tets.count = end - at < SIMD_WIDTH ? (int)(end - at) : SIMD_WIDTH;
-        for (int n = 0; n < s->tets.count; n++) {
-            s->tets.cell[n] = (uint32_t)(at + n);
-            for (int i = 0; i < vertices; i++) s->tets.packed[i][n] = (int32_t)((at + n) * vertices + i);
-        }
-        kernel_find_pending(s);
+    for (int64_t at = first, end = first + count; at < end && !s->list->is_full; at++) {
+        if (s->queued_count == SIMD_WIDTH) kernel_find_queued(s);
+        s->queued[s->queued_count++] = (uint32_t)at;
     }
-    kernel_find_all_crossed(s);
+    kernel_find_rest(s);
 }
 
 #endif

@@ -1,6 +1,6 @@
 /* The search of a subtree for the cells that show (kernel_candidates.h), and the pixels that a cell alone may show in.
- * Isosurfaces are looked for in many cells at once (kernel_candidate_tets.h, kernel_candidate_polys.h), but for those
- * whose numbers are too large, too small or NaN for lanes. */
+ * Isosurfaces are looked for in many cells at once (kernel_candidate_surfaces.h, kernel_candidate_volumes.h), but for
+ * those whose numbers are too large, too small or NaN for lanes. */
 #ifndef RENDER_KERNEL_FINDER_H
 #define RENDER_KERNEL_FINDER_H
 
@@ -8,36 +8,55 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
 #include "kernel_outline.h"
+#include "kernel_shapes.h"
 #include "kernel_tile.h"
 #include "kernel_types.h"
+#include "kernel_wide.h"
 #include "render.h"
 #include "simd.h"
 
-/* Tets, one a lane. */
-typedef struct kernel_tets {
+/* Cells of one type, one a lane. */
+typedef struct kernel_cells {
+    int type, vertices; /* of each */
     int count;
     uint32_t cell[SIMD_WIDTH];
-    int64_t vertices[SIMD_WIDTH][GRID_MAX_CELL_VERTICES];
-    int32_t packed[8][SIMD_WIDTH]; /* the vertices of a packed mesh, instead; or of hexes */
-} kernel_tets;
+    int32_t vertex[8][SIMD_WIDTH];
+} kernel_cells;
 
-/* Fills the lanes from count on with the first, for a packed mesh's cells of so many vertices. */
-SIMD_INLINE void kernel_tets_fill(kernel_tets *t, int vertices)
+/* Fills the lanes from count on with the first. */
+SIMD_INLINE void kernel_cells_fill(kernel_cells *c)
 {
-    for (int n = t->count; n < SIMD_WIDTH; n++)
-        for (int i = 0; i < vertices; i++) t->packed[i][n] = t->packed[i][0];
+    for (int n = c->count; n < SIMD_WIDTH; n++) {
+        c->cell[n] = c->cell[0];
+        for (int i = 0; i < c->vertices; i++) c->vertex[i][n] = c->vertex[i][0];
+    }
 }
 
-/* Cells of one type with quads that isovalues cross, one a lane, until there is one in each (kernel_candidate_polys.h).
- * Hexes of a packed mesh are all crossed by one isovalue, and their places and values are still to be fetched. */
+/* The vertex of each lane's cell. */
+SIMD_INLINE vi kernel_cells_vertex(const kernel_cells *c, int i)
+{
+    vi vertex;
+    memcpy(&vertex, c->vertex[i], sizeof vertex);
+    return vertex;
+}
+
+/* Types of cells that are looked for in lanes. */
+enum { KERNEL_FOUND_TYPES = 4, KERNEL_FOUND_TETS = KERNEL_FOUND_TYPES - 1 };
+
+SIMD_INLINE int kernel_found_number(int type)
+{
+    return type == GRID_TET ? KERNEL_FOUND_TETS : kernel_shape_number(type);
+}
+
+/* Cells of one type with quads that an isovalue crosses, one a lane, until there is one in each
+ * (kernel_candidate_surfaces.h). */
 typedef struct kernel_crossed {
-    int type, count, value;
-    uint32_t cell[SIMD_WIDTH], source[SIMD_WIDTH];
-    int32_t vertex[8][SIMD_WIDTH];   /* of a packed mesh; else */
-    float place[4][8][SIMD_WIDTH];   /* along the camera's axes from the eye; values less the isovalue, scaled */
+    kernel_cells cells;
+    int value; /* the isovalue, of all of them */
 } kernel_crossed;
 
 /* One subtree's search. */
@@ -54,29 +73,17 @@ typedef struct kernel_finder {
     kernel_tile picture; /* all of it as one tile, about the axis of view */
     kernel_planes planes;
     float t_near, column_scale, row_scale, column_0, row_0;
+    kernel_level eye[3];
     kernel_cell cell;
     uint32_t queued[SIMD_WIDTH]; /* cells whose connectivity is on its way from memory; */
-    kernel_tets tets;            /* tets whose vertices are */
-    kernel_crossed crossed[3];   /* by kernel_shape_number() */
-    kernel_packed packed;
     int queued_count;
+    kernel_cells pending[KERNEL_FOUND_TYPES]; /* those whose vertices are, by kernel_found_number() */
+    kernel_crossed crossed[KERNEL_FOUND_TETS];
+    kernel_arrays arrays;
     /* The other end: what is crossed is kept, and the picture is not asked. */
     kernel_active_writer *writer; /* NULL: none */
     bool (*keep)(kernel_active_writer *writer);
 } kernel_finder;
-
-/* The least float that is not below x. */
-SIMD_INLINE float kernel_not_below(double x)
-{
-    float f = (float)x;
-    int32_t bits;
-    if (!((double)f < x)) return f;
-    if (f == 0) return 1e-45f;
-    memcpy(&bits, &f, sizeof bits);
-    bits += f > 0 ? 1 : -1;
-    memcpy(&f, &bits, sizeof f);
-    return f;
-}
 
 static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, const kernel_subtree *subtree)
 {
@@ -93,23 +100,25 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     }
     s->field = s->surface ? &s->surface->layer->field : &f->job->volumes[0].field;
     s->interest = s->surface ? &s->surface->interest : &s->transfer->interest;
-    s->queued_count = s->tets.count = 0;
-    for (int type = GRID_HEX; type <= GRID_PYRAMID; type++) {
-        kernel_crossed *h = &s->crossed[kernel_shape_number(type)];
-        h->type = type;
-        h->count = h->value = 0;
+    s->queued_count = 0;
+    static const int types[KERNEL_FOUND_TYPES] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID, GRID_TET};
+    for (int i = 0; i < KERNEL_FOUND_TYPES; i++) {
+        kernel_cells *c = &s->pending[kernel_found_number(types[i])];
+        *c = (kernel_cells){.type = types[i], .vertices = grid_type_vertices(types[i])};
+        if (types[i] != GRID_TET) s->crossed[kernel_found_number(types[i])] = (kernel_crossed){.cells = *c};
     }
     s->writer = NULL;
     if (s->surface)
-        kernel_packed_surface(&s->packed, f, subtree->surface, s->part);
+        kernel_arrays_surface(&s->arrays, f, subtree->surface, s->part);
     else
-        kernel_packed_begin(&s->packed, f, f->job->parts[s->part].cells, &s->field->fields[s->part]);
+        kernel_arrays_begin(&s->arrays, f->job->parts[s->part].cells, &s->field->fields[s->part]);
     memset(&s->picture, 0, sizeof s->picture);
     s->picture.depth_shift = f->depth_shift;
     kernel_picture_borders(&borders, f);
     kernel_tree_planes(&s->planes, f, &borders);
     const double unit = f->job->camera.is_orthographic ? f->job->space.scale : 1;
     s->t_near = (float)-f->depth_shift;
+    for (int a = 0; a < 3; a++) s->eye[a] = kernel_level_of(f->job->camera.eye[a]);
     s->column_scale = (float)(1 / (f->slope_dx * unit));
     s->row_scale = (float)(1 / (f->slope_dy * unit));
     s->column_0 = (float)(-f->slope_x0 / f->slope_dx);
@@ -285,12 +294,23 @@ typedef struct kernel_ends_lanes {
     vf near, far, left, right, top, bottom;
 } kernel_ends_lanes;
 
-/* Gathers a packed mesh's vertices, as places from the eye on in the space's scale. */
-SIMD_INLINE void kernel_packed_place(const kernel_packed *p, vi vertex, vf out[3])
+/* Fetches vertices, as places from the eye on in the space's scale. */
+SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3])
 {
-    vertex *= p->stride;
-    for (int a = 0; a < 3; a++)
-        out[a] = ((vf_gather(p->coordinates[a], vertex) - p->eye[a][0]) - p->eye[a][1]) * p->scale;
+    const render_job *job = s->frame->job;
+    for (int a = 0; a < 3; a++) {
+        const kernel_numbers *c = &s->arrays.coordinates[a];
+        kernel_taken world;
+        kernel_numbers_take_raw(c, vertex, &world);
+        out[a] = kernel_taken_less(c, &world, &s->eye[a]) * (float)job->space.scale;
+    }
+}
+
+/* Are the numbers of usual sizes? Others are for the cell alone. */
+SIMD_INLINE vm kernel_usual_place(vm usual, const vf place[3])
+{
+    for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
+    return usual;
 }
 
 /* Turns such a place into the camera's axes. */
@@ -334,7 +354,7 @@ SIMD_INLINE vm kernel_pixel_range(vf low, vf high, float zero, float blur, int p
 
 /* Adds the cells of the lanes whose bits are set: kernel_extents_candidate() lane by lane. */
 static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsigned lanes, const uint32_t *cells,
-                             const uint32_t *sources)
+                             uint32_t source)
 {
     const render_camera *camera = &s->frame->job->camera;
     const bool flat = camera->is_orthographic;
@@ -365,7 +385,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
     for (; lanes; lanes &= lanes - 1) {
         const int n = __builtin_ctz(lanes);
         list->items[list->count++] = (kernel_candidate){.cell = cells[n],
-                                                        .source = sources[n],
+                                                        .source = source,
                                                         .near = near[n],
                                                         .far = far[n],
                                                         .x0 = (uint16_t)ends[0][n],

@@ -132,7 +132,7 @@ static bool is_usual(const kernel_frame *frame, const kernel_surface *surface)
     bool is_tets = scale > 1e-20 && scale < 1e20;
     for (int a = 0; a < 3; a++) {
         const double eye = fabs(frame->job->camera.eye[a]);
-        is_tets = is_tets && eye * scale < (double)KERNEL_ACTIVE_PLACE && eye < 1e15; /* kernel_packed_begin() */
+        is_tets = is_tets && eye * scale < (double)KERNEL_ACTIVE_PLACE && eye < 1e15;
     }
     for (int i = 0; i < surface->layer->value_count; i++)
         is_tets = is_tets && fabs(surface->layer->values[i]) < (double)KERNEL_ACTIVE_VALUE;

@@ -1,5 +1,5 @@
-/* Vectors of doubles, a lane for each of a vf's half: they fill a register. Vectors of more are taken apart by compilers,
- * and their comparisons lane by lane. */
+/* Vectors of doubles, a lane for each of a vf's half: they fill a register. Vectors of more are taken apart by
+ * compilers, and their comparisons lane by lane. */
 #ifndef RENDER_KERNEL_WIDE_H
 #define RENDER_KERNEL_WIDE_H
 
@@ -9,7 +9,7 @@
 #include "simd.h"
 
 enum { KERNEL_HALF = SIMD_WIDTH / 2 };
-typedef double kernel_half __attribute__((vector_size(8 * KERNEL_HALF)));
+typedef vd kernel_half;
 typedef int64_t kernel_half_mask __attribute__((vector_size(8 * KERNEL_HALF)));
 typedef float kernel_half_floats __attribute__((vector_size(4 * KERNEL_HALF)));
 
@@ -71,6 +71,60 @@ SIMD_INLINE kernel_half kernel_half_sqrt(kernel_half v)
 SIMD_INLINE kernel_half kernel_half_max(kernel_half a, kernel_half b)
 {
     return kernel_half_select((kernel_half_mask)(b < a), a, b);
+}
+
+/* Held within -limit .. limit. */
+SIMD_INLINE kernel_half kernel_half_hold(kernel_half v, double limit)
+{
+    const kernel_half most = (kernel_half){0} + limit;
+    v = kernel_half_select((kernel_half_mask)(v < -most), -most, v);
+    return kernel_half_select((kernel_half_mask)(most < v), most, v);
+}
+
+/* A double a lane. */
+typedef struct kernel_whole {
+    kernel_half half[2];
+} kernel_whole;
+
+SIMD_INLINE vm kernel_whole_lt(const kernel_whole *a, const kernel_whole *b)
+{
+    return vd_lt(a->half, b->half);
+}
+
+SIMD_INLINE vm kernel_whole_eq(const kernel_whole *a, const kernel_whole *b)
+{
+    return vd_eq(a->half, b->half);
+}
+
+SIMD_INLINE kernel_whole kernel_whole_select(vm m, const kernel_whole *a, const kernel_whole *b)
+{
+    kernel_whole out;
+    vd_select(m, a->half, b->half, out.half);
+    return out;
+}
+
+SIMD_INLINE kernel_whole kernel_whole_set(double x)
+{
+    const kernel_half all = (kernel_half){0} + x;
+    return (kernel_whole){{all, all}};
+}
+
+SIMD_INLINE kernel_whole kernel_whole_widen(vf v)
+{
+    return (kernel_whole){{kernel_half_of(&v, 0), kernel_half_of(&v, 1)}};
+}
+
+SIMD_INLINE vf kernel_whole_narrow(const kernel_whole *v)
+{
+    vf out;
+    for (int half = 0; half < 2; half++) kernel_half_put(&out, half, v->half[half]);
+    return out;
+}
+
+/* x in the lane. */
+SIMD_INLINE double kernel_whole_lane(const kernel_whole *v, int lane)
+{
+    return v->half[lane / KERNEL_HALF][lane % KERNEL_HALF];
 }
 
 #endif

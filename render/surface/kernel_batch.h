@@ -1,4 +1,4 @@
-/* Tets of a packed mesh, as many at once as there are lanes, in a tile that traces what is binned there:
+/* Tets, as many at once as there are lanes, in a tile that traces what is binned there:
  *
  *     lanes are cells:     fetched, ordered, placed, edge functions' lines          (once a batch)
  *     lanes are pixels:    each with the lines of its own cell                      (cells of few pixels)
@@ -15,6 +15,7 @@
 #include <string.h>
 
 #include "kernel_accept.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_crossings.h"
 #include "kernel_map.h"
@@ -33,8 +34,8 @@ enum {
 
 typedef struct kernel_batch {
     int count, layer, part; /* -1: of none yet */
-    kernel_packed packed;   /* of the layer's field on the part */
-    bool takes_batches;     /* its cells may be put into batches */
+    kernel_arrays arrays;   /* of the layer's field on the part */
+    bool takes_batches;     /* its tets may be put into batches */
     /* cell by cell */
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
@@ -65,7 +66,7 @@ SIMD_INLINE void kernel_batch_relative(kernel_batch *b)
     for (int half = 0; half < 2; half++) {
         kernel_half isovalue, v[4], largest;
         memcpy(&isovalue, b->isovalue + half * KERNEL_HALF, sizeof isovalue);
-        for (int i = 0; i < 4; i++) v[i] = kernel_half_of(&b->tets.values[i], half) - isovalue;
+        for (int i = 0; i < 4; i++) v[i] = b->tets.values[i].half[half] - isovalue;
         largest = kernel_half_max(kernel_half_max(kernel_half_abs(v[0]), kernel_half_abs(v[1])),
                                   kernel_half_max(kernel_half_abs(v[2]), kernel_half_abs(v[3])));
         /* kernel_mirrored_power() */
@@ -87,9 +88,7 @@ static __attribute__((noinline)) void kernel_batch_normals(kernel_batch *b, cons
         for (int i = 0; i < 3; i++) {
             df[i] = kernel_half_of(&b->tets.f[i + 1], half) - kernel_half_of(&b->tets.f[0], half);
             for (int a = 0; a < 3; a++)
-                d[i][a] =
-                    (kernel_half_of(&b->tets.world[a][i + 1], half) - kernel_half_of(&b->tets.world[a][0], half)) *
-                    scale;
+                d[i][a] = (b->tets.world[a][i + 1].half[half] - b->tets.world[a][0].half[half]) * scale;
         }
         for (int a = 0; a < 3; a++) {
             const int p = (a + 1) % 3, q = (a + 2) % 3;
@@ -302,7 +301,7 @@ SIMD_INLINE void kernel_batch_rays_of(kernel_batch *b, int n, int columns, int r
 
 static __attribute__((noinline)) void kernel_batch_run(kernel_tile_trace *t, kernel_batch *b)
 {
-    kernel_place_tets(&b->tets, &b->packed, t->frame, &t->tile, b->vertex, b->count);
+    kernel_place_tets(&b->tets, &b->arrays, t->frame, &t->tile, b->vertex, b->count);
     kernel_batch_relative(b);
     b->has_normals = false;
     b->ray_count = 0;
@@ -335,8 +334,8 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     }
     b->layer = layer;
     b->part = part;
-    kernel_packed_surface(&b->packed, t->frame, layer, part);
-    b->takes_batches = b->packed.is_tets && !t->surface->layer->colour_map && kernel_tile_layer_batches(t);
+    kernel_arrays_surface(&b->arrays, t->frame, layer, part);
+    b->takes_batches = b->arrays.has_lanes && !t->surface->layer->colour_map && kernel_tile_layer_batches(t);
 }
 
 /* The last ones. */
@@ -358,8 +357,7 @@ SIMD_INLINE void kernel_batch_add(kernel_tile_trace *t, kernel_batch *b, const k
     b->near[n] = candidate->near;
     b->value[n] = value;
     b->isovalue[n] = t->surface->layer->values[value];
-    for (int i = 0; i < 4; i++) b->vertex[i][n] = kernel_packed_vertex(&b->packed, candidate->cell, 4, i);
-    for (int i = 0; i < 4; i++) kernel_packed_prefetch(&b->packed, b->vertex[i][n]);
+    kernel_arrays_cells(&b->arrays, &candidate->cell, 1, 4, b->vertex, n);
     for (unsigned blocks = candidate->blocks & ~t->begun; blocks; blocks &= blocks - 1)
         kernel_block_begin(t, __builtin_ctz(blocks));
 }

@@ -20,6 +20,7 @@
 
 #include "grid.h"
 #include "kernel_accept.h"
+#include "kernel_arrays.h"
 #include "kernel_bounds.h"
 #include "kernel_bounds_hexes.h"
 #include "kernel_cell.h"
@@ -39,7 +40,7 @@
 
 typedef struct kernel_hexes {
     int count, layer, part; /* -1: of none yet */
-    kernel_packed packed;   /* of the layer's field on the part: if it is of hexes, */
+    kernel_arrays arrays;   /* of the layer's field on the part */
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH]; /* cells wait to be placed together */
     double isovalue[SIMD_WIDTH];
@@ -255,7 +256,7 @@ static __attribute__((noinline)) void kernel_hexes_fetch_colours(const kernel_ti
     const grid_field *field = &s->layer->colour_field.fields[h->part];
     for (int n = 0; n < h->count; n++)
         for (int i = 0; i < 8; i++) {
-            const int64_t vertex = h->placed.vertex[i][n] - h->packed.base;
+            const int64_t vertex = h->placed.vertex[i][n];
             const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->cell[n] : vertex);
             h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
         }
@@ -435,7 +436,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
         for (int i = 0; i < 8; i++) h->vertex[i][n] = h->vertex[i][0];
         h->isovalue[n] = h->isovalue[0];
     }
-    const vm collapsed = kernel_place_hexes(&h->placed, &h->packed, t->frame, &t->tile, h->vertex, h->isovalue);
+    const vm collapsed = kernel_place_hexes(&h->placed, &h->arrays, t->frame, &t->tile, h->vertex, h->isovalue);
     kernel_hexes_bound((const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
     if (t->surface->layer->colour_map) kernel_hexes_fetch_colours(t, h);
     h->ready = 0;
@@ -454,7 +455,7 @@ static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, k
 
 static __attribute__((noinline)) void kernel_hexes_run(kernel_tile_trace *t, kernel_hexes *h)
 {
-    if (h->packed.is_hexes) kernel_hexes_place(t, h);
+    kernel_hexes_place(t, h);
     if (h->rays.count) kernel_hexes_trace(t, h);
     h->count = 0;
 }
@@ -470,28 +471,22 @@ SIMD_INLINE void kernel_hexes_end(kernel_tile_trace *t, kernel_hexes *h)
 }
 
 /* Starts a new part and layer. */
-SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const kernel_packed *packed, int part)
+SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const kernel_arrays *arrays, int part)
 {
     if (h->layer == t->layer && h->part == part) return;
     kernel_hexes_end(t, h);
     h->layer = t->layer;
     h->part = part;
-    h->packed = *packed;
+    h->arrays = *arrays;
 }
 
 /* Can hexes of the layer under way be traced in batches? */
-SIMD_INLINE bool kernel_hexes_layer_fits(const kernel_tile_trace *t)
+SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
 {
-    return t->surface->layer->root == RENDER_ROBUST && kernel_tile_layer_batches(t);
+    return arrays->has_lanes && t->surface->layer->root == RENDER_ROBUST && kernel_tile_layer_batches(t);
 }
 
-/* Can all hexes of the mesh be traced in batches? */
-SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t, const kernel_packed *packed)
-{
-    return packed->is_hexes && kernel_hexes_layer_fits(t);
-}
-
-/* Adds a hex of a packed mesh to the pending ones. */
+/* Adds a hex to the pending ones. */
 SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_candidate *candidate,
                                    int value)
 {
@@ -503,40 +498,7 @@ SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const 
     h->near[n] = candidate->near;
     h->value[n] = value;
     h->isovalue[n] = t->surface->layer->values[value];
-    for (int i = 0; i < 8; i++) {
-        h->vertex[i][n] = kernel_packed_vertex(&h->packed, candidate->cell, 8, i);
-        kernel_packed_prefetch(&h->packed, h->vertex[i][n]);
-    }
-}
-
-/* Tells whether the tile's cell, which is ready to meet rays, can be traced in a batch. */
-SIMD_INLINE bool kernel_hexes_take(const kernel_tile_trace *t, const kernel_cell *c)
-{
-    if (c->type != GRID_HEX || !kernel_hexes_layer_fits(t)) return false;
-    for (int face = 0; face < KERNEL_HEX_FACES; face++) {
-        int corner[4];
-        kernel_quad_corners(c, kernel_shapes[0].faces[face].vertices, corner);
-        if (kernel_quad_collapses(c, corner)) return false;
-    }
-    return true;
-}
-
-/* Adds the tile's cell to the pending ones. */
-SIMD_INLINE void kernel_hexes_add(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_candidate *candidate,
-                                  int value)
-{
-    if (h->count == SIMD_WIDTH) kernel_hexes_run(t, h);
-    const int n = h->count++;
-    h->cells[n] = *t->cell;
-    h->polys[n] = *t->poly;
-    for (int i = 0; i < 8; i++) h->colours[i][n] = t->cell->g[i];
-    h->ready |= 1u << n;
-    h->cell[n] = candidate->cell;
-    h->value[n] = value;
-    h->near[n] = candidate->near;
-    kernel_hexes_bounds_put(&h->bounds, n, &t->poly->bounds, t->cell->z);
-    kernel_placed_hex_put(&h->placed, n, t->cell);
-    kernel_hexes_rays_of(t, h, n, candidate->box, candidate->blocks);
+    kernel_arrays_cells(&h->arrays, &candidate->cell, 1, 8, h->vertex, n);
 }
 
 #endif

@@ -325,13 +325,6 @@ SIMD_INLINE void kernel_local_fetch(const kernel_tile_trace *t, kernel_local_bat
     kernel_local_scalars(field, cell, vertices, count, b->scalars, lane);
 }
 
-SIMD_INLINE kernel_half kernel_half_hold(kernel_half v, double limit)
-{
-    const kernel_half most = (kernel_half){0} + limit;
-    v = kernel_half_select((kernel_half_mask)(v < -most), -most, v);
-    return kernel_half_select((kernel_half_mask)(most < v), most, v);
-}
-
 /* The field in the transfer function's domain, as kernel_cell_domain() has it; returns the lanes that show. */
 SIMD_INLINE vm kernel_local_domain(const kernel_transfer *t, double (*const scalars)[SIMD_WIDTH], int count,
                                    vf values[8])

@@ -12,6 +12,7 @@
 #include <math.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_bins.h"
 #include "kernel_cell.h"
 #include "kernel_cell_values.h"
@@ -38,7 +39,7 @@ typedef struct kernel_tile_cells {
     int count, open_count, next;
     kernel_cell cell;     /* the one under way, */
     kernel_map map;       /* and its map */
-    kernel_packed packed; /* of the volume's field on the part: */
+    kernel_arrays arrays; /* of the volume's field on the part: */
     int plain_volume, plain_part;
     kernel_placed placed;
     kernel_block_rays block_rays;
@@ -86,18 +87,15 @@ SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int par
     if (blocks) take(t, part, c, c->type == GRID_TET || c->is_constant ? NULL : &cells->map, blocks);
 }
 
-/* ---- tets of packed meshes, as many at once as there are lanes ---- */
+/* ---- tets, as many at once as there are lanes ---- */
 
 /* kernel_cell_domain(). */
 SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transfer *t)
 {
-    const kernel_half limit = (kernel_half){0} + 1e18;
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < 4; i++) {
-            kernel_half f = (kernel_half_of(&placed->values[i], half) - t->low) * t->inverse_width;
-            f = kernel_half_select((kernel_half_mask)(f < -limit), -limit, f);
-            f = kernel_half_select((kernel_half_mask)(limit < f), limit, f);
-            kernel_half_put(&placed->f[i], half, f);
+            const kernel_half f = (placed->values[i].half[half] - t->low) * t->inverse_width;
+            kernel_half_put(&placed->f[i], half, kernel_half_hold(f, 1e18));
         }
 }
 
@@ -105,9 +103,17 @@ SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transf
 SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const kernel_placed *placed,
                                            const kernel_interest *interest, float near[SIMD_WIDTH])
 {
-    const vf *z = placed->at[2], *v = placed->values;
+    const vf *z = placed->at[2];
+    vf v[4], odd = vf_set(0);
     vm is_finite = vm_all_lanes();
-    for (int i = 0; i < 4; i++) is_finite = vm_and(is_finite, vf_lt(vf_abs(v[i]), vf_set(INFINITY)));
+    for (int i = 0; i < 4; i++) {
+        for (int half = 0; half < 2; half++) {
+            const kernel_half own = placed->values[i].half[half];
+            kernel_half_put(&odd, half, own - own);
+            kernel_half_put(&v[i], half, kernel_half_hold(own, 3e38));
+        }
+        is_finite = vm_and(is_finite, vf_eq(odd, odd));
+    }
     const vm shows = kernel_interest_meets_values(interest, v, 4);
     const vf front = vf_min(vf_min(z[0], z[1]), vf_min(z[2], z[3]));
     const vf back = vf_max(vf_max(z[0], z[1]), vf_max(z[2], z[3]));
@@ -126,9 +132,10 @@ static __attribute__((noinline)) void kernel_tile_take_pending(kernel_tile_trace
     const kernel_transfer *transfer = &t->frame->volumes[cells->plain_volume];
     float near[SIMD_WIDTH];
     cells->pending = 0;
-    kernel_place_tets(&cells->placed, &cells->packed, t->frame, &t->tile, cells->wait_vertices, count);
+    kernel_place_tets(&cells->placed, &cells->arrays, t->frame, &t->tile, cells->wait_vertices, count);
     kernel_placed_domain(&cells->placed, transfer);
     unsigned candidates = kernel_placed_showing(t, &cells->placed, &transfer->interest, near) & ((1u << count) - 1);
+    candidates = kernel_arrays_drawn(&cells->arrays, cells->wait_cell, candidates);
     for (; candidates; candidates &= candidates - 1) {
         const int n = __builtin_ctz(candidates);
         unsigned blocks = cells->wait_blocks[n] & kernel_blocks_beyond(t, near[n]);
@@ -141,27 +148,27 @@ static __attribute__((noinline)) void kernel_tile_take_pending(kernel_tile_trace
     }
 }
 
-/* What waits from now on is of this volume and part. True where their tets do. */
+/* What waits from now on is of this volume and part. True where their tets do: not where the values are the cells', for
+ * what is constant in a cell is not interpolated. */
 SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
                                       kernel_tile_take *take)
 {
     if (part != cells->plain_part || volume != cells->plain_volume) {
         kernel_tile_take_pending(t, cells, take);
-        kernel_packed_begin(&cells->packed, t->frame, t->frame->job->parts[part].cells,
+        kernel_arrays_begin(&cells->arrays, t->frame->job->parts[part].cells,
                             &t->frame->job->volumes[volume].field.fields[part]);
         cells->plain_volume = volume;
         cells->plain_part = part;
     }
-    return cells->packed.is_tets;
+    return cells->arrays.has_lanes && !cells->arrays.is_by_cell;
 }
 
 /* Until a vector is full. */
 SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
                                   kernel_tile_take *take)
 {
-    const int32_t *vertices = cells->packed.connectivity + 4 * (int64_t)cell;
     const int n = cells->pending++;
-    for (int i = 0; i < 4; i++) cells->wait_vertices[i][n] = vertices[i];
+    kernel_arrays_tet(&cells->arrays, cell, cells->wait_vertices, n);
     cells->wait_cell[n] = cell;
     cells->wait_blocks[n] = blocks;
     if (cells->pending == SIMD_WIDTH) kernel_tile_take_pending(t, cells, take);
@@ -175,10 +182,12 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, int volume, int par
     const grid *g = t->frame->job->parts[part].cells;
     kernel_tile_cells *pending = t->thread->tile_cells;
     kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
-    if (kernel_tile_wait_for(t, pending, volume, part, take))
-        for (int n = 0; n < count; n++) kernel_tile_wait(t, pending, cells[n], blocks, take);
-    else
-        for (int n = 0; n < count; n++) kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
+    const bool waits = kernel_tile_wait_for(t, pending, volume, part, take);
+    for (int n = 0; n < count; n++)
+        if (waits && kernel_arrays_type(&pending->arrays, cells[n]) == GRID_TET)
+            kernel_tile_wait(t, pending, cells[n], blocks, take);
+        else
+            kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
 }
 
 /* The trees of the parts, with the volume's ranges. */
@@ -279,7 +288,7 @@ SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *
                                        kernel_tile_take *take)
 {
     const int part = (int)item->source;
-    if (kernel_tile_wait_for(t, cells, 0, part, take))
+    if (kernel_tile_wait_for(t, cells, 0, part, take) && kernel_arrays_type(&cells->arrays, item->cell) == GRID_TET)
         kernel_tile_wait(t, cells, item->cell, blocks, take);
     else
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);

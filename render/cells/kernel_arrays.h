@@ -1,0 +1,338 @@
+/* A part's arrays as cells in lanes fetch them: any layout, one type of cells or several. Numbers within reach of a
+ * gather come by gathers, others one by one. Those that are float32 are compared and subtracted as such, others as
+ * doubles, to the same bits; all are doubles behind that. Meshes of so many vertices or cells that an index has no room
+ * in 32 bits have no lanes. */
+#ifndef RENDER_KERNEL_ARRAYS_H
+#define RENDER_KERNEL_ARRAYS_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell.h"
+#include "kernel_types.h"
+#include "kernel_wide.h"
+#include "simd.h"
+
+/* Numbers by index. */
+typedef struct kernel_numbers {
+    const float *data; /* NULL: out of a gather's reach, or neither float32 nor float64 */
+    int32_t stride;    /* in float32's */
+    bool is_wide;
+    grid_array array;        /* what is asked where data is NULL; */
+    const grid_field *field; /* or this, where it is a field's */
+} kernel_numbers;
+
+SIMD_INLINE bool kernel_numbers_are_narrow(const kernel_numbers *c)
+{
+    return __builtin_expect(c->data && !c->is_wide, 1);
+}
+
+typedef struct kernel_arrays {
+    bool has_lanes;         /* tets, hexes, wedges and pyramids are for lanes */
+    bool is_narrow;         /* all numbers are float32 that are gathered, */
+    bool has_narrow_places; /* or the coordinates are */
+    const grid *cells;      /* NULL: the cells' vertices are one after the other, */
+    int type;               /* and all are of this type */
+    const grid_field *own;  /* NULL, or what tells the cells that have no value of their own */
+    bool is_by_cell;        /* values are the cells' */
+    kernel_numbers coordinates[3], values;
+    struct { /* arrays that are asked of memory beforehand */
+        const char *data;
+        int64_t stride;
+    } asked[4];
+} kernel_arrays;
+
+static inline kernel_numbers kernel_numbers_of(const grid_array *a, int64_t count)
+{
+    const int64_t stride = a->stride / (int64_t)sizeof(float);
+    const bool is_gathered = !a->is_integer && a->stride % (int64_t)sizeof(float) == 0 && stride > 0 &&
+                             stride < INT32_MAX / 2 && count <= INT32_MAX / stride;
+    kernel_numbers c = {.array = *a, .is_wide = a->is_wide, .stride = (int32_t)stride};
+    c.data = is_gathered ? (const float *)(const void *)a->data : NULL;
+    return c;
+}
+
+static inline void kernel_arrays_begin(kernel_arrays *p, const grid *g, const grid_field *field)
+{
+    const int64_t count = field->is_cell_centred ? g->cell_count : g->vertex_count;
+    grid_array values = field->values;
+    memset(p, 0, sizeof *p);
+    p->cells = g;
+    p->type = g->cell_types ? GRID_NO_TYPE : g->cell_type;
+    p->has_lanes = g->vertex_count < INT32_MAX && g->cell_count < INT32_MAX;
+    p->own = field->own;
+    p->is_by_cell = field->is_cell_centred;
+    if (field->component >= 0) values.data += field->component * field->component_stride;
+    p->values = kernel_numbers_of(&values, count);
+    if (field->component < 0) p->values.data = NULL;
+    p->values.field = field;
+    p->has_narrow_places = true;
+    for (int a = 0; a < 3; a++) {
+        const grid_array *c = &g->coordinates[a];
+        p->coordinates[a] = kernel_numbers_of(c, g->vertex_count);
+        p->has_narrow_places = p->has_narrow_places && kernel_numbers_are_narrow(&p->coordinates[a]);
+        p->asked[a].data = c->data;
+        p->asked[a].stride = c->stride;
+    }
+    p->is_narrow = p->has_narrow_places && kernel_numbers_are_narrow(&p->values);
+    p->asked[3].data = p->is_by_cell ? p->asked[0].data : values.data;
+    p->asked[3].stride = p->is_by_cell ? p->asked[0].stride : values.stride;
+}
+
+/* Returns the active records of a surface's cells on a part, or NULL where there are none. */
+SIMD_INLINE const kernel_active *kernel_active_of(const kernel_frame *f, int surface, int part)
+{
+    const kernel_active *active = f->active ? &f->active[surface * f->job->part_count + part] : NULL;
+    return active && active->records ? active : NULL;
+}
+
+/* Sets up a surface's cells on a part: its active records, or else the mesh. */
+static inline void kernel_arrays_surface(kernel_arrays *p, const kernel_frame *f, int surface, int part)
+{
+    const kernel_active *active = kernel_active_of(f, surface, part);
+    kernel_arrays_begin(p, f->job->parts[part].cells, &f->surfaces[surface].layer->field.fields[part]);
+    if (!active) return;
+    p->cells = NULL;
+    p->own = NULL;
+    p->type = active->vertices == 8 ? GRID_HEX : GRID_TET;
+    for (int a = 0; a < 4; a++)
+        *(a < 3 ? &p->coordinates[a] : &p->values) =
+            (kernel_numbers){.data = active->records + a, .stride = KERNEL_ACTIVE_FLOATS};
+}
+
+/* ---- cells ---- */
+
+SIMD_INLINE int kernel_arrays_type(const kernel_arrays *p, uint32_t cell)
+{
+    return p->type != GRID_NO_TYPE ? p->type : grid_cell_type(p->cells, cell);
+}
+
+/* The first of the cell's entries in the connectivity, of cells of so many vertices. */
+SIMD_INLINE int64_t kernel_arrays_first(const grid *g, uint32_t cell, int vertices)
+{
+    return g->offsets.data ? grid_array_index(&g->offsets, cell) : (int64_t)cell * vertices;
+}
+
+/* vertices: of each cell; a constant where this is called from. */
+SIMD_INLINE void kernel_arrays_indices(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
+                                       int32_t (*out)[SIMD_WIDTH], int lane)
+{
+    const grid_array c = p->cells->connectivity;
+    const int32_t base = (int32_t)c.base;
+    for (int n = 0; n < count; n++, lane++) {
+        const char *at = c.data + kernel_arrays_first(p->cells, cells[n], vertices) * c.stride;
+        if (c.is_wide)
+            for (int i = 0; i < vertices; i++, at += c.stride)
+                out[i][lane] = (int32_t) * (const int64_t *)(const void *)at - base;
+        else
+            for (int i = 0; i < vertices; i++, at += c.stride) out[i][lane] = *(const int32_t *)(const void *)at - base;
+    }
+}
+
+/* Asks memory for what the vertices have. */
+SIMD_INLINE void kernel_arrays_prefetch(const kernel_arrays *p, int count, int vertices,
+                                        int32_t (*const vertex)[SIMD_WIDTH], int lane)
+{
+    for (int n = lane; n < lane + count; n++)
+        for (int i = 0; i < vertices; i++)
+            for (int k = 0; k < 4; k++) __builtin_prefetch(p->asked[k].data + vertex[i][n] * p->asked[k].stride);
+}
+
+/* The vertices of a tet into a lane, of a mesh that has no active records. */
+SIMD_INLINE void kernel_arrays_tet(const kernel_arrays *p, uint32_t cell, int32_t (*out)[SIMD_WIDTH], int lane)
+{
+    kernel_arrays_indices(p, &cell, 1, 4, out, lane);
+}
+
+/* The vertices of cells of one type into lanes from the given one on, and what they have on its way from memory. Active
+ * records are prefetched whole (kernel_candidate_prefetch()). */
+SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cells, int count, int vertices,
+                                     int32_t (*out)[SIMD_WIDTH], int lane)
+{
+    if (!p->cells) {
+        for (int n = 0; n < count; n++)
+            for (int i = 0; i < vertices; i++) out[i][lane + n] = (int32_t)((int64_t)cells[n] * vertices + i);
+    } else if (vertices == 4) {
+        kernel_arrays_indices(p, cells, count, 4, out, lane);
+        kernel_arrays_prefetch(p, count, 4, out, lane);
+    } else if (vertices == 8) {
+        kernel_arrays_indices(p, cells, count, 8, out, lane);
+        kernel_arrays_prefetch(p, count, 8, out, lane);
+    } else {
+        kernel_arrays_indices(p, cells, count, vertices, out, lane);
+        kernel_arrays_prefetch(p, count, vertices, out, lane);
+    }
+}
+
+/* Of the lanes' cells those that have a value. */
+SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
+{
+    for (unsigned left = p->own ? lanes : 0; left; left &= left - 1)
+        if (!isfinite(grid_field_value(p->own, cells[__builtin_ctz(left)]))) lanes &= ~(left & -left);
+    return lanes;
+}
+
+/* ---- numbers ---- */
+
+static __attribute__((noinline)) void kernel_numbers_slowly(const kernel_numbers *c, vi index, kernel_whole *out)
+{
+    double v[SIMD_WIDTH];
+    int32_t at[SIMD_WIDTH];
+    memcpy(at, &index, sizeof index);
+    for (int n = 0; n < SIMD_WIDTH; n++)
+        v[n] = c->field ? grid_field_value(c->field, at[n]) : grid_array_number(&c->array, at[n]);
+    memcpy(out, v, sizeof v);
+}
+
+/* Numbers as they came: float32 where that is what there is, for which less is to be done. */
+typedef struct kernel_taken {
+    vf narrow;
+    kernel_whole wide;
+} kernel_taken;
+
+SIMD_INLINE void kernel_numbers_take_raw(const kernel_numbers *c, vi index, kernel_taken *out)
+{
+    if (kernel_numbers_are_narrow(c)) {
+        out->narrow = vf_gather(c->data, index * c->stride);
+    } else if (c->data) {
+        for (int half = 0; half < 2; half++) out->wide.half[half] = vd_gather(c->data, index * c->stride, half);
+    } else {
+        kernel_numbers_slowly(c, index, &out->wide);
+    }
+}
+
+SIMD_INLINE kernel_whole kernel_numbers_take(const kernel_numbers *c, vi index)
+{
+    kernel_taken out;
+    kernel_numbers_take_raw(c, index, &out);
+    return kernel_numbers_are_narrow(c) ? kernel_whole_widen(out.narrow) : out.wide;
+}
+
+/* Of numbers of which it is known beforehand whether all are narrow. */
+SIMD_INLINE vm kernel_taken_lt(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
+{
+    return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_whole_lt(&a->wide, &b->wide);
+}
+
+SIMD_INLINE vm kernel_taken_eq(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
+{
+    return is_narrow ? vf_eq(a->narrow, b->narrow) : kernel_whole_eq(&a->wide, &b->wide);
+}
+
+SIMD_INLINE void kernel_taken_swap(bool is_narrow, vm lanes, kernel_taken *a, kernel_taken *b)
+{
+    const kernel_taken was = *a;
+    if (is_narrow) {
+        a->narrow = vf_select(lanes, b->narrow, was.narrow);
+        b->narrow = vf_select(lanes, was.narrow, b->narrow);
+    } else {
+        a->wide = kernel_whole_select(lanes, &b->wide, &was.wide);
+        b->wide = kernel_whole_select(lanes, &was.wide, &b->wide);
+    }
+}
+
+/* Is a before b, in the order of coordinates? */
+SIMD_INLINE vm kernel_taken_before(bool is_narrow, const kernel_taken a[3], const kernel_taken b[3])
+{
+    vm before = kernel_taken_lt(is_narrow, &a[2], &b[2]);
+    for (int axis = 1; axis >= 0; axis--)
+        before = vm_or(kernel_taken_lt(is_narrow, &a[axis], &b[axis]),
+                       vm_and(kernel_taken_eq(is_narrow, &a[axis], &b[axis]), before));
+    return before;
+}
+
+/* The vertices' coordinates. */
+SIMD_INLINE void kernel_arrays_place(const kernel_arrays *p, bool is_narrow, vi vertex, kernel_taken out[3])
+{
+    for (int a = 0; a < 3; a++) {
+        if (is_narrow)
+            out[a].narrow = vf_gather(p->coordinates[a].data, vertex * p->coordinates[a].stride);
+        else
+            out[a].wide = kernel_numbers_take(&p->coordinates[a], vertex);
+    }
+}
+
+SIMD_INLINE kernel_whole kernel_taken_whole(bool is_narrow, const kernel_taken *v)
+{
+    return is_narrow ? kernel_whole_widen(v->narrow) : v->wide;
+}
+
+/* What numbers are compared with: its value, the same as two float32, and the least float32 that is not below it. */
+typedef struct kernel_level {
+    double value;
+    float middle, rest, least;
+} kernel_level;
+
+/* The least float that is not below x. */
+SIMD_INLINE float kernel_not_below(double x)
+{
+    float f = (float)x;
+    int32_t bits;
+    if (!((double)f < x)) return f;
+    if (f == 0) return 1e-45f;
+    memcpy(&bits, &f, sizeof bits);
+    bits += f > 0 ? 1 : -1;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+
+SIMD_INLINE kernel_level kernel_level_of(double value)
+{
+    const float middle = (float)value;
+    return (kernel_level){value, middle, (float)(value - (double)middle), kernel_not_below(value)};
+}
+
+/* Is v below the level? Exactly. */
+SIMD_INLINE vm kernel_taken_below(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
+{
+    const kernel_whole value = kernel_whole_set(level->value);
+    return kernel_numbers_are_narrow(c) ? vf_lt(v->narrow, vf_set(level->least)) : kernel_whole_lt(&v->wide, &value);
+}
+
+/* Returns v less the level, as a float32. */
+SIMD_INLINE vf kernel_taken_less(const kernel_numbers *c, const kernel_taken *v, const kernel_level *level)
+{
+    vf out;
+    if (kernel_numbers_are_narrow(c)) return (v->narrow - level->middle) - level->rest;
+    for (int half = 0; half < 2; half++) kernel_half_put(&out, half, v->wide.half[half] - level->value);
+    return out;
+}
+
+/* The field at vertices of the cells. */
+SIMD_INLINE void kernel_arrays_values(const kernel_arrays *p, vi vertex, const uint32_t *cells, kernel_taken *out)
+{
+    if (__builtin_expect(p->is_by_cell, 0)) memcpy(&vertex, cells, sizeof vertex);
+    kernel_numbers_take_raw(&p->values, vertex, out);
+}
+
+/* One number. */
+SIMD_INLINE double kernel_numbers_one(const kernel_numbers *c, int64_t index)
+{
+    double wide;
+    if (!c->data) return c->field ? grid_field_value(c->field, index) : grid_array_number(&c->array, index);
+    const float *at = c->data + index * c->stride;
+    if (!c->is_wide) return (double)*at;
+    memcpy(&wide, at, sizeof wide);
+    return wide;
+}
+
+/* A cell with finite values, as kernel_cell_fetch() makes it, and where its vertices are; for the caller to place. */
+SIMD_INLINE void kernel_arrays_fetch(kernel_cell *c, const kernel_arrays *p, uint32_t index, int vertices)
+{
+    int32_t own[GRID_MAX_CELL_VERTICES][SIMD_WIDTH];
+    kernel_arrays_cells(p, &index, 1, vertices, own, 0);
+    c->index = index;
+    c->type = vertices == 8 ? GRID_HEX : GRID_TET;
+    c->count = vertices;
+    c->is_finite = c->is_placed = true;
+    c->has_lines = c->has_normal = false;
+    for (int i = 0; i < vertices; i++) {
+        const int64_t vertex = own[i][0];
+        c->vertices[i] = vertex;
+        c->values[i] = kernel_numbers_one(&p->values, p->is_by_cell ? (int64_t)index : vertex);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_numbers_one(&p->coordinates[a], vertex);
+    }
+}
+
+#endif

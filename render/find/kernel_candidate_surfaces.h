@@ -1,0 +1,320 @@
+/* Isosurfaces of tets, hexes, wedges and pyramids, found as many at once as there are lanes (kernel_candidates.h):
+ *
+ *     lanes are cells of one type:  do their values straddle an isovalue?
+ *     lanes are cells that do:      kernel_linearize(), kernel_slab_outline() and the box of pixels; of tets
+ *                                   where the isovalue crosses their edges
+ *
+ * Places are differences from the eye as float32, along the camera's axes. A hit is the mean of the vertices with
+ * weights that are not negative, and its value is that of theirs (kernel_outline.h), so that |L| <= E there for
+ * whatever places the vertices are given, if L and E are made of these same places: a hit is off its place in that slab
+ * by no more than the vertices are, 8 roundings of their distance from the eye, which is within the pads of
+ * kernel_add_lanes(). What is said of cells that are not folded holds but for rounding as well, and those whose size is
+ * near that are within the pads anywhere. */
+#ifndef RENDER_KERNEL_CANDIDATE_SURFACES_H
+#define RENDER_KERNEL_CANDIDATE_SURFACES_H
+
+#include <math.h>
+#include <string.h>
+
+#include "kernel_arrays.h"
+#include "kernel_cell.h"
+#include "kernel_finder.h"
+#include "kernel_outline.h"
+#include "kernel_shapes.h"
+#include "kernel_tile.h"
+#include "kernel_wide.h"
+#include "render.h"
+#include "simd.h"
+
+typedef struct kernel_poly_lanes {
+    int count;         /* of a cell's vertices */
+    vf at[8][3], f[8]; /* along the camera's axes; values less the isovalue, scaled as kernel_cell_relative() does */
+    vm usual;          /* numbers are of usual sizes: others are for the cell alone */
+} kernel_poly_lanes;
+
+/* L of kernel_outline.h at the vertices; the slab is |L| <= thickness, which is infinite where there is none. */
+typedef struct kernel_poly_slab {
+    vf at[8], thickness;
+} kernel_poly_slab;
+
+/* kernel_is_unfolded(). */
+SIMD_INLINE vm kernel_poly_lanes_unfolded(const kernel_poly_lanes *l, const kernel_differential *d, int count,
+                                          vf inverse[3][3])
+{
+    vf y[8][3], off[12];
+    vm unfolded = vm_all_lanes();
+    for (int i = 1; i < count; i++) {
+        vf move[3];
+        for (int a = 0; a < 3; a++) move[a] = l->at[i][a] - l->at[0][a];
+        for (int a = 0; a < 3; a++)
+            y[i][a] = (inverse[a][0] * move[0] + inverse[a][1] * move[1]) + inverse[a][2] * move[2];
+    }
+    for (int a = 0; a < 3; a++) y[0][a] = vf_set(0);
+    for (int n = 0; n < d->column_count; n++) {
+        const signed char *v = d->columns[n].vertex;
+        off[n] = vf_set(0);
+        for (int a = 0; a < 3; a++) {
+            vf part = (y[v[1]][a] - y[v[0]][a]) - (a == d->columns[n].along ? 1.0f : 0);
+            if (v[2] != v[3]) part += y[v[3]][a] - y[v[2]][a];
+            off[n] += part * part;
+        }
+    }
+    for (int n = 0; n < d->corner_count; n++) {
+        const signed char *columns = d->corners[n];
+        unfolded = vm_and(unfolded, vf_lt(off[columns[0]] + off[columns[1]] + off[columns[2]], vf_set(0.9f)));
+    }
+    return unfolded;
+}
+
+/* kernel_linearize(). Lanes whose volume is near float32's least are not usual. */
+SIMD_INLINE void kernel_poly_lanes_slab_of(kernel_poly_lanes *l, int type, kernel_poly_slab *out)
+{
+    const kernel_differential *differential = kernel_cell_differential(type);
+    const int count = grid_type_vertices(type);
+    vf d[4][3], n[3][3], middle[4], g[3], size = vf_set(0), error = size, blur = size;
+    for (int a = 0; a < 4; a++) {
+        middle[a] = d[a][0] = d[a][1] = d[a][2] = vf_set(0);
+        for (int i = 0; i < count; i++) {
+            const vf v = a < 3 ? l->at[i][a] : l->f[i];
+            middle[a] += v * (1 / (float)count);
+            for (int k = 0; k < 3; k++) d[a][k] += v * differential->middle[k][i];
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        const int u = (i + 1) % 3, v = (i + 2) % 3;
+        for (int a = 0; a < 3; a++) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            n[i][a] = d[b][u] * d[c][v] - d[c][u] * d[b][v];
+        }
+    }
+    const vf volume = (d[0][0] * n[0][0] + d[1][0] * n[0][1]) + d[2][0] * n[0][2];
+    l->usual = vm_and(l->usual, vf_lt(vf_set(1e-30f), vf_abs(volume)));
+    const vf inverse = 1.0f / volume;
+    for (int i = 0; i < 3; i++)
+        for (int a = 0; a < 3; a++) n[i][a] *= inverse;
+    for (int a = 0; a < 3; a++) g[a] = (d[3][0] * n[0][a] + d[3][1] * n[1][a]) + d[3][2] * n[2][a];
+    for (int i = 0; i < count; i++) {
+        out->at[i] = middle[3];
+        for (int a = 0; a < 3; a++) {
+            const vf part = g[a] * (l->at[i][a] - middle[a]);
+            out->at[i] += part;
+            size = vf_max(vf_abs(part), size);
+        }
+        error = vf_max(vf_abs(out->at[i] - l->f[i]), error);
+    }
+    error *= vf_select(kernel_poly_lanes_unfolded(l, differential, count, n), vf_set(1), vf_set(3.4f));
+    for (int a = 0; a < 3; a++) {
+        vf reach = vf_set(0);
+        for (int i = 0; i < count; i++) reach = vf_max(vf_abs(l->at[i][a]), reach);
+        blur += vf_abs(g[a]) * reach;
+    }
+    const vf thickness = error + KERNEL_OUTLINE_PAD * (1 + size) + 16 * 6e-8f * blur;
+    out->thickness = vf_select(vf_lt(thickness, vf_set(1)), thickness, vf_set(INFINITY));
+}
+
+static __attribute__((noinline)) void kernel_poly_lanes_slab(kernel_poly_lanes *l, int type, kernel_poly_slab *out)
+{
+    if (type == GRID_HEX)
+        kernel_poly_lanes_slab_of(l, GRID_HEX, out); /* loops of known length */
+    else
+        kernel_poly_lanes_slab_of(l, type, out);
+}
+
+/* kernel_slab_outline()'s points: vertices in the slab, and where lines between two vertices meet its sides. */
+static __attribute__((noinline)) void kernel_poly_lanes_ends(const kernel_finder *s, const kernel_poly_lanes *l,
+                                                             const kernel_poly_slab *slab, kernel_ends_lanes *e)
+{
+    *e = kernel_no_ends();
+    for (int i = 0; i < l->count; i++) {
+        kernel_ends_add(s, e, l->at[i], vf_le(vf_abs(slab->at[i]), slab->thickness));
+        for (int j = 0; j < i; j++) {
+            const vf inverse = 1.0f / (slab->at[j] - slab->at[i]);
+            for (int side = 0; side < 2; side++) {
+                const vf level = side ? slab->thickness : -slab->thickness, along = (level - slab->at[i]) * inverse;
+                const vm crossed = vm_xor(vf_lt(slab->at[i], level), vf_lt(slab->at[j], level));
+                vf point[3];
+                if (!vm_any(crossed)) continue;
+                for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
+                kernel_ends_add(s, e, point, crossed);
+            }
+        }
+    }
+}
+
+/* Of tets: where the isovalue crosses their edges. negative: their values are below the isovalue, exactly. */
+SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_poly_lanes *l, const vm negative[4],
+                                       kernel_ends_lanes *e)
+{
+    *e = kernel_no_ends();
+    for (int n = 0; n < KERNEL_TET_EDGES; n++) {
+        const int i = kernel_tet_edge[n][0], j = kernel_tet_edge[n][1];
+        const vm crossed = vm_xor(negative[i], negative[j]);
+        const vf along = vf_max(l->f[i] / (l->f[i] - l->f[j]), vf_set(0)); /* not 0 / 0 */
+        vf point[3];
+        for (int a = 0; a < 3; a++) point[a] = l->at[i][a] + along * (l->at[j][a] - l->at[i][a]);
+        kernel_ends_add(s, e, point, crossed);
+    }
+}
+
+/* Fetches the vertices along the camera's axes. */
+SIMD_INLINE void kernel_poly_lanes_place(const kernel_finder *s, const kernel_cells *c, int count, kernel_poly_lanes *l)
+{
+    l->count = count;
+    l->usual = vm_all_lanes();
+    for (int i = 0; i < count; i++) {
+        vf from_eye[3];
+        kernel_found_place(s, kernel_cells_vertex(c, i), from_eye);
+        l->usual = kernel_usual_place(l->usual, from_eye);
+        kernel_place_turn(s, from_eye, l->at[i]);
+    }
+}
+
+/* Sets the values less the level, and what of usual they leave. */
+SIMD_INLINE vf kernel_poly_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
+                                        const kernel_level *level, kernel_poly_lanes *l)
+{
+    vf size = vf_set(0);
+    for (int i = 0; i < count; i++) {
+        l->f[i] = kernel_taken_less(&s->arrays.values, &v[i], level);
+        size = vf_max(vf_abs(l->f[i]), size);
+        l->usual = vm_and(l->usual, vf_lt(vf_abs(l->f[i]), vf_set(1e30f)));
+    }
+    l->usual = vm_and(l->usual, vf_lt(vf_set(1e-30f), size));
+    return size;
+}
+
+/* Fetches a cell of odd numbers, from the mesh or from its active record; a record's number is not the mesh's. */
+static void kernel_odd_fetch(const kernel_finder *s, uint32_t cell, kernel_cell *c)
+{
+    if (s->arrays.cells) {
+        kernel_cell_fetch(c, s->arrays.cells, &s->field->fields[s->part], cell);
+        return;
+    }
+    kernel_arrays_fetch(c, &s->arrays, cell, grid_type_vertices(s->arrays.type));
+    for (int i = 0; i < c->count; i++)
+        kernel_place_in(s->frame, &s->picture, c->world[i], &c->x[i], &c->y[i], &c->z[i]);
+}
+
+/* Adds the cells of the lanes that are crossed and of usual numbers. Values too large, too small or NaN for lanes are
+ * handled one by one. */
+SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int value, vm usual, unsigned crossed,
+                                    const kernel_ends_lanes *e)
+{
+    const unsigned good = crossed & vm_bits(vm_and(usual, vf_le(e->near, e->far)));
+    kernel_add_lanes(s, e, kernel_arrays_drawn(&s->arrays, c->cell, good), c->cell, s->source + (uint32_t)value);
+    for (unsigned odd = crossed & ~vm_bits(usual); odd; odd &= odd - 1) {
+        kernel_cell own;
+        kernel_odd_fetch(s, c->cell[__builtin_ctz(odd)], &own);
+        kernel_find_alone(s, &own, value);
+    }
+}
+
+/* ---- tets ---- */
+
+/* Most of a leaf's are crossed where one is, so that all are placed. */
+static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const kernel_cells *c)
+{
+    const unsigned all = (1u << c->count) - 1;
+    kernel_poly_lanes l;
+    kernel_taken v[4];
+    for (int i = 0; i < 4; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
+    kernel_poly_lanes_place(s, c, 4, &l);
+    const vm usual = l.usual;
+    for (int value = 0; value < s->surface->layer->value_count; value++) {
+        const kernel_level level = kernel_level_of(s->surface->layer->values[value]);
+        vm negative[4], any = vm_none(), every = vm_all_lanes();
+        kernel_ends_lanes e;
+        l.usual = usual;
+        kernel_poly_lanes_values(s, v, 4, &level, &l);
+        for (int i = 0; i < 4; i++) {
+            negative[i] = kernel_taken_below(&s->arrays.values, &v[i], &level);
+            any = vm_or(any, negative[i]);
+            every = vm_and(every, negative[i]);
+        }
+        const unsigned crossed = all & vm_bits(vm_andnot(any, every));
+        if (!crossed) continue;
+        kernel_tet_lanes_ends(s, &l, negative, &e);
+        kernel_add_crossed(s, c, value, l.usual, crossed, &e);
+    }
+}
+
+/* ---- hexes, wedges and pyramids ---- */
+
+/* Finds where the surface in the crossed cells may be seen. */
+SIMD_INLINE void kernel_crossed_run(kernel_finder *s, kernel_crossed *h, int vertices)
+{
+    const kernel_level level = kernel_level_of(s->surface->layer->values[h->value]);
+    const kernel_cells *c = &h->cells;
+    kernel_poly_lanes l;
+    kernel_poly_slab slab;
+    kernel_ends_lanes e;
+    kernel_taken v[8];
+    for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
+    kernel_poly_lanes_place(s, c, vertices, &l);
+    const vf size = kernel_poly_lanes_values(s, v, vertices, &level, &l);
+    /* The power of two that brings the largest near 1: its exponent, mirrored. */
+    const vi power = (254 << 23) - (vi_from_bits(size) & vi_set(0x7f800000));
+    for (int i = 0; i < vertices; i++) l.f[i] *= vf_from_bits(power);
+    kernel_poly_lanes_slab(&l, c->type, &slab);
+    kernel_poly_lanes_ends(s, &l, &slab, &e);
+    kernel_add_crossed(s, c, h->value, l.usual, (1u << c->count) - 1, &e);
+}
+
+static __attribute__((noinline)) void kernel_find_crossed(kernel_finder *s, kernel_crossed *h)
+{
+    if (!h->cells.count) return;
+    kernel_cells_fill(&h->cells);
+    if (h->cells.vertices == 8)
+        kernel_crossed_run(s, h, 8);
+    else
+        kernel_crossed_run(s, h, h->cells.vertices);
+    h->cells.count = 0;
+}
+
+static void kernel_find_all_crossed(kernel_finder *s)
+{
+    for (int i = 0; i < KERNEL_FOUND_TETS; i++) kernel_find_crossed(s, &s->crossed[i]);
+}
+
+/* Puts these lanes' cells, which the isovalue crosses, to the crossed ones, all of which one isovalue crosses. */
+SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
+{
+    kernel_crossed *h = &s->crossed[kernel_found_number(from->type)];
+    if (lanes && value != h->value) kernel_find_crossed(s, h);
+    for (; lanes; lanes &= lanes - 1) {
+        if (h->cells.count == SIMD_WIDTH) kernel_find_crossed(s, h);
+        const int n = __builtin_ctz(lanes), to = h->cells.count++;
+        h->value = value;
+        h->cells.cell[to] = from->cell[n];
+        for (int i = 0; i < vertices; i++) h->cells.vertex[i][to] = from->vertex[i][n];
+    }
+}
+
+/* Do the cells' values straddle an isovalue? */
+SIMD_INLINE void kernel_find_straddling(kernel_finder *s, const kernel_cells *c, int vertices)
+{
+    const render_surface_layer *layer = s->surface->layer;
+    const unsigned all = (1u << c->count) - 1;
+    kernel_taken v[8];
+    for (int i = 0; i < vertices; i++) kernel_arrays_values(&s->arrays, kernel_cells_vertex(c, i), c->cell, &v[i]);
+    for (int value = 0; value < layer->value_count; value++) {
+        const kernel_level level = kernel_level_of(layer->values[value]);
+        vm any = vm_none(), every = vm_all_lanes();
+        for (int i = 0; i < vertices; i++) {
+            const vm below = kernel_taken_below(&s->arrays.values, &v[i], &level);
+            any = vm_or(any, below);
+            every = vm_and(every, below);
+        }
+        kernel_crossed_add(s, c, vertices, value, all & vm_bits(vm_andnot(any, every)));
+    }
+}
+
+static __attribute__((noinline)) void kernel_find_polys(kernel_finder *s, const kernel_cells *c)
+{
+    if (c->vertices == 8)
+        kernel_find_straddling(s, c, 8);
+    else
+        kernel_find_straddling(s, c, c->vertices);
+}
+
+#endif

@@ -1,0 +1,48 @@
+/* Cells that show in a volume, found as many at once as there are lanes (kernel_candidates.h): boxes of all vertices.
+ */
+#ifndef RENDER_KERNEL_CANDIDATE_VOLUMES_H
+#define RENDER_KERNEL_CANDIDATE_VOLUMES_H
+
+#include "grid.h"
+#include "kernel_arrays.h"
+#include "kernel_cell.h"
+#include "kernel_finder.h"
+#include "kernel_interest.h"
+#include "kernel_wide.h"
+#include "simd.h"
+
+/* Fetches the cell, from the mesh. */
+SIMD_INLINE void kernel_found_fetch(kernel_finder *s, uint32_t cell)
+{
+    kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], cell);
+}
+
+/* All that a volume shows of cells of one type. */
+static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
+{
+    kernel_ends_lanes e = kernel_no_ends();
+    vm usual = vm_all_lanes();
+    vf v[8] = {vf_set(0)};
+    for (int i = 0; i < c->vertices; i++) {
+        const vi vertex = kernel_cells_vertex(c, i);
+        kernel_taken value;
+        vf place[3], at[3];
+        kernel_arrays_values(&s->arrays, vertex, c->cell, &value);
+        v[i] = kernel_numbers_are_narrow(&s->arrays.values) ? value.narrow : kernel_whole_narrow(&value.wide);
+        usual = vm_and(usual, vf_lt(vf_abs(v[i]), vf_set(1e30f)));
+        kernel_found_place(s, vertex, place);
+        usual = kernel_usual_place(usual, place);
+        kernel_place_turn(s, place, at);
+        kernel_ends_add(s, &e, at, vm_all_lanes());
+    }
+    const vm shows = kernel_interest_meets_values(s->interest, v, c->vertices);
+    const unsigned all = (1u << c->count) - 1;
+    const unsigned good = kernel_arrays_drawn(&s->arrays, c->cell, all & vm_bits(vm_and(usual, shows)));
+    if (good) kernel_add_lanes(s, &e, good, c->cell, s->source);
+    for (unsigned odd = all & ~vm_bits(usual); odd; odd &= odd - 1) {
+        kernel_found_fetch(s, c->cell[__builtin_ctz(odd)]);
+        kernel_find_volume(s);
+    }
+}
+
+#endif
