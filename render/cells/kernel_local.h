@@ -39,6 +39,7 @@ typedef struct kernel_local_cells {
     float bent[KERNEL_BENT_TERMS][3][SIMD_WIDTH];
     float field[4 + KERNEL_BENT_TERMS][SIMD_WIDTH];
     float low[3][SIMD_WIDTH], high[3][SIMD_WIDTH]; /* y of no point inside is beyond */
+    float bend[SIMD_WIDTH]; /* the derivative of n is no more than its root by Frobenius' norm */
     float blur[SIMD_WIDTH]; /* a point nearer than that to the border may be on either side of it */
 } kernel_local_cells;
 
@@ -153,13 +154,13 @@ SIMD_INLINE vm kernel_local_is_before(vf (*const at)[8], int i, int j)
     return kernel_local_before(a, b);
 }
 
-SIMD_INLINE void kernel_local_swap(vf (*at)[8], vf *value, vm lanes, int i, int j)
+/* What is known of the vertices: lists[0] to lists[2] are their places, and all lists are turned. */
+SIMD_INLINE void kernel_local_swap(vf (*lists)[8], int count, vm lanes, int i, int j)
 {
-    for (int a = 0; a < 4; a++) {
-        vf *list = a < 3 ? at[a] : value;
-        const vf was = list[i];
-        list[i] = vf_select(lanes, list[j], was);
-        list[j] = vf_select(lanes, was, list[j]);
+    for (int n = 0; n < count; n++) {
+        const vf was = lists[n][i];
+        lists[n][i] = vf_select(lanes, lists[n][j], was);
+        lists[n][j] = vf_select(lanes, was, lists[n][j]);
     }
 }
 
@@ -177,7 +178,7 @@ SIMD_INLINE void kernel_local_least(vf (*const at)[8], const signed char *vertic
     }
 }
 
-SIMD_INLINE void kernel_hex_turn(vf (*at)[8], vf *value)
+SIMD_INLINE void kernel_hex_turn(vf (*at)[8], int lists)
 {
     static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
     vm is_least[8];
@@ -187,55 +188,56 @@ SIMD_INLINE void kernel_hex_turn(vf (*at)[8], vf *value)
         for (int b = 0; b < 8; b++)
             if (b >> a & 1) turn = vm_or(turn, is_least[b]);
         for (int b = 0; b < 8; b++)
-            if (!(b >> a & 1)) kernel_local_swap(at, value, turn, vertex[b], vertex[b | 1 << a]);
+            if (!(b >> a & 1)) kernel_local_swap(at, lists, turn, vertex[b], vertex[b | 1 << a]);
     }
     for (int k = 0; k < 3; k++) {
         const int low = k == 1 ? 2 : 1, high = 2 * low, other = 7 & ~(low | high); /* axes 0 and 1, 1 and 2, 0 and 1 */
         const vm swap = kernel_local_is_before(at, vertex[high], vertex[low]);
-        kernel_local_swap(at, value, swap, vertex[low], vertex[high]);
-        kernel_local_swap(at, value, swap, vertex[low | other], vertex[high | other]);
+        kernel_local_swap(at, lists, swap, vertex[low], vertex[high]);
+        kernel_local_swap(at, lists, swap, vertex[low | other], vertex[high | other]);
     }
 }
 
-SIMD_INLINE void kernel_wedge_turn(vf (*at)[8], vf *value)
+SIMD_INLINE void kernel_wedge_turn(vf (*at)[8], int lists)
 {
     static const signed char vertex[6] = {0, 1, 2, 3, 4, 5};
     vm is_least[8];
     kernel_local_least(at, vertex, 6, is_least);
     const vm over = vm_or(vm_or(is_least[3], is_least[4]), is_least[5]);
-    for (int i = 0; i < 3; i++) kernel_local_swap(at, value, over, i, i + 3);
+    for (int i = 0; i < 3; i++) kernel_local_swap(at, lists, over, i, i + 3);
     for (int i = 1; i < 3; i++) {
         const vm first = vm_or(is_least[i], is_least[i + 3]);
-        kernel_local_swap(at, value, first, 0, i);
-        kernel_local_swap(at, value, first, 3, i + 3);
+        kernel_local_swap(at, lists, first, 0, i);
+        kernel_local_swap(at, lists, first, 3, i + 3);
     }
     const vm swap = kernel_local_is_before(at, 2, 1);
-    kernel_local_swap(at, value, swap, 1, 2);
-    kernel_local_swap(at, value, swap, 4, 5);
+    kernel_local_swap(at, lists, swap, 1, 2);
+    kernel_local_swap(at, lists, swap, 4, 5);
 }
 
-SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], vf *value)
+SIMD_INLINE void kernel_pyramid_turn(vf (*at)[8], int lists)
 {
     static const signed char vertex[4] = {0, 1, 2, 3};
     vm is_least[8];
     kernel_local_least(at, vertex, 4, is_least);
-    kernel_local_swap(at, value, is_least[1], 0, 1);
-    kernel_local_swap(at, value, is_least[1], 3, 2);
-    kernel_local_swap(at, value, is_least[2], 0, 2);
-    kernel_local_swap(at, value, is_least[3], 0, 3);
-    kernel_local_swap(at, value, is_least[3], 1, 2);
-    kernel_local_swap(at, value, kernel_local_is_before(at, 3, 1), 1, 3);
+    kernel_local_swap(at, lists, is_least[1], 0, 1);
+    kernel_local_swap(at, lists, is_least[1], 3, 2);
+    kernel_local_swap(at, lists, is_least[2], 0, 2);
+    kernel_local_swap(at, lists, is_least[3], 0, 3);
+    kernel_local_swap(at, lists, is_least[3], 1, 2);
+    kernel_local_swap(at, lists, kernel_local_is_before(at, 3, 1), 1, 3);
 }
 
-/* Turns the vertices of a hex, wedge or pyramid in each lane, with their values, into the order of places. */
-SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], vf *value)
+/* Turns the vertices of a hex, wedge or pyramid in each lane, with all that the lists have of them, into the order of
+ * places. */
+SIMD_INLINE void kernel_local_turn(int type, vf (*at)[8], int lists)
 {
     if (type == GRID_HEX)
-        kernel_hex_turn(at, value);
+        kernel_hex_turn(at, lists);
     else if (type == GRID_WEDGE)
-        kernel_wedge_turn(at, value);
+        kernel_wedge_turn(at, lists);
     else
-        kernel_pyramid_turn(at, value);
+        kernel_pyramid_turn(at, lists);
 }
 
 /* How far r is inside of the cell's border; less than 0 outside. */
@@ -367,7 +369,9 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
     kernel_local_blur(count, places, (const vf(*)[3])inverse, out);
     const vm sharp = vf_lt(vf_load(out->blur), vf_set(0.05f));
     if (!bends) return sharp;
-    return vm_and(sharp, vf_lt(kernel_local_bent(type, (const vf(*)[3])bent), vf_set(KERNEL_LOCAL_BENT)));
+    const vf bend = kernel_local_bent(type, (const vf(*)[3])bent);
+    vf_store(out->bend, bend);
+    return vm_and(sharp, vf_lt(bend, vf_set(KERNEL_LOCAL_BENT)));
 }
 
 /* ---- points ---- */

@@ -212,11 +212,9 @@ SIMD_INLINE void kernel_placed_hex_line(kernel_placed_hexes *out, const kernel_f
     vf_store(out->bound[n], bound);
 }
 
-/* Of all faces the corners in kernel_quad_corners()' order, and the diagonals. */
-SIMD_INLINE void kernel_placed_hex_face(kernel_placed_hexes *out, const kernel_frame *f, int face, const vf rank[8],
-                                        const kernel_lanes_spot spots[8], vi *turned, vf *doubt)
+/* kernel_quad_corners() of the loop, four bits a corner; odd_lanes: where that begins at the loop's vertex 1 or 3. */
+SIMD_INLINE vi kernel_hex_quad_word(const signed char *loop, const vf rank[8], vm *odd_lanes)
 {
-    const signed char *loop = kernel_shapes[0].faces[face].vertices;
     const vf r[4] = {rank[loop[0]], rank[loop[1]], rank[loop[2]], rank[loop[3]]};
     /* The least of 0 and 2, of 1 and 3, and of all. */
     const vm second = vf_lt(r[2], r[0]), fourth = vf_lt(r[3], r[1]),
@@ -230,8 +228,19 @@ SIMD_INLINE void kernel_placed_hex_face(kernel_placed_hexes *out, const kernel_f
     const int loops = loop[0] | loop[1] << 4 | loop[2] << 8 | loop[3] << 12;
     vi word = none;
     for (int i = 0; i < 4; i++) word |= (vi_set(loops) >> (((first + i * step) & 3) << 2) & 15) << (4 * i);
+    *odd_lanes = odd;
+    return word;
+}
+
+/* Of all faces the corners, and the diagonals. */
+SIMD_INLINE void kernel_placed_hex_face(kernel_placed_hexes *out, const kernel_frame *f, int face, const vf rank[8],
+                                        const kernel_lanes_spot spots[8], vi *turned, vf *doubt)
+{
+    const signed char *loop = kernel_shapes[0].faces[face].vertices;
+    vm odd;
+    const vi word = kernel_hex_quad_word(loop, rank, &odd);
     memcpy(out->quads + face * SIMD_WIDTH, &word, sizeof word);
-    *turned |= vi_select(odd, vi_set(1 << face), none);
+    *turned |= vi_select(odd, vi_set(1 << face), vi_set(0));
     kernel_lanes_spot from, to;
     for (int a = 0; a < 3; a++) {
         from.at[a] = vf_select(odd, spots[loop[1]].at[a], spots[loop[0]].at[a]);

@@ -59,6 +59,7 @@ typedef struct kernel_piece {
  * domain. */
 typedef struct kernel_bound {
     float extinction_low, extinction_high, extinction_slope, colour_slope;
+    float fall, rise; /* the extinction's slope with its sign, the least and the most */
 } kernel_bound;
 
 /* A step of the opacity: its value, and that value rounded, at which pieces end. */

@@ -610,6 +610,20 @@ static __attribute__((noinline)) void kernel_tet_segments(kernel_packet *p, kern
     kernel_segments_add(state->pieces, list, mine, &i, list->is_double ? &precise : NULL);
 }
 
+/* Cells with quads. map NULL: of one value. */
+static __attribute__((noinline)) void kernel_poly_segments(kernel_packet *p, kernel_segment_state *state,
+                                                                const kernel_cell *c, const kernel_map *map)
+{
+    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
+    kernel_span span = {.map = map, .cell = c};
+    const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
+    if (intervals && (map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
+    for (int k = 0; k < intervals; k++) {
+        span.interval = &list[k];
+        kernel_span_run(p, state, &span);
+    }
+}
+
 /* Volumes in polyhedra: samples on the profile. */
 
 SIMD_INLINE bool kernel_polyhedron_shows(const polyhedron *c, const kernel_transfer *t)

@@ -309,8 +309,31 @@ typedef struct kernel_span {
     bool is_steep, is_narrow;   /* steep ramps are, narrow ones */
 } kernel_span;
 
+/* The function's bounds over the values from low to high, between steps. */
+SIMD_INLINE kernel_bound kernel_bound_between(const kernel_pieces *t, float low, float high)
+{
+    const float last = KERNEL_BOUND_BINS - 1;
+    const int from = (int)simd_min(simd_max((low - t->bin_low) * t->bound_inverse, 0), last);
+    const int to = (int)simd_min(simd_max((high - t->bin_low) * t->bound_inverse, 0), last);
+    kernel_bound b = t->bounds[from];
+    for (int i = from + 1; i <= to; i++) {
+        b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
+        b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
+        b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
+        b.fall = simd_min(t->bounds[i].fall, b.fall);
+        b.rise = simd_max(t->bounds[i].rise, b.rise);
+    }
+    return b;
+}
+
 /* With extinction s and colour c, a field that is off by d changes the light by at most T (contrast |s'| + s |c'|) d a
- * unit distance (docs/error_budget.md): the most of that over the cell's values, between steps. */
+ * unit distance (docs/error_budget.md). */
+SIMD_INLINE float kernel_bound_cost(const kernel_pieces *t, const kernel_bound *b)
+{
+    return simd_min(t->contrast * b->extinction_slope + b->extinction_high * b->colour_slope, 1e30f);
+}
+
+/* The most of that over the cell's values, and which steps and ramps are among these. */
 SIMD_INLINE void kernel_span_bound(const kernel_segment_state *state, const float *values, int count, kernel_span *out)
 {
     const kernel_pieces *t = state->pieces;
@@ -320,16 +343,8 @@ SIMD_INLINE void kernel_span_bound(const kernel_segment_state *state, const floa
         low = simd_min(values[i], low);
         high = simd_max(values[i], high);
     }
-    const float last = KERNEL_BOUND_BINS - 1;
-    const int from = (int)simd_min(simd_max((low - t->bin_low) * t->bound_inverse, 0), last);
-    const int to = (int)simd_min(simd_max((high - t->bin_low) * t->bound_inverse, 0), last);
-    kernel_bound b = t->bounds[from];
-    for (int i = from + 1; i <= to; i++) {
-        b.extinction_high = simd_max(t->bounds[i].extinction_high, b.extinction_high);
-        b.extinction_slope = simd_max(t->bounds[i].extinction_slope, b.extinction_slope);
-        b.colour_slope = simd_max(t->bounds[i].colour_slope, b.colour_slope);
-    }
-    out->cost = simd_min(t->contrast * b.extinction_slope + b.extinction_high * b.colour_slope, 1e30f);
+    const kernel_bound b = kernel_bound_between(t, low, high);
+    out->cost = kernel_bound_cost(t, &b);
     while (out->first_step < t->step_count && t->steps[out->first_step].cut < low) out->first_step++;
     while (out->first_step + out->step_count < t->step_count && t->steps[out->first_step + out->step_count].cut <= high)
         out->step_count++;

@@ -311,21 +311,6 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
     }
 }
 
-/* The window's cells. */
-SIMD_INLINE void kernel_tile_meet_candidate(kernel_tile_trace *t, bool is_pencil, unsigned blocks,
-                                            kernel_tile_take *take)
-{
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_tile_cells_open(t, cells);
-    for (int n = 0; n < cells->open_count; n++) {
-        const kernel_tile_candidate *item = &cells->items[n];
-        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
-        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
-        if (met) kernel_tile_meet_item(t, cells, item, is_pencil, met, take);
-    }
-    kernel_tile_take_pending(t, cells, take);
-}
-
 /* ---- windows ---- */
 
 /* The blocks that any tree's box may meet, and the depths between which. */

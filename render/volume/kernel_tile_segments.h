@@ -23,6 +23,8 @@
 #include "kernel_crossings.h"
 #include "kernel_double.h"
 #include "kernel_exact.h"
+#include "kernel_local_queue.h"
+#include "kernel_local_segments.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_samples.h"
@@ -32,47 +34,17 @@
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
+#include "mmbvh.h"
 #include "simd.h"
-
-typedef struct kernel_tile_ray_segments {
-    kernel_segments list;
-    kernel_segment_state state;
-    kernel_blend blend;
-    vf t_last; /* where the ray ends: at what is opaque, or behind all cells */
-    vm active; /* of the packet, whose own is narrowed to the rays that are under way */
-} kernel_tile_ray_segments;
 
 typedef struct kernel_tile_segments {
     kernel_tile_ray_segments packets[KERNEL_TILE_PACKETS];
     kernel_double_cell precise;
+    kernel_local_stretches stretches;
     float depth; /* of windows; 0: not known yet */
 } kernel_tile_segments;
 
 /* ---- cells ---- */
-
-static __attribute__((noinline)) void kernel_tile_poly_segments(kernel_packet *p, kernel_segment_state *state,
-                                                                const kernel_cell *c, const kernel_map *map)
-{
-    kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
-    kernel_span span = {.map = map, .cell = c};
-    const int intervals = kernel_poly_intervals(p, c, p->active, false, list);
-    if (intervals && (map || state->pieces->has_rests)) kernel_span_bound(state, c->f, c->count, &span);
-    for (int k = 0; k < intervals; k++) {
-        span.interval = &list[k];
-        kernel_span_run(p, state, &span);
-    }
-}
-
-/* The farthest of the block's rays' ends of the window. */
-SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kernel_tile_segments *s, int block)
-{
-    vf end = vf_set(-INFINITY);
-    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
-        const int i = block * KERNEL_BLOCK_PACKETS + n;
-        end = vf_max(end, vf_select(t->packets[i].active, s->packets[i].list.t_end, vf_set(-INFINITY)));
-    }
-    return vf_reduce_max(end);
-}
 
 /* The cell's segments on the rays of the blocks. */
 static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
@@ -93,17 +65,48 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
             else if (c->type == GRID_TET)
                 kernel_tet_segments(p, state, c, &s->precise, p->active);
             else
-                kernel_tile_poly_segments(p, state, c, map);
+                kernel_poly_segments(p, state, c, map);
             is_shortened = is_shortened || state->list->is_shortened;
             state->list->is_shortened = false;
         }
-        if (is_shortened) t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_window_end(t, s, block);
+        if (is_shortened)
+            t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_window_end(t, s->packets, block);
     }
 }
 
+/* A leaf's cells, those that fit into lanes and others. */
 static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_tile_meet_leaf(t, 0, part, cells, count, false, blocks, kernel_tile_cell_segments);
+    kernel_tile_segments *s = t->thread->tile_segments;
+    const grid *g = t->frame->job->parts[part].cells;
+    uint32_t others[MMBVH_MAX_LEAF];
+    int left = 0;
+    for (int n = 0; n < count; n++) {
+        if (kernel_local_segments_fit(t->frame, grid_cell_type(g, cells[n])))
+            kernel_local_segments_wait(t, &s->stretches, part, cells[n], blocks, kernel_local_box(blocks));
+        else
+            others[left++] = cells[n];
+    }
+    if (left) kernel_tile_meet_leaf(t, 0, part, others, left, false, blocks, kernel_tile_cell_segments);
+}
+
+/* The window's cells that are known. */
+SIMD_INLINE void kernel_tile_segments_candidates(kernel_tile_trace *t, kernel_tile_segments *s, unsigned blocks)
+{
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_tile_cells_open(t, cells);
+    for (int n = 0; n < cells->open_count; n++) {
+        const kernel_tile_candidate *item = &cells->items[n];
+        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
+        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
+        if (!met) continue;
+        const int part = (int)item->source, type = grid_cell_type(t->frame->job->parts[part].cells, item->cell);
+        if (kernel_local_segments_fit(t->frame, type))
+            kernel_local_segments_wait(t, &s->stretches, part, item->cell, met, item->box);
+        else
+            kernel_tile_meet_item(t, cells, item, false, met, kernel_tile_cell_segments);
+    }
+    kernel_tile_take_pending(t, cells, kernel_tile_cell_segments);
 }
 
 static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
@@ -155,13 +158,15 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
             kernel_tile_ray_segments *r = &s->packets[b * KERNEL_BLOCK_PACKETS + n];
             kernel_segments_begin(&r->list, vf_max(r->list.t_begin, vf_min(r->t_last, vf_set(end))));
         }
-        if (blocks >> b & 1) far = kernel_block_window_end(t, s, b);
+        if (blocks >> b & 1) far = kernel_block_window_end(t, s->packets, b);
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
     }
+    kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments);
     if (t->frame->volume_candidates)
-        kernel_tile_meet_candidate(t, false, blocks, kernel_tile_cell_segments);
+        kernel_tile_segments_candidates(t, s, blocks);
     else
         kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
+    kernel_local_segments_run(t, &s->stretches);
 }
 
 /* Learn from the window how deep the next one is to be: so that some ray has three quarters of its room filled. */

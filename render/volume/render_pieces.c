@@ -197,10 +197,14 @@ static double piece_opacity(const kernel_piece *p, double x)
 static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
 {
     const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to), most = fmax(a0, a1);
-    const double slope = fabs((double)p->entry[KERNEL_PIECE_SLOPE]);
+    const double slope = (double)p->entry[KERNEL_PIECE_SLOPE], steepness = fabs(slope);
     b->extinction_low = fminf(b->extinction_low, (float)extinction_of(fmin(a0, a1)));
     b->extinction_high = largest(extinction_of(most), b->extinction_high);
-    if (slope > 0) b->extinction_slope = largest(most < 1 ? fmin(slope / (1 - most), 1e30) : 1e30, b->extinction_slope);
+    const double steepest_here = steepness > 0 ? (most < 1 ? fmin(steepness / (1 - most), 1e30) : 1e30) : 0;
+    const double flattest_here = steepness / fmax(1 - fmin(a0, a1), 1e-30);
+    b->extinction_slope = largest(steepest_here, b->extinction_slope);
+    b->fall = fminf(b->fall, (float)(slope < 0 ? -steepest_here : flattest_here));
+    b->rise = largest(slope < 0 ? -flattest_here : steepest_here, b->rise);
     for (int c = 0; c < 3; c++)
         b->colour_slope = largest(fabs((double)p->entry[KERNEL_PIECE_COLOUR_SLOPE + c]), b->colour_slope);
 }
@@ -250,7 +254,8 @@ static void fill_steep(kernel_pieces *out, const render_transfer *t)
 static void fill_bounds(kernel_pieces *out, const render_transfer *t)
 {
     float low = 0, high = 1;
-    for (int i = 0; i < KERNEL_BOUND_BINS; i++) out->bounds[i] = (kernel_bound){.extinction_low = 1e30f};
+    for (int i = 0; i < KERNEL_BOUND_BINS; i++)
+        out->bounds[i] = (kernel_bound){.extinction_low = 1e30f, .fall = 1e30f, .rise = -1e30f};
     for (int i = 0; i < out->count; i++) bound_piece(out, &out->pieces[i]);
     for (int i = 0; i < 3 * t->colour_count; i++) {
         low = fminf(low, t->colours[i]);

@@ -1,0 +1,511 @@
+/* Segments of hexes, a ray and its cell a lane (kernel_segments.h has what segments are for):
+ *
+ *     cells                    where are they, and what map have they?     kernel_local.h
+ *     pixels of their boxes    may the ray meet the cell in the window?    by planes about it
+ *     rays in cells            where do they come in and go out?           kernel_local_crossings.h
+ *     and                      what is the field between?                  Newton's method at three places
+ *
+ * Rays that cross not just two faces once each, or are cut by clips or surfaces, and cells among whose values opacity
+ * steps or rises steeply, go the way of other cells (kernel_cell_segments.h).
+ *
+ * The field along the ray. Along it y of kernel_local.h, y = r + n(r), goes in a line between its values at the two
+ * faces, where r is known. So r is found at the middle and the quarters from there, and by how much the field there is
+ * off the chord between its values at the faces: d1, d2 and d3. The field is then taken for the polynomial through all
+ * five values, for u from -1/2 to 1/2
+ *
+ *     d = (1/4 - u^2) (a + b u + c u^2),   a = 4 d2,   b = 32/3 (d3 - d1),   c = 16 (8/3 (d1 + d3) - a),
+ *
+ * and segments are its chords, each raised or lowered to the polynomial's mean.
+ *
+ * What that costs (docs/error_budget.md). Let f be the field, v what segments have instead. Light changes by the
+ * integral of g (v - f) along the ray, with g = T ((s c)' - s' b), where b is the light of all that lies behind. On
+ * each segment v - f is of mean zero, but for what the polynomial is off, so that of g only what varies along the
+ * segment counts: the error is at most half the oscillation of g times the integral of |v - f|. Let D be the segment's
+ * depth and R the colours' contrast. Along it T falls by min(D, 1), s' varies by S, b by R D, c by c' times the change
+ * of the value, and s c' by 2 s c' at most:
+ *
+ *     oscillation of g <= T (R S + 2 s |c'| + |s'| |c'| change + min(D, 1) (R |s'| + s |c'| + R |s'|)).
+ *
+ * No more than twice g's own bound R |s'| + s |c'|. The mean of |v - f| is 0.26 of a parabola's most at the middle,
+ * P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at the quarters, 0.67; and of the quartic's no more than four times
+ * E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments they fall as n^2 at least. What the polynomial itself is off is not
+ * of mean zero: 2 E, and what Newton's method leaves, count whole. */
+#ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
+#define RENDER_KERNEL_LOCAL_SEGMENTS_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_cell_segments.h"
+#include "kernel_colour.h"
+#include "kernel_integral.h"
+#include "kernel_local.h"
+#include "kernel_local_crossings.h"
+#include "kernel_local_queue.h"
+#include "kernel_packet.h"
+#include "kernel_segment_list.h"
+#include "kernel_segments.h"
+#include "kernel_tile_cells.h"
+#include "kernel_tile_trace.h"
+#include "kernel_types.h"
+#include "simd.h"
+
+typedef struct kernel_tile_ray_segments {
+    kernel_segments list;
+    kernel_segment_state state;
+    kernel_blend blend;
+    vf t_last; /* where the ray ends: at what is opaque, or behind all cells */
+    vm active; /* of the packet, whose own is narrowed to the rays that are under way */
+} kernel_tile_ray_segments;
+
+enum { KERNEL_LOCAL_PIXELS = KERNEL_TILE * KERNEL_TILE, KERNEL_LOCAL_PIECES = 32 };
+
+/* Lane by lane, what a field that is off does to the light over the cell's values. */
+typedef struct kernel_local_bounds {
+    float cost[SIMD_WIDTH]; /* R |s'| + s |c'| */
+    float sway[SIMD_WIDTH]; /* R S + 2 s |c'| */
+    float tint[SIMD_WIDTH]; /* |s'| |c'| */
+    float fade[SIMD_WIDTH]; /* 2 R |s'| + s |c'| */
+    float extinction[SIMD_WIDTH];
+    float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* the bounds hold between these values */
+    float slip[SIMD_WIDTH]; /* what the field may be off by where r does not solve for y, by how far it does not */
+} kernel_local_bounds;
+
+typedef struct kernel_local_stretches {
+    kernel_tile_ray_segments *packets; /* the tile's */
+    kernel_segment_state state;        /* what all rays have in common */
+    unsigned blocks;                   /* that are under way */
+    kernel_local_lanes lanes;
+    kernel_local_faces faces;
+    kernel_local_bounds bounds;
+    kernel_hex_rays rays, met;
+    /* By packet and lane: where the window begins and ends, side by side; the same of the ray; unit distances per t. */
+    float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS], per_t[KERNEL_LOCAL_PIXELS];
+} kernel_local_stretches;
+
+/* Are segments of cells of this type for lanes in this frame? Not where ends are taken in double. */
+SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
+{
+    return f->allowance > 0 && !f->is_double && type == GRID_HEX;
+}
+
+/* The packets' windows. */
+static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_stretches *b,
+                                        kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take)
+{
+    b->packets = packets;
+    b->state = (kernel_segment_state){NULL, &t->frame->pieces[0], 0, t->frame->allowance, 0, t->frame->reach[0]};
+    b->blocks = blocks;
+    kernel_local_lanes_begin(&b->lanes, 0, take);
+    for (int i = 0; i < KERNEL_LOCAL_PIXELS; i++) b->window[2 * i] = INFINITY, b->window[2 * i + 1] = -INFINITY;
+    for (; blocks; blocks &= blocks - 1) {
+        const int begin = __builtin_ctz(blocks) * KERNEL_BLOCK_PACKETS;
+        for (int i = begin; i < begin + KERNEL_BLOCK_PACKETS; i++) {
+            const kernel_packet *p = &t->packets[i];
+            const kernel_segments *list = &packets[i].list;
+            const vf from = vf_select(p->active, list->t_begin, vf_set(INFINITY));
+            vf_store(b->per_t + i * SIMD_WIDTH, list->per_t);
+            for (int n = 0; n < SIMD_WIDTH; n++) {
+                const int at = 2 * (i * SIMD_WIDTH + n);
+                b->window[at] = from[n];
+                b->window[at + 1] = list->t_end[n];
+                b->reach[at] = p->t_near[n];
+                b->reach[at + 1] = p->t_far[n];
+            }
+        }
+    }
+}
+
+/* ---- cells ---- */
+
+/* By what the field may be off where y - (r + n(r)) is not zero: r is off by that over 1 - |n'| at most, and the field
+ * by its slope along the coordinates together. */
+SIMD_INLINE float kernel_local_slip(const kernel_local_cells *c, int n)
+{
+    float slope = 0;
+    for (int i = 1; i < 8; i++) slope += fabsf(c->field[i][n]);
+    return slope / (1 - sqrtf(c->bend[n]));
+}
+
+/* The lane's bounds; false where its values are for bisection. Chords end beyond the cell's values, but by no more
+ * than an eighth of their range (kernel_local_strays()). */
+SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_local_stretches *b, int n)
+{
+    const kernel_pieces *t = state->pieces;
+    float values[8], low, high;
+    kernel_span span = {.map = NULL};
+    for (int i = 0; i < 8; i++) values[i] = b->faces.at[3][i][n];
+    low = high = values[0];
+    for (int i = 1; i < 8; i++) low = simd_min(values[i], low), high = simd_max(values[i], high);
+    const float ends[2] = {low - 0.125f * (high - low), high + 0.125f * (high - low)};
+    kernel_span_bound(state, ends, 2, &span);
+    if (span.step_count || span.is_steep) return false;
+    const kernel_bound s = kernel_bound_between(t, ends[0], ends[1]);
+    const float steep = t->contrast * s.extinction_slope, tinted = s.extinction_high * s.colour_slope;
+    b->bounds.cost[n] = span.cost;
+    b->bounds.sway[n] = simd_min(t->contrast * (s.rise - s.fall) + 2 * tinted, 1e30f);
+    b->bounds.tint[n] = simd_min(s.extinction_slope * s.colour_slope, 1e30f);
+    b->bounds.fade[n] = simd_min(2 * steep + tinted, 1e30f);
+    b->bounds.extinction[n] = s.extinction_high;
+    b->bounds.low[n] = ends[0];
+    b->bounds.high[n] = ends[1];
+    b->bounds.slip[n] = kernel_local_slip(&b->lanes.cells, n);
+    return true;
+}
+
+/* ---- the field between two faces ---- */
+
+typedef struct kernel_local_course {
+    vf deviation[3]; /* of the field off its chord, at the quarters and the middle */
+    vf slip;         /* how far r does not solve for y, at the one of them where that is most */
+} kernel_local_course;
+
+/* The bent terms' sum at r. */
+SIMD_INLINE void kernel_local_bent_sum(const kernel_local_points *p, const kernel_bend *bend, vf out[3])
+{
+    for (int a = 0; a < 3; a++) {
+        out[a] = p->bent[0][a] * bend->term[0];
+        for (int k = 1; k < 4; k++) out[a] = vf_muladd(p->bent[k][a], bend->term[k], out[a]);
+    }
+}
+
+SIMD_INLINE vf kernel_local_slip_at(const kernel_local_points *p)
+{
+    vf left[3];
+    kernel_local_left(GRID_HEX, p, left);
+    return (vf_abs(left[0]) + vf_abs(left[1])) + vf_abs(left[2]);
+}
+
+/* A step, and others where one was not enough. Returns what is left. */
+SIMD_INLINE vf kernel_local_settle(kernel_local_points *p)
+{
+    vf left = vf_set(0);
+    vm open = vm_all_lanes();
+    for (int n = 0; n < KERNEL_LOCAL_STEPS && vm_any(open); n++) {
+        kernel_local_step(GRID_HEX, p, open);
+        left = kernel_local_slip_at(p);
+        open = vm_not(vf_le(left, vf_set(2e-5f)));
+    }
+    return left;
+}
+
+SIMD_INLINE void kernel_local_course_of(const kernel_local_cells *cells, vi lane, const kernel_local_crossing ends[2],
+                                        kernel_local_course *out)
+{
+    kernel_local_points p;
+    vf y[2][3], middle[3];
+    for (int k = 0; k < 4; k++)
+        for (int a = 0; a < 3; a++) p.bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
+    for (int e = 0; e < 2; e++) {
+        vf n[3];
+        kernel_bend_at(GRID_HEX, ends[e].r, &p.bend);
+        kernel_local_bent_sum(&p, &p.bend, n);
+        for (int a = 0; a < 3; a++) y[e][a] = ends[e].r[a] + n[a];
+    }
+    for (int a = 0; a < 3; a++) {
+        p.y[a] = 0.5f * (y[0][a] + y[1][a]);
+        p.r[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
+    }
+    kernel_bend_at(GRID_HEX, p.r, &p.bend);
+    kernel_local_derive(GRID_HEX, &p);
+    out->slip = kernel_local_settle(&p);
+    const vf rise = ends[1].v - ends[0].v;
+    out->deviation[1] = kernel_local_value(GRID_HEX, cells, lane, &p) - (ends[0].v + 0.5f * rise);
+    memcpy(middle, p.r, sizeof middle);
+    for (int q = 0; q < 2; q++) {
+        const float share = q ? 0.75f : 0.25f, own = q ? -0.125f : 0.375f, other = q ? 0.375f : -0.125f;
+        for (int a = 0; a < 3; a++) {
+            p.y[a] = y[0][a] + share * (y[1][a] - y[0][a]);
+            p.r[a] = (own * ends[0].r[a] + other * ends[1].r[a]) + 0.75f * middle[a];
+        }
+        kernel_bend_at(GRID_HEX, p.r, &p.bend);
+        out->slip = vf_max(kernel_local_settle(&p), out->slip);
+        out->deviation[2 * q] = kernel_local_value(GRID_HEX, cells, lane, &p) - (ends[0].v + share * rise);
+    }
+}
+
+/* ---- rays in cells ---- */
+
+/* A vector of rays, each in its cell. */
+typedef struct kernel_local_pairs {
+    kernel_local_rays rays;
+    kernel_local_crossing ends[2];
+    kernel_local_course course;
+    vm active;
+    vf count; /* of segments */
+} kernel_local_pairs;
+
+/* Rays of which one chord would end among values that have not been looked at. */
+SIMD_INLINE vm kernel_local_strays(const kernel_local_stretches *b, const kernel_local_pairs *p)
+{
+    const vf *d = p->course.deviation, v0 = p->ends[0].v, v1 = p->ends[1].v;
+    const vf lift = (2.0f / 15) * d[1] + (16.0f / 45) * (d[0] + d[2]);
+    const vf low = vf_min(v0, v1) + lift, high = vf_max(v0, v1) + lift;
+    return vm_or(vf_lt(low, kernel_local_take(b->bounds.low, p->rays.lane)),
+                 vf_lt(kernel_local_take(b->bounds.high, p->rays.lane), high));
+}
+
+/* Into how many segments, and the rays for which no number will do. */
+SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_stretches *b, kernel_local_pairs *p)
+{
+    const kernel_segment_state *state = &b->state;
+    const kernel_transfer *transfer = &t->frame->volumes[0];
+    const kernel_local_course *course = &p->course;
+    const vi lane = p->rays.lane;
+    const vf *d = course->deviation, one = vf_set(1), v0 = p->ends[0].v, v1 = p->ends[1].v;
+    const vf length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
+    const vf middle = 0.5f * (v0 + v1) + d[1];
+    const vf ends = kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1);
+    const vf seen = length * vf_muladd(vf_set(0.5f), kernel_opacity(transfer, middle), 0.25f * ends);
+    const vf allowed = state->allowance * (length * (1 / state->reach) + seen / (1.0f + seen));
+    const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
+    const vf quartic = vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]);
+    const vf change = vf_abs(v1 - v0) + 3.0f * (parabola + cubic);
+    const vf cost = kernel_local_take(b->bounds.cost, lane);
+    const vf depth = vf_min(kernel_local_take(b->bounds.extinction, lane) * length, one);
+    const vf sway =
+        vf_muladd(kernel_local_take(b->bounds.tint, lane), change,
+                  vf_muladd(kernel_local_take(b->bounds.fade, lane), depth, kernel_local_take(b->bounds.sway, lane)));
+    const vf mean = 0.26f * parabola + (0.67f * cubic + 4.0f * quartic);
+    const vf made = (0.5f * vf_min(sway, 2.0f * cost)) * (mean * length);
+    const vf rest = cost * length * (2.0f * quartic + kernel_local_take(b->bounds.slip, lane) * course->slip);
+    const vf left = allowed - rest;
+    const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(left, vf_set(1e-30f))));
+    p->count = vf_clamp(wanted, vf_select(kernel_local_strays(b, p), 2.0f * one, one), vf_set(KERNEL_LOCAL_PIECES + 1));
+    return vm_or(vm_not(vf_lt(rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));
+}
+
+/* One of the lane's rays has a segment. */
+SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const kernel_segment *s)
+{
+    kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
+    kernel_segments *list = &r->list;
+    const int lane = at % SIMD_WIDTH;
+    if (!(list->t_begin[lane] <= s->t_in && s->t_in < list->t_end[lane] && s->t_in < s->t_out)) return;
+    if (__builtin_expect(kernel_segments_put(list, lane, s, NULL), 1)) return;
+    const kernel_run run = kernel_run_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
+    kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
+}
+
+/* The polynomial's deviation, and its integral from the middle on. */
+typedef struct kernel_local_polynomial {
+    vf a, b, c;
+} kernel_local_polynomial;
+
+SIMD_INLINE vf kernel_local_deviation(const kernel_local_polynomial *p, vf u)
+{
+    return (0.25f - u * u) * vf_muladd(vf_muladd(p->c, u, p->b), u, p->a);
+}
+
+SIMD_INLINE vf kernel_local_primitive(const kernel_local_polynomial *p, vf u)
+{
+    const vf square = u * u;
+    const vf odd = p->a * (0.25f - square * (1.0f / 3)) + p->c * square * (1.0f / 12 - square * 0.2f);
+    return u * odd + p->b * square * (0.125f - 0.25f * square);
+}
+
+/* The rays' segments. */
+SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel_local_pairs *p)
+{
+    const vf *d = p->course.deviation, t0 = p->ends[0].t, t1 = p->ends[1].t, v0 = p->ends[0].v, v1 = p->ends[1].v;
+    const vf share = 1.0f / p->count, span = t1 - t0, rise = v1 - v0;
+    kernel_local_polynomial f = {.a = 4.0f * d[1], .b = (32.0f / 3) * (d[2] - d[0])};
+    int32_t at[SIMD_WIDTH];
+    f.c = 16.0f * ((8.0f / 3) * (d[0] + d[2]) - f.a);
+    memcpy(at, &p->rays.at, sizeof at);
+    vf from = t0, u0 = vf_set(-0.5f), off0 = vf_set(0), sum0 = kernel_local_primitive(&f, u0);
+    vm open = p->active;
+    for (int n = 1; vm_any(open); n++) {
+        const vf number = vf_set((float)n), along = number * share;
+        const vm inner = vm_and(open, vf_lt(number, p->count));
+        const vf u1 = vf_select(inner, along - 0.5f, vf_set(0.5f)), sum1 = kernel_local_primitive(&f, u1);
+        const vf to = vf_select(inner, t0 + span * along, t1), off1 = kernel_local_deviation(&f, u1);
+        const vf lift = (sum1 - sum0) * p->count - 0.5f * (off0 + off1);
+        const vf in = (v0 + (u0 + 0.5f) * rise) + (off0 + lift), out = (v1 - (0.5f - u1) * rise) + (off1 + lift);
+        float lanes[4][SIMD_WIDTH];
+        vf_store(lanes[0], from);
+        vf_store(lanes[1], to);
+        vf_store(lanes[2], in);
+        vf_store(lanes[3], out);
+        for (unsigned bits = vm_bits(open); bits; bits &= bits - 1) {
+            const int i = __builtin_ctz(bits);
+            const kernel_segment s = {lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]};
+            kernel_local_put(b, at[i], &s);
+        }
+        from = to;
+        u0 = u1;
+        off0 = off1;
+        sum0 = sum1;
+        open = inner;
+    }
+}
+
+/* Rays that are for the cell alone. */
+static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_trace *t, kernel_local_stretches *b,
+                                                                  const kernel_local_queue *q,
+                                                                  const kernel_local_rays *rays, unsigned wanted)
+{
+    int32_t at[SIMD_WIDTH], lane[SIMD_WIDTH];
+    memcpy(at, &rays->at, sizeof at);
+    memcpy(lane, &rays->lane, sizeof lane);
+    while (wanted) {
+        const int first = __builtin_ctz(wanted);
+        const int packet = at[first] / SIMD_WIDTH;
+        unsigned same = 0;
+        for (unsigned more = wanted; more; more &= more - 1) {
+            const int i = __builtin_ctz(more);
+            if (lane[i] != lane[first] || at[i] / SIMD_WIDTH != packet) continue;
+            same |= 1u << at[i] % SIMD_WIDTH;
+            wanted &= ~(1u << i);
+        }
+        if (!kernel_local_ready_alone(t, &b->lanes, q, lane[first], false)) continue;
+        const kernel_cell *c = &t->thread->tile_cells->cell;
+        kernel_packet *p = &t->packets[packet];
+        const vm active = p->active;
+        p->active = vm_and(active, vm_from_bits(same));
+        kernel_poly_segments(p, &b->packets[packet].state, c, c->is_constant ? NULL : &t->thread->tile_cells->map);
+        p->active = active;
+    }
+}
+
+/* Rays from n on of those that may meet their cells. */
+SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_stretches *b,
+                                             const kernel_local_queue *q, int n)
+{
+    const int left = b->met.count - n;
+    const vm all = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
+    kernel_local_pairs p;
+    kernel_local_seen seen;
+    kernel_hex_crossed crossed;
+    vf begin, end, near, far;
+    kernel_local_rays_of(&p.rays, &t->tile, kernel_bytes(b->met.pixel + n), kernel_bytes(b->met.lane + n));
+    kernel_local_see(&b->faces, &p.rays, &seen);
+    kernel_local_find_faces(&seen, all, &crossed);
+    vm alone = crossed.alone;
+    p.active = crossed.two;
+    if (vm_any(p.active)) {
+        kernel_local_cross(&b->faces, &seen, p.rays.lane, &crossed, p.ends);
+        vf_gather_pair(b->window, 2 * p.rays.at, &begin, &end);
+        vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
+        p.active = vm_and(p.active, vm_and(vf_lt(begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
+        const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
+        kernel_local_course_of(&b->lanes.cells, p.rays.lane, p.ends, &p.course);
+        const vm odd = vm_and(p.active, vm_or(cut, kernel_local_count(t, b, &p)));
+        p.active = vm_andnot(p.active, odd);
+        alone = vm_or(alone, odd);
+        kernel_local_emit(b, &p);
+    }
+    if (__builtin_expect(vm_any(alone), 0)) kernel_local_segments_alone(t, b, q, &p.rays, vm_bits(alone));
+}
+
+/* Of the rays that wait, those that may meet their cells in the window. */
+SIMD_INLINE void kernel_local_segments_meet(const kernel_tile_trace *t, kernel_local_stretches *b, int n)
+{
+    const int left = b->rays.count - n;
+    const vm active = left < SIMD_WIDTH ? vm_from_bits((1u << left) - 1) : vm_all_lanes();
+    kernel_local_rays rays;
+    vf near, far, begin, end;
+    kernel_local_rays_of(&rays, &t->tile, kernel_bytes(b->rays.pixel + n), kernel_bytes(b->rays.lane + n));
+    const vf depth = kernel_local_take(b->lanes.cells.origin[2], rays.lane);
+    kernel_local_stretch(&b->lanes.cells, &rays, depth, &near, &far);
+    vf_gather_pair(b->window, 2 * rays.at, &begin, &end);
+    const vm meets = vm_and(vf_le(near, far), vm_and(vf_le(begin, depth + far), vf_le(depth + near, end)));
+    for (unsigned bits = vm_bits(vm_and(active, meets)); bits; bits &= bits - 1)
+        kernel_hex_ray_add(&b->met, &b->rays, n + __builtin_ctz(bits));
+}
+
+static __attribute__((noinline)) void kernel_local_segments_cast(kernel_tile_trace *t, kernel_local_stretches *b,
+                                                                 const kernel_local_queue *q)
+{
+    kernel_hex_rays_close(&b->rays);
+    b->met.count = 0;
+    for (int n = 0; n < b->rays.count; n += SIMD_WIDTH) kernel_local_segments_meet(t, b, n);
+    kernel_hex_rays_close(&b->met);
+    for (int n = 0; n < b->met.count; n += SIMD_WIDTH) kernel_local_segments_lanes(t, b, q, n);
+    b->rays.count = 0;
+}
+
+/* ---- batches ---- */
+
+/* Places the queue's cells; returns those that show, and in lanes those of them that are for lanes. */
+static __attribute__((noinline)) unsigned kernel_local_segments_place(kernel_tile_trace *t, kernel_local_stretches *b,
+                                                                      unsigned all, unsigned *lanes)
+{
+    vf lists[5][8];
+    kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, 8, lists[4]);
+    const unsigned showing = kernel_local_place(t, &b->lanes, GRID_HEX, lists, 5, lanes) & all;
+    *lanes &= all;
+    kernel_local_faces_of(lists, &b->faces);
+    for (unsigned more = *lanes; more; more &= more - 1) {
+        const int n = __builtin_ctz(more);
+        if (!kernel_local_bound(&b->state, b, n)) *lanes &= ~(1u << n);
+    }
+    return showing;
+}
+
+/* The farthest of the block's rays' ends of the window. */
+SIMD_INLINE float kernel_block_window_end(const kernel_tile_trace *t, const kernel_tile_ray_segments *packets,
+                                          int block)
+{
+    vf end = vf_set(-INFINITY);
+    for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+        const int i = block * KERNEL_BLOCK_PACKETS + n;
+        end = vf_max(end, vf_select(t->packets[i].active, packets[i].list.t_end, vf_set(-INFINITY)));
+    }
+    return vf_reduce_max(end);
+}
+
+/* Blocks of which windows have ended early meanwhile end there. */
+SIMD_INLINE void kernel_local_segments_shorten(kernel_tile_trace *t, kernel_local_stretches *b)
+{
+    for (unsigned blocks = b->blocks; blocks; blocks &= blocks - 1) {
+        const int block = __builtin_ctz(blocks);
+        bool is_shortened = false;
+        for (int n = 0; n < KERNEL_BLOCK_PACKETS; n++) {
+            kernel_segments *list = &b->packets[block * KERNEL_BLOCK_PACKETS + n].list;
+            is_shortened = is_shortened || list->is_shortened;
+            list->is_shortened = false;
+        }
+        if (is_shortened)
+            t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_window_end(t, b->packets, block);
+    }
+}
+
+/* The cells that wait. */
+static __attribute__((noinline)) void kernel_local_segments_run(kernel_tile_trace *t, kernel_local_stretches *b)
+{
+    kernel_local_queue *q = &b->lanes.queues[0];
+    unsigned placed;
+    if (!q->count) return;
+    const unsigned all = kernel_local_fetch_all(t, &b->lanes, q);
+    const unsigned showing = kernel_local_segments_place(t, b, all, &placed);
+    b->rays.count = 0;
+    for (unsigned lanes = placed; lanes; lanes &= lanes - 1) {
+        const int n = __builtin_ctz(lanes);
+        unsigned box = q->box[n];
+        if (!kernel_local_cut(b->lanes.ends, n, &box)) continue;
+        kernel_hex_rays_of(&b->rays, box, n);
+        if (b->rays.count >= KERNEL_HEX_RAYS) kernel_local_segments_cast(t, b, q);
+    }
+    kernel_local_segments_cast(t, b, q);
+    for (unsigned lanes = showing & ~placed; lanes; lanes &= lanes - 1) {
+        const int n = __builtin_ctz(lanes);
+        kernel_tile_meet_cell(t, 0, b->lanes.part, q->cell[n], false, q->blocks[n], b->lanes.take);
+    }
+    q->count = 0;
+    kernel_local_segments_shorten(t, b);
+}
+
+/* A cell of a type that fits waits. */
+SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_stretches *b, int part, uint32_t cell,
+                                            unsigned blocks, unsigned box)
+{
+    if (part != b->lanes.part) {
+        kernel_local_segments_run(t, b);
+        b->lanes.part = part;
+    }
+    if (kernel_local_push(&b->lanes.queues[0], cell, blocks, box)) kernel_local_segments_run(t, b);
+}
+
+#endif
