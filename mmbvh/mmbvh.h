@@ -71,6 +71,12 @@ static inline void mmbvh_node_box(const mmbvh *tree, int64_t index, float lower[
     }
 }
 
+/* Asks memory for a node that is soon looked at. */
+static inline void mmbvh_prefetch_node(const mmbvh *tree, int64_t index)
+{
+    __builtin_prefetch(tree->compact ? (const void *)&tree->compact[index] : (const void *)&tree->nodes[index]);
+}
+
 /* Cells in a leaf; 0: an inner node. */
 static inline int mmbvh_node_count(const mmbvh *tree, int64_t index)
 {

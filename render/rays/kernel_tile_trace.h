@@ -130,10 +130,12 @@ SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const 
     if (placement.blocks) {
         /* Prefetches what an inner node or a leaf needs next. */
         const int64_t ref = mmbvh_node_ref(tree, node);
-        if (mmbvh_node_count(tree, node))
+        if (mmbvh_node_count(tree, node)) {
             __builtin_prefetch(tree->cells + ref);
-        else if (interest)
-            __builtin_prefetch(ranges->low + ref * ranges->stride);
+        } else {
+            mmbvh_prefetch_node(tree, ref);
+            if (interest) __builtin_prefetch(ranges->low + ref * ranges->stride);
+        }
     }
     return placement;
 }

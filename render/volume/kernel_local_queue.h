@@ -12,6 +12,7 @@
 #include "kernel_interest.h"
 #include "kernel_local.h"
 #include "kernel_placed_hexes.h"
+#include "kernel_prefetch.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
@@ -19,7 +20,10 @@
 #include "kernel_wide.h"
 #include "simd.h"
 
-enum { KERNEL_LOCAL_TYPES = 3 /* hexes, wedges, pyramids */ };
+enum {
+    KERNEL_LOCAL_TYPES = 3, /* hexes, wedges, pyramids */
+    KERNEL_LOCAL_AHEAD = 6  /* so many cells queue between a cell's indices and its vertices on their way from memory */
+};
 
 /* Cells of one type that wait. */
 typedef struct kernel_local_queue {
@@ -193,22 +197,34 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
     return vm_bits(shows);
 }
 
+/* Asks memory for the vertices of queued cells first .. end - 1, whose indices have been asked for before. */
+SIMD_INLINE void kernel_local_prefetch(const kernel_tile_trace *t, const kernel_local_lanes *l,
+                                       const kernel_local_queue *q, int first, int end)
+{
+    const grid *g = t->frame->job->parts[l->part].cells;
+    const grid_field *field = &t->frame->job->volumes[l->volume].field.fields[l->part];
+    for (int n = first < 0 ? 0 : first; n < end; n++) kernel_prefetch_vertices(g, field, q->cell[n]);
+}
+
 /* The queue's cells are fetched; returns their lanes. */
 SIMD_INLINE unsigned kernel_local_fetch_all(const kernel_tile_trace *t, kernel_local_lanes *l,
                                             const kernel_local_queue *q)
 {
+    kernel_local_prefetch(t, l, q, q->count - KERNEL_LOCAL_AHEAD, q->count);
     for (int n = 0; n < q->count; n++) kernel_local_fetch(t, l, q->cell[n], n);
     l->alone = -1;
     return (1u << q->count) - 1;
 }
 
-/* A cell waits; true where the queue is full. */
-SIMD_INLINE bool kernel_local_push(kernel_local_queue *q, uint32_t cell, unsigned blocks, unsigned box)
+/* Queues a cell; returns whether the queue is full. */
+SIMD_INLINE bool kernel_local_push(const kernel_tile_trace *t, const kernel_local_lanes *l, kernel_local_queue *q,
+                                   uint32_t cell, unsigned blocks, unsigned box)
 {
     const int n = q->count++;
     q->cell[n] = cell;
     q->blocks[n] = (uint16_t)blocks;
     q->box[n] = (uint16_t)box;
+    kernel_local_prefetch(t, l, q, n - KERNEL_LOCAL_AHEAD, n - KERNEL_LOCAL_AHEAD + 1);
     return q->count == SIMD_WIDTH;
 }
 

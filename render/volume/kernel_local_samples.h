@@ -259,7 +259,7 @@ SIMD_INLINE void kernel_local_wait(kernel_tile_trace *t, kernel_local_batch *b, 
         kernel_local_end(t, b);
         b->lanes.part = part;
     }
-    if (kernel_local_push(q, cell, blocks, box)) kernel_local_run(t, b, queue);
+    if (kernel_local_push(t, &b->lanes, q, cell, blocks, box)) kernel_local_run(t, b, queue);
 }
 
 #endif

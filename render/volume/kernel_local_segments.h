@@ -505,7 +505,7 @@ SIMD_INLINE void kernel_local_segments_wait(kernel_tile_trace *t, kernel_local_s
         kernel_local_segments_run(t, b);
         b->lanes.part = part;
     }
-    if (kernel_local_push(&b->lanes.queues[0], cell, blocks, box)) kernel_local_segments_run(t, b);
+    if (kernel_local_push(t, &b->lanes, &b->lanes.queues[0], cell, blocks, box)) kernel_local_segments_run(t, b);
 }
 
 #endif

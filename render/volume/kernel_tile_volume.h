@@ -24,6 +24,7 @@
 #include "kernel_local_samples.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_prefetch.h"
 #include "kernel_samples.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
@@ -83,6 +84,7 @@ static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32
     const grid *g = t->frame->job->parts[part].cells;
     uint32_t others[MMBVH_MAX_LEAF];
     int left = 0;
+    for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
     for (int n = 0; n < count; n++) {
         const int type = grid_cell_type(g, cells[n]);
         if (kernel_local_fits(t->frame, type))
