@@ -168,7 +168,7 @@ static insitu_status open_inbox(deep_inbox *in, deep_image *out, base_error *err
     }
     if (in->pixels && samples <= out->capacity) return INSITU_OK;
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image of %lld samples (%lld bytes)",
-                     (long long)samples, (long long)(samples * (int64_t)sizeof *out->samples));
+                     (long long)samples, (long long)samples * (long long)sizeof *out->samples);
 }
 
 static insitu_status count_all(MPI_Comm comm, const comp_deep_list *lists, int count, deep_inbox *in,

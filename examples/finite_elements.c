@@ -33,9 +33,10 @@ static void put_cell(int cell)
 static void make_mesh(int rank)
 {
     for (int n = 0; n < NODES; n++) {
+        const int layer = n / SIDE_X / SIDE_Y;
         nodes[n][0] = 0.5 * (n % SIDE_X) + rank * NX;
         nodes[n][1] = 0.5 * (n / SIDE_X % SIDE_Y);
-        nodes[n][2] = 0.5 * (n / SIDE_X / SIDE_Y);
+        nodes[n][2] = 0.5 * layer;
         dof_of_node[n] = GHOST_DOFS + (int)(7919LL * n % NODES); /* as scattered as a solver's */
     }
     for (int c = 0; c < CELLS; c++) put_cell(c);

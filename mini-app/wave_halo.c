@@ -8,7 +8,7 @@ enum { COMPONENTS = 4 };
 
 bool wave_halo_create(const wave_mesh *mesh, MPI_Comm comm, int value_bytes, wave_halo *halo)
 {
-    size_t tuple = (size_t)(COMPONENTS * value_bytes);
+    size_t tuple = (size_t)COMPONENTS * (size_t)value_bytes;
     *halo = (wave_halo){.mesh = mesh, .comm = comm, .value_bytes = value_bytes};
     halo->send = malloc(((size_t)mesh->send_count + 1) * tuple);
     halo->receive = malloc(((size_t)(mesh->cells - mesh->own_cells) + 1) * tuple);
@@ -61,7 +61,7 @@ void wave_halo_exchange(wave_halo *halo, void *values, int64_t cell_stride, int6
 {
     const wave_mesh *mesh = halo->mesh;
     MPI_Datatype type = halo->value_bytes == 8 ? MPI_DOUBLE : MPI_FLOAT;
-    size_t tuple = (size_t)(COMPONENTS * halo->value_bytes);
+    size_t tuple = (size_t)COMPONENTS * (size_t)halo->value_bytes;
     int count = 0;
     for (int l = 0; l < mesh->link_count; ++l) {
         const wave_link *link = &mesh->links[l];

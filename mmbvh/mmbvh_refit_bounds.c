@@ -87,12 +87,13 @@ static insitu_status sweep_new_grid(mmbvh *tree, const bounds_source *source, in
 /* A mesh that has shrunk leaves most of its grid's steps unused. */
 static bool is_grid_wasted(const mmbvh *tree)
 {
+    const int few = COMPACT_LOWER_MAX / 8;
     float lower[4], upper[4];
     mmbvh_node_box(tree, 0, lower, upper);
     for (int axis = 0; axis < 3; axis++) {
         const float steps = (upper[axis] - lower[axis]) / tree->grid.step[axis];
         const float far = fmaxf(fabsf(lower[axis]), fabsf(upper[axis]));
-        if (steps < (float)(COMPACT_LOWER_MAX / 8) && tree->grid.step[axis] > far * 0x1p-20f) return true;
+        if (steps < (float)few && tree->grid.step[axis] > far * 0x1p-20f) return true;
     }
     return false;
 }

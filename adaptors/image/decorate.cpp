@@ -161,7 +161,8 @@ void write_text(sheet &s, const std::string &text, double x, double baseline, in
     const int top = static_cast<int>(std::lround(baseline)) - letters.baseline;
     for (int row = std::max(0, -top); row < letters.height && top + row < s.image.height; row++)
         for (int column = std::max(0, -left); column < letters.width && left + column < s.image.width; column++) {
-            const float covered = letters.covered[static_cast<std::size_t>(row * letters.width + column)];
+            const float covered = letters.covered[static_cast<std::size_t>(row) * static_cast<std::size_t>(letters.width) +
+                                                  static_cast<std::size_t>(column)];
             if (covered > 0)
                 blend(pixel_at(s, left + column, top + row), s.what.colour, static_cast<double>(covered), false);
         }

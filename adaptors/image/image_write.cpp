@@ -120,6 +120,7 @@ template <typename code> std::vector<code> encode(const insitu_image &image, std
     for (std::size_t i = 0; i < pixel_count(image); i++) {
         const float *pixel = image.rgba + 4 * i;
         code *out = &codes[channels * i];
+        // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): equal bits are what is asked for
         if (i > 0 && std::memcmp(pixel, pixel - 4, 4 * sizeof *pixel) == 0)
             std::copy_n(out - channels, channels, out);
         else

@@ -67,7 +67,7 @@ template <typename Array> vtkSmartPointer<vtkCellArray> list_cells(const lattice
     vtkNew<Array> offsets, connectivity;
     offsets->SetNumberOfValues(count + 1);
     connectivity->SetNumberOfValues(count * l.corners());
-    for (int64_t i = 0; i <= count; i++) offsets->SetValue(i, static_cast<id>(i * l.corners()));
+    for (int64_t i = 0; i <= count; i++) offsets->SetValue(i, static_cast<id>(i) * l.corners());
     id *to = connectivity->GetPointer(0);
     for (int64_t k = 0; k < (l.is_flat() ? 1 : l.layers - 1); k++)
         for (int64_t j = 0; j + 1 < l.rows; j++)

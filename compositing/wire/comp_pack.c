@@ -223,5 +223,5 @@ insitu_status comp_unpack(const comp_layout *layout, uint32_t owner, const comp_
     base_free(out->starts);
     *out = (comp_owned){NULL, NULL};
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for received fragments (%lld bytes)",
-                     (long long)(total * (int64_t)sizeof(fragment)));
+                     (long long)total * (long long)sizeof(fragment));
 }

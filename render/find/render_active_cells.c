@@ -275,7 +275,7 @@ void render_active_cells_begin(kernel_frame *frame, kernel_thread *thread_of, in
 {
     const render_job *job = frame->job;
     if (!job->active) return;
-    kernel_active *active = base_calloc((size_t)(frame->surface_count * job->part_count), sizeof *active);
+    kernel_active *active = base_calloc((size_t)frame->surface_count * (size_t)job->part_count, sizeof *active);
     for (int surface = 0; active && surface < frame->surface_count; surface++)
         for (int part = 0; part < job->part_count; part++)
             if (is_usual(frame, &frame->surfaces[surface]) && can_keep(frame, surface, part))

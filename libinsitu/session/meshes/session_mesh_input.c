@@ -240,7 +240,7 @@ static insitu_status check_shape(const insitu_mesh *mesh, base_error *error)
     if (!mesh->offsets.data && !mesh->connectivity_row && mesh->connectivity_count != mesh->cell_count * vertices)
         return base_fail(error, INSITU_ERROR_MESH, "connectivity_count is %lld, %lld cells of %d vertices need %lld",
                          (long long)mesh->connectivity_count, (long long)mesh->cell_count, vertices,
-                         (long long)(mesh->cell_count * vertices));
+                         (long long)mesh->cell_count * vertices);
     return INSITU_OK;
 }
 

@@ -23,7 +23,7 @@ static bool has_interval(const session_scalar *scalar, const mmbvh_interval *int
 static bool add_intervals(session_scalar *scalar, const mmbvh_interval *more, int count)
 {
     if (count == 1 && has_interval(scalar, more)) return true;
-    const size_t sum = (size_t)(scalar->interval_count + count);
+    const size_t sum = (size_t)scalar->interval_count + (size_t)count;
     mmbvh_interval *intervals = base_realloc(scalar->intervals, (sum ? sum : 1) * sizeof *intervals);
     if (!intervals) return false;
     scalar->intervals = intervals;

@@ -71,7 +71,7 @@ static bool add_layer(smooth_items *items, const session_catalogue_mesh *mesh, c
     const int component = session_resolve_component(&layer->field, field->component_count);
     smooth_item *item = find_item(items, &(smooth_item){mesh, field, &layer->field, component, 0, NULL});
     if (!item) return false;
-    const size_t count = (size_t)(item->value_count + layer->value_count);
+    const size_t count = (size_t)item->value_count + (size_t)layer->value_count;
     mmbvh_interval *values = base_realloc(item->values, count * sizeof *values);
     if (!values) return false;
     item->values = values;

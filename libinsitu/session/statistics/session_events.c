@@ -37,7 +37,7 @@ static void work_free(event_work *w)
 
 static bool work_create(const scene *scene, int64_t cycle, event_work *w)
 {
-    const size_t most = (size_t)(scene->statistics_count + scene->image_count);
+    const size_t most = (size_t)scene->statistics_count + (size_t)scene->image_count;
     *w = (event_work){0, base_calloc(most, sizeof *w->wishes), base_calloc(most, sizeof *w->found),
                       base_calloc(most, sizeof *w->of)};
     if (!w->wishes || !w->found || !w->of) return false;

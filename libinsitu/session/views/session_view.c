@@ -92,8 +92,9 @@ static double estimate_samples(const session_extent *e, const scene_image *image
     const render_camera *camera = &view->camera;
     double sum = 0;
     for (int i = 0; i < PROBES * PROBES; i++) {
-        const int x = (int)((i % PROBES + 0.5) * camera->width / PROBES);
-        const int y = (int)((i / PROBES + 0.5) * camera->height / PROBES);
+        const int column = i % PROBES, row = i / PROBES;
+        const int x = (int)((column + 0.5) * camera->width / PROBES);
+        const int y = (int)((row + 0.5) * camera->height / PROBES);
         sum += chord_of_bounds(e, camera, x, y);
     }
     const double rays = (double)image->width * image->height * image->frames;
