@@ -1,4 +1,4 @@
-/* What a rank sends of a volume that is to be the same to the bit on any partition. */
+/* Folds a rank's samples and segments of a volume so that the picture is the same to the bit on any partition. */
 #ifndef RENDER_RENDER_FOLD_H
 #define RENDER_RENDER_FOLD_H
 
@@ -15,10 +15,10 @@ typedef struct render_folding {
     int64_t capacity, *starts;
 } render_folding;
 
-/* A tile's fragments, of the list from the first on, where each sample or segment is one: those of volumes that a pixel
- * has of one half of a stretch, all of which this rank has, become one (fragment_fold.h). FRAGMENT_EARLY says that
- * something of another rank, or a surface, may come before, FRAGMENT_LATE that it marks where cells overlap. False
- * where memory ran out. */
+/* Folds a tile's fragments, those of the list from the first on, each of which is one sample or segment. A pixel's
+ * volume fragments of one half of a stretch become one where this rank has all of them (fragment_fold.h).
+ * FRAGMENT_EARLY says that a surface or another rank's fragment may come before; FRAGMENT_LATE marks where cells
+ * overlap. Returns false if memory ran out. */
 bool render_fold(render_folding *folding, const pixel_area *area, fragment_list *list, int64_t first);
 
 void render_folding_free(render_folding *folding);

@@ -47,8 +47,8 @@ static const struct {
                    {0.30026319f, 0.22222222f, -0.022485417f},
                    {0.26798833f, 0.48042111f, 0.13888889f}}};
 
-/* -ln(1 - a), relative to 3e-7, for a in [0, 1] and 1 - a as the caller knows it: where a is small, what that lost to
- * rounding is put back to first order. */
+/* Returns -ln(1 - a) to a relative 3e-7, for a in [0, 1] and clear = 1 - a as the caller knows it. Where a is small,
+ * the rounding of clear is put back to first order. */
 SIMD_INLINE vf kernel_extinction(vf a, vf clear)
 {
     const vf rest = vf_select(vf_lt(a, vf_set(0.5f)), (1.0f - clear) - a, vf_set(0));
@@ -67,10 +67,10 @@ SIMD_INLINE vf kernel_exp(vf x)
 #define KERNEL_STEP_RATIO ((kernel_real)0.3)
 /* The extinction where the opacity is 1 throughout. */
 #define KERNEL_OPAQUE ((kernel_real)1e6)
-/* No logarithm is asked for of less; and a change of the value of less is none. */
+/* Logarithms are taken of no less, and a smaller change of the value counts as none. */
 #define KERNEL_TINY ((kernel_real)1e-30)
 
-/* What a segment adds: colour (premultiplied) and what it lets through. */
+/* A segment's light: its premultiplied colour and its transmittance. */
 typedef struct kernel_light {
     vf colour[3], depth; /* depth: -ln(transmittance), whose sums round less than products near 1 */
     vf transmittance;
@@ -150,7 +150,7 @@ SIMD_INLINE vf kernel_piece_find(const kernel_pieces *t, vm rays, vf x, vf rest,
     return piece;
 }
 
-/* Where a ray is in a piece. */
+/* A ray's position in a piece. */
 typedef struct kernel_way {
     vf below, above; /* to the piece's low and high end */
     vf todo;         /* how far the value goes on in the piece */
@@ -160,7 +160,7 @@ typedef struct kernel_way {
     vm is_last;      /* the segment ends before it */
 } kernel_way;
 
-/* What a segment is to all its pieces. */
+/* A segment's properties that all its pieces share. */
 typedef struct kernel_leg {
     vm falling, level;
     vf turn; /* 1 or -1 */
@@ -197,7 +197,7 @@ SIMD_INLINE void kernel_way_enter(kernel_way *way, const kernel_leg *leg, vm fre
     way->is_last = vm_or(vm_andnot(way->is_last, fresh), vm_and(fresh, vf_le(ahead, most)));
 }
 
-/* From both ends: near one where it is nothing it is as exact as the distance to it. */
+/* Interpolates from both ends, so that near an end where it is 0 it is as exact as the distance to that end. */
 SIMD_INLINE vf kernel_way_weigh(const kernel_way *way, vf inverse, vf at_low, vf at_high)
 {
     const vf zero = vf_set(0), one = vf_set(1);
@@ -246,7 +246,7 @@ SIMD_INLINE void kernel_stretch_limit(kernel_stretch *st, vf left, vf shortest)
     st->length = left * st->share;
 }
 
-/* Of the step: emitted light (e0) and its first moment along the step (e1); returns the optical depth. */
+/* Computes the step's emitted light (e0) and its first moment along the step (e1); returns the optical depth. */
 SIMD_INLINE vf kernel_stretch_sum(const kernel_stretch *st, vf *e0, vf *e1)
 {
     vf sigma[KERNEL_NODES], depth = vf_set(0);

@@ -45,7 +45,7 @@ typedef struct kernel_pre_end {
     vi before[4], colour; /* those of the bins before it */
 } kernel_pre_end;
 
-/* What a segment or a subinterval of it is. */
+/* A segment, or a subinterval of it. */
 typedef struct kernel_pre_subinterval {
     vf colour[3], depth, absorbed;
     vf error, rough, allowed; /* error: of the absorption within; rough: of the tables */
@@ -92,7 +92,7 @@ SIMD_INLINE vf kernel_pre_channel(const kernel_preintegral *t, vi colour, int ch
     return vf_from_vi(colour >> (10 * channel) & 1023) * t->colour_unit;
 }
 
-/* By how much a channel of the colour is off its chord between two values, at most. */
+/* Bounds how far a channel of the colour is off its chord between two values. */
 SIMD_INLINE vf kernel_pre_bend(const kernel_preintegral *t, vf v0, vf v1)
 {
     const vf width = vf_abs(v1 - v0), low = vf_min(v0, v1), high = vf_max(v0, v1);
@@ -131,8 +131,8 @@ SIMD_INLINE void kernel_pre_between(const kernel_preintegral *t, const kernel_pr
     out->allowed = out->absorbed * t->allowed_absorbed + length * t->allowed_length;
 }
 
-/* The segment in count subintervals, equal in values: each ray's own count, so that it does not depend on those beside
- * it. */
+/* Integrates the segment in count subintervals, equal in values. Each ray has its own count and so does not depend on
+ * its neighbours. */
 static __attribute__((noinline)) void kernel_pre_subdivide(const kernel_preintegral *t, const kernel_pre_end *from,
                                                            vf v_out, vf length, vf count, int most,
                                                            kernel_pre_subinterval *all)
@@ -172,7 +172,7 @@ SIMD_INLINE kernel_light kernel_light_select(vm m, const kernel_pre_subinterval 
     return out;
 }
 
-/* Rays for which one subinterval does not suffice. */
+/* Integrates the rays for which one subinterval is too coarse. */
 static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pieces, vm rays,
                                                         const kernel_pre_end *from, const kernel_run *run,
                                                         const kernel_pre_subinterval *whole, kernel_light *light)
@@ -199,8 +199,8 @@ static __attribute__((noinline)) void kernel_pre_finely(const kernel_pieces *pie
     light->transmittance = vf_select(left, exact.transmittance, light->transmittance);
 }
 
-/* What kernel_integrate() gives of the segment alone, within the budget. end: where the rays' last segments ended; then
- * where this one ends. */
+/* Returns what kernel_integrate() gives for the segment alone, within the budget. end holds where the rays' last
+ * segments ended and is moved to where this one ends. */
 SIMD_INLINE kernel_light kernel_preintegrated(const kernel_pieces *pieces, vm rays, const kernel_run *run,
                                               kernel_pre_end *end)
 {

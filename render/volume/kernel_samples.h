@@ -20,7 +20,7 @@
 #include "render_face_error.h"
 #include "simd.h"
 
-/* What is behind so little light does not show: far below the 1e-6 that ranks may differ by. */
+/* The light left in front below which nothing shows: far below the 1e-6 that ranks may differ by. */
 #define KERNEL_DARK FRAGMENT_DARK_OF_RANK
 
 /* The samples of a window: NaN where this rank has none. */
@@ -42,9 +42,9 @@ SIMD_INLINE vf kernel_sample_t(const kernel_packet *p, int m)
     return p->sample_base + p->sample_step * (float)m;
 }
 
-/* The window, of samples first .. first + count - 1. A number found from t, by three roundings of it, and t found from
- * the number, by one of step * m and one of t, are apart by no more than 6e-8 (4 m + t / step), and t / step is m and
- * base / step at most. */
+/* Sets the window to samples first .. first + count - 1. A number found from t has three roundings; a t found from the
+ * number m has one of step * m and one of t. So they are apart by no more than 6e-8 (4 m + t / step), and t / step is
+ * at most m + base / step. */
 SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s, int first, int count)
 {
     const float base = vf_reduce_max(vf_select(p->active, vf_abs(p->sample_base * p->sample_inverse), vf_set(0)));
@@ -53,7 +53,7 @@ SIMD_INLINE void kernel_samples_window(const kernel_packet *p, kernel_samples *s
     s->pad = 1e-4f + 4e-7f * ((float)(abs(first) + count) + base);
 }
 
-/* The window's samples that may be in the interval of some ray: indices into the window. */
+/* Finds the window's samples, as indices into it, that may be in the interval of some ray. */
 SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples *s, const kernel_interval *i,
                                     int *begin, int *end)
 {
@@ -68,9 +68,9 @@ SIMD_INLINE void kernel_sample_span(const kernel_packet *p, const kernel_samples
     *end = (int)last;
 }
 
-/* A sample as a fragment of its own, in front of what is opaque. Of those that another cell owns too, which mark their
- * ray (render.h), the nearest counts, for others may be behind what is opaque on another rank; a clear one beside it
- * makes sure that it overlaps something. cell: from where to where the sample's cell has the ray. */
+/* Emits a sample as a fragment of its own, in front of opaque surfaces. Samples that another cell owns too mark their
+ * ray (render.h). Only the nearest of them counts, as others may be behind another rank's opaque surface; a clear one
+ * beside it makes sure that it overlaps something. cell: the ray's interval in the sample's cell. */
 static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p, kernel_volume_state *state,
                                                                const kernel_interval *cell, vm mask, vf t, vf value)
 {
@@ -100,7 +100,7 @@ static __attribute__((noinline, cold)) void kernel_emit_sample(kernel_packet *p,
     kernel_emit(p, mask, kind, &sample);
 }
 
-/* Of the window's samples begin .. end - 1 those of the interval. One that another cell owns too stays the other's. */
+/* Fills those of the window's samples begin .. end - 1 that are in the interval. A sample keeps its first owner. */
 SIMD_INLINE void kernel_fill_some(kernel_packet *p, kernel_volume_state *state, const kernel_map *map,
                                   const kernel_interval *i, int begin, int end)
 {
@@ -140,15 +140,15 @@ SIMD_INLINE void kernel_fill(kernel_packet *p, kernel_volume_state *state, const
     if (begin < end) kernel_fill_some(p, state, map, i, begin, end);
 }
 
-/* A fragment under way on each ray. */
+/* The open fragment on each ray. */
 typedef struct kernel_blend {
     vm open;
     vf t_first, t_last, contact_in, contact_out;
     vf colour[3], transmittance;
     vf depth, lost[3]; /* of segments: -ln(transmittance), and what colour has lost to rounding */
     vf light;          /* what reaches this rank's next sample through all its samples so far */
-    /* Where all samples and segments are given to the fold (render_fold.h): of the last one the stretch, and what reaches
-     * the next through all so far; light is then what it was where the last stretch ended. */
+    /* Used where all samples and segments go to the fold (render_fold.h): the last one's stretch, and the light that
+     * passes all so far. light is then the light at the last stretch's end. */
     vf stretch, within;
 } kernel_blend;
 
@@ -163,8 +163,8 @@ SIMD_INLINE void kernel_blend_close(kernel_packet *p, kernel_blend *b, vm mask)
     b->open = vm_andnot(b->open, closing);
 }
 
-/* A fragment a sample or segment, for the fold, which is told where something may come between it and the one before.
- * Fragments have no transmittance of their own then, so that none is emitted as they close. */
+/* Emits each sample or segment as a fragment for the fold, and says where something may come between it and the one
+ * before. The open fragment then has no transmittance of its own, so that closing it emits nothing. */
 SIMD_INLINE void kernel_blend_apart(kernel_packet *p, kernel_blend *b, vm has, vf t_in, vf t_out,
                                     const vf colour[3], vf clear)
 {

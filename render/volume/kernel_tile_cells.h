@@ -32,8 +32,8 @@
 
 enum { KERNEL_OPEN_PIECE = 16 };
 
-/* The tile's cells of a volume. Of items, the first open_count begin before the last window's end, and do not end
- * before its begin; next is the first that is still to come. */
+/* The tile's cells of a volume. The first open_count items begin before the last window's end and do not end before its
+ * begin; next is the first item that is still to come. */
 typedef struct kernel_tile_cells {
     kernel_tile_candidate *items;
     int count, open_count, next;
@@ -49,7 +49,7 @@ typedef struct kernel_tile_cells {
     int32_t wait_vertices[4][SIMD_WIDTH];
 } kernel_tile_cells;
 
-/* What is to be done with a cell that is ready; of a polyhedron it has the index alone. map NULL: needs none. */
+/* Called with a cell that is ready; a polyhedron has its index alone. map is NULL for cells that need none. */
 typedef void kernel_tile_take(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
                               unsigned blocks);
 
@@ -99,7 +99,7 @@ SIMD_INLINE void kernel_placed_domain(kernel_placed *placed, const kernel_transf
         }
 }
 
-/* Lanes whose cells show and reach into the window, and where these begin. */
+/* Returns the lanes whose cells show and reach into the window, and the depths at which they begin. */
 SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const kernel_placed *placed,
                                            const kernel_interest *interest, float near[SIMD_WIDTH])
 {
@@ -122,7 +122,7 @@ SIMD_INLINE unsigned kernel_placed_showing(const kernel_tile_trace *t, const ker
     return vm_bits(vm_andnot(vm_and(is_finite, shows), vf_lt(back + pad, vf_set(t->t_near))));
 }
 
-/* The tets that wait. */
+/* Places the pending tets and hands them to take. */
 static __attribute__((noinline)) void kernel_tile_take_pending(kernel_tile_trace *t, kernel_tile_cells *cells,
                                                                kernel_tile_take *take)
 {
@@ -148,8 +148,8 @@ static __attribute__((noinline)) void kernel_tile_take_pending(kernel_tile_trace
     }
 }
 
-/* What waits from now on is of this volume and part. True where their tets do: not where the values are the cells', for
- * what is constant in a cell is not interpolated. */
+/* From now on pending tets are of this volume and part. Returns whether its tets are placed in lanes; they are not where
+ * values are the cells', as a field that is constant in a cell is not interpolated. */
 SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
                                       kernel_tile_take *take)
 {
@@ -163,7 +163,7 @@ SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *c
     return cells->arrays.has_lanes && !cells->arrays.is_by_cell;
 }
 
-/* Until a vector is full. */
+/* Adds a tet to the pending ones, and places these once they fill a vector. */
 SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells, uint32_t cell, unsigned blocks,
                                   kernel_tile_take *take)
 {
@@ -190,7 +190,7 @@ SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, int volume, int par
             kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
 }
 
-/* The trees of the parts, with the volume's ranges. */
+/* Goes down the trees of the parts, with the volume's ranges. */
 SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, const uint32_t *parts, int count,
                                           unsigned blocks, kernel_tile_visit *visit)
 {
@@ -203,7 +203,7 @@ SIMD_INLINE void kernel_tile_volume_trees(kernel_tile_trace *t, int volume, cons
     }
 }
 
-/* All trees of the frame, by way of the tree over them where there is one. take: what their cells are for. */
+/* Goes down all trees of the frame, by way of the tree over them if there is one. take gets their cells. */
 SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, kernel_tile_visit *parts,
                                        kernel_tile_take *take)
 {
@@ -236,7 +236,7 @@ static inline int kernel_depth_bin_of(kernel_tile_candidate *items, int count)
     }
 }
 
-/* All of them, by quicksort down to pieces of a few; the shorter part is called for, so that calls stay few. */
+/* Sorts by quicksort down to short pieces. It calls itself on the shorter part alone, so that the stack stays low. */
 static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
 {
     enum { PIECE = 8 };
@@ -255,7 +255,7 @@ static void kernel_order_by_depth(kernel_tile_candidate *items, int count)
     }
 }
 
-/* Before the first window; false where it is known that there are none. */
+/* Begins the tile, before its first window; returns false if it is known to have no cells. */
 SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
 {
     const kernel_frame *f = t->frame;
@@ -269,7 +269,7 @@ SIMD_INLINE bool kernel_tile_cells_begin(kernel_tile_trace *t)
     return cells->count > 0;
 }
 
-/* Those of the window are open. */
+/* Opens the window's cells. */
 SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_cells *cells)
 {
     kernel_tile_candidate *items = cells->items;
@@ -282,7 +282,7 @@ SIMD_INLINE void kernel_tile_cells_open(const kernel_tile_trace *t, kernel_tile_
     cells->open_count = count;
 }
 
-/* One of the window's cells. */
+/* Meets one of the window's cells. */
 SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *cells,
                                        const kernel_tile_candidate *item, bool is_pencil, unsigned blocks,
                                        kernel_tile_take *take)
@@ -294,7 +294,7 @@ SIMD_INLINE void kernel_tile_meet_item(kernel_tile_trace *t, kernel_tile_cells *
         kernel_tile_meet_cell(t, 0, part, item->cell, is_pencil, blocks, take);
 }
 
-/* What the next of the open cells are made of, on its way from memory: the indices of more, the vertices of some. */
+/* Prefetches the next open cells: the indices of more of them, the vertices of some. */
 SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const kernel_tile_cells *cells, int first)
 {
     const render_job *job = t->frame->job;

@@ -14,9 +14,9 @@
 #include "insitu/status.h"
 #include "memory.h"
 
-/* Far outside of every domain, and finite so that 0 times it is 0. */
+/* A value far outside of every domain; it is finite so that 0 times it is 0. */
 static const kernel_real endless = (kernel_real)0x1p100;
-/* No extinction, nor its slope, is more. */
+/* No extinction and no slope of one is above this. */
 static const double steepest = 1e6;
 static const double rounding = 1e-7;
 
@@ -45,8 +45,8 @@ static bool is_straight(const render_transfer *t, int from, int to, double toler
     return true;
 }
 
-/* The entry that follows i, as far on as the line allows, by places that are even. Long tables are tried piecewise:
- * this is quadratic. */
+/* Returns the last entry after i up to which all lie on a line; entries are evenly spaced. Long tables are searched
+ * piece by piece, as the search is quadratic. */
 static int next_entry(const render_transfer *t, int i, double tolerance)
 {
     enum { FARTHEST = 256 };
@@ -114,7 +114,7 @@ static void set_colours(const render_transfer *t, const kept_entry *entries, dou
     }
 }
 
-/* Of the function's domain: in a narrower ramp 3e-8, by which float32 rounds its ends and a value, shows. */
+/* The width, in shares of the domain, below which float32's rounding of a ramp's ends and values (3e-8) shows. */
 static const double narrow_width = 0.01;
 
 static bool is_narrow(const render_transfer *t, int i)
@@ -123,8 +123,8 @@ static bool is_narrow(const render_transfer *t, int i)
     return 0 < width && width < narrow_width && t->opacities[i] != t->opacities[i + 1];
 }
 
-/* Where the narrow ramp that ends at the cut does so; the cut, where none does, or where points fall together there (a
- * step). */
+/* Returns where the narrow ramp that ends at the cut ends exactly. Returns the cut if no such ramp ends there, or if
+ * points coincide there (a step). */
 static double cut_exactly(const render_transfer *t, kernel_real cut)
 {
     double out = (double)cut;
@@ -193,7 +193,7 @@ static double piece_opacity(const kernel_piece *p, double x)
     return fmin(fmax((double)e[KERNEL_PIECE_OPACITY] + along * (double)e[KERNEL_PIECE_SLOPE], 0), 1);
 }
 
-/* What the piece is between two of its values, into a bin. */
+/* Widens the bin's bounds by those of the piece between two of its values. */
 static void widen(kernel_bound *b, const kernel_piece *p, double from, double to)
 {
     const double a0 = piece_opacity(p, from), a1 = piece_opacity(p, to), most = fmax(a0, a1);
@@ -220,8 +220,8 @@ static void bound_piece(kernel_pieces *out, const kernel_piece *p)
     }
 }
 
-/* Points that pieces do not tell apart: of those at one place the first's opacity ends one side, and the last's begins
- * the other. */
+/* Finds the steps. Of points at one place, the first's opacity ends the lower side and the last's begins the upper
+ * side. */
 static void fill_steps(kernel_pieces *out, const render_transfer *t)
 {
     int last;
@@ -236,7 +236,7 @@ static void fill_steps(kernel_pieces *out, const render_transfer *t)
     }
 }
 
-/* Of the function's domain: equal parts are enough for wider ramps, up to 1000 optical depths (docs/error_budget.md).
+/* A share of the domain. Wider ramps need only equal parts, up to 1000 optical depths (docs/error_budget.md).
  */
 static const double steep_width = 1.0 / 64;
 

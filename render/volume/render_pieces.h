@@ -7,8 +7,8 @@
 #include "kernel_types.h"
 #include "render.h"
 
-/* Colours may be off the table's by tolerance where that saves pieces; 0: by rounding. Freed by render_pieces_free().
- */
+/* Colours may be off the table's by tolerance where that saves pieces; 0 means by rounding alone. The caller frees it
+ * with render_pieces_free(). */
 insitu_status render_pieces_build(kernel_pieces *out, const render_transfer *t, double tolerance, base_error *error);
 /* Sums for an error of max_error in the light of a ray that goes no farther than reach in the cells, in unit distances.
  */

@@ -27,7 +27,7 @@ static int bin_count_for(double max_error)
     return count;
 }
 
-/* What a bin is, before units are known. */
+/* A bin's sums, before the unit of whole numbers is known. */
 typedef struct bin_sums {
     double sum[CHANNELS], low, high; /* extinctions */
     double colour_low[3], colour_high[3];
@@ -90,7 +90,7 @@ static void widen(bin_sums *bin, const kernel_piece *p, double x)
     }
 }
 
-/* From begin to end; first: the piece that holds begin. Returns the one that holds the end. */
+/* Integrates from begin to end. first is the piece that holds begin; returns the piece that holds end. */
 static int fill_bin(const kernel_pieces *pieces, int first, double begin, double end, bin_sums *bin)
 {
     *bin = (bin_sums){.low = INFINITY,
@@ -137,7 +137,7 @@ static int32_t pack_colour(const bin_sums *bin, double contrast)
     return packed;
 }
 
-/* Of the widest of three channels. */
+/* Returns the widest change among the three channels. */
 static double colour_change(const bin_sums *bin)
 {
     double change = 0;
@@ -145,7 +145,7 @@ static double colour_change(const bin_sums *bin)
     return change;
 }
 
-/* Sums in units; returns by how much the colour of a bin differs from that of its middle. */
+/* Writes the sums in units; returns by how much the colour within a bin differs from its middle's. */
 static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double width, double contrast)
 {
     double total[2] = {0, 0}, before[CHANNELS] = {0}, change = 0;
@@ -175,8 +175,8 @@ static double fill_entries(kernel_preintegral *out, const bin_sums *bins, double
     return 0.5 * change;
 }
 
-/* The same where entries are not even: the sharpest bend as often as the closest two are, and that to or from a
- * constant colour at an end is one of them, as the ends need not be at 0 and 1. */
+/* Fills the bends of tables with uneven entries. It assumes the sharpest bend at the closest spacing. The bends to
+ * constant colours at the ends count too, as the ends need not be at 0 and 1. */
 static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
 {
     double bend = 0, closest = 1;
@@ -195,7 +195,7 @@ static void fill_uneven_bends(kernel_preintegral *out, const render_transfer *t)
     out->bend = (float)fmin(bend / 4, 1e30);
 }
 
-/* Where the table's colours bend, and by how much. */
+/* Fills in where the table's colours bend and by how much. */
 static void fill_bends(kernel_preintegral *out, const render_transfer *t)
 {
     const int last = t->colour_count - 1;
