@@ -76,22 +76,24 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* What the leaf's cells know in lanes. */
+/* What the leaf's cells know in lanes, of one ray. */
 typedef struct kernel_leaf_lanes {
-    float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH];
+    int ray;
+    float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
 } kernel_leaf_lanes;
 
-static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_hex_pairs *pairs, int ray,
-                              const kernel_leaf_lanes *lanes, const float *rows, int i, int32_t occluder)
+/* The cell in lane i. */
+static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_hex_pairs *pairs,
+                              const kernel_leaf_lanes *lanes, int i, int32_t occluder)
 {
-    if (o->cells[occluder].record < 0) return kernel_doubts_add(s, ray, occluder);
+    if (o->cells[occluder].record < 0) return kernel_doubts_add(s, lanes->ray, occluder);
     const int n = pairs->count++;
-    pairs->ray[n] = ray;
+    pairs->ray[n] = lanes->ray;
     pairs->occluder[n] = occluder;
     pairs->level[n] = lanes->level[i];
     pairs->rise[n] = lanes->rise[i];
     pairs->thickness[n] = lanes->thickness[i];
-    pairs->reach[n] = rows[KERNEL_SLAB_REACH * SIMD_WIDTH + i];
+    pairs->reach[n] = lanes->reach[i];
     return pairs->count < SIMD_WIDTH || kernel_pairs_run(o, s, pairs);
 }
 
@@ -109,13 +111,15 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, k
         vf level, rise, thickness;
         unsigned met = vm_bits(kernel_plumb_slabs(&p, rows, &level, &rise, &thickness));
         if (!met) continue;
+        lanes.ray = ray;
         vf_store(lanes.level, level);
         vf_store(lanes.rise, rise);
         vf_store(lanes.thickness, thickness);
+        vf_store(lanes.reach, vf_load(rows + KERNEL_SLAB_REACH * SIMD_WIDTH));
         for (; met; met &= met - 1) {
             const int i = __builtin_ctz(met);
-            is_well =
-                kernel_meets_slab(o, s, pairs, ray, &lanes, rows, i, tree->sources[leaf * SIMD_WIDTH + i]) && is_well;
+            const int32_t occluder = tree->sources[leaf * SIMD_WIDTH + i];
+            is_well = kernel_meets_slab(o, s, pairs, &lanes, i, occluder) && is_well;
         }
     }
     return is_well;
