@@ -231,8 +231,8 @@ typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integ
 
 /* The cells that isosurfaces cross, kept side by side for other pictures of the same cells and values: what a picture
  * needs of 662,000 of 12 million tets lies in 40 MiB then, in the order of the tree (docs/decisions/find.md has the
- * gain). A frame whose job has one fills it with what is not in it yet: tets or hexes with float32 coordinates and
- * values and int32 indices, of opaque surfaces in one colour with the cells' gradients for normals (hexes: robust
+ * gain). A frame whose job has one fills it with what is not in it yet: parts of tets alone or hexes alone, with float32
+ * coordinates and values at vertices, of opaque surfaces in one colour with the cells' gradients for normals (hexes: robust
  * roots), by RENDER_BINNED and all pixels, of parts most of whose box the picture has, up to 64 MiB in all. Pictures
  * are the same to the last bit. For one frame at a time. */
 typedef struct render_active_cells render_active_cells;

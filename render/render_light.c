@@ -226,8 +226,11 @@ static void ask_cell(tracer *t, int32_t occluder)
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
+/* A doubt whose cell has been asked, for all the rays that doubt it. */
+enum { ASKED = -1 };
+
 /* Asks the cells of a hit's doubts, of which there are count, of the rays into the hemisphere. */
-static void settle_hemisphere(tracer *t, const render_hit *hit, const kernel_doubt *doubts, int64_t count)
+static void settle_hemisphere(tracer *t, const render_hit *hit, kernel_doubt *doubts, int64_t count)
 {
     uint64_t open = 0;
     int32_t ray_of[RENDER_MAX_SAMPLES];
@@ -239,14 +242,18 @@ static void settle_hemisphere(tracer *t, const render_hit *hit, const kernel_dou
     }
     const uint64_t asked = open;
     for (int64_t i = 0; i < count && open; i++) {
+        const int32_t occluder = doubts[i].occluder;
+        if (occluder == ASKED) continue;
         t->bundle.open = 0;
-        for (int64_t j = i; j < count; j++)
-            if (doubts[j].occluder == doubts[i].occluder)
-                t->bundle.open |= (uint64_t)1 << t->names[doubts[j].ray].number;
+        for (int64_t j = i; j < count; j++) {
+            if (doubts[j].occluder != occluder) continue;
+            t->bundle.open |= (uint64_t)1 << t->names[doubts[j].ray].number;
+            doubts[j].occluder = ASKED;
+        }
         t->bundle.open &= open;
-        if (!(t->bundle.open >> t->names[doubts[i].ray].number & 1)) continue;
+        if (!t->bundle.open) continue;
         const uint64_t before = t->bundle.open;
-        ask_cell(t, doubts[i].occluder);
+        ask_cell(t, occluder);
         open &= ~(before & ~t->bundle.open);
     }
     for (uint64_t closed = asked & ~open; closed; closed &= closed - 1)
@@ -268,7 +275,7 @@ static void settle_doubts(tracer *t, const render_hit *hits)
     kernel_straights *s = &t->straights;
     qsort(s->doubts, (size_t)s->doubt_count, sizeof *s->doubts, by_ray);
     for (int64_t first = 0, end; first < s->doubt_count; first = end) {
-        const kernel_doubt *from = &s->doubts[first];
+        kernel_doubt *from = &s->doubts[first];
         const ray_name name = t->names[from->ray];
         for (end = first + 1; end < s->doubt_count && name.number < RENDER_MAX_SAMPLES; end++) {
             const ray_name next = t->names[s->doubts[end].ray];

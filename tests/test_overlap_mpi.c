@@ -380,7 +380,7 @@ static void turns_make_the_same_bits(void **state)
     free_image(&at_once);
     free_image(&in_turns);
     test_mesh_free(&mesh);
-    assert_everywhere(overlaps > 500 && is_same);
+    assert_everywhere(overlaps > 4 * 100 && is_same); /* so that there are turns */
 }
 
 /* Several cells hold a sample's point: the least of their values counts, on whichever ranks they are. */

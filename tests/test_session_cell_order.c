@@ -373,7 +373,7 @@ static const spoilt_case cases[] = {
     {"one less", missing_entry, INSITU_ERROR_MESH, true, {"too few for ", "cells of 8 vertices in rows of 27"}},
     {"four", no_entries, INSITU_ERROR_MESH, true, {"connectivity_count is 4, too few for "}},
     {"offsets", rows_and_offsets, INSITU_ERROR_MESH, true, {"connectivity_row is 8 and offsets are given"}},
-    {"types", rows_and_types, INSITU_ERROR_MESH, true, {"offsets are not given, cell types are"}},
+    {"types", rows_and_types, INSITU_ERROR_MESH, true, {"cell types are given without offsets"}},
     {"vertex", vertex_in_row, INSITU_ERROR_MESH, false, {"cell 3 (hex): vertex index -5 is outside 0.."}},
     {"far", far_vertex_in_row, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index 4294967297 is outside 0.."}},
     {"0 of 1", vertex_before_one, INSITU_ERROR_MESH, false, {"cell 1 (hex): vertex index 0 is outside 1..", "is 1)"}},

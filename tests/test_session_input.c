@@ -190,7 +190,7 @@ static const spoilt_case cases[] = {
      INSITU_ERROR_MESH,
      false,
      {"cell 0 (hex): vertex ", "coordinates of at most 1e+100 are supported"}},
-    {"types alone", types_without_offsets, INSITU_ERROR_MESH, true, {"offsets are not given"}},
+    {"types alone", types_without_offsets, INSITU_ERROR_MESH, true, {"cell types are given without offsets"}},
     {"one unknown type", one_type_unknown, INSITU_ERROR_MESH, true, {"unknown cell_type 41"}},
     {"one type's count", one_type_wrong_count, INSITU_ERROR_MESH, true, {"connectivity_count is ", "of 6 vertices"}},
     {"no coordinates", no_coordinates, INSITU_ERROR_MESH, true, {"z coordinates are not given"}},

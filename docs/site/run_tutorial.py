@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """run_tutorial.py PREFIX FOLDER: does what docs/tutorial.md says, in an empty folder, by the libinsitu installed in PREFIX.
 
-A block after "Save as `NAME`" is written to that file; a block of shell is run, in the order of the page. After each run of a
+A block after "Save it as `NAME`" is written to that file; a block of shell is run, in the order of the page. After each run of a
 program the pictures are those that the page shows in its text. A language whose compiler is not here is left out.
 """
 import os
@@ -41,7 +41,7 @@ shutil.rmtree(folder, ignore_errors=True)
 folder.mkdir(parents=True)
 of_languages, last = [], {}
 for number, m in enumerate(markdown_pages.FENCE.finditer(text)):
-    saved = re.findall(r"[Ss]ave as\s+`([\w.]+)`", text[:m.start()].rsplit("```", 1)[-1])
+    saved = re.findall(r"[Ss]ave (?:it )?as\s+`([\w.]+)`", text[:m.start()].rsplit("```", 1)[-1])
     if saved:
         (folder / saved[-1]).write_text(m[2])
     elif m[1] == "sh" and "export" in m[2]:

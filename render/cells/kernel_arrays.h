@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "grid.h"
-#include "kernel_cell.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
 #include "simd.h"
@@ -315,24 +314,6 @@ SIMD_INLINE double kernel_numbers_one(const kernel_numbers *c, int64_t index)
     if (!c->is_wide) return (double)*at;
     memcpy(&wide, at, sizeof wide);
     return wide;
-}
-
-/* A cell with finite values, as kernel_cell_fetch() makes it, and where its vertices are; for the caller to place. */
-SIMD_INLINE void kernel_arrays_fetch(kernel_cell *c, const kernel_arrays *p, uint32_t index, int vertices)
-{
-    int32_t own[GRID_MAX_CELL_VERTICES][SIMD_WIDTH];
-    kernel_arrays_cells(p, &index, 1, vertices, own, 0);
-    c->index = index;
-    c->type = vertices == 8 ? GRID_HEX : GRID_TET;
-    c->count = vertices;
-    c->is_finite = c->is_placed = true;
-    c->has_lines = c->has_normal = false;
-    for (int i = 0; i < vertices; i++) {
-        const int64_t vertex = own[i][0];
-        c->vertices[i] = vertex;
-        c->values[i] = kernel_numbers_one(&p->values, p->is_by_cell ? (int64_t)index : vertex);
-        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_numbers_one(&p->coordinates[a], vertex);
-    }
 }
 
 #endif

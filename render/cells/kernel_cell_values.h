@@ -1,4 +1,5 @@
-/* A cell's values as layers want them: beside an isovalue, in the domain of a transfer function, as colours. */
+/* A cell's values as layers need them: beside an isovalue, in the domain of a transfer function, as colours; and cells
+ * fetched one by one from arrays of any layout. */
 #ifndef RENDER_KERNEL_CELL_VALUES_H
 #define RENDER_KERNEL_CELL_VALUES_H
 
@@ -6,6 +7,7 @@
 #include <string.h>
 
 #include "grid.h"
+#include "kernel_arrays.h"
 #include "kernel_cell.h"
 #include "kernel_interest.h"
 #include "kernel_types.h"
@@ -80,6 +82,24 @@ SIMD_INLINE void kernel_cell_domain(kernel_cell *c, const kernel_transfer *t)
     for (int i = 0; i < c->count; i++) {
         c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
         c->is_constant = c->is_constant && c->values[i] == c->values[0];
+    }
+}
+
+/* A cell with finite values, as kernel_cell_fetch() makes it, and where its vertices are; for the caller to place. */
+SIMD_INLINE void kernel_arrays_fetch(kernel_cell *c, const kernel_arrays *p, uint32_t index, int vertices)
+{
+    int32_t own[GRID_MAX_CELL_VERTICES][SIMD_WIDTH];
+    kernel_arrays_cells(p, &index, 1, vertices, own, 0);
+    c->index = index;
+    c->type = vertices == 8 ? GRID_HEX : GRID_TET;
+    c->count = vertices;
+    c->is_finite = c->is_placed = true;
+    c->has_lines = c->has_normal = false;
+    for (int i = 0; i < vertices; i++) {
+        const int64_t vertex = own[i][0];
+        c->vertices[i] = vertex;
+        c->values[i] = kernel_numbers_one(&p->values, p->is_by_cell ? (int64_t)index : vertex);
+        for (int a = 0; a < 3; a++) c->world[i][a] = kernel_numbers_one(&p->coordinates[a], vertex);
     }
 }
 

@@ -308,10 +308,12 @@ SIMD_INLINE void kernel_local_invert(const vf m[3][8], vf inverse[3][3])
         for (int a = 0; a < 3; a++) inverse[i][a] *= one;
 }
 
-/* y of all vertices: no point inside is beyond, as each is a mean of them with weights that are not negative. */
+/* Bounds y by that of all vertices, widened by what kernel_local_blur() has found before: no point inside is beyond, as
+ * each is a mean of them with weights that are not negative. */
 SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inverse[3][3], const vf offset[3],
                                     kernel_local_cells *out)
 {
+    const vf pad = 1e-3f + vf_load(out->blur);
     for (int i = 0; i < 3; i++) {
         vf low = vf_set(INFINITY), high = vf_set(-INFINITY);
         for (int n = 0; n < count; n++) {
@@ -319,8 +321,8 @@ SIMD_INLINE void kernel_local_reach(int count, const vf at[3][8], const vf inver
             low = vf_min(y, low);
             high = vf_max(y, high);
         }
-        vf_store(out->low[i], low - 1e-3f);
-        vf_store(out->high[i], high + 1e-3f);
+        vf_store(out->low[i], low - pad);
+        vf_store(out->high[i], high + pad);
     }
 }
 
@@ -365,8 +367,8 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
             vf_store(out->bent[k][i], bent[k][i]);
         }
     }
-    kernel_local_reach(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
     kernel_local_blur(count, places, (const vf(*)[3])inverse, out);
+    kernel_local_reach(count, (const vf(*)[8])at, (const vf(*)[3])inverse, offset, out);
     const vm sharp = vf_lt(vf_load(out->blur), vf_set(0.05f));
     if (!bends) return sharp;
     const vf bend = kernel_local_bent(type, (const vf(*)[3])bent);

@@ -216,16 +216,6 @@ SIMD_INLINE void kernel_map_spread(const kernel_map *map, kernel_map_lanes *out)
         for (int i = 0; i < 8; i++) out->exact[0][n][i] = out->exact[1][n][i] = (kernel_half){0} + map->exact[n][i];
 }
 
-/* Rays in tile space. */
-typedef struct kernel_rays {
-    vf origin_x, origin_y, slope_x, slope_y;
-} kernel_rays;
-
-SIMD_INLINE kernel_rays kernel_packet_rays(const kernel_packet *p)
-{
-    return (kernel_rays){p->origin_x, p->origin_y, p->slope_x, p->slope_y};
-}
-
 /* Relative to the map's origin. */
 SIMD_INLINE void kernel_rays_at(const kernel_rays *rays, const kernel_map_lanes *map, vf t, vf out[3])
 {

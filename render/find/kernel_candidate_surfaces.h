@@ -17,6 +17,7 @@
 #include <string.h>
 
 #include "kernel_arrays.h"
+#include "kernel_cell_values.h"
 #include "kernel_cell.h"
 #include "kernel_finder.h"
 #include "kernel_outline.h"

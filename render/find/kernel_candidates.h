@@ -200,7 +200,7 @@ static void kernel_activate_subtree(kernel_finder *s, int64_t root)
     const kernel_arrays *p = &s->arrays;
     const bool is_one_type = p->type == GRID_TET || p->type == GRID_HEX;
     k->vertices = grid_type_vertices(p->type);
-    k->is_refused = k->is_refused || !(p->has_lanes && p->is_narrow && is_one_type && !p->own);
+    k->is_refused = k->is_refused || !(p->has_lanes && p->is_narrow && is_one_type && !p->own && !p->is_by_cell);
     if (!k->is_refused) kernel_find_candidates(s, root);
 }
 

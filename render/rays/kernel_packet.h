@@ -288,4 +288,14 @@ SIMD_INLINE vm kernel_box(const kernel_packet *p, const mmbvh *tree, int64_t nod
     return vf_le(low, high);
 }
 
+/* Rays in tile space. */
+typedef struct kernel_rays {
+    vf origin_x, origin_y, slope_x, slope_y;
+} kernel_rays;
+
+SIMD_INLINE kernel_rays kernel_packet_rays(const kernel_packet *p)
+{
+    return (kernel_rays){p->origin_x, p->origin_y, p->slope_x, p->slope_y};
+}
+
 #endif

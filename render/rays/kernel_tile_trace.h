@@ -118,6 +118,13 @@ typedef struct kernel_tile_entry {
 
 typedef void kernel_tile_visit(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks);
 
+struct kernel_cell;
+struct kernel_map;
+
+/* Called with a cell that is ready; a polyhedron has its index alone. map is NULL for cells that need none. */
+typedef void kernel_tile_take(kernel_tile_trace *t, int part, const struct kernel_cell *c, const struct kernel_map *map,
+                              unsigned blocks);
+
 /* Returns those of the blocks in which the node may be met, none where its values do not show. interest NULL: all
  * values show. */
 SIMD_INLINE kernel_placement kernel_tile_look(const kernel_tile_trace *t, const mmbvh *tree, const mmbvh_ranges *ranges,

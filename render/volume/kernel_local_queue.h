@@ -9,12 +9,12 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
+#include "kernel_hex_rays.h"
 #include "kernel_interest.h"
 #include "kernel_local.h"
 #include "kernel_placed_hexes.h"
 #include "kernel_prefetch.h"
 #include "kernel_tile.h"
-#include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
 #include "kernel_wide.h"
@@ -56,21 +56,6 @@ SIMD_INLINE int kernel_local_queue_of(int type)
 }
 
 /* ---- cells ---- */
-
-/* The tile's cell is the lane's; false where it shows nowhere. */
-static __attribute__((noinline, cold)) bool kernel_local_ready_alone(kernel_tile_trace *t, kernel_local_lanes *l,
-                                                                     const kernel_local_queue *q, int lane,
-                                                                     bool is_pencil)
-{
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    const grid *g = t->frame->job->parts[l->part].cells;
-    if (l->alone == lane) return true;
-    l->alone = -1;
-    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[l->volume].field.fields[l->part], q->cell[lane]);
-    if (!kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[l->volume], is_pencil, KERNEL_ALL_BLOCKS)) return false;
-    l->alone = lane;
-    return true;
-}
 
 /* An array's numbers at the vertices, into a lane. */
 SIMD_INLINE void kernel_local_column(const grid_array *a, const int64_t *vertices, int count, double (*out)[SIMD_WIDTH],
@@ -171,8 +156,9 @@ SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigne
         end[2 * a] = from > ends[2 * a][lane] ? from : ends[2 * a][lane];
         end[2 * a + 1] = to < ends[2 * a + 1][lane] ? to : ends[2 * a + 1][lane];
     }
+    if (end[0] > end[1] || end[2] > end[3]) return false;
     *box = (unsigned)(end[0] | end[1] << 4 | end[2] << 8 | end[3] << 12);
-    return end[0] <= end[1] && end[2] <= end[3];
+    return true;
 }
 
 /* Places the cells that are fetched: lists gets the vertices' places and the field there, and whatever else it has of
@@ -243,23 +229,6 @@ SIMD_INLINE unsigned kernel_local_box(unsigned blocks)
     }
     return (unsigned)(x0 * KERNEL_BLOCK) | (unsigned)(x1 * KERNEL_BLOCK + KERNEL_BLOCK - 1) << 4 |
            (unsigned)(y0 * KERNEL_BLOCK) << 8 | (unsigned)(y1 * KERNEL_BLOCK + KERNEL_BLOCK - 1) << 12;
-}
-
-/* Rays of the samples' pixels in tile space, and where these are in packets. */
-typedef struct kernel_local_rays {
-    vi lane, at;
-    vf origin[2], slope[2];
-} kernel_local_rays;
-
-SIMD_INLINE void kernel_local_rays_of(kernel_local_rays *rays, const kernel_tile *tile, vi pixel, vi lane)
-{
-    const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
-    rays->lane = lane & (SIMD_WIDTH - 1);
-    rays->at = kernel_batch_at(column, row);
-    rays->origin[0] = kernel_batch_of_tile(tile->origin_x, column);
-    rays->origin[1] = kernel_batch_of_tile(tile->origin_y, row);
-    rays->slope[0] = kernel_batch_of_tile(tile->slope_x, column);
-    rays->slope[1] = kernel_batch_of_tile(tile->slope_y, row);
 }
 
 /* From where to where the rays may be inside of their cells, after depth. */

@@ -27,9 +27,10 @@
  *     oscillation of g <= T (R S + 2 s |c'| + |s'| |c'| change + min(D, 1) (R |s'| + s |c'| + R |s'|)).
  *
  * No more than twice g's own bound R |s'| + s |c'|. The mean of |v - f| is 0.26 of a parabola's most at the middle,
- * P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at the quarters, 0.67; and of the quartic's no more than four times
- * E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments they fall as n^2 at least. What the polynomial itself is off is not
- * of mean zero: 2 E, and what Newton's method leaves, count whole. */
+ * P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at the quarters, 1.09 (0.67 of one chord, which crosses it in the
+ * middle; 1.082 at most, times n^2, of n >= 2); and of the quartic's no more than four times
+ * E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2. What the polynomial itself is off is not of mean zero: 2 E, and what
+ * Newton's method leaves, count whole. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -128,8 +129,9 @@ SIMD_INLINE float kernel_local_slip(const kernel_local_cells *c, int n)
     return slope / (1 - sqrtf(c->bend[n]));
 }
 
-/* The lane's bounds; false where its values are for bisection. Chords end beyond the cell's values, but by no more
- * than an eighth of their range (kernel_local_strays()). */
+/* The lane's bounds; false where its values are for bisection. Chords end beyond the cell's values: one chord by no
+ * more than three sixteenths of their range (kernel_local_strays()), several by a sixth of the parabola's most, which
+ * is less than that range. */
 SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_local_stretches *b, int n)
 {
     const kernel_pieces *t = state->pieces;
@@ -138,7 +140,7 @@ SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_lo
     for (int i = 0; i < 8; i++) values[i] = b->faces.at[3][i][n];
     low = high = values[0];
     for (int i = 1; i < 8; i++) low = simd_min(values[i], low), high = simd_max(values[i], high);
-    const float ends[2] = {low - 0.125f * (high - low), high + 0.125f * (high - low)};
+    const float ends[2] = {low - 0.1875f * (high - low), high + 0.1875f * (high - low)};
     kernel_span_bound(state, ends, 2, &span);
     if (span.step_count || span.is_steep) return false;
     const kernel_bound s = kernel_bound_between(t, ends[0], ends[1]);
@@ -255,9 +257,12 @@ SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local
     const vi lane = p->rays.lane;
     const vf *d = course->deviation, one = vf_set(1), v0 = p->ends[0].v, v1 = p->ends[1].v;
     const vf length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
-    const vf middle = 0.5f * (v0 + v1) + d[1];
-    const vf ends = kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1);
-    const vf seen = length * vf_muladd(vf_set(0.5f), kernel_opacity(transfer, middle), 0.25f * ends);
+    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
+    for (int i = 0; i < 3; i++) {
+        const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + d[i];
+        opacities += 0.25f * kernel_opacity(transfer, value);
+    }
+    const vf seen = length * opacities;
     const vf allowed = state->allowance * (length * (1 / state->reach) + seen / (1.0f + seen));
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
     const vf quartic = vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]);
@@ -267,7 +272,7 @@ SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local
     const vf sway =
         vf_muladd(kernel_local_take(b->bounds.tint, lane), change,
                   vf_muladd(kernel_local_take(b->bounds.fade, lane), depth, kernel_local_take(b->bounds.sway, lane)));
-    const vf mean = 0.26f * parabola + (0.67f * cubic + 4.0f * quartic);
+    const vf mean = 0.26f * parabola + (1.09f * cubic + 4.0f * quartic);
     const vf made = (0.5f * vf_min(sway, 2.0f * cost)) * (mean * length);
     const vf rest = cost * length * (2.0f * quartic + kernel_local_take(b->bounds.slip, lane) * course->slip);
     const vf left = allowed - rest;
@@ -359,7 +364,9 @@ static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_tr
             same |= 1u << at[i] % SIMD_WIDTH;
             wanted &= ~(1u << i);
         }
-        if (!kernel_local_ready_alone(t, &b->lanes, q, lane[first], false)) continue;
+        kernel_local_lanes *l = &b->lanes;
+        const uint32_t cell = q->cell[lane[first]];
+        if (!kernel_tile_ready_alone(t, l->volume, l->part, cell, false, lane[first], &l->alone)) continue;
         const kernel_cell *c = &t->thread->tile_cells->cell;
         kernel_packet *p = &t->packets[packet];
         const vm active = p->active;

@@ -49,10 +49,6 @@ typedef struct kernel_tile_cells {
     int32_t wait_vertices[4][SIMD_WIDTH];
 } kernel_tile_cells;
 
-/* Called with a cell that is ready; a polyhedron has its index alone. map is NULL for cells that need none. */
-typedef void kernel_tile_take(kernel_tile_trace *t, int part, const kernel_cell *c, const kernel_map *map,
-                              unsigned blocks);
-
 /* Ready the fetched cell for rays of blocks, which are a pencil or are not; returns the blocks that it may show in. */
 SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_cells *cells, const grid *g,
                                             const kernel_transfer *transfer, bool is_pencil, unsigned blocks)
@@ -70,6 +66,21 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
     if (c->type == GRID_TET) return meets & kernel_tet_blocks(&cells->block_rays, c);
     if (!c->is_constant) kernel_map_setup(&cells->map, c);
     return meets;
+}
+
+/* Makes a cell that is in a lane of a batch the tile's cell, ready for rays of all blocks, unless *alone says that it is;
+ * false if it shows nowhere. *alone: the lane whose cell the tile's cell is, or -1. */
+static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_trace *t, int volume, int part,
+                                                                    uint32_t cell, bool is_pencil, int lane, int *alone)
+{
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    const grid *g = t->frame->job->parts[part].cells;
+    if (*alone == lane) return true;
+    *alone = -1;
+    kernel_cell_fetch(&cells->cell, g, &t->frame->job->volumes[volume].field.fields[part], cell);
+    if (!kernel_tile_ready_cell(t, cells, g, &t->frame->volumes[volume], is_pencil, KERNEL_ALL_BLOCKS)) return false;
+    *alone = lane;
+    return true;
 }
 
 SIMD_INLINE void kernel_tile_meet_cell(kernel_tile_trace *t, int volume, int part, uint32_t index, bool is_pencil,

@@ -7,6 +7,7 @@
 #include "memory.h"
 #include "session_agree.h"
 #include "session_mesh.h"
+#include "session_team.h"
 #include "session_topology.h"
 
 enum { MOST_SAMPLES = 1024 };

@@ -14,9 +14,9 @@
 
 #include "error.h"
 #include "insitu/status.h"
-#include "session_team.h"
 
 struct session_mesh;
+struct session_team;
 
 typedef struct session_box {
     double lower[3], upper[3];
@@ -41,7 +41,7 @@ void session_homes_free(session_homes *homes);
 
 /* mesh: this rank's part, NULL: it has none. half_diagonal: of the scene. Collective, agreed. */
 insitu_status session_homes_find(session_homes *homes, const struct session_mesh *mesh, bool by_id,
-                                 double half_diagonal, const session_team *team, base_error *error);
+                                 double half_diagonal, const struct session_team *team, base_error *error);
 
 /* Does the point lie in another rank's box? */
 bool session_homes_share(const session_homes *homes, const double point[3]);

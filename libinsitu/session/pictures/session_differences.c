@@ -18,6 +18,8 @@
 
 enum {
     ROUND_HITS = 1 << 18,
+    LEAST_ROUND_HITS = 1 << 10,
+    ROUND_QUESTIONS = 1 << 22,
     QUESTION_WORDS = sizeof(render_waiting_hit) / 8,
     ANSWER_WORDS = sizeof(render_samples_about) / 8
 };
@@ -38,6 +40,13 @@ typedef struct differing {
     int64_t *asked; /* the hits that are asked about, in the order of the mail */
 } differing;
 
+/* Hits of a round: each may be a question to every rank. The same on all ranks. */
+static int64_t round_hits(int ranks)
+{
+    const int64_t most = ROUND_QUESTIONS / ranks;
+    return most < LEAST_ROUND_HITS ? LEAST_ROUND_HITS : most < ROUND_HITS ? most : ROUND_HITS;
+}
+
 /* ---- what ranks know of each other --------------------------------------------------------------------------- */
 
 /* Greatest ends of the surfaces' fields, the lower ones negated; the most rounds; has any rank failed? */
@@ -52,7 +61,7 @@ static insitu_status share_ranges(differing *d, base_error *error)
         shared[2 * i] = -ranges[i][0];
         shared[2 * i + 1] = ranges[i][1];
     }
-    shared[SHARED_ROUNDS] = (double)((d->list->count + ROUND_HITS - 1) / ROUND_HITS);
+    shared[SHARED_ROUNDS] = (double)((d->list->count + round_hits(d->ranks) - 1) / round_hits(d->ranks));
     shared[SHARED_FAILURE] = error->status != INSITU_OK;
     insitu_status status =
         session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, shared, SHARED, MPI_DOUBLE, MPI_MAX, d->comm), "MPI_Allreduce");
@@ -143,7 +152,7 @@ static insitu_status ask_others(differing *d, base_error *error)
     session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};
     if (!write_questions(d, &asked)) session_no_memory(error, d->count * 24, "samples of other ranks");
     insitu_status status = session_mail_deliver(d->comm, SESSION_MAIL_THERE, &asked, &questions, error);
-    if (!status && !write_answers(d, &questions, &answered, error))
+    if (!status && !error->status && !write_answers(d, &questions, &answered, error))
         session_no_memory(error, questions.total * 16, "samples for other ranks");
     if (!status) status = session_mail_deliver(d->comm, SESSION_MAIL_BACK, &answered, &answers, error);
     if (!status && !error->status)
@@ -181,7 +190,7 @@ static insitu_status differ_rounds(differing *d, fragment_list *fragments, base_
     insitu_status status = INSITU_OK;
     for (int64_t round = 0; round < d->rounds && !status; round++) {
         const int64_t left = d->list->count - d->first;
-        d->count = left < ROUND_HITS ? left : ROUND_HITS;
+        d->count = left < round_hits(d->ranks) ? left : round_hits(d->ranks);
         if (!error->status) render_differences_sample(d->job, d->list->items + d->first, d->samples, d->count, error);
         status = ask_others(d, error);
         if (!status && !error->status) light_round(d, fragments, error);
@@ -192,7 +201,7 @@ static insitu_status differ_rounds(differing *d, fragment_list *fragments, base_
 
 static insitu_status differ(differing *d, fragment_list *fragments, base_error *error)
 {
-    const int64_t most = d->list->count < ROUND_HITS ? d->list->count : ROUND_HITS;
+    const int64_t most = d->list->count < round_hits(d->ranks) ? d->list->count : round_hits(d->ranks);
     d->samples = base_alloc((size_t)(most + 1) * sizeof *d->samples);
     d->boxes = base_alloc((size_t)d->ranks * sizeof *d->boxes);
     d->near = base_alloc((size_t)d->ranks * sizeof *d->near);

@@ -13,6 +13,7 @@
 #include "comp_tiles.h"
 #include "memory.h"
 #include "render_differences.h"
+#include "render_light.h"
 #include "session_agree.h"
 #include "session_differences.h"
 #include "session_light.h"
@@ -35,7 +36,8 @@ static insitu_status draw_alone(const session_frame_target *t, const render_job 
     render_statistics rendered = {0};
     comp_statistics composited = {0};
     comp_tiles tiles;
-    if (!error->status && comp_tiles_begin(&tiles, t->background, job->threads, overlaps != NULL, out, error) == INSITU_OK) {
+    if (!error->status &&
+        comp_tiles_begin(&tiles, t->background, job->threads, overlaps != NULL, out, error) == INSITU_OK) {
         render_frame_tiles(job, comp_tiles_take, &tiles, &rendered, error);
         comp_tiles_end(&tiles, overlaps, &composited);
     }
@@ -58,12 +60,13 @@ static insitu_status trace(const session_frame_target *t, const render_job *job,
     return session_differ_fragments(t->comm, &traced, fragments, &rendered->surface_ms, error);
 }
 
+/* The occluders of a frame are those of all its turns, which differ in their pixels alone. */
 static insitu_status light(const session_frame_target *t, const render_job *job, fragment_list *fragments,
-                           render_statistics *rendered, base_error *error)
+                           session_frame *frame, render_statistics *rendered, base_error *error)
 {
     const insitu_status status = session_agree(t->comm, error);
     if (status) return status;
-    return session_light_fragments(t->comm, job, fragments, &rendered->surface_ms, error);
+    return session_light_fragments(t->comm, job, &frame->occluders, fragments, &rendered->surface_ms, error);
 }
 
 static insitu_status draw(const session_frame_target *t, const render_job *job, image *out, session_frame *frame,
@@ -78,7 +81,7 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
     render_statistics rendered = {0};
     comp_statistics composited = {0};
     insitu_status status = trace(t, job, &fragments, &rendered, error);
-    if (!status && is_unlit) status = light(t, job, &fragments, &rendered, error);
+    if (!status && is_unlit) status = light(t, job, &fragments, frame, &rendered, error);
     if (status) {
         base_free(fragments.items);
         return status;
@@ -256,5 +259,7 @@ insitu_status session_draw_frame(const session_frame_target *t, const render_job
     }
     if (!status && overlaps.count) status = draw_overlaps(t, job, &overlaps, out, frame, error);
     base_free(overlaps.pixels);
+    render_occluders_free(frame->occluders);
+    frame->occluders = NULL;
     return status;
 }

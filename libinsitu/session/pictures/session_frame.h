@@ -12,6 +12,7 @@ typedef struct session_frame {
     int64_t overlaps; /* pixels in which cells overlap */
     int64_t sent_bytes;
     comp_schedule schedule; /* COMP_AUTOMATIC: nothing went to other ranks */
+    struct render_occluders *occluders; /* made by the first drawing that needs them; NULL once the frame is drawn */
 } session_frame;
 
 /* Where and how a frame is drawn. */

@@ -256,8 +256,8 @@ static insitu_status light_rounds(lighting *l, fragment_list *fragments, base_er
     return status;
 }
 
-insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
-                                      base_error *error)
+insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, render_occluders **occluders,
+                                      fragment_list *fragments, double *ms, base_error *error)
 {
     const double start = MPI_Wtime();
     lighting l = {.comm = comm, .job = job};
@@ -269,8 +269,9 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, frag
     l.rays = base_alloc((size_t)(most + 1) * sizeof *l.rays);
     if (!l.fragments || !l.hits || !l.rays)
         session_no_memory(error, most * 40, "hits that are lit");
-    else
-        render_occluders_create(job, &l.occluders, error);
+    else if (!*occluders)
+        render_occluders_create(job, occluders, error);
+    l.occluders = *occluders;
     insitu_status status = session_agree(comm, error);
     if (!status) status = share_boxes(&l, error);
     if (!status) status = light_rounds(&l, fragments, error);
@@ -278,7 +279,6 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, frag
     base_free(l.hits);
     base_free(l.rays);
     base_free(l.boxes);
-    render_occluders_free(l.occluders);
     *ms += 1e3 * (MPI_Wtime() - start);
     return status;
 }

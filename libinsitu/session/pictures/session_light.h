@@ -7,10 +7,12 @@
 #include "error.h"
 #include "fragment.h"
 #include "render.h"
+#include "render_light.h"
 
 /* Makes fragments that were painted RENDER_UNLIT what they are by the light that comes to them past the opaque surfaces
- * of all ranks. *ms grows by what it took. Collective; agreed. */
-insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, fragment_list *fragments, double *ms,
-                                      base_error *error);
+ * of all ranks. *occluders: this rank's, made here if it is NULL, of this job or of one that differs from it in its
+ * pixels alone; the caller frees them. *ms grows by what it took. Collective; agreed. */
+insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, render_occluders **occluders,
+                                      fragment_list *fragments, double *ms, base_error *error);
 
 #endif

@@ -350,7 +350,7 @@ static const cyaml_schema_value_t image = {CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAUL
       .help =                                                                                                          \
           "The images to draw. Three frames or more of a step that show the same isosurface, opaque, in one colour a " \
           "value, normals by gradient, share the work of finding its cells, where these are tets or hexes in arrays "  \
-          "of float32 and int32 and the images have most of a rank's mesh in view: 64 bytes a crossed tet and 128 a "  \
+          "of float32 and the images have most of a rank's mesh in view: 64 bytes a crossed tet and 128 a "  \
           "hex, at most 64 MiB a rank, are held while the step is drawn.",                                             \
       .child = &image_mapping)                                                                                         \
     X(CYAML_FIELD_SEQUENCE("statistics", POINTER, scene_file, statistics, &statistics, 0, 64),                         \
