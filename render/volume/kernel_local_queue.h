@@ -216,9 +216,11 @@ SIMD_INLINE bool kernel_local_push(const kernel_tile_trace *t, const kernel_loca
 
 /* ---- pixels ---- */
 
-/* The pixels of blocks, ends included, as a candidate has them (kernel_types.h). */
-SIMD_INLINE unsigned kernel_local_box(unsigned blocks)
+/* Returns the box of pixels, ends included, as a candidate has it (kernel_types.h); that of the blocks where box is
+ * negative. */
+SIMD_INLINE unsigned kernel_local_box(unsigned blocks, int box)
 {
+    if (box >= 0) return (unsigned)box;
     int x0 = KERNEL_BLOCKS_ACROSS, x1 = 0, y0 = KERNEL_BLOCKS_ACROSS, y1 = 0;
     for (; blocks; blocks &= blocks - 1) {
         const int x = __builtin_ctz(blocks) % KERNEL_BLOCKS_ACROSS, y = __builtin_ctz(blocks) / KERNEL_BLOCKS_ACROSS;

@@ -68,8 +68,8 @@ SIMD_INLINE unsigned kernel_tile_ready_cell(kernel_tile_trace *t, kernel_tile_ce
     return meets;
 }
 
-/* Makes a cell that is in a lane of a batch the tile's cell, ready for rays of all blocks, unless *alone says that it is;
- * false if it shows nowhere. *alone: the lane whose cell the tile's cell is, or -1. */
+/* Makes a cell that is in a lane of a batch the tile's cell, ready for rays of all blocks, unless *alone says that it
+ * is; false if it shows nowhere. *alone: the lane whose cell the tile's cell is, or -1. */
 static __attribute__((noinline, cold)) bool kernel_tile_ready_alone(kernel_tile_trace *t, int volume, int part,
                                                                     uint32_t cell, bool is_pencil, int lane, int *alone)
 {
@@ -159,8 +159,8 @@ static __attribute__((noinline)) void kernel_tile_take_pending(kernel_tile_trace
     }
 }
 
-/* From now on pending tets are of this volume and part. Returns whether its tets are placed in lanes; they are not where
- * values are the cells', as a field that is constant in a cell is not interpolated. */
+/* From now on pending tets are of this volume and part. Returns whether its tets are placed in lanes; they are not
+ * where values are the cells', as a field that is constant in a cell is not interpolated. */
 SIMD_INLINE bool kernel_tile_wait_for(kernel_tile_trace *t, kernel_tile_cells *cells, int volume, int part,
                                       kernel_tile_take *take)
 {
@@ -224,6 +224,30 @@ SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, ke
     else
         for (uint32_t part = 0; part < (uint32_t)job->part_count; part++) parts(t, 0, &part, 1, blocks);
     kernel_tile_take_pending(t, t->thread->tile_cells, take);
+}
+
+enum { KERNEL_ALL_PIXELS = -1 };
+
+/* How a volume's cells are taken, those for lanes and others. */
+typedef struct kernel_cell_visitor {
+    bool is_pencil;
+    kernel_tile_take *take;
+    /* Queues a cell if its type is for lanes; else returns false. box: of its pixels, as a candidate has it, or
+     * KERNEL_ALL_PIXELS of the blocks. */
+    bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
+} kernel_cell_visitor;
+
+/* Meets a leaf's cells. */
+SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
+                                   const uint32_t *cells, int count, unsigned blocks)
+{
+    const grid *g = t->frame->job->parts[part].cells;
+    uint32_t others[MMBVH_MAX_LEAF];
+    int left = 0;
+    for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
+    for (int n = 0; n < count; n++)
+        if (!visitor->queue(t, part, cells[n], blocks, KERNEL_ALL_PIXELS)) others[left++] = cells[n];
+    if (left) kernel_tile_meet_leaf(t, volume, part, others, left, visitor->is_pencil, blocks, visitor->take);
 }
 
 /* ---- those that are known ---- */
@@ -320,6 +344,21 @@ SIMD_INLINE void kernel_tile_prefetch_open(const kernel_tile_trace *t, const ker
                 kernel_prefetch_indices(g, item->cell);
         }
     }
+}
+
+/* Meets the window's cells. */
+SIMD_INLINE void kernel_visit_open(kernel_tile_trace *t, const kernel_cell_visitor *visitor, unsigned blocks)
+{
+    kernel_tile_cells *cells = t->thread->tile_cells;
+    kernel_tile_cells_open(t, cells);
+    for (int n = 0; n < cells->open_count; n++) {
+        const kernel_tile_candidate *item = &cells->items[n];
+        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
+        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
+        if (met && !visitor->queue(t, (int)item->source, item->cell, met, item->box))
+            kernel_tile_meet_item(t, cells, item, visitor->is_pencil, met, visitor->take);
+    }
+    kernel_tile_take_pending(t, cells, visitor->take);
 }
 
 /* ---- windows ---- */

@@ -74,39 +74,20 @@ static void kernel_tile_cell_segments(kernel_tile_trace *t, int part, const kern
     }
 }
 
-/* A leaf's cells, those that fit into lanes and others. */
-static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
+static bool kernel_segments_queue(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box)
 {
-    kernel_tile_segments *s = t->thread->tile_segments;
-    const grid *g = t->frame->job->parts[part].cells;
-    uint32_t others[MMBVH_MAX_LEAF];
-    int left = 0;
-    for (int n = 0; n < count; n++) {
-        if (kernel_local_segments_fit(t->frame, grid_cell_type(g, cells[n])))
-            kernel_local_segments_wait(t, &s->stretches, part, cells[n], blocks, kernel_local_box(blocks));
-        else
-            others[left++] = cells[n];
-    }
-    if (left) kernel_tile_meet_leaf(t, 0, part, others, left, false, blocks, kernel_tile_cell_segments);
+    const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
+    if (!kernel_local_segments_fit(t->frame, type)) return false;
+    kernel_local_stretches *b = &t->thread->tile_segments->stretches;
+    kernel_local_segments_wait(t, b, part, cell, blocks, kernel_local_box(blocks, box));
+    return true;
 }
 
-/* The window's cells that are known. */
-SIMD_INLINE void kernel_tile_segments_candidates(kernel_tile_trace *t, kernel_tile_segments *s, unsigned blocks)
+static const kernel_cell_visitor kernel_segments_visitor = {false, kernel_tile_cell_segments, kernel_segments_queue};
+
+static void kernel_tile_segments_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_tile_cells_open(t, cells);
-    for (int n = 0; n < cells->open_count; n++) {
-        const kernel_tile_candidate *item = &cells->items[n];
-        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
-        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
-        if (!met) continue;
-        const int part = (int)item->source, type = grid_cell_type(t->frame->job->parts[part].cells, item->cell);
-        if (kernel_local_segments_fit(t->frame, type))
-            kernel_local_segments_wait(t, &s->stretches, part, item->cell, met, item->box);
-        else
-            kernel_tile_meet_item(t, cells, item, false, met, kernel_tile_cell_segments);
-    }
-    kernel_tile_take_pending(t, cells, kernel_tile_cell_segments);
+    kernel_visit_leaf(t, &kernel_segments_visitor, 0, part, cells, count, blocks);
 }
 
 static void kernel_tile_segments_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
@@ -163,7 +144,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
     }
     kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments);
     if (t->frame->volume_candidates)
-        kernel_tile_segments_candidates(t, s, blocks);
+        kernel_visit_open(t, &kernel_segments_visitor, blocks);
     else
         kernel_tile_all_trees(t, blocks, kernel_tile_segments_parts, kernel_tile_cell_segments);
     kernel_local_segments_run(t, &s->stretches);

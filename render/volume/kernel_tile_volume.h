@@ -24,7 +24,6 @@
 #include "kernel_local_samples.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
-#include "kernel_prefetch.h"
 #include "kernel_samples.h"
 #include "kernel_tile.h"
 #include "kernel_tile_cells.h"
@@ -77,41 +76,19 @@ static void kernel_tile_samples(kernel_tile_trace *t, int part, const kernel_cel
     }
 }
 
-/* A leaf's cells, those that fit into lanes and others. */
-static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
+static bool kernel_samples_queue(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box)
 {
-    kernel_tile_volume *v = t->thread->tile_volume;
-    const grid *g = t->frame->job->parts[part].cells;
-    uint32_t others[MMBVH_MAX_LEAF];
-    int left = 0;
-    for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
-    for (int n = 0; n < count; n++) {
-        const int type = grid_cell_type(g, cells[n]);
-        if (kernel_local_fits(t->frame, type))
-            kernel_local_wait(t, &v->batch, part, type, cells[n], blocks, kernel_local_box(blocks));
-        else
-            others[left++] = cells[n];
-    }
-    if (left) kernel_tile_meet_leaf(t, v->volume, part, others, left, true, blocks, kernel_tile_samples);
+    const int type = grid_cell_type(t->frame->job->parts[part].cells, cell);
+    if (!kernel_local_fits(t->frame, type)) return false;
+    kernel_local_wait(t, &t->thread->tile_volume->batch, part, type, cell, blocks, kernel_local_box(blocks, box));
+    return true;
 }
 
-/* The window's cells that are known. */
-SIMD_INLINE void kernel_tile_volume_candidates(kernel_tile_trace *t, kernel_tile_volume *v, unsigned blocks)
+static const kernel_cell_visitor kernel_samples_visitor = {true, kernel_tile_samples, kernel_samples_queue};
+
+static void kernel_tile_volume_leaf(kernel_tile_trace *t, int part, const uint32_t *cells, int count, unsigned blocks)
 {
-    kernel_tile_cells *cells = t->thread->tile_cells;
-    kernel_tile_cells_open(t, cells);
-    for (int n = 0; n < cells->open_count; n++) {
-        const kernel_tile_candidate *item = &cells->items[n];
-        if (n % KERNEL_OPEN_PIECE == 0) kernel_tile_prefetch_open(t, cells, n);
-        const unsigned met = item->blocks & blocks & kernel_blocks_beyond(t, item->near);
-        if (!met) continue;
-        const int part = (int)item->source, type = grid_cell_type(t->frame->job->parts[part].cells, item->cell);
-        if (kernel_local_fits(t->frame, type))
-            kernel_local_wait(t, &v->batch, part, type, item->cell, met, item->box);
-        else
-            kernel_tile_meet_item(t, cells, item, true, met, kernel_tile_samples);
-    }
-    kernel_tile_take_pending(t, cells, kernel_tile_samples);
+    kernel_visit_leaf(t, &kernel_samples_visitor, t->thread->tile_volume->volume, part, cells, count, blocks);
 }
 
 static void kernel_tile_volume_parts(kernel_tile_trace *t, int unused, const uint32_t *parts, int count,
@@ -175,7 +152,7 @@ SIMD_INLINE bool kernel_tile_window(kernel_tile_trace *t, kernel_tile_volume *v,
     for (v->volume = 0; v->volume < job->volume_count; v->volume++) {
         kernel_local_begin(t, &v->batch, v->packets, blocks, v->volume, kernel_tile_samples);
         if (t->frame->volume_candidates)
-            kernel_tile_volume_candidates(t, v, blocks);
+            kernel_visit_open(t, &kernel_samples_visitor, blocks);
         else
             kernel_tile_all_trees(t, blocks, kernel_tile_volume_parts, kernel_tile_samples);
         kernel_local_end(t, &v->batch);
