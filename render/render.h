@@ -341,4 +341,10 @@ insitu_status render_frame_tiles(const render_job *job, fragment_taker *take, vo
 const char *render_isa(void);
 const char *render_isa_warning(void);
 
+/* Around the cells of a rank that may matter to other ranks' hits: ranks know each other's, and so whom to ask. Scene
+ * units; empty where lower > upper. */
+typedef struct render_box {
+    double lower[3], upper[3];
+} render_box;
+
 #endif

@@ -9,6 +9,7 @@
 #include "kernel_types.h"
 #include "memory.h"
 #include "mmbvh.h"
+#include "render_hits.h"
 #include "render_kernels.h"
 #include "render_prepare.h"
 
@@ -28,33 +29,21 @@ void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_I
 
 /* ---- which ranks to ask -------------------------------------------------------------------------------------- */
 
-static void grow_box(render_sampled_box *box, const render_space *s, const mmbvh *tree)
+static bool is_by_differences(const render_surface_layer *layer)
 {
-    float lower[4], upper[4];
-    mmbvh_node_box(tree, 0, lower, upper);
-    for (int a = 0; a < 3; a++) {
-        box->lower[a] = fmin(box->lower[a], (double)lower[a] / s->scale + s->origin[a]);
-        box->upper[a] = fmax(box->upper[a], (double)upper[a] / s->scale + s->origin[a]);
-    }
+    return layer->normal == RENDER_DIFFERENCES;
 }
 
-render_sampled_box render_differences_box(const render_job *job)
+render_box render_differences_box(const render_job *job)
 {
-    render_sampled_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (int i = 0; i < job->surface_count; i++) {
-        if (job->surfaces[i].normal != RENDER_DIFFERENCES) continue;
-        for (int part = 0; part < job->part_count; part++)
-            if (job->surfaces[i].field.ranges[part].low && job->parts[part].tree->node_count)
-                grow_box(&out, &job->space, job->parts[part].tree);
-    }
-    return out;
+    return hit_box(job, is_by_differences);
 }
 
 /* Scaled units, of which a scene is about one: points and float32 boxes are off by less. */
 static const double box_margin = 1e-5;
 
 /* The points are on a cross of two reaches' size around the hit: does one of its bars meet the box? */
-bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_sampled_box *box)
+bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
     const double z = (double)hit->t / job->space.scale + job->space.depth_origin;

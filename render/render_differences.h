@@ -13,13 +13,8 @@
 #include "insitu/status.h"
 #include "render.h"
 
-/* What all ranks must know of each other: around all cells of a rank that may have samples; empty where lower > upper.
- * Scene units. */
-typedef struct render_sampled_box {
-    double lower[3], upper[3];
-} render_sampled_box;
-
-render_sampled_box render_differences_box(const render_job *job);
+/* Returns the box of all cells on this rank that may have samples. */
+render_box render_differences_box(const render_job *job);
 
 /* Is a hit of the job to wait for others? */
 bool render_has_differences(const render_job *job);
@@ -31,7 +26,7 @@ void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_I
 bool render_differences_sort(const render_job *job, render_waiting_list *list);
 
 /* May one of the hit's points be in the box? */
-bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_sampled_box *box);
+bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box);
 
 /* Samples this rank's cells about the hits, which may be of any rank. Local. */
 insitu_status render_differences_sample(const render_job *job, const render_waiting_hit *hits,

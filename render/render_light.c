@@ -411,26 +411,14 @@ insitu_status render_occlude(const render_occluders *of, const render_hit *hits,
 
 /* ---- which ranks to ask -------------------------------------------------------------------------------------- */
 
-static void grow_box(render_box *box, const render_space *s, const mmbvh *tree)
+static bool is_opaque(const render_surface_layer *layer)
 {
-    float lower[4], upper[4];
-    mmbvh_node_box(tree, 0, lower, upper);
-    for (int a = 0; a < 3; a++) {
-        box->lower[a] = fmin(box->lower[a], (double)lower[a] / s->scale + s->origin[a]);
-        box->upper[a] = fmax(box->upper[a], (double)upper[a] / s->scale + s->origin[a]);
-    }
+    return !(layer->opacity < 1);
 }
 
 render_box render_occluder_box(const render_job *job)
 {
-    render_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (int i = 0; i < job->surface_count; i++) {
-        if (job->surfaces[i].opacity < 1) continue;
-        for (int part = 0; part < job->part_count; part++)
-            if (job->surfaces[i].field.ranges[part].low && job->parts[part].tree->node_count)
-                grow_box(&out, &job->space, job->parts[part].tree);
-    }
-    return out;
+    return hit_box(job, is_opaque);
 }
 
 /* Scaled units. Boxes are grown by it, which is more than rays and float32 boxes are off by. */

@@ -36,11 +36,6 @@ typedef struct render_hit_rays {
     uint32_t lights, unused;
 } render_hit_rays;
 
-/* What all ranks must know to ask each other. */
-typedef struct render_box {
-    double lower[3], upper[3]; /* scene units; empty where lower > upper */
-} render_box;
-
 /* The hit of an unlit fragment of the job, with the rays it has. False: it is lit without any. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 

@@ -7,6 +7,7 @@
 
 #include <math.h>
 
+#include "mmbvh.h"
 #include "render.h"
 
 static void normalize(double v[3])
@@ -105,4 +106,26 @@ void hit_directions(const render_job *job, uint32_t pixel, const hit_axes *a, do
         const double d[3] = {out[k][0], out[k][1], out[k][2]};
         for (int i = 0; i < 3; i++) out[k][i] = d[0] * a->right[i] + d[1] * a->up[i] + d[2] * a->forward[i];
     }
+}
+
+static void grow_box(render_box *box, const render_space *s, const mmbvh *tree)
+{
+    float lower[4], upper[4];
+    mmbvh_node_box(tree, 0, lower, upper);
+    for (int a = 0; a < 3; a++) {
+        box->lower[a] = fmin(box->lower[a], (double)lower[a] / s->scale + s->origin[a]);
+        box->upper[a] = fmax(box->upper[a], (double)upper[a] / s->scale + s->origin[a]);
+    }
+}
+
+render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer))
+{
+    render_box out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (int i = 0; i < job->surface_count; i++) {
+        if (!is_wanted(&job->surfaces[i])) continue;
+        for (int part = 0; part < job->part_count; part++)
+            if (job->surfaces[i].field.ranges[part].low && job->parts[part].tree->node_count)
+                grow_box(&out, &job->space, job->parts[part].tree);
+    }
+    return out;
 }

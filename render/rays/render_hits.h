@@ -1,4 +1,5 @@
-/* A hit's place in the scene, and the directions of its rays into the hemisphere above it. */
+/* A hit's place in the scene, the directions of its rays into the hemisphere above it, and the box of what they may
+ * meet. */
 #ifndef RENDER_RENDER_HITS_H
 #define RENDER_RENDER_HITS_H
 
@@ -18,6 +19,9 @@ static inline double hit_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
+
+/* Returns the box around this rank's cells in the trees of the job's wanted surfaces. */
+render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface_layer *layer));
 
 /* Finds two unit vectors across a third, which is forward. */
 hit_axes hit_axes_around(const double n[3]);

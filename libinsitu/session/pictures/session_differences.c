@@ -18,8 +18,6 @@
 
 enum {
     ROUND_HITS = 1 << 18,
-    LEAST_ROUND_HITS = 1 << 10,
-    ROUND_QUESTIONS = 1 << 22,
     QUESTION_WORDS = sizeof(render_waiting_hit) / 8,
     ANSWER_WORDS = sizeof(render_samples_about) / 8
 };
@@ -29,23 +27,16 @@ typedef struct differing {
     const render_job *job;
     render_waiting_list *list;
     int rank, ranks;
-    int64_t rounds;
+    int64_t round_hits, rounds;
     /* Ranks that may have samples about any of this rank's hits, and their boxes. */
     int near_count;
     int *near;
-    render_sampled_box *boxes;
+    render_box *boxes;
     /* Of a round. */
     int64_t first, count;
     render_samples_about *samples;
     int64_t *asked; /* the hits that are asked about, in the order of the mail */
 } differing;
-
-/* Hits of a round: each may be a question to every rank. The same on all ranks. */
-static int64_t round_hits(int ranks)
-{
-    const int64_t most = ROUND_QUESTIONS / ranks;
-    return most < LEAST_ROUND_HITS ? LEAST_ROUND_HITS : most < ROUND_HITS ? most : ROUND_HITS;
-}
 
 /* ---- what ranks know of each other --------------------------------------------------------------------------- */
 
@@ -61,7 +52,7 @@ static insitu_status share_ranges(differing *d, base_error *error)
         shared[2 * i] = -ranges[i][0];
         shared[2 * i + 1] = ranges[i][1];
     }
-    shared[SHARED_ROUNDS] = (double)((d->list->count + round_hits(d->ranks) - 1) / round_hits(d->ranks));
+    shared[SHARED_ROUNDS] = (double)((d->list->count + d->round_hits - 1) / d->round_hits);
     shared[SHARED_FAILURE] = error->status != INSITU_OK;
     insitu_status status =
         session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, shared, SHARED, MPI_DOUBLE, MPI_MAX, d->comm), "MPI_Allreduce");
@@ -78,7 +69,7 @@ static insitu_status share_ranges(differing *d, base_error *error)
 /* Hits are in this rank's box, and their samples no farther from it than the farthest reach. */
 static void keep_near(differing *d)
 {
-    const render_sampled_box *own = &d->boxes[d->rank];
+    const render_box *own = &d->boxes[d->rank];
     double reach = 0;
     for (int64_t i = 0; i < d->list->count; i++) reach = fmax(reach, (double)d->list->items[i].reach);
     reach = (reach * 1.001 + 1e-4) / d->job->space.scale;
@@ -93,7 +84,7 @@ static void keep_near(differing *d)
 
 static insitu_status share_boxes(differing *d, base_error *error)
 {
-    const render_sampled_box own = render_differences_box(d->job);
+    const render_box own = render_differences_box(d->job);
     const int doubles = sizeof own / sizeof(double);
     const insitu_status status = session_mpi(
         error, MPI_Allgather(&own, doubles, MPI_DOUBLE, d->boxes, doubles, MPI_DOUBLE, d->comm), "MPI_Allgather");
@@ -190,7 +181,7 @@ static insitu_status differ_rounds(differing *d, fragment_list *fragments, base_
     insitu_status status = INSITU_OK;
     for (int64_t round = 0; round < d->rounds && !status; round++) {
         const int64_t left = d->list->count - d->first;
-        d->count = left < round_hits(d->ranks) ? left : round_hits(d->ranks);
+        d->count = left < d->round_hits ? left : d->round_hits;
         if (!error->status) render_differences_sample(d->job, d->list->items + d->first, d->samples, d->count, error);
         status = ask_others(d, error);
         if (!status && !error->status) light_round(d, fragments, error);
@@ -201,7 +192,7 @@ static insitu_status differ_rounds(differing *d, fragment_list *fragments, base_
 
 static insitu_status differ(differing *d, fragment_list *fragments, base_error *error)
 {
-    const int64_t most = d->list->count < round_hits(d->ranks) ? d->list->count : round_hits(d->ranks);
+    const int64_t most = d->list->count < d->round_hits ? d->list->count : d->round_hits;
     d->samples = base_alloc((size_t)(most + 1) * sizeof *d->samples);
     d->boxes = base_alloc((size_t)d->ranks * sizeof *d->boxes);
     d->near = base_alloc((size_t)d->ranks * sizeof *d->near);
@@ -223,6 +214,7 @@ insitu_status session_differ_fragments(MPI_Comm comm, const render_job *job, fra
     differing d = {.comm = comm, .job = job, .list = &job->waiting->list};
     MPI_Comm_rank(comm, &d.rank);
     MPI_Comm_size(comm, &d.ranks);
+    d.round_hits = session_mail_round(d.ranks, ROUND_HITS);
     const insitu_status status = differ(&d, fragments, error);
     base_free(d.list->items);
     base_free(d.list->looks);

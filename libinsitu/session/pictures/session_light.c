@@ -15,7 +15,7 @@
 #include "session_agree.h"
 #include "session_exchange.h"
 
-enum { ROUND_HITS = 1 << 16, LEAST_ROUND_HITS = 1 << 10, ROUND_QUESTIONS = 1 << 22 };
+enum { ROUND_HITS = 1 << 16 };
 
 /* A question: a hit, and which of its rays are asked for; its answer. */
 enum { ASKED_WORDS = sizeof(render_hit) / 8 + sizeof(render_hit_rays) / 8, ANSWER_WORDS = sizeof(render_hit_rays) / 8 };
@@ -26,6 +26,7 @@ typedef struct lighting {
     const render_job *job;
     int rank, ranks;
     render_occluders *occluders; /* of this rank */
+    int64_t round_hits;
     render_box *boxes;           /* of all ranks */
     int64_t count;
     int64_t *fragments; /* whose hits these are */
@@ -203,18 +204,11 @@ static insitu_status ask_others(lighting *l, base_error *error)
 
 /* ---- rounds -------------------------------------------------------------------------------------------------- */
 
-/* Hits of a round: each may be a question to every rank. The same on all ranks. */
-static int64_t round_hits(int ranks)
-{
-    const int64_t most = ROUND_QUESTIONS / ranks;
-    return most < LEAST_ROUND_HITS ? LEAST_ROUND_HITS : most < ROUND_HITS ? most : ROUND_HITS;
-}
-
 /* Takes the hits of the fragments from the first on; returns where to go on. What has no rays is lit at once. */
 static int64_t collect_hits(lighting *l, fragment_list *fragments, int64_t first)
 {
     static const render_hit_rays none = {0, 0, 0};
-    for (l->count = 0; first < fragments->count && l->count < round_hits(l->ranks); first++) {
+    for (l->count = 0; first < fragments->count && l->count < l->round_hits; first++) {
         fragment *f = &fragments->items[first];
         if (render_hit_of(l->job, f, &l->hits[l->count], &l->rays[l->count]))
             l->fragments[l->count++] = first;
@@ -263,7 +257,8 @@ insitu_status session_light_fragments(MPI_Comm comm, const render_job *job, rend
     lighting l = {.comm = comm, .job = job};
     MPI_Comm_rank(comm, &l.rank);
     MPI_Comm_size(comm, &l.ranks);
-    const int64_t most = fragments->count < round_hits(l.ranks) ? fragments->count : round_hits(l.ranks);
+    l.round_hits = session_mail_round(l.ranks, ROUND_HITS);
+    const int64_t most = fragments->count < l.round_hits ? fragments->count : l.round_hits;
     l.fragments = base_alloc((size_t)(most + 1) * sizeof *l.fragments);
     l.hits = base_alloc((size_t)(most + 1) * sizeof *l.hits);
     l.rays = base_alloc((size_t)(most + 1) * sizeof *l.rays);

@@ -52,4 +52,8 @@ insitu_status session_mail_deliver(MPI_Comm comm, session_mail_tag tag, const se
 /* The same; what fails in receiving is agreed on, too. Collective, agreed. */
 insitu_status session_mail_exchange(MPI_Comm comm, const session_mail *out, session_mail *in, base_error *error);
 
+/* Returns how many things a rank takes in a round in which each may be a question to every rank: at most so many, and
+ * fewer the more ranks there are, so that a round's mail has a bound. The same on all ranks. */
+int64_t session_mail_round(int ranks, int64_t most);
+
 #endif
