@@ -177,37 +177,13 @@ static void measure_thousand(bench_scene *s, const bench_command *command)
     }
 }
 
-static const struct {
-    const char *name;
-    void (*measure)(bench_scene *scene, const bench_command *command);
-} tables[] = {{"types", measure_types}, {"layouts", measure_layouts}, {"thousand", measure_thousand}};
-
-enum { TABLES = sizeof tables / sizeof *tables };
-
-static void measure(const bench_command *command, int table, test_mesh_kind kind, int n)
-{
-    char program[64];
-    bench_scene scene;
-    snprintf(program, sizeof program, "bench_cells %s", tables[table].name);
-    bench_scene_create(&scene, program, kind, n);
-    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
-    tables[table].measure(&scene, command);
-    bench_scene_free(&scene);
-}
+static const bench_table tables[] = {
+    {"types", measure_types}, {"layouts", measure_layouts}, {"thousand", measure_thousand}};
 
 int main(int argc, char **argv)
 {
-    bench_command command;
-    int table = 0;
-    while (argc > 1 && table < TABLES && strcmp(argv[1], tables[table].name) != 0) table++;
-    const bool is_named = argc > 1 && table < TABLES;
-    if (!bench_command_parse(
-            argc - is_named, argv + is_named,
-            "Before all else stands a table's name: types, layouts, or thousand (a rank of a thousand: the\n"
-            "mesh is a tenth of the picture's width). Measures it on each MESH of N^3 cubes.",
-            TEST_MIXED, &command))
-        return command.status;
-    if (!is_named) return fprintf(stderr, "bench_cells: no table of that name\n"), 2;
-    for (int i = 0; i < command.mesh_count; i++) measure(&command, table, command.meshes[i].kind, command.meshes[i].n);
-    return 0;
+    return bench_run_table(argc, argv, "bench_cells",
+                           "Before all else stands a table's name: types, layouts, or thousand (a rank of a thousand:\n"
+                           "the mesh is a tenth of the picture's width). Measures it on each MESH of N^3 cubes.",
+                           tables, sizeof tables / sizeof *tables);
 }

@@ -231,3 +231,28 @@ void bench_scene_integral_error(bench_scene *s, const char *name)
     free(rgba);
     free(depths);
 }
+
+static void run_table(const bench_command *command, const char *program, const bench_table *table, test_mesh_kind kind,
+                      int n)
+{
+    char name[64];
+    bench_scene scene;
+    snprintf(name, sizeof name, "%s %s", program, table->name);
+    bench_scene_create(&scene, name, kind, n);
+    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
+    table->measure(&scene, command);
+    bench_scene_free(&scene);
+}
+
+int bench_run_table(int argc, char **argv, const char *program, const char *about, const bench_table *tables, int count)
+{
+    bench_command command;
+    int table = 0;
+    while (argc > 1 && table < count && strcmp(argv[1], tables[table].name) != 0) table++;
+    const bool is_named = argc > 1 && table < count;
+    if (!bench_command_parse(argc - is_named, argv + is_named, about, TEST_MIXED, &command)) return command.status;
+    if (!is_named) return fprintf(stderr, "%s: no table of that name\n", program), 2;
+    for (int i = 0; i < command.mesh_count; i++)
+        run_table(&command, program, &tables[table], command.meshes[i].kind, command.meshes[i].n);
+    return 0;
+}

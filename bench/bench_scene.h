@@ -7,6 +7,7 @@
 #ifndef BENCH_SCENE_H
 #define BENCH_SCENE_H
 
+#include "bench_command.h"
 #include "bench_error.h"
 #include "test_meshes.h"
 
@@ -76,5 +77,16 @@ double *bench_scene_integrals(bench_scene *scene, const render_transfer *transfe
 
 /* The pixels' differences from the integrals, where these show something: the largest of the four channels. */
 bench_stats bench_scene_pixel_error(const bench_scene *scene, const double *integrals, const float *rgba);
+
+/* A table that a program prints of one mesh. */
+typedef struct bench_table {
+    const char *name;
+    void (*measure)(bench_scene *scene, const bench_command *command);
+} bench_table;
+
+/* All of a program whose command line begins with the name of one of its count tables: measures it on the scene of each
+ * mesh. Returns what main() returns. */
+int bench_run_table(int argc, char **argv, const char *program, const char *about, const bench_table *tables,
+                    int count);
 
 #endif

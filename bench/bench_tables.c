@@ -25,6 +25,13 @@ static const struct {
 } traversals[] = {
     {"binned", RENDER_BINNED}, {"tiles", RENDER_TILES}, {"packets", RENDER_PACKETS}, {"spmd", RENDER_SPMD}};
 
+static void build(bench_scene *s)
+{
+    const double began = bench_begin();
+    bench_scene_build(s);
+    bench_print_number(&s->subject, "build", "s", bench_seconds() - began);
+}
+
 static void measure_frames(bench_scene *s, const char *name, const bench_command *command)
 {
     double speeds[BENCH_MAX_RUNS];
@@ -69,12 +76,14 @@ static void measure_groups(bench_scene *s, const char *prefix, const bench_comma
 
 static void table_groups(bench_scene *s, const bench_command *command)
 {
+    build(s);
     bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
     measure_groups(s, "volume", command);
 }
 
 static void table_steps(bench_scene *s, const bench_command *command)
 {
+    build(s);
     bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
     for (int step = 0; step < STEPS; step++) {
         char prefix[64];
@@ -84,11 +93,17 @@ static void table_steps(bench_scene *s, const bench_command *command)
     }
 }
 
-static void table_scaling(bench_scene *s, const bench_command *command)
+static void measure_layers(bench_scene *s, const bench_command *command)
 {
     measure_surface(s, "isosurface", command);
     bench_scene_resize(s, VOLUME_WIDTH / command->shrink, VOLUME_HEIGHT / command->shrink);
     measure_volume(s, "volume", command);
+}
+
+static void table_scaling(bench_scene *s, const bench_command *command)
+{
+    build(s);
+    measure_layers(s, command);
 }
 
 static void measure_traversals(bench_scene *s, const bench_command *command)
@@ -105,46 +120,20 @@ static void measure_traversals(bench_scene *s, const bench_command *command)
 static void table_sizes(bench_scene *s, const bench_command *command)
 {
     struct rusage usage;
+    build(s);
     measure_traversals(s, command);
-    table_scaling(s, command);
+    measure_layers(s, command);
     getrusage(RUSAGE_SELF, &usage);
     bench_print_number(&s->subject, "process peak", "GiB", (double)usage.ru_maxrss / (1 << 20));
 }
 
-static const struct {
-    const char *name;
-    void (*measure)(bench_scene *scene, const bench_command *command);
-} tables[] = {{"groups", table_groups}, {"steps", table_steps}, {"sizes", table_sizes}, {"scaling", table_scaling}};
-
-enum { TABLES = sizeof tables / sizeof *tables };
-
-static void measure(const bench_command *command, int table, test_mesh_kind kind, int n)
-{
-    char program[64];
-    bench_scene scene;
-    snprintf(program, sizeof program, "bench_tables %s", tables[table].name);
-    bench_scene_create(&scene, program, kind, n);
-    bench_scene_resize(&scene, BENCH_WIDTH / command->shrink, BENCH_HEIGHT / command->shrink);
-    const double began = bench_begin();
-    bench_scene_build(&scene);
-    bench_print_number(&scene.subject, "build", "s", bench_seconds() - began);
-    tables[table].measure(&scene, command);
-    bench_scene_free(&scene);
-}
+static const bench_table tables[] = {
+    {"groups", table_groups}, {"steps", table_steps}, {"sizes", table_sizes}, {"scaling", table_scaling}};
 
 int main(int argc, char **argv)
 {
-    bench_command command;
-    int table = 0;
-    while (argc > 1 && table < TABLES && strcmp(argv[1], tables[table].name) != 0) table++;
-    const bool is_named = argc > 1 && table < TABLES;
-    if (!bench_command_parse(
-            argc - is_named, argv + is_named,
-            "Before all else stands a table's name: traversal (4.1 of the thesis), groups (4.2), steps\n"
-            "(4.3), sizes (5.2) or scaling. Measures it on each MESH of N^3 cubes.",
-            TEST_MIXED, &command))
-        return command.status;
-    if (!is_named) return fprintf(stderr, "bench_tables: no table of that name\n"), 2;
-    for (int i = 0; i < command.mesh_count; i++) measure(&command, table, command.meshes[i].kind, command.meshes[i].n);
-    return 0;
+    return bench_run_table(argc, argv, "bench_tables",
+                           "Before all else stands a table's name: sizes (4.1 and 5.2 of the thesis), groups (4.2),\n"
+                           "steps (4.3) or scaling. Measures it on each MESH of N^3 cubes.",
+                           tables, sizeof tables / sizeof *tables);
 }
