@@ -16,6 +16,7 @@
 #include "memory.h"
 #include "render_light.h"
 #include "test_effort.h"
+#include "test_hemisphere.h"
 #include "test_mesh_honeycomb.h"
 #include "test_render_fixture.h"
 
@@ -67,20 +68,6 @@ static void unfold(const float folded[2], double n[3])
     }
     const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     for (int a = 0; a < 3; a++) n[a] /= length;
-}
-
-/* A spiral of equal steps in area on the disk below, turned and begun by the pixel (docs/decisions/surface.md). */
-static void sample_ray(uint32_t pixel, const double n[3], int k, double out[3])
-{
-    const double pi = acos(-1.0), x = pixel % WIDTH, y = pixel / WIDTH;
-    const double noise = fmod(52.9829189 * fmod(0.06711056 * x + 0.00583715 * y, 1), 1);
-    const double share = fmin((k + render_jitter(pixel, 0)) / SAMPLES, 1 - 1.0 / 1024);
-    const double angle = 2 * pi * noise + k * pi * (3 - sqrt(5));
-    const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
-    const double right[3] = {1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]};
-    const double up[3] = {b, sign + n[1] * n[1] * a, -n[1]};
-    for (int i = 0; i < 3; i++)
-        out[i] = sqrt(share) * (cos(angle) * right[i] + sin(angle) * up[i]) + sqrt(1 - share) * n[i];
 }
 
 static void start_of(const render_fixture *f, const render_hit *hit, const double n[3], double out[3])
@@ -168,7 +155,7 @@ static void judge_hit(const render_fixture *f, const test_mesh *mesh, const hits
     unfold(hit->normal, n);
     start_of(f, hit, n, start);
     for (int k = 0; k < SAMPLES; k += 3) {
-        sample_ray(hit->pixel, n, k, d);
+        test_hemisphere(hit->pixel, WIDTH, SAMPLES, k, n, d);
         judge(look(f, mesh, start, d, radius), h->open[i].samples >> k & 1, what, t);
     }
     for (int k = 0; k < LIGHTS; k++)

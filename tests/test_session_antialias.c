@@ -93,22 +93,14 @@ static bool is_mean(const float *rgba, int pixel, int count)
 /* scene: a file, from write_scene() on all ranks. */
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, int64_t *rays)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_session(comm, scene);
     forget_pictures();
     assert_int_equal(hand_over(session, in), INSITU_OK);
     assert_int_equal(insitu_step(session, 0, 0), INSITU_OK);
     *rays = insitu_last_report(session)->rays;
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
 }
 
 /* plain: one sample a pixel. Edges are also counted by the rays that they took. */
@@ -148,10 +140,10 @@ static void edges_are_means_and_the_rest_is_as_before(void **state)
         if (own_rank != 0) continue;
         caught_picture picture = draw(MPI_COMM_SELF, scene, &whole, &rays);
         is_well = is_truth(&picture, &plain, 2 << i, rays) && is_well;
-        free_picture(&picture);
+        free_caught(&picture);
     }
     everywhere(is_well);
-    if (own_rank == 0) free_picture(&plain);
+    if (own_rank == 0) free_caught(&plain);
     input_free(&whole);
 }
 
@@ -171,7 +163,7 @@ static void check_on_ranks(const char *text, test_mesh_kind kind, double worst)
         off = test_worse(off, fabs((double)picture.rgba[i] - (double)alone.rgba[i]));
     everywhere(off <= worst);
     everywhere(own_rank != 0 || memcmp(picture.depth, alone.depth, PIXELS * sizeof(float)) == 0);
-    if (own_rank == 0) free_picture(&alone), free_picture(&picture);
+    if (own_rank == 0) free_caught(&alone), free_caught(&picture);
     input_free(&part);
     input_free(&whole);
 }

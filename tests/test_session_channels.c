@@ -107,24 +107,8 @@ static bool is_right(const caught_picture *picture)
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
-    const insitu_status status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
-    insitu_destroy(&session);
-    return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
-    free(picture->data);
+    return draw_once(&session, in);
 }
 
 static void compare(test_mesh_kind kind, const char *text)
@@ -147,8 +131,8 @@ static void compare(test_mesh_kind kind, const char *text)
         if (!is_well) fprintf(stderr, "%s\n", test_mesh_kind_name(kind));
     }
     everywhere(is_well);
-    free_picture(&ours);
-    free_picture(&alone);
+    free_caught(&ours);
+    free_caught(&alone);
     input_free(&part);
     input_free(&whole);
 }

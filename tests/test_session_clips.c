@@ -305,23 +305,8 @@ static const char *scene_of(const clip_case *c, const region *g, clip_place plac
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
-    const insitu_status status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
-    insitu_destroy(&session);
-    return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
+    return draw_once(&session, in);
 }
 
 static double difference(const caught_picture *a, const caught_picture *b)
@@ -346,8 +331,8 @@ static void judge(test_mesh_kind kind, const clip_case *c, const region *g, clip
                     (int)place, off);
     }
     everywhere(is_well);
-    free_picture(&ours);
-    free_picture(&alone);
+    free_caught(&ours);
+    free_caught(&alone);
 }
 
 /* Two of the region and place pairs a case, others for each kind of mesh: over all kinds, every case has all of them.
@@ -410,7 +395,7 @@ static void slices_in_the_clipping_plane_are_seen(void **state)
         is_well = is_well && fabs((double)picture.depth[pixel] - depth) < 1.5e-5;
     }
     everywhere(own_rank != 0 || (is_well && hits > PIXELS / 20));
-    free_picture(&picture);
+    free_caught(&picture);
     input_free(&in);
 }
 

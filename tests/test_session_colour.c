@@ -32,10 +32,8 @@ static const char *scene_with(const char *surface_keys, const char *volume_keys)
 
 static caught_picture draw_step(insitu_session *session, int cycle)
 {
-    caught_picture picture = {0};
     step_is_good(session, cycle);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     return picture;
 }
 

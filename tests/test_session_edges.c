@@ -168,7 +168,6 @@ static bool is_truth(const caught_picture *picture, const body *b, bool is_flat)
 /* The body is given where the caller wants it. */
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, body *b)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_session(comm, scene);
     forget_pictures();
     assert_int_equal(hand_over(session, in), INSITU_OK);
@@ -176,16 +175,9 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
     if (b) *b = make_body(&session_find_mesh(&session->meshes, "m")->cells, in->part.cell_count > 1);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
 }
 
 static void check_truth(const session_input *in, bool is_flat)
@@ -196,7 +188,7 @@ static void check_truth(const session_input *in, bool is_flat)
         body b = {0};
         caught_picture picture = draw(MPI_COMM_SELF, scene, in, &b);
         is_well = is_truth(&picture, &b, is_flat);
-        free_picture(&picture);
+        free_caught(&picture);
         test_free(b.faces);
     }
     everywhere(is_well);
@@ -280,8 +272,8 @@ static void any_ranks_draw_one_picture(void **state)
         input_describe(&part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
         everywhere(own_rank != 0 || are_same(&picture, &alone));
-        free_picture(&picture);
-        free_picture(&alone);
+        free_caught(&picture);
+        free_caught(&alone);
         input_free(&part);
         input_free(&whole);
     }
@@ -299,7 +291,7 @@ static void lines_fade_on_small_faces(void **state)
     if (own_rank == 0) {
         caught_picture picture = draw(MPI_COMM_SELF, scene, &in, NULL);
         for (int i = 0; i < 24 * 18; i++) is_well = is_well && picture.rgba[4 * i] == picture.rgba[4 * i + 3];
-        free_picture(&picture);
+        free_caught(&picture);
     }
     everywhere(is_well);
     input_free(&in);

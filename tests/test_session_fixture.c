@@ -184,6 +184,26 @@ void forget_pictures(void)
     caught_count = 0;
 }
 
+caught_picture take_caught(void)
+{
+    caught_picture picture = {0};
+    if (own_rank == 0) picture = caught[0];
+    caught_count = 0;
+    return picture;
+}
+
+caught_picture draw_once(insitu_session **session, const session_input *in)
+{
+    forget_pictures();
+    assert_int_equal(hand_over(*session, in), INSITU_OK);
+    const insitu_status status = insitu_step(*session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(*session));
+    assert_int_equal(status, INSITU_OK);
+    const caught_picture picture = take_caught();
+    insitu_destroy(session);
+    return picture;
+}
+
 bool session_writes_behind;
 
 void session_load_image_library(void) {}

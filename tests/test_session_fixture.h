@@ -92,6 +92,12 @@ extern int caught_count;
 void forget_pictures(void);
 void free_caught(caught_picture *picture);
 
+/* The first picture caught on rank 0, from now on the caller's, and the only one; on other ranks one of nothing. */
+caught_picture take_caught(void);
+
+/* Hands the input over, takes a step, which is to be well, and its picture, and destroys the session. */
+caught_picture draw_once(insitu_session **session, const session_input *in);
+
 /* Paths with this in them cannot be written. NULL: all can. */
 extern const char *unwritable;
 

@@ -11,6 +11,7 @@
 #include "render.h"
 #include "session.h"
 #include "test_effort.h"
+#include "test_hemisphere.h"
 #include "test_session_fixture.h"
 
 enum { SIDE = 4, WIDTH = 48, HEIGHT = 36, PIXELS = WIDTH * HEIGHT, SAMPLES = 16 };
@@ -25,25 +26,9 @@ static const double eye[3] = {3, 2.2, 4};
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
-    caught_picture picture = {0};
     insitu_session *session = NULL;
-    forget_pictures();
-    insitu_status status = insitu_create_from_text(comm, scene, &session);
-    if (!status) status = hand_over(session, in);
-    if (!status) status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
-    insitu_destroy(&session);
-    return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
-    free(picture->data);
+    assert_int_equal(insitu_create_from_text(comm, scene, &session), INSITU_OK);
+    return draw_once(&session, in);
 }
 
 static void camera_ray(int pixel, double base[3], double direction[3])
@@ -138,8 +123,8 @@ static tally draw_floor(test_mesh_kind kind, const char *scene, const char *lit_
     make_part(&in, kind, test_linear, TEST_RANDOM, own_rank, rank_count);
     caught_picture shadowed = draw(MPI_COMM_WORLD, scene, &in), lit = draw(MPI_COMM_WORLD, lit_scene, &in);
     if (own_rank == 0) out = judge_floor(&shadowed, &lit);
-    free_picture(&shadowed);
-    free_picture(&lit);
+    free_caught(&shadowed);
+    free_caught(&lit);
     input_free(&in);
     return out;
 }
@@ -178,8 +163,8 @@ static void what_casts_no_shadow_casts_none(void **context)
                        lit = draw(MPI_COMM_WORLD, scenes[i][1], &in);
         for (int k = 0; k < 4 * PIXELS && own_rank == 0; k++)
             worst = fmax(worst, fabs((double)shadowed.rgba[k] - (double)lit.rgba[k]));
-        free_picture(&shadowed);
-        free_picture(&lit);
+        free_caught(&shadowed);
+        free_caught(&lit);
         input_free(&in);
         /* Colours are lit in double here, in float there: of a few products below 1, 5e-7. */
         if (worst > 5e-7) fprintf(stderr, "scene %zu: off by %g\n", i, worst);
@@ -188,20 +173,6 @@ static void what_casts_no_shadow_casts_none(void **context)
 }
 
 /* ---- the same rays in double --------------------------------------------------------------------------------- */
-
-/* docs/decisions/surface.md: a spiral of equal steps in area on the disk below, turned and begun by the pixel. */
-static void sample_ray(int pixel, const double n[3], int k, double out[3])
-{
-    const double pi = acos(-1.0), x = pixel % WIDTH, y = pixel / WIDTH;
-    const double noise = fmod(52.9829189 * fmod(0.06711056 * x + 0.00583715 * y, 1), 1);
-    const double share = fmin((k + render_jitter((uint32_t)pixel, 0)) / SAMPLES, 1 - 1.0 / 1024);
-    const double angle = 2 * pi * noise + k * pi * (3 - sqrt(5));
-    const double sign = n[2] < 0 ? -1 : 1, a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
-    const double right[3] = {1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]};
-    const double up[3] = {b, sign + n[1] * n[1] * a, -n[1]};
-    for (int i = 0; i < 3; i++)
-        out[i] = sqrt(share) * (cos(angle) * right[i] + sin(angle) * up[i]) + sqrt(1 - share) * n[i];
-}
 
 #define BARE "material: {ambient: 0.6, diffuse: 0.1, specular: 0}"
 #define DARK "    lights: [{direction: [0, 0, 1], intensity: 0}]\n"
@@ -251,7 +222,7 @@ static sky judge_sky(const caught_picture *drawn, const caught_picture *plain)
         place_at(p, (double)drawn->depth[p], place);
         normal_at(drawn, p, n);
         for (int k = 0; k < SAMPLES; k++) {
-            sample_ray(p, n, k, d);
+            test_hemisphere((uint32_t)p, WIDTH, SAMPLES, k, n, d);
             const int blocked = corner_blocks(place, d);
             open += blocked == 0;
             unsure += blocked < 0;
@@ -303,8 +274,8 @@ static void corners_are_as_dark_as_disk_segments(void **context)
                 fprintf(stderr, "%s: %d pixels, %d wrong, %d unsure, mean off by %g\n", test_mesh_kind_name(kind),
                         s.pixels, s.wrong, s.unsure, off);
         }
-        free_picture(&drawn);
-        free_picture(&plain);
+        free_caught(&drawn);
+        free_caught(&plain);
         input_free(&in);
         everywhere(is_right);
     }
@@ -342,9 +313,9 @@ static void judge_partition(const char *scene, const session_input *whole, const
     if (own_rank == 0) {
         caught_picture alone = draw(MPI_COMM_SELF, scene, whole);
         off = difference(&dealt, &alone);
-        free_picture(&alone);
+        free_caught(&alone);
     }
-    free_picture(&dealt);
+    free_caught(&dealt);
     if (!(off <= most)) fprintf(stderr, "%s, %d ranks: off by %g\n", what, rank_count, off);
     everywhere(off <= most);
 }

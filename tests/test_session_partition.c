@@ -119,12 +119,6 @@ static double difference(const caught_picture *a, const caught_picture *b)
     return worst;
 }
 
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
-}
-
 static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind kind, const session_input *whole,
                            const session_input *part)
 {
@@ -137,8 +131,8 @@ static bool is_one_picture(const scene_case *scene, const char *file, mesh_kind 
     if (!is_one)
         fprintf(stderr, "%s, %s, %d ranks: off by %.3g; cells of size %.17g and %.17g\n", mesh_names[kind], scene->name,
                 rank_count, off, size, alone_size);
-    free_picture(&ours);
-    free_picture(&alone);
+    free_caught(&ours);
+    free_caught(&alone);
     return is_one;
 }
 
@@ -170,8 +164,8 @@ static bool is_near(const char *layers, const session_input *in)
     if (own_rank != 0) return true;
     const double off = difference(&standard, &fine);
     if (off > 0.01 + 1e-4) fprintf(stderr, "off by %.3g: %s", off, layers);
-    free_picture(&standard);
-    free_picture(&fine);
+    free_caught(&standard);
+    free_caught(&fine);
     return off <= 0.01 + 1e-4;
 }
 

@@ -303,7 +303,6 @@ static void smooth_volumes_of_dealt_cells_are_those_of_one_rank(void **context)
 /* On rank 0, draws a scene with the cells' values as c and the means of a search over all cells as v. */
 static caught_picture draw_smooth(const char *scene, const part_input *in, const double *means)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scene));
     insitu_field v;
     insitu_field_defaults(&v);
@@ -314,8 +313,7 @@ static caught_picture draw_smooth(const char *scene, const part_input *in, const
     everywhere(insitu_set_field(session, "m", &in->field) == INSITU_OK);
     everywhere(insitu_set_field(session, "m", &v) == INSITU_OK);
     everywhere(draw(session, NULL, 0) == INSITU_OK);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
 }

@@ -59,22 +59,14 @@ static insitu_session *open_regions(const char *scene)
 /* The picture of a scene, on rank 0. */
 static caught_picture draw(const char *scene, const char *warning)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_regions(scene);
     step_is_good(session, 0);
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fprintf(stderr, "warnings: %s\n", warnings);
     everywhere(warning ? strstr(warnings, warning) != NULL : !*warnings);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
 }
 
 static bool has_colour(const caught_picture *picture, int p)
@@ -99,8 +91,8 @@ static void assert_same(const char *scene, const char *warning, const char *othe
     count_covered(&a, counts);
     everywhere(own_rank != 0 || counts[0] + counts[1] > 100);
     everywhere(is_same);
-    free_picture(&a);
-    free_picture(&b);
+    free_caught(&a);
+    free_caught(&b);
 }
 
 #define FRONT "    camera: {automatic: {direction: [0, 0, 1]}}\n"
@@ -135,7 +127,7 @@ static void layers_are_on_the_meshes_that_have_the_field(void **context)
         count_covered(&picture, counts);
         if (own_rank == 0) fprintf(stderr, "case %zu: %d and %d pixels\n", i, counts[0], counts[1]);
         everywhere(own_rank != 0 || ((counts[0] > 50) == cases[i].is_on[0] && (counts[1] > 50) == cases[i].is_on[1]));
-        free_picture(&picture);
+        free_caught(&picture);
     }
 }
 
@@ -188,8 +180,8 @@ static void colours_that_are_not_numbers_are_grey(void **context)
         }
         everywhere(own_rank != 0 ||
                    memcmp(pictures[0].rgba, pictures[1].rgba, sizeof(float) * WIDTH * HEIGHT * 4) == 0);
-        free_picture(&pictures[0]);
-        free_picture(&pictures[1]);
+        free_caught(&pictures[0]);
+        free_caught(&pictures[1]);
         test_free(nothing);
     }
     regions_free();

@@ -176,19 +176,11 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const shell_m
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const shell_mesh *m)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_with(comm, scene, m);
     if (insitu_last_report(session)->warnings[0]) fail_msg("warnings: %s", insitu_last_report(session)->warnings);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
 }
 
 static bool are_same(const caught_picture *a, const caught_picture *b)
@@ -255,8 +247,8 @@ static void sheets_are_planes_on_any_ranks(void **state)
                 is_well = is_sheet(&alone) && are_same(&ours, &alone);
             }
             everywhere(is_well);
-            free_picture(&ours);
-            free_picture(&alone);
+            free_caught(&ours);
+            free_caught(&alone);
         }
 }
 
@@ -304,9 +296,9 @@ static void other_layers_pass_shells_over(void **state)
                 is_well = is_well && fabs((double)alone.rgba[k] - (double)ours.rgba[k]) <= 1e-6;
         }
         everywhere(is_well);
-        free_picture(&ours);
-        free_picture(&alone);
-        free_picture(&bare);
+        free_caught(&ours);
+        free_caught(&alone);
+        free_caught(&bare);
     }
 }
 

@@ -72,7 +72,6 @@ static void table_colour(double value, double out[3])
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, const char *warning)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_session(comm, scene);
     forget_pictures();
     assert_int_equal(hand_over(session, in), INSITU_OK);
@@ -81,16 +80,9 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     assert_int_equal(status, INSITU_OK);
     const char *warnings = insitu_last_report(session)->warnings;
     if (warning ? !strstr(warnings, warning) : *warnings) fail_msg("warnings: %s", warnings);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
 }
 
 /* Compares with the scene's planes, whose nearest hit within the cube counts. Rays near the cube's border may hit or
@@ -185,10 +177,10 @@ static void planes_are_one_picture_of(test_mesh_kind kind)
         take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part, NULL);
         everywhere(own_rank != 0 || are_same(&picture, &alone));
-        free_picture(&picture);
+        free_caught(&picture);
         input_free(&part);
     }
-    free_picture(&alone);
+    free_caught(&alone);
     input_free(&whole);
 }
 
@@ -227,7 +219,7 @@ static void draw_in_faces(test_mesh_kind kind, const char *scene, const plane *p
     take_part(&whole, TEST_RANDOM, false, &part);
     caught_picture picture = draw(MPI_COMM_WORLD, write_scene(scene), &part, NULL);
     everywhere(own_rank != 0 || is_once(&picture, p));
-    free_picture(&picture);
+    free_caught(&picture);
     input_free(&part);
     input_free(&whole);
 }
@@ -261,7 +253,7 @@ static void planes_beside_the_data_are_warned_of(void **state)
     input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     caught_picture picture = draw(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 2], offset: 1.5}"))),
                                   &part, "a plane of its slices meets no cell: cells are -2.5 to -0.5 from it");
-    free_picture(&picture);
+    free_caught(&picture);
     input_free(&part);
 }
 
@@ -313,7 +305,7 @@ static void cells_have_their_values_and_no_number_is_grey(void **state)
     caught_picture picture =
         draw(MPI_COMM_WORLD, write_scene(IMAGE(SLICE("", "{normal: [0, 0, 1], point: [0, 0, 0.1]}"))), &part, NULL);
     everywhere(own_rank != 0 || has_colours_of_cells(&picture));
-    free_picture(&picture);
+    free_caught(&picture);
     test_free(values);
     input_free(&part);
     input_free(&whole);

@@ -158,7 +158,6 @@ static void gradients_free(gradients *g)
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, const gradients *g)
 {
     static const char *const names[] = {"gx", "gy", "gz"};
-    caught_picture picture = {0};
     insitu_session *session = NULL;
     forget_pictures();
     insitu_status status = insitu_create_from_text(comm, scene, &session);
@@ -174,17 +173,9 @@ static caught_picture draw(MPI_Comm comm, const char *scene, const session_input
     if (!status) status = insitu_step(session, 0, 0);
     if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
-    free(picture->data);
 }
 
 static bool are_same(const caught_picture *a, const caught_picture *b)
@@ -285,8 +276,8 @@ static void normals_are_the_interpolated_gradients(void **state)
         printf("%s: %d pixels, normals within %.2g of the interpolated gradients, %d beyond 3e-4\n", cases[c].name,
                pixels, worst, far);
         assert_true(pixels > 300 && far <= (cases[c].kind == TEST_POLYHEDRA ? pixels / 10 : 0));
-        free_picture(&smooth);
-        for (int k = 0; k < 3; k++) free_picture(&expected[k]);
+        free_caught(&smooth);
+        for (int k = 0; k < 3; k++) free_caught(&expected[k]);
         gradients_free(&g);
         input_free(&whole);
     }
@@ -306,7 +297,7 @@ static void a_linear_field_has_its_gradient(void **state)
         const double worst = worst_angle(&smooth, NULL, gradient, &pixels, &far);
         if (!(worst < 1e-6)) fprintf(stderr, "%s: off by %g\n", cases[c].name, worst);
         assert_true(pixels > 300 && worst < 1e-6);
-        free_picture(&smooth);
+        free_caught(&smooth);
         input_free(&whole);
     }
 }
@@ -345,7 +336,7 @@ static double mean_angle(test_mesh_kind kind, int side, const char *scene)
         sum += acos(fmin(1, fabs(dot) / sqrt(length))) * 180 / M_PI;
         count++;
     }
-    free_picture(&picture);
+    free_caught(&picture);
     input_free(&whole);
     return sum / count;
 }
@@ -398,8 +389,8 @@ static void same_as_alone(const char *name, const char *scene, const session_inp
         if (!is_well) fprintf(stderr, "%s: not the same on %d ranks\n", name, rank_count);
     }
     everywhere(is_well);
-    free_picture(&ours);
-    free_picture(&alone);
+    free_caught(&ours);
+    free_caught(&alone);
 }
 
 static void any_partition_has_the_same_bits(void **state)
@@ -460,8 +451,8 @@ static void doubled_vertices_are_one(void **state)
     caught_picture one = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
     caught_picture two = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &cracked, NULL);
     assert_true(cracked.part.vertex_count > whole.part.vertex_count && are_same(&one, &two));
-    free_picture(&one);
-    free_picture(&two);
+    free_caught(&one);
+    free_caught(&two);
     for (int i = 0; i < 2; i++) test_mesh_free(&halves[i]);
     free(owners);
     input_free(&cracked);
@@ -481,7 +472,7 @@ static void rubbish_gives_nothing(void **state)
     if (own_rank == 0) {
         caught_picture picture = draw(MPI_COMM_SELF, SCENE(SMOOTH("")), &whole, NULL);
         for (int i = 0; i < 3 * PIXELS; i++) assert_true(isfinite(picture.data[i]));
-        free_picture(&picture);
+        free_caught(&picture);
     }
     input_free(&part);
     input_free(&whole);

@@ -72,18 +72,10 @@ static insitu_session *open_with(MPI_Comm comm, const char *scene, const session
 
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
-    caught_picture picture = {0};
     insitu_session *session = open_with(comm, scene, in);
-    if (own_rank == 0) picture = caught[0];
-    caught_count = 0;
+    const caught_picture picture = take_caught();
     insitu_destroy(&session);
     return picture;
-}
-
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
 }
 
 /* ---- which faces --------------------------------------------------------------------------------------------- */
@@ -266,11 +258,11 @@ static void cube_is_one_picture_of(test_mesh_kind kind)
         take_part(&whole, way == 1 ? TEST_BLOCK : TEST_RANDOM, way == 2, &part);
         caught_picture picture = draw(MPI_COMM_WORLD, scene, &part);
         everywhere(own_rank != 0 || are_same(&picture, &clear));
-        free_picture(&picture);
+        free_caught(&picture);
         input_free(&part);
     }
-    free_picture(&alone);
-    free_picture(&clear);
+    free_caught(&alone);
+    free_caught(&clear);
     input_free(&whole);
 }
 
@@ -409,7 +401,7 @@ static void warped_faces_are_bilinear_patches(void **state)
         memcpy(places, in.part.coordinates, sizeof places);
         caught_picture picture = draw(MPI_COMM_SELF, scene, &in);
         assert_true(is_hex(&picture, places));
-        free_picture(&picture);
+        free_caught(&picture);
         input_free(&in);
     }
     remove(scene);

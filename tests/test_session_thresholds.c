@@ -165,12 +165,6 @@ static void keep(caught_picture *out)
     caught_count = 0;
 }
 
-static void free_picture(caught_picture *picture)
-{
-    free(picture->rgba);
-    free(picture->depth);
-}
-
 /* Takes this rank's part; with ghosts, all cells, of which the others' are ghosts. */
 static void take_part(const test_mesh *whole, bool with_ghosts, test_mesh *out)
 {
@@ -209,8 +203,8 @@ static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
         everywhere(truth.count > 0 && drawn.count == truth.count && drawn.sum == truth.sum);
         keep(&picture);
         everywhere(own_rank != 0 || are_same(&picture, &alone));
-        free_picture(&picture);
-        free_picture(&alone);
+        free_caught(&picture);
+        free_caught(&alone);
     }
     insitu_destroy(&session);
     input_free(&part);
@@ -237,7 +231,7 @@ static void bounds_may_show_all_or_nothing(void **state)
         everywhere(find_drawn(session).count == (i ? 0 : 6 * SIDE * SIDE));
         caught_picture picture;
         keep(&picture);
-        free_picture(&picture);
+        free_caught(&picture);
         insitu_destroy(&session);
     }
     insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(scenes[2]));
