@@ -15,4 +15,6 @@ add_test(NAME house_tests_can_fail
 set_tests_properties(
   house_arrows_go_down house_library_shows_insitu_only house_kernels_show_their_table_only house_tests_can_fail
   PROPERTIES TIMEOUT 60)
+add_test(NAME house_figures_are_held
+  COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/house_figures.py --hold ${PROJECT_SOURCE_DIR})
 add_test(NAME house_hard_cases_are_tested COMMAND sh ${CMAKE_CURRENT_SOURCE_DIR}/house_hard_cases.sh ${PROJECT_SOURCE_DIR})

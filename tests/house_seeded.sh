@@ -82,6 +82,19 @@ planted mini-app/seeded.c '#include "error.h"' 'mini-app must not include error.
 planted mini-app/seeded.c '#include "insitu/nowhere.h"' 'no file of the tree is called nowhere.h'
 planted render/seeded.cpp 'int seeded;' 'the core is C'
 planted tests/comp.c 'int seeded;' 'same name as compositing/comp.c'
+figures() {
+    python3 "$here/house_figures.py" --hold "$place/tree"
+}
+accepts figures
+echo 'int seeded(int a, int b, int c, int d, int e, int f, int g, int h)
+{
+    return a + b + c + d + e + f + g + h;
+}' >"$place/tree/render/seeded.c"
+refuses 'render: functions of more than 7 parameters: 1' figures
+echo '#include "render_kernels.c"' >"$place/tree/render/seeded.c"
+refuses 'render: depth of includes: 9, more than 8' figures
+rm "$place/tree/render/seeded.c"
+accepts figures
 rm -rf "$place/tree"
 mkdir -p "$place/tree/mmbvh"
 refuses 'wrong place' sh "$here/house_includes.sh" "$place/tree"
