@@ -171,21 +171,34 @@ static void find_jumps(const wave_grid *grid, double time_step)
     }
 }
 
-/* p* and u* of a face with normal n, between jumps a and b over the common mean; b is NULL at a wall. */
-INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
-                          const real *a, int layer_a, const real *b, int layer_b, real star[2])
+/* One side of a face: the cell's jump over the face's mean, NULL beyond a wall, and its layer. */
+typedef struct face_side {
+    const real *jump;
+    int layer;
+} face_side;
+
+INLINE face_side side_of(const wave_grid *grid, int32_t cell)
 {
-    real za = layers->impedance[layer_a], pa = mean[0] + a[0];
+    return cell < 0 ? (face_side){NULL, 0}
+                    : (face_side){(const real *)grid->jump + 4 * (int64_t)cell, grid->layers[cell]};
+}
+
+/* p* and u* of a face with normal n, whose two sides have the mean in common. */
+INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, const real *n, const real mean[4],
+                          face_side near, face_side far, real star[2])
+{
+    const real *a = near.jump, *b = far.jump;
+    real za = layers->impedance[near.layer], pa = mean[0] + a[0];
     real ua = n[0] * (mean[1] + a[1]) + n[1] * (mean[2] + a[2]) + n[2] * (mean[3] + a[3]);
     if (!b) {
         /* A rigid wall mirrors the state; behind an absorbing wall there is silence. */
         star[0] = grid->reflecting ? pa + za * ua : (pa + za * ua) * (real)0.5;
-        star[1] = grid->reflecting ? 0 : star[0] * (2 * layers->inverse_sum[layer_a][layer_a]);
+        star[1] = grid->reflecting ? 0 : star[0] * (2 * layers->inverse_sum[near.layer][near.layer]);
         return;
     }
-    real zb = layers->impedance[layer_b], pb = mean[0] + b[0];
+    real zb = layers->impedance[far.layer], pb = mean[0] + b[0];
     real ub = n[0] * (mean[1] + b[1]) + n[1] * (mean[2] + b[2]) + n[2] * (mean[3] + b[3]);
-    real inverse = layers->inverse_sum[layer_a][layer_b];
+    real inverse = layers->inverse_sum[near.layer][far.layer];
     star[0] = ((zb * pa + za * pb) + za * zb * (ua - ub)) * inverse;
     star[1] = ((za * ua + zb * ub) + (pa - pb)) * inverse;
 }
@@ -193,18 +206,16 @@ INLINE void solve_riemann(const wave_grid *grid, const layer_table *layers, cons
 INLINE void apply_flux(const wave_grid *grid, const wave_cell_shape *shape, const layer_table *layers, real time_step,
                        int32_t c)
 {
-    const real *jumps = grid->jump;
     cell_view view = view_cell(grid, shape, c);
     real p[8][4], mean[4] = {0, 0, 0, 0}, sum[4] = {0, 0, 0, 0};
     int layer = grid->layers[c];
+    face_side near = side_of(grid, c);
     if (grid->second_order) load_vertices(grid, &view, p);
     for (int f = 0; f < view.shape->face_count; ++f) {
         const real *n = view.face + 4 * f;
-        int32_t beyond = view.neighbour[f];
         real star[2];
         if (grid->second_order) face_mean(view.shape, f, p, mean);
-        solve_riemann(grid, layers, n, mean, jumps + 4 * (int64_t)c, layer,
-                      beyond < 0 ? NULL : jumps + 4 * (int64_t)beyond, beyond < 0 ? 0 : grid->layers[beyond], star);
+        solve_riemann(grid, layers, n, mean, near, side_of(grid, view.neighbour[f]), star);
         sum[0] += n[3] * star[1];
         for (int a = 0; a < 3; ++a) sum[1 + a] += n[3] * star[0] * n[a];
     }

@@ -175,7 +175,8 @@ void make_part(vtkUnstructuredGrid *grid, const std::string &name, outcome &out,
     cell_counts counts;
     tally count;
     std::string error;
-    if (!view_cells(grid, what, p.held, count, p.mesh, cells, counts, error)) throw failure{INSITU_ERROR_MESH, error};
+    const cells_view view = {what, p.held, count, p.mesh, cells, counts};
+    if (!view_cells(grid, view, error)) throw failure{INSITU_ERROR_MESH, error};
     tell_about_cells(counts, what, out.count);
     out.cells.split += counts.split;
     out.cells.linear += counts.linear;

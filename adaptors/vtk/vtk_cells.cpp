@@ -202,12 +202,14 @@ std::string why_converted(const std::array<int64_t, 256> &by_type)
 }
 
 template <typename Id>
-void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::string &why, const std::string &what,
-                   hold &held, tally &count, insitu_mesh &mesh, cell_list &cells, cell_counts &counts)
+void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::string &why, const cells_view &view)
 {
+    hold &held = view.held;
+    insitu_mesh &mesh = view.mesh;
+    cell_list &cells = view.cells;
     faced_cells faced;
     read_faces(grid, raw, faced);
-    const new_size size = count_new(raw, faced, counts);
+    const new_size size = count_new(raw, faced, view.counts);
     cells.count = size.cells;
     cells.is_one_to_one = size.is_one_to_one;
     if (!cells.is_one_to_one) cells.source.reserve(static_cast<size_t>(size.cells));
@@ -224,16 +226,20 @@ void convert_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const st
     mesh.connectivity = {connectivity, sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64, 0};
     mesh.connectivity_count = size.vertices;
     const int64_t face_bytes = faced.has.empty() ? 0 : faced.faces.hand_over(held, mesh);
-    count.copied(what + " cells", why,
-                 size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) + face_bytes);
+    view.count.copied(view.what + " cells", why,
+                      size.cells + (size.cells + 1) * 8 + size.vertices * static_cast<int64_t>(sizeof(Id)) +
+                          face_bytes);
 }
 
 /* All cells are drawn as they are, from VTK's arrays; if all are of one type and size, neither types nor offsets are
  * needed. */
 template <typename Id>
 void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std::array<int64_t, 256> &by_type,
-                  int64_t connectivity_count, hold &held, tally &count, insitu_mesh &mesh)
+                  int64_t connectivity_count, const cells_view &view)
 {
+    hold &held = view.held;
+    tally &count = view.count;
+    insitu_mesh &mesh = view.mesh;
     const auto id_type = sizeof(Id) == 4 ? INSITU_INT32 : INSITU_INT64;
     held.objects.emplace_back(grid->GetCells());
     mesh.cell_count = raw.count;
@@ -253,8 +259,8 @@ void borrow_cells(vtkUnstructuredGrid *grid, const raw_cells<Id> &raw, const std
 }
 
 template <typename Array>
-bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, const std::string &what, hold &held,
-                tally &count, insitu_mesh &mesh, cell_list &cells, cell_counts &counts, std::string &error)
+bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, const cells_view &view,
+                std::string &error)
 {
     using id = typename Array::ValueType;
     const raw_cells<id> raw = {grid->GetCellTypesArray()->GetPointer(0), offsets->GetPointer(0),
@@ -266,7 +272,7 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
         by_type[raw.types[i]]++;
         const recipe &r = recipes()[raw.types[i]];
         if (raw.offsets[i] < 0 || raw.offsets[i] > raw.offsets[i + 1] || raw.offsets[i + 1] > connectivity_count) {
-            error = what + ": cell " + std::to_string(i) + ": offsets " + std::to_string(raw.offsets[i]) + ", " +
+            error = view.what + ": cell " + std::to_string(i) + ": offsets " + std::to_string(raw.offsets[i]) + ", " +
                     std::to_string(raw.offsets[i + 1]) + " are not within the connectivity's " +
                     std::to_string(connectivity_count) + " entries";
             return false;
@@ -275,32 +281,29 @@ bool view_typed(vtkUnstructuredGrid *grid, Array *offsets, Array *connectivity, 
                                       (r.what == kind::polygon && raw.size(i) >= r.needed_points));
     }
     if (is_as_it_is) {
-        cells.count = raw.count;
-        borrow_cells(grid, raw, by_type, connectivity_count, held, count, mesh);
+        view.cells.count = raw.count;
+        borrow_cells(grid, raw, by_type, connectivity_count, view);
     } else {
-        convert_cells(grid, raw, why_converted(by_type), what, held, count, mesh, cells, counts);
+        convert_cells(grid, raw, why_converted(by_type), view);
     }
     return true;
 }
 
 } // namespace
 
-bool view_cells(vtkUnstructuredGrid *grid, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
-                cell_list &cells, cell_counts &counts, std::string &error)
+bool view_cells(vtkUnstructuredGrid *grid, const cells_view &view, std::string &error)
 {
     vtkCellArray *array = grid->GetCells();
     vtkUnsignedCharArray *types = grid->GetCellTypesArray();
     if (!array || array->GetNumberOfCells() == 0) return true;
     if (!types || types->GetNumberOfValues() != array->GetNumberOfCells()) {
-        error = what + ": " + std::to_string(array->GetNumberOfCells()) + " cells but " +
+        error = view.what + ": " + std::to_string(array->GetNumberOfCells()) + " cells but " +
                 std::to_string(types ? types->GetNumberOfValues() : 0) + " cell types";
         return false;
     }
     if (array->IsStorage64Bit())
-        return view_typed(grid, array->GetOffsetsArray64(), array->GetConnectivityArray64(), what, held, count, mesh,
-                          cells, counts, error);
-    return view_typed(grid, array->GetOffsetsArray32(), array->GetConnectivityArray32(), what, held, count, mesh, cells,
-                      counts, error);
+        return view_typed(grid, array->GetOffsetsArray64(), array->GetConnectivityArray64(), view, error);
+    return view_typed(grid, array->GetOffsetsArray32(), array->GetConnectivityArray32(), view, error);
 }
 
 void tell_about_cells(const cell_counts &counts, const std::string &what, tally &count)

@@ -29,10 +29,19 @@ struct cell_list {
     std::vector<int64_t> source; // VTK's cell for each cell i
 };
 
-/* Fill in the cells of mesh (count, types, connectivity, offsets) from grid. The indices of the connectivity are not
- * checked here. False, with a message, where grid's arrays do not fit together. */
-bool view_cells(vtkUnstructuredGrid *grid, const std::string &what, hold &held, tally &count, insitu_mesh &mesh,
-                cell_list &cells, cell_counts &counts, std::string &error);
+// Where the cells of a grid go, and what is told of them.
+struct cells_view {
+    const std::string &what; // the grid's name in messages
+    hold &held;
+    tally &count;
+    insitu_mesh &mesh;
+    cell_list &cells;
+    cell_counts &counts;
+};
+
+/* Fill in the cells of the view's mesh (count, types, connectivity, offsets) from grid. The indices of the connectivity
+ * are not checked here. False, with a message, where grid's arrays do not fit together. */
+bool view_cells(vtkUnstructuredGrid *grid, const cells_view &view, std::string &error);
 
 /* Say in count which cells were left out or simplified. */
 void tell_about_cells(const cell_counts &counts, const std::string &what, tally &count);

@@ -19,11 +19,6 @@ typedef struct kernel_hex_ends {
     float t[2][KERNEL_HEX_ROOM], v[2][KERNEL_HEX_ROOM], r[2][3][KERNEL_HEX_ROOM];
 } kernel_hex_ends;
 
-/* A face's edges around, and whether they are the other way. */
-static const signed char kernel_hex_around[KERNEL_HEX_FACES][4][2] = {
-    {{8, 0}, {7, 1}, {11, 1}, {3, 0}},  {{1, 0}, {10, 0}, {5, 1}, {9, 1}}, {{0, 0}, {9, 0}, {4, 1}, {8, 1}},
-    {{11, 0}, {6, 1}, {10, 1}, {2, 0}}, {{3, 1}, {2, 1}, {1, 1}, {0, 1}},  {{4, 0}, {5, 0}, {6, 0}, {7, 0}}};
-
 typedef struct kernel_hex_packet {
     vm active;
     vi lane, at;
@@ -59,24 +54,6 @@ SIMD_INLINE void kernel_hex_ray_add(kernel_hex_rays *to, const kernel_hex_rays *
     to->lane[to->count] = from->lane[i];
     to->count++;
 }
-
-/* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more, among rays on the
- * same sides of its opposite sides. loop has the corners 0 to 3 around; side01 and side30 are the signs of its sides
- * from 0 to 1 and from 3 to 0. */
-SIMD_INLINE vm kernel_hex_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, vm side01, vm side30)
-{
-    const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
-    const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
-    const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
-    const vm bent = vf_le(vf_select(side01, -sum, sum), slack);
-    return vm_and(rays, vm_and(bent, vf_le(vf_select(side30, difference, -difference), slack)));
-}
-
-/* The first and the last of the faces that are crossed once, and the rays that must be traced in the cell alone. */
-typedef struct kernel_hex_crossed {
-    vm two, alone;
-    vi first, last;
-} kernel_hex_crossed;
 
 SIMD_INLINE void kernel_hex_faces(const kernel_placed_hexes *h, const kernel_hex_packet *p, kernel_hex_crossed *out)
 {
@@ -217,23 +194,6 @@ SIMD_INLINE void kernel_hex_ends_add(const kernel_hex_rays *met, int n, const ke
         }
         kernel_hex_ray_add(rays, met, n + i);
     }
-}
-
-/* Rays of pixels in tile space, the lanes of their cells, and where the pixels are in packets. */
-typedef struct kernel_local_rays {
-    vi lane, at;
-    vf origin[2], slope[2];
-} kernel_local_rays;
-
-SIMD_INLINE void kernel_local_rays_of(kernel_local_rays *rays, const kernel_tile *tile, vi pixel, vi lane)
-{
-    const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
-    rays->lane = lane & (SIMD_WIDTH - 1);
-    rays->at = kernel_batch_at(column, row);
-    rays->origin[0] = kernel_batch_of_tile(tile->origin_x, column);
-    rays->origin[1] = kernel_batch_of_tile(tile->origin_y, row);
-    rays->slope[0] = kernel_batch_of_tile(tile->slope_x, column);
-    rays->slope[1] = kernel_batch_of_tile(tile->slope_y, row);
 }
 
 #endif

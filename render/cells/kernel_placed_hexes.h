@@ -337,4 +337,15 @@ static __attribute__((noinline)) void kernel_placed_hex_cell(const kernel_placed
     c->least[0] = (float)INFINITY;
 }
 
+/* A face's edges around, and whether they are the other way. */
+static const signed char kernel_hex_around[KERNEL_HEX_FACES][4][2] = {
+    {{8, 0}, {7, 1}, {11, 1}, {3, 0}},  {{1, 0}, {10, 0}, {5, 1}, {9, 1}}, {{0, 0}, {9, 0}, {4, 1}, {8, 1}},
+    {{11, 0}, {6, 1}, {10, 1}, {2, 0}}, {{3, 1}, {2, 1}, {1, 1}, {0, 1}},  {{4, 0}, {5, 0}, {6, 0}, {7, 0}}};
+
+/* The first and the last of the faces that are crossed once, and the rays that must be traced in the cell alone. */
+typedef struct kernel_hex_crossed {
+    vm two, alone;
+    vi first, last;
+} kernel_hex_crossed;
+
 #endif

@@ -412,6 +412,18 @@ SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
+/* Returns the rays that may meet a quad's patch twice, as kernel_quad_bends() does and a few more, among rays on the
+ * same sides of its opposite sides. loop has the corners 0 to 3 around; side01 and side30 are the signs of its sides
+ * from 0 to 1 and from 3 to 0. */
+SIMD_INLINE vm kernel_hex_bends(const vf x[8], const vf y[8], const signed char *loop, vm rays, vm side01, vm side30)
+{
+    const int a = loop[0], b = loop[1], c = loop[2], d = loop[3];
+    const vf across = vf_diff_of_products(x[a], y[c], x[c], y[a]), other = vf_diff_of_products(x[d], y[b], x[b], y[d]);
+    const vf slack = 2e-6f * (vf_abs(across) + vf_abs(other)), sum = across + other, difference = across - other;
+    const vm bent = vf_le(vf_select(side01, -sum, sum), slack);
+    return vm_and(rays, vm_and(bent, vf_le(vf_select(side30, difference, -difference), slack)));
+}
+
 /* Finds the places where rays meet the patch; the rays of twice meet it in two places or none. Returns how many entries
  * of out are set, 0 to 2. */
 SIMD_INLINE int kernel_quad_places(const kernel_quad *q, vm once, vm twice, kernel_quad_place out[2])

@@ -232,6 +232,23 @@ SIMD_INLINE vi kernel_batch_at(vi column, vi row)
     return block * (KERNEL_BLOCK * KERNEL_BLOCK) + within;
 }
 
+/* Rays of pixels in tile space, the lanes of their cells, and where the pixels are in packets. */
+typedef struct kernel_local_rays {
+    vi lane, at;
+    vf origin[2], slope[2];
+} kernel_local_rays;
+
+SIMD_INLINE void kernel_local_rays_of(kernel_local_rays *rays, const kernel_tile *tile, vi pixel, vi lane)
+{
+    const vi column = pixel & (KERNEL_TILE - 1), row = pixel >> 4 & (KERNEL_TILE - 1);
+    rays->lane = lane & (SIMD_WIDTH - 1);
+    rays->at = kernel_batch_at(column, row);
+    rays->origin[0] = kernel_batch_of_tile(tile->origin_x, column);
+    rays->origin[1] = kernel_batch_of_tile(tile->origin_y, row);
+    rays->slope[0] = kernel_batch_of_tile(tile->slope_x, column);
+    rays->slope[1] = kernel_batch_of_tile(tile->slope_y, row);
+}
+
 SIMD_INLINE vf kernel_batch_far(const kernel_tile_trace *t, vi at)
 {
     const int stride = (int)(sizeof(kernel_packet) / sizeof(float));

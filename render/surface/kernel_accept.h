@@ -7,17 +7,12 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_cell_cache.h"
 #include "kernel_clip.h"
 #include "kernel_colour.h"
-#include "kernel_crossings.h"
-#include "kernel_differences.h"
-#include "kernel_edges.h"
 #include "kernel_hits.h"
 #include "kernel_map.h"
 #include "kernel_packet.h"
 #include "kernel_tile_trace.h"
-#include "kernel_traverse.h"
 #include "kernel_types.h"
 #include "render.h"
 #include "simd.h"
@@ -152,6 +147,32 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
     }
 }
 
+/* The gradient of a tet's field, by Cramer's rule in double; its length and sign do not matter. */
+SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
+{
+    double d[3][3], df[3], g[3];
+    if (c->has_normal) {
+        for (int a = 0; a < 3; a++) out[a] = vf_set(c->normal[a]);
+        return;
+    }
+    for (int i = 0; i < 3; i++) {
+        df[i] = (double)c->f[i + 1] - (double)c->f[0];
+        for (int a = 0; a < 3; a++) d[i][a] = (c->world[i + 1][a] - c->world[0][a]) * p->frame->job->space.scale;
+    }
+    for (int a = 0; a < 3; a++) {
+        const int b = (a + 1) % 3, e = (a + 2) % 3;
+        g[a] = df[0] * (d[1][b] * d[2][e] - d[1][e] * d[2][b]) + df[1] * (d[2][b] * d[0][e] - d[2][e] * d[0][b]) +
+               df[2] * (d[0][b] * d[1][e] - d[0][e] * d[1][b]);
+    }
+    double largest = 0;
+    for (int a = 0; a < 3; a++) largest = fabs(g[a]) > largest ? fabs(g[a]) : largest;
+    const double scale = largest > 0 ? 1 / (largest * p->frame->job->space.scale) : 0;
+    for (int a = 0; a < 3; a++) {
+        const double *axis = p->frame->scaled_axes[a];
+        out[a] = vf_set((float)((axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * scale));
+    }
+}
+
 /* ---- hits of a packet ---- */
 
 typedef struct kernel_surface_state {
@@ -232,11 +253,22 @@ static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, c
     kernel_emit(p, tied, s->first_kind + (uint32_t)value, &lit);
 }
 
-/* Puts hits that other ranks may have samples about among those that wait, and in the place of each a fragment by which
- * volumes are cut. colour: unlit. Returns the others. */
-static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const kernel_surface *s, int value, vm hit,
-                                                      vf t, vf reach, const vf normal[3], const vf colour[3])
+/* How hits look before light falls on them: a vector along the normal, in camera axes, and the colour. */
+typedef struct kernel_look {
+    vf normal[3], colour[3];
+} kernel_look;
+
+SIMD_INLINE kernel_look kernel_look_of(const vf normal[3], const vf colour[3])
 {
+    return (kernel_look){{normal[0], normal[1], normal[2]}, {colour[0], colour[1], colour[2]}};
+}
+
+/* Puts hits that other ranks may have samples about among those that wait, and in the place of each a fragment by which
+ * volumes are cut. Returns the others. */
+static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const kernel_surface *s, int value, vm hit,
+                                                      vf t, vf reach, const kernel_look *look)
+{
+    const vf *normal = look->normal, *colour = look->colour;
     render_waiting_list *list = &p->thread->waiting;
     const vm waits = vm_and(hit, vf_lt(vf_set(0), reach));
     if (list->capacity - list->count < SIMD_WIDTH && !p->thread->grow_waiting(list)) {
@@ -254,16 +286,6 @@ static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const ke
     return vm_andnot(hit, waits);
 }
 
-/* Gives hits their normals by differences, of cells that are all here; or returns those alone that have theirs, and
- * lets the others wait. */
-SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach, vf normal[3],
-                             const vf colour[3])
-{
-    if (p->frame->job->waiting) return kernel_wait(p, s, value, hit, t, reach, normal, colour);
-    kernel_differences(p, s, value, hit, t, reach, normal);
-    return hit;
-}
-
 /* The places of hits: the depth, a vector along the normal (or the coordinates that kernel_vertex_normals() makes one
  * of), and the value that the surface is coloured by. */
 typedef struct kernel_hit_places {
@@ -276,57 +298,6 @@ SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
 {
     if (!s->layer->colour_map) return vf_set((float)s->layer->values[value]);
     return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
-}
-
-/* Takes hits: the nearest are kept; those of a transparent surface are written at once. */
-SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
-                               kernel_hit_places *at)
-{
-    const kernel_surface *s = state->surface;
-    kernel_hits *hits = state->hits;
-    const vf t = at->t;
-    vf *normal = at->normal, colour[3];
-    const bool by_differences = s->layer->normal == RENDER_DIFFERENCES, by_vertices = s->layer->normal == RENDER_VERTEX;
-    const kernel_hit_cells cells = {vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
-    /* Polyhedra (no cell given) have their own gradient always, or come with what their vertices make. */
-    const vf reach = vf_set(by_differences && c ? kernel_difference_reach(p, s->layer, c) : 0);
-    kernel_base_colour(s, value, at->w, colour);
-    if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
-        colour[0] = kernel_surface_value(s, value, at->w);
-    else if (s->layer->edge_width > 0 && c)
-        kernel_draw_edges(p, s->layer, c, t, colour);
-    if (state->is_opaque) {
-        const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(t, p->t_far));
-        if (__builtin_expect(vm_any(tied), 0)) {
-            vf own[3] = {normal[0], normal[1], normal[2]};
-            const vm ready = by_differences ? kernel_differ(p, s, value, tied, t, reach, own, colour) : tied;
-            if (by_vertices) kernel_vertex_normals(p, s, tied, t, &cells, own);
-            kernel_emit_tied(p, s, value, ready, t, own, colour);
-            hit = vm_andnot(hit, tied);
-        }
-        p->t_far = vf_select(hit, t, p->t_far);
-        p->is_nearer = true;
-        hits->found = vm_or(hits->found, hit);
-        for (int a = 0; a < 3; a++) {
-            hits->normal[a] = vf_select(hit, normal[a], hits->normal[a]);
-            hits->colour[a] = vf_select(hit, colour[a], hits->colour[a]);
-        }
-        if (by_differences) hits->reach = vf_select(hit, reach, hits->reach);
-        if (by_vertices) {
-            hits->cells.part = vi_select(hit, cells.part, hits->cells.part);
-            hits->cells.index = vi_select(hit, cells.index, hits->cells.index);
-        }
-        hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + value)), hits->kind);
-        return;
-    }
-    kernel_hits_cut(hits, hit, t);
-    if (by_differences) hit = kernel_differ(p, s, value, hit, t, reach, normal, colour);
-    if (by_vertices) kernel_vertex_normals(p, s, hit, t, &cells, normal);
-    const float opacity = s->layer->opacity;
-    kernel_fragments f = {t, t, {colour[0], colour[1], colour[2]}, vf_set(1 - opacity), vf_set(0)};
-    kernel_paint(p, s, normal, vf_set((float)((int)s->first_kind + value)), &f);
-    for (int a = 0; a < 3; a++) f.colour[a] *= opacity;
-    kernel_emit(p, hit, s->first_kind + (uint32_t)value, &f);
 }
 
 /* Rays on which the sign changes between the interval's faces. */

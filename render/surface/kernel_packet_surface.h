@@ -88,7 +88,9 @@ SIMD_INLINE vm kernel_opaque_differences(kernel_packet *p, const kernel_surface 
     for (int value = 0; value < s->layer->value_count; value++) {
         const vm mine = vm_and(rays, vf_eq(hits->kind, vf_set((float)((int)s->first_kind + value))));
         if (!vm_any(mine)) continue;
-        ready = vm_or(ready, kernel_differ(p, s, value, mine, p->t_far, hits->reach, hits->normal, hits->colour));
+        kernel_look look = kernel_look_of(hits->normal, hits->colour);
+        ready = vm_or(ready, kernel_differ(p, s, value, mine, p->t_far, hits->reach, &look));
+        for (int a = 0; a < 3; a++) hits->normal[a] = look.normal[a];
     }
     return ready;
 }

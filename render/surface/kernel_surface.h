@@ -15,8 +15,13 @@
 #include "kernel_accept.h"
 #include "kernel_bounds.h"
 #include "kernel_cell.h"
+#include "kernel_cell_cache.h"
 #include "kernel_cell_values.h"
+#include "kernel_colour.h"
 #include "kernel_crossings.h"
+#include "kernel_differences.h"
+#include "kernel_edges.h"
+#include "kernel_hits.h"
 #include "kernel_map.h"
 #include "kernel_neubauer.h"
 #include "kernel_packet.h"
@@ -29,30 +34,95 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* The gradient of a tet's field, by Cramer's rule in double; its length and sign do not matter. */
-SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
+/* Gives hits their normals by differences, of cells that are all here; or returns those alone that have theirs, and
+ * lets the others wait. */
+SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
+                             kernel_look *look)
 {
-    double d[3][3], df[3], g[3];
-    if (c->has_normal) {
-        for (int a = 0; a < 3; a++) out[a] = vf_set(c->normal[a]);
-        return;
+    if (p->frame->job->waiting) return kernel_wait(p, s, value, hit, t, reach, look);
+    kernel_differences(p, s, value, hit, t, reach, look->normal);
+    return hit;
+}
+
+/* Hits of one isovalue in one cell (none given of polyhedra). */
+typedef struct kernel_accepted {
+    int value;
+    vf t, reach;
+    kernel_look look;
+    kernel_hit_cells cells;
+} kernel_accepted;
+
+/* Hits in the place of the nearest. */
+static __attribute__((noinline, cold)) void kernel_accept_tied(kernel_packet *p, const kernel_surface *s, vm tied,
+                                                               const kernel_accepted *h)
+{
+    kernel_look own = h->look;
+    vm ready = tied;
+    if (s->layer->normal == RENDER_DIFFERENCES) ready = kernel_differ(p, s, h->value, tied, h->t, h->reach, &own);
+    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, tied, h->t, &h->cells, own.normal);
+    kernel_emit_tied(p, s, h->value, ready, h->t, own.normal, own.colour);
+}
+
+/* Keeps the nearest hits. */
+SIMD_INLINE void kernel_accept_opaque(kernel_packet *p, kernel_surface_state *state, vm hit, const kernel_accepted *h)
+{
+    const kernel_surface *s = state->surface;
+    kernel_hits *hits = state->hits;
+    const vm tied = vm_and(vm_and(hit, hits->found), vf_eq(h->t, p->t_far));
+    if (__builtin_expect(vm_any(tied), 0)) {
+        kernel_accept_tied(p, s, tied, h);
+        hit = vm_andnot(hit, tied);
     }
-    for (int i = 0; i < 3; i++) {
-        df[i] = (double)c->f[i + 1] - (double)c->f[0];
-        for (int a = 0; a < 3; a++) d[i][a] = (c->world[i + 1][a] - c->world[0][a]) * p->frame->job->space.scale;
-    }
+    p->t_far = vf_select(hit, h->t, p->t_far);
+    p->is_nearer = true;
+    hits->found = vm_or(hits->found, hit);
     for (int a = 0; a < 3; a++) {
-        const int b = (a + 1) % 3, e = (a + 2) % 3;
-        g[a] = df[0] * (d[1][b] * d[2][e] - d[1][e] * d[2][b]) + df[1] * (d[2][b] * d[0][e] - d[2][e] * d[0][b]) +
-               df[2] * (d[0][b] * d[1][e] - d[0][e] * d[1][b]);
+        hits->normal[a] = vf_select(hit, h->look.normal[a], hits->normal[a]);
+        hits->colour[a] = vf_select(hit, h->look.colour[a], hits->colour[a]);
     }
-    double largest = 0;
-    for (int a = 0; a < 3; a++) largest = fabs(g[a]) > largest ? fabs(g[a]) : largest;
-    const double scale = largest > 0 ? 1 / (largest * p->frame->job->space.scale) : 0;
-    for (int a = 0; a < 3; a++) {
-        const double *axis = p->frame->scaled_axes[a];
-        out[a] = vf_set((float)((axis[0] * g[0] + axis[1] * g[1] + axis[2] * g[2]) * scale));
+    if (s->layer->normal == RENDER_DIFFERENCES) hits->reach = vf_select(hit, h->reach, hits->reach);
+    if (s->layer->normal == RENDER_VERTEX) {
+        hits->cells.part = vi_select(hit, h->cells.part, hits->cells.part);
+        hits->cells.index = vi_select(hit, h->cells.index, hits->cells.index);
     }
+    hits->kind = vf_select(hit, vf_set((float)((int)s->first_kind + h->value)), hits->kind);
+}
+
+/* Writes the hits of a transparent surface. */
+SIMD_INLINE void kernel_accept_transparent(kernel_packet *p, kernel_surface_state *state, vm hit, kernel_accepted *h)
+{
+    const kernel_surface *s = state->surface;
+    const uint32_t kind = s->first_kind + (uint32_t)h->value;
+    const float opacity = s->layer->opacity;
+    kernel_hits_cut(state->hits, hit, h->t);
+    if (s->layer->normal == RENDER_DIFFERENCES) hit = kernel_differ(p, s, h->value, hit, h->t, h->reach, &h->look);
+    if (s->layer->normal == RENDER_VERTEX) kernel_vertex_normals(p, s, hit, h->t, &h->cells, h->look.normal);
+    const vf *colour = h->look.colour;
+    kernel_fragments f = {h->t, h->t, {colour[0], colour[1], colour[2]}, vf_set(1 - opacity), vf_set(0)};
+    kernel_paint(p, s, h->look.normal, vf_set((float)kind), &f);
+    for (int a = 0; a < 3; a++) f.colour[a] *= opacity;
+    kernel_emit(p, hit, kind, &f);
+}
+
+/* Takes hits: the nearest are kept; those of a transparent surface are written at once. c: NULL of polyhedra. */
+SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c, int value, vm hit,
+                               const kernel_hit_places *at)
+{
+    const kernel_surface *s = state->surface;
+    kernel_accepted h = {.value = value, .t = at->t};
+    for (int a = 0; a < 3; a++) h.look.normal[a] = at->normal[a];
+    h.cells = (kernel_hit_cells){vi_set(c ? c->part : -1), vi_set(c ? (int32_t)c->index : -1)};
+    /* Polyhedra have their own gradient always, or come with what their vertices make. */
+    h.reach = vf_set(s->layer->normal == RENDER_DIFFERENCES && c ? kernel_difference_reach(p, s->layer, c) : 0);
+    kernel_base_colour(s, value, at->w, h.look.colour);
+    if (__builtin_expect(p->frame->job->paint == RENDER_VALUES, 0))
+        h.look.colour[0] = kernel_surface_value(s, value, at->w);
+    else if (s->layer->edge_width > 0 && c)
+        kernel_draw_edges(p, s->layer, c, at->t, h.look.colour);
+    if (state->is_opaque)
+        kernel_accept_opaque(p, state, hit, &h);
+    else
+        kernel_accept_transparent(p, state, hit, &h);
 }
 
 /* A function of its own, so that its vectors stay in registers beside the larger one of other cells. */

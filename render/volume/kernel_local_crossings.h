@@ -7,11 +7,11 @@
 #include <string.h>
 
 #include "kernel_crossings.h"
-#include "kernel_hex_rays.h"
 #include "kernel_local.h"
 #include "kernel_placed_hexes.h"
 #include "kernel_quad.h"
 #include "kernel_shapes.h"
+#include "kernel_tile_trace.h"
 #include "kernel_wide.h"
 #include "simd.h"
 

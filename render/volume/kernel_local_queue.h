@@ -9,7 +9,6 @@
 
 #include "grid.h"
 #include "kernel_cell.h"
-#include "kernel_hex_rays.h"
 #include "kernel_interest.h"
 #include "kernel_local.h"
 #include "kernel_placed_hexes.h"

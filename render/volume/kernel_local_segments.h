@@ -38,15 +38,19 @@
 #include <string.h>
 
 #include "grid.h"
-#include "kernel_cell_segments.h"
+#include "kernel_cell.h"
 #include "kernel_colour.h"
+#include "kernel_hex_rays.h"
 #include "kernel_integral.h"
 #include "kernel_local.h"
 #include "kernel_local_crossings.h"
 #include "kernel_local_queue.h"
+#include "kernel_map.h"
 #include "kernel_packet.h"
+#include "kernel_preintegral.h"
+#include "kernel_samples.h"
 #include "kernel_segment_list.h"
-#include "kernel_segments.h"
+#include "kernel_tile.h"
 #include "kernel_tile_cells.h"
 #include "kernel_tile_trace.h"
 #include "kernel_types.h"
@@ -73,10 +77,15 @@ typedef struct kernel_local_bounds {
     float slip[SIMD_WIDTH]; /* what the field may be off by where r does not solve for y, by how far it does not */
 } kernel_local_bounds;
 
+/* Adds the cell's segments on the packet's active rays. map is NULL for a constant field. */
+typedef void kernel_ray_segments_take(kernel_packet *p, kernel_segment_state *state, const kernel_cell *c,
+                                      const kernel_map *map);
+
 typedef struct kernel_local_stretches {
     kernel_tile_ray_segments *packets; /* the tile's */
     kernel_segment_state state;        /* what all rays have in common */
     unsigned blocks;                   /* that are under way */
+    kernel_ray_segments_take *alone;   /* takes rays that are not for lanes */
     kernel_local_lanes lanes;
     kernel_local_faces faces;
     kernel_local_bounds bounds;
@@ -93,9 +102,11 @@ SIMD_INLINE bool kernel_local_segments_fit(const kernel_frame *f, int type)
 
 /* The packets' windows. */
 static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local_stretches *b,
-                                        kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take)
+                                        kernel_tile_ray_segments *packets, unsigned blocks, kernel_tile_take *take,
+                                        kernel_ray_segments_take *alone)
 {
     b->packets = packets;
+    b->alone = alone;
     b->state = (kernel_segment_state){NULL, &t->frame->pieces[0], 0, t->frame->allowance, 0, t->frame->reach[0]};
     b->blocks = blocks;
     kernel_local_lanes_begin(&b->lanes, 0, take);
@@ -371,7 +382,7 @@ static __attribute__((noinline)) void kernel_local_segments_alone(kernel_tile_tr
         kernel_packet *p = &t->packets[packet];
         const vm active = p->active;
         p->active = vm_and(active, vm_from_bits(same));
-        kernel_poly_segments(p, &b->packets[packet].state, c, c->is_constant ? NULL : &t->thread->tile_cells->map);
+        b->alone(p, &b->packets[packet].state, c, c->is_constant ? NULL : &t->thread->tile_cells->map);
         p->active = active;
     }
 }

@@ -187,18 +187,29 @@ SIMD_INLINE void kernel_tile_wait(kernel_tile_trace *t, kernel_tile_cells *cells
 
 /* ---- from trees ---- */
 
-SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, int volume, int part, const uint32_t *cells, int count,
-                                       bool is_pencil, unsigned blocks, kernel_tile_take *take)
+enum { KERNEL_ALL_PIXELS = -1 };
+
+/* How a volume's cells are taken, those for lanes and others. */
+typedef struct kernel_cell_visitor {
+    bool is_pencil;
+    kernel_tile_take *take;
+    /* Queues a cell if its type is for lanes; else returns false. box: of its pixels, as a candidate has it, or
+     * KERNEL_ALL_PIXELS of the blocks. */
+    bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
+} kernel_cell_visitor;
+
+SIMD_INLINE void kernel_tile_meet_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
+                                       const uint32_t *cells, int count, unsigned blocks)
 {
     const grid *g = t->frame->job->parts[part].cells;
     kernel_tile_cells *pending = t->thread->tile_cells;
     kernel_prefetch(g, &t->frame->job->volumes[volume].field.fields[part], cells, count);
-    const bool waits = kernel_tile_wait_for(t, pending, volume, part, take);
+    const bool waits = kernel_tile_wait_for(t, pending, volume, part, visitor->take);
     for (int n = 0; n < count; n++)
         if (waits && kernel_arrays_type(&pending->arrays, cells[n]) == GRID_TET)
-            kernel_tile_wait(t, pending, cells[n], blocks, take);
+            kernel_tile_wait(t, pending, cells[n], blocks, visitor->take);
         else
-            kernel_tile_meet_cell(t, volume, part, cells[n], is_pencil, blocks, take);
+            kernel_tile_meet_cell(t, volume, part, cells[n], visitor->is_pencil, blocks, visitor->take);
 }
 
 /* Goes down the trees of the parts, with the volume's ranges. */
@@ -226,17 +237,6 @@ SIMD_INLINE void kernel_tile_all_trees(kernel_tile_trace *t, unsigned blocks, ke
     kernel_tile_take_pending(t, t->thread->tile_cells, take);
 }
 
-enum { KERNEL_ALL_PIXELS = -1 };
-
-/* How a volume's cells are taken, those for lanes and others. */
-typedef struct kernel_cell_visitor {
-    bool is_pencil;
-    kernel_tile_take *take;
-    /* Queues a cell if its type is for lanes; else returns false. box: of its pixels, as a candidate has it, or
-     * KERNEL_ALL_PIXELS of the blocks. */
-    bool (*queue)(kernel_tile_trace *t, int part, uint32_t cell, unsigned blocks, int box);
-} kernel_cell_visitor;
-
 /* Meets a leaf's cells. */
 SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visitor *visitor, int volume, int part,
                                    const uint32_t *cells, int count, unsigned blocks)
@@ -247,7 +247,7 @@ SIMD_INLINE void kernel_visit_leaf(kernel_tile_trace *t, const kernel_cell_visit
     for (int n = 0; n < count; n++) kernel_prefetch_indices(g, cells[n]);
     for (int n = 0; n < count; n++)
         if (!visitor->queue(t, part, cells[n], blocks, KERNEL_ALL_PIXELS)) others[left++] = cells[n];
-    if (left) kernel_tile_meet_leaf(t, volume, part, others, left, visitor->is_pencil, blocks, visitor->take);
+    if (left) kernel_tile_meet_leaf(t, visitor, volume, part, others, left, blocks);
 }
 
 /* ---- those that are known ---- */

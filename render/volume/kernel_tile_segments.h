@@ -20,7 +20,6 @@
 #include "grid.h"
 #include "kernel_cell.h"
 #include "kernel_cell_segments.h"
-#include "kernel_crossings.h"
 #include "kernel_double.h"
 #include "kernel_exact.h"
 #include "kernel_local_queue.h"
@@ -142,7 +141,7 @@ SIMD_INLINE void kernel_tile_segments_find(kernel_tile_trace *t, kernel_tile_seg
         if (blocks >> b & 1) far = kernel_block_window_end(t, s->packets, b);
         t->far[b / SIMD_WIDTH][b % SIMD_WIDTH] = far;
     }
-    kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments);
+    kernel_local_segments_begin(t, &s->stretches, s->packets, blocks, kernel_tile_cell_segments, kernel_poly_segments);
     if (t->frame->volume_candidates)
         kernel_visit_open(t, &kernel_segments_visitor, blocks);
     else
