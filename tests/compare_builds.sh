@@ -1,12 +1,13 @@
 #!/bin/sh
-# compare_builds.sh BEFORE AFTER [GRID ...]: do two builds draw the same pictures, to the byte?
+# compare_builds.sh BEFORE AFTER [GRID ...]: do two builds draw the same pictures, to the bit?
 #
-# BEFORE and AFTER are the insitu-render programs of the two. The grids are those of INSITU_TEST_DATA, the named ones or
-# a choice that has every cell type. Each is drawn as isosurfaces and as volumes in every way that a scene knows, on
-# every instruction set, on 1 and 3 ranks. Names the pictures that differ and exits with 1 where one does.
+# BEFORE and AFTER are the insitu-render programs of the two, and picture_difference is built beside AFTER. The grids
+# are those of INSITU_TEST_DATA, the named ones or a choice that has every cell type. Each is drawn as isosurfaces and
+# as volumes in every way that a scene knows, on every instruction set, on 1 and 3 ranks. Names the pictures that
+# differ, with how many pixels and by how much, and exits with 1 where one does.
 set -eu
 if [ $# -lt 2 ]; then
-    sed -n '2,6s/^# //p' "$0" >&2
+    sed -n '2,7s/^# //p' "$0" >&2
     exit 2
 fi
 before=$1
@@ -63,11 +64,6 @@ draw() {
     rm "$5/said"
 }
 
-# A picture's checksum without the time of writing that EXR files hold.
-undated() {
-    LC_ALL=C sed 's/[0-9]\{4\}:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]//' "$1" | cksum
-}
-
 different=0 compared=0
 for grid; do
     # shellcheck disable=SC2046 # four words
@@ -78,8 +74,8 @@ for grid; do
             draw "$after" $isa $ranks "$grid" "$place/after"
             for picture in "$place"/before/*; do
                 compared=$((compared + 1))
-                [ "$(undated "$picture")" = "$(undated "$place/after/${picture##*/}")" ] && continue
-                echo "$grid $isa $ranks: ${picture##*/}"
+                said=$("${after%/*}/picture_difference" "$picture" "$place/after/${picture##*/}") && continue
+                echo "$grid $isa $ranks: ${picture##*/}: $said"
                 different=$((different + 1))
             done
             rm -r "$place/before" "$place/after"

@@ -34,6 +34,11 @@ target_link_libraries(test_image_output PRIVATE
 add_test(NAME image_output COMMAND test_image_output ${CMAKE_CURRENT_BINARY_DIR}/image_output)
 set_tests_properties(image_output PROPERTIES TIMEOUT 120)
 
+# For compare_builds.sh.
+add_executable(picture_difference picture_difference.cpp)
+target_include_directories(picture_difference SYSTEM PRIVATE ${OPENIMAGEIO_INCLUDE_DIR})
+target_link_libraries(picture_difference PRIVATE insitu_flags ${OPENIMAGEIO_LIBRARY} ${OPENIMAGEIO_UTIL_LIBRARY})
+
 add_executable(test_decorations test_decorations.c)
 target_link_libraries(test_decorations PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA m)
 add_test(NAME decorations COMMAND test_decorations)
