@@ -461,18 +461,9 @@ static void warnings_of_swept_isovalues_are_told_once(void **state)
 
 static const char *work_folder = ".";
 
-/* Files are written where the program runs: each count of ranks has a folder of its own. */
-static bool enter_folder(void)
-{
-    char name[512];
-    snprintf(name, sizeof name, "%s/cinema_np%d", work_folder, rank_count);
-    mkdir(name, 0777);
-    return chdir(name) == 0;
-}
-
 static int run(void)
 {
-    if (!enter_folder()) return 1;
+    if (!enter_folder(work_folder, "cinema")) return 1;
     const struct CMUnitTest tests[] = {cmocka_unit_test(tables_have_a_line_a_picture),
                                        cmocka_unit_test(tables_of_several_images_have_all_columns),
                                        cmocka_unit_test(runs_that_begin_again_go_on_with_the_table),

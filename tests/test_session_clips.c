@@ -346,18 +346,6 @@ static void judge_all(test_mesh_kind kind, const session_input inputs[2])
         }
 }
 
-/* The rank's cells; with ghosts: all cells, of which the others' are ghosts. */
-static void take_part(const test_mesh *whole, bool with_ghosts, test_mesh *out)
-{
-    int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
-    int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
-    test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
-    test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
-    for (int64_t cell = 0; cell < out->cell_count && with_ghosts; cell++) out->ghosts[cell] = owners[cell] != own_rank;
-    test_free(owners);
-    test_free(all);
-}
-
 static void layers_are_clipped(void **state)
 {
     (void)state;
@@ -366,7 +354,7 @@ static void layers_are_clipped(void **state)
         memset(inputs, 0, sizeof inputs);
         test_mesh_lattice(kind, SIDE, 0.2, test_linear, &inputs[0].part);
         input_describe(&inputs[0]);
-        take_part(&inputs[0].part, kind % 2, &inputs[1].part);
+        take_own_cells(&inputs[0].part, TEST_RANDOM, SIDE, kind % 2, &inputs[1].part);
         input_describe(&inputs[1]);
         judge_all(kind, inputs);
         input_free(&inputs[0]);

@@ -125,12 +125,7 @@ typedef struct two_pictures {
 static two_pictures draw(MPI_Comm comm, const char *scene, const session_input *in)
 {
     two_pictures out = {0};
-    insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
-    const insitu_status status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
+    insitu_session *session = open_drawn(comm, scene, in);
     if (own_rank == 0) {
         assert_int_equal(caught_count, 2);
         out = (two_pictures){caught[0], caught[1]};

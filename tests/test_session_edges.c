@@ -168,12 +168,7 @@ static bool is_truth(const caught_picture *picture, const body *b, bool is_flat)
 /* The body is given where the caller wants it. */
 static caught_picture draw(MPI_Comm comm, const char *scene, const session_input *in, body *b)
 {
-    insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
-    const insitu_status status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
+    insitu_session *session = open_drawn(comm, scene, in);
     if (b) *b = make_body(&session_find_mesh(&session->meshes, "m")->cells, in->part.cell_count > 1);
     const caught_picture picture = take_caught();
     insitu_destroy(&session);

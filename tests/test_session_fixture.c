@@ -3,6 +3,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "memory.h"
 #include "session_image.h"
@@ -168,6 +170,35 @@ void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spo
     step_is_good(session, 2);
 }
 
+void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side, bool with_ghosts, test_mesh *out)
+{
+    int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
+    int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
+    test_partition(whole, dealt, side, rank_count, owners);
+    test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
+    for (int64_t cell = 0; cell < out->cell_count && with_ghosts; cell++) out->ghosts[cell] = owners[cell] != own_rank;
+    test_free(owners);
+    test_free(all);
+}
+
+const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
+                           "    outputs: [{path: a.exr}]\n";
+
+void all_are_told(session_input *in, const spoilt_case *cases, size_t count)
+{
+    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
+    for (size_t i = 0; i < count; i++) spoilt_is_told_to_all(session, in, &cases[i]);
+    insitu_destroy(&session);
+}
+
+bool enter_folder(const char *folder, const char *name)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s_np%d", folder, name, rank_count);
+    mkdir(path, 0777);
+    return chdir(path) == 0;
+}
+
 void free_caught(caught_picture *picture)
 {
     free(picture->rgba);
@@ -192,13 +223,25 @@ caught_picture take_caught(void)
     return picture;
 }
 
-caught_picture draw_once(insitu_session **session, const session_input *in)
+static void draw_well(insitu_session *session, const session_input *in)
 {
     forget_pictures();
-    assert_int_equal(hand_over(*session, in), INSITU_OK);
-    const insitu_status status = insitu_step(*session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(*session));
+    assert_int_equal(hand_over(session, in), INSITU_OK);
+    const insitu_status status = insitu_step(session, 0, 0);
+    if (status) fprintf(stderr, "%s\n", insitu_error(session));
     assert_int_equal(status, INSITU_OK);
+}
+
+insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in)
+{
+    insitu_session *session = open_session(comm, scene);
+    draw_well(session, in);
+    return session;
+}
+
+caught_picture draw_once(insitu_session **session, const session_input *in)
+{
+    draw_well(*session, in);
     const caught_picture picture = take_caught();
     insitu_destroy(session);
     return picture;

@@ -27,6 +27,9 @@ void assert_everywhere(bool is_well, const char *what, const char *file, int lin
 void assert_told(const insitu_session *session, insitu_status status, insitu_status expected, const char *const *words,
                  const char *file, int line);
 
+/* Goes into a folder of this name and the count of ranks, within the folder: each count's files are apart. */
+bool enter_folder(const char *folder, const char *name);
+
 /* MPI, and argv[1]: a folder for scene files. Returns what main returns. */
 int run_session_tests(int argc, char **argv, int (*run)(void));
 
@@ -53,6 +56,9 @@ void input_describe(session_input *in);
 void input_renew(session_input *in);
 void input_free(session_input *in);
 
+/* This rank's cells of the whole; with ghosts: all cells, of which the others' are ghosts. */
+void take_own_cells(const test_mesh *whole, test_partition_kind dealt, int side, bool with_ghosts, test_mesh *out);
+
 /* Set the mesh "m" and its field; the first status that is not OK. */
 insitu_status hand_over(insitu_session *session, const session_input *in);
 
@@ -74,6 +80,10 @@ typedef struct spoilt_case {
  * picture is drawn; once the input is renewed the next step draws. */
 void spoilt_is_told_to_all(insitu_session *session, session_input *in, const spoilt_case *c);
 
+/* A scene of one small picture of "f", to which that is told; and each of the cases in a session of it. */
+extern const char error_scene[];
+void all_are_told(session_input *in, const spoilt_case *cases, size_t count);
+
 /* Pictures caught on rank 0 since the last forget_pictures(). */
 typedef struct caught_picture {
     int width, height;
@@ -94,6 +104,9 @@ void free_caught(caught_picture *picture);
 
 /* The first picture caught on rank 0, from now on the caller's, and the only one; on other ranks one of nothing. */
 caught_picture take_caught(void);
+
+/* Opens a session, hands the input over, and takes a step, which is to be well. */
+insitu_session *open_drawn(MPI_Comm comm, const char *scene, const session_input *in);
 
 /* Hands the input over, takes a step, which is to be well, and its picture, and destroys the session. */
 caught_picture draw_once(insitu_session **session, const session_input *in);

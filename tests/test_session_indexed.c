@@ -233,8 +233,6 @@ static void an_index_that_nobody_needs_is_left_alone(void **state)
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
 
-static const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
-                                  "    outputs: [{path: a.exr}]\n";
 static int64_t *spoilt;
 
 static void by_index(session_input *in)
@@ -321,10 +319,8 @@ static void what_is_wrong_is_told_to_all(void **state)
 {
     (void)state;
     session_input in = {0};
-    insitu_session *session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
     input_create(&in, TEST_HEXES, 3, TEST_RANDOM, own_rank, rank_count);
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &in, &cases[i]);
-    insitu_destroy(&session);
+    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
     free(spoilt);
 }

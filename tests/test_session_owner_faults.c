@@ -3,10 +3,6 @@
 #include "test_owned_faces.h"
 #include "test_session_fixture.h"
 
-static const char error_scene[] = "images:\n  - name: a\n    size: [24, 16]\n    layers:\n      - volume: {field: f}\n"
-                                  "    outputs: [{path: a.exr}]\n";
-
-static insitu_session *session;
 static owned spoilt;
 
 /* The description of these is spoilt, or their arrays, on one rank. */
@@ -197,10 +193,8 @@ static void what_is_wrong_is_told_to_all(void **state)
 {
     (void)state;
     session_input in = {0};
-    session = open_session(MPI_COMM_WORLD, write_scene(error_scene));
     input_create(&in, TEST_POLYHEDRA, 3, TEST_RANDOM, own_rank, rank_count);
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) spoilt_is_told_to_all(session, &in, &cases[i]);
-    insitu_destroy(&session);
+    all_are_told(&in, cases, sizeof cases / sizeof cases[0]);
     input_free(&in);
     free_owned(&spoilt);
 }

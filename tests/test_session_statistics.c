@@ -267,18 +267,9 @@ static void conditions_hold_images_back(void **state)
 
 static const char *work_folder = ".";
 
-/* Files are written where the program runs: each count of ranks has a folder of its own. */
-static bool enter_folder(void)
-{
-    char name[512];
-    snprintf(name, sizeof name, "%s/statistics_np%d", work_folder, rank_count);
-    mkdir(name, 0777);
-    return chdir(name) == 0;
-}
-
 static int run(void)
 {
-    if (!enter_folder()) return 1;
+    if (!enter_folder(work_folder, "statistics")) return 1;
     const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_linear_fields_are_closed_forms),
                                        cmocka_unit_test(numbers_of_cells_are_sums),
                                        cmocka_unit_test(files_do_not_depend_on_the_partition),

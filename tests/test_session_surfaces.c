@@ -44,14 +44,7 @@ static void make_whole(test_mesh_kind kind, session_input *out)
 /* The rank's cells, listed its own way; with ghosts: all cells, of which the others' are ghosts. */
 static void take_part(const session_input *whole, test_partition_kind dealt, bool with_ghosts, session_input *out)
 {
-    int *owners = test_calloc((size_t)whole->part.cell_count, sizeof *owners);
-    int *all = test_calloc((size_t)whole->part.cell_count, sizeof *all);
-    test_partition(&whole->part, dealt, SIDE, rank_count, owners);
-    test_mesh_part(&whole->part, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, &out->part);
-    for (int64_t cell = 0; cell < out->part.cell_count && with_ghosts; cell++)
-        out->part.ghosts[cell] = owners[cell] != own_rank;
-    test_free(owners);
-    test_free(all);
+    take_own_cells(&whole->part, dealt, SIDE, with_ghosts, &out->part);
     if (!with_ghosts) test_mesh_turn(&out->part, 3 + (uint64_t)own_rank);
     test_mesh_shuffle(&out->part, 7 + (uint64_t)own_rank);
     input_describe(out);
@@ -59,12 +52,7 @@ static void take_part(const session_input *whole, test_partition_kind dealt, boo
 
 static insitu_session *open_with(MPI_Comm comm, const char *scene, const session_input *in)
 {
-    insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
-    const insitu_status status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
+    insitu_session *session = open_drawn(comm, scene, in);
     const char *warnings = insitu_last_report(session)->warnings;
     if (*warnings && !strstr(warnings, "left-handed")) fail_msg("warnings: %s", warnings);
     return session;

@@ -129,22 +129,11 @@ static void set_values(session_input *in, bool is_cell_centred, double step)
     in->field.count = count;
 }
 
-static insitu_session *begin(MPI_Comm comm, const char *scene, const session_input *in)
-{
-    insitu_session *session = open_session(comm, scene);
-    forget_pictures();
-    assert_int_equal(hand_over(session, in), INSITU_OK);
-    const insitu_status status = insitu_step(session, 0, 0);
-    if (status) fprintf(stderr, "%s\n", insitu_error(session));
-    assert_int_equal(status, INSITU_OK);
-    return session;
-}
-
 static face_set truth_of(const char *scene, const session_input *whole, bool is_cell_centred)
 {
     face_set out = {0};
     if (own_rank == 0) {
-        insitu_session *session = begin(MPI_COMM_SELF, scene, whole);
+        insitu_session *session = open_drawn(MPI_COMM_SELF, scene, whole);
         out = find_truth(&whole->part, &session_find_mesh(&session->meshes, "m")->cells, is_cell_centred);
         insitu_destroy(&session);
     }
@@ -165,18 +154,6 @@ static void keep(caught_picture *out)
     caught_count = 0;
 }
 
-/* Takes this rank's part; with ghosts, all cells, of which the others' are ghosts. */
-static void take_part(const test_mesh *whole, bool with_ghosts, test_mesh *out)
-{
-    int *owners = test_calloc((size_t)whole->cell_count, sizeof *owners);
-    int *all = test_calloc((size_t)whole->cell_count, sizeof *all);
-    test_partition(whole, TEST_RANDOM, SIDE, rank_count, owners);
-    test_mesh_part(whole, with_ghosts ? all : owners, with_ghosts ? 0 : own_rank, out);
-    for (int64_t cell = 0; cell < out->cell_count && with_ghosts; cell++) out->ghosts[cell] = owners[cell] != own_rank;
-    test_free(owners);
-    test_free(all);
-}
-
 /* Two steps, each of values of its own. */
 static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
 {
@@ -184,7 +161,7 @@ static void check(test_mesh_kind kind, bool is_cell_centred, bool with_ghosts)
     insitu_session *session = NULL;
     const char *scene = write_scene(IMAGE("field: f, from: -0.6, to: 0.9"));
     test_mesh_lattice(kind, SIDE, 0.2, test_linear, &whole.part);
-    take_part(&whole.part, with_ghosts, &part.part);
+    take_own_cells(&whole.part, TEST_RANDOM, SIDE, with_ghosts, &part.part);
     for (int step = 0; step < 2; step++) {
         caught_picture alone = {0}, picture;
         set_values(&whole, is_cell_centred, step);
@@ -227,7 +204,7 @@ static void bounds_may_show_all_or_nothing(void **state)
     session_input part = {0};
     input_create(&part, TEST_HEXES, SIDE, TEST_RANDOM, own_rank, rank_count);
     for (int i = 0; i < 2; i++) {
-        insitu_session *session = begin(MPI_COMM_WORLD, write_scene(scenes[i]), &part);
+        insitu_session *session = open_drawn(MPI_COMM_WORLD, write_scene(scenes[i]), &part);
         everywhere(find_drawn(session).count == (i ? 0 : 6 * SIDE * SIDE));
         caught_picture picture;
         keep(&picture);
