@@ -230,6 +230,22 @@ SIMD_INLINE bool kernel_position_before(const double *a, const double *b)
     return a[2] < b[2];
 }
 
+/* A cell's size: the cube root of its box's volume, or its longest side where that is flat. */
+static inline double kernel_size_of(const double (*world)[3], int count)
+{
+    double volume = 1, longest = 0;
+    for (int a = 0; a < 3; a++) {
+        double low = world[0][a], high = low;
+        for (int i = 1; i < count; i++) {
+            low = world[i][a] < low ? world[i][a] : low;
+            high = world[i][a] > high ? world[i][a] : high;
+        }
+        volume *= high - low;
+        longest = high - low > longest ? high - low : longest;
+    }
+    return volume > 0 ? cbrt(volume) : longest;
+}
+
 /* Returns the face's vertices as bits of their places in the list, to which new ones are added. Returns 0 where there
  * would be more than four. */
 static int kernel_face_corners(const grid *g, int64_t face, int64_t vertices[4], int *count)

@@ -64,15 +64,20 @@ SIMD_INLINE float kernel_hold(double v, double limit)
     return (float)(v < -limit ? -limit : v > limit ? limit : v);
 }
 
-/* Does the cell show? */
-SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)
+/* Does any value between the least and the most of these show? */
+SIMD_INLINE bool kernel_values_show(const double *values, int count, const kernel_transfer *t)
 {
-    double low = c->values[0], high = low;
-    for (int i = 1; i < c->count; i++) {
-        low = c->values[i] < low ? c->values[i] : low;
-        high = c->values[i] > high ? c->values[i] : high;
+    double low = values[0], high = low;
+    for (int i = 1; i < count; i++) {
+        low = values[i] < low ? values[i] : low;
+        high = values[i] > high ? values[i] : high;
     }
     return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
+}
+
+SIMD_INLINE bool kernel_cell_shows(const kernel_cell *c, const kernel_transfer *t)
+{
+    return kernel_values_show(c->values, c->count, t);
 }
 
 /* f: values in the transfer's domain, held to 1e18 so that interpolation cannot overflow. */

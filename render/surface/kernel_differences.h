@@ -182,23 +182,11 @@ SIMD_INLINE void kernel_differences(const kernel_packet *p, const kernel_surface
     kernel_differentiate(p, &about, hit, normal);
 }
 
-/* Half the offset of differences in scaled units: by the cell's size, the cube root of its box's volume, or of its
- * longest side where that is flat. */
+/* Half the offset of differences in scaled units. */
 SIMD_INLINE float kernel_difference_reach(const kernel_packet *p, const render_surface_layer *layer,
                                           const kernel_cell *c)
 {
-    double volume = 1, longest = 0;
-    for (int a = 0; a < 3; a++) {
-        double low = c->world[0][a], high = low;
-        for (int i = 1; i < c->count; i++) {
-            low = c->world[i][a] < low ? c->world[i][a] : low;
-            high = c->world[i][a] > high ? c->world[i][a] : high;
-        }
-        volume *= high - low;
-        longest = high - low > longest ? high - low : longest;
-    }
-    const double size = volume > 0 ? cbrt(volume) : longest;
-    return (float)(0.5 * layer->difference * size * p->frame->job->space.scale);
+    return (float)(0.5 * layer->difference * kernel_size_of(c->world, c->count) * p->frame->job->space.scale);
 }
 
 /* ---- hits that wait ---- */

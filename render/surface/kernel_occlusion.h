@@ -1,6 +1,6 @@
-/* Do opaque surfaces hide a light or the sky from a hit? Every root in [t_near, t_far) does: whichever cell is asked
- * first, and on whichever rank, the answer is the same. Roots are found as those of primary rays are, but that nothing
- * else is asked of them: no normal, no colour, and no order. */
+/* Decides whether opaque surfaces hide a light or the sky from a hit. Any root in [t_near, t_far) blocks the ray, so
+ * the answer does not depend on which cell is traced first or on which rank. Roots are found as those of primary rays
+ * are, but they need no normal, no colour and no order. */
 #ifndef RENDER_KERNEL_OCCLUSION_H
 #define RENDER_KERNEL_OCCLUSION_H
 
@@ -29,36 +29,21 @@ typedef struct kernel_occlusion {
     int layer;
     const kernel_bundle *bundle;
     int first; /* the packet's first ray in the bundle */
-    /* The cell that is asked. */
+    /* The cell that the rays are traced in. */
     double (*world)[3];
     int vertex_count;
 } kernel_occlusion;
 
-/* The cube root of the cell's box's volume, or its longest side where that is flat. */
-static double kernel_occlusion_size(const kernel_occlusion *o)
-{
-    double volume = 1, longest = 0;
-    for (int a = 0; a < 3; a++) {
-        double low = o->world[0][a], high = low;
-        for (int i = 1; i < o->vertex_count; i++) {
-            low = o->world[i][a] < low ? o->world[i][a] : low;
-            high = o->world[i][a] > high ? o->world[i][a] : high;
-        }
-        volume *= high - low;
-        longest = high - low > longest ? high - low : longest;
-    }
-    return volume > 0 ? cbrt(volume) : longest;
-}
-
-/* Roots farther from the hit than the layer's contact. */
+/* Returns the rays whose root is farther from the hit than the layer's contact. */
 static __attribute__((noinline)) vm kernel_occlusion_beyond(const kernel_packet *p, const kernel_occlusion *o, vf t)
 {
-    const double reach = (double)o->surface->layer->contact * kernel_occlusion_size(o) * p->frame->job->space.scale;
+    const double size = kernel_size_of((const double(*)[3])o->world, o->vertex_count);
+    const double reach = (double)o->surface->layer->contact * size * p->frame->job->space.scale;
     const vf length = vf_sqrt((p->slope_x * p->slope_x + p->slope_y * p->slope_y) + 1.0f);
     return vf_le(vf_set((float)reach), (t - p->t_near) * length);
 }
 
-/* What clips cut away hides nothing. */
+/* Returns the rays whose root no clip cuts away. */
 static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_packet *p, const kernel_occlusion *o,
                                                                 vm hit, vf t)
 {
@@ -74,7 +59,7 @@ static __attribute__((noinline, cold)) vm kernel_occlusion_clip(const kernel_pac
     return vm_from_bits(kept);
 }
 
-/* Takes the roots found at t: their rays end. Returns these. */
+/* Ends the rays whose roots at t count, and returns these rays. */
 SIMD_INLINE vm kernel_occlusion_take(kernel_packet *p, const kernel_occlusion *o, vm found, vf t)
 {
     vm hit = vm_and(found, vm_and(vf_le(p->t_near, t), vf_lt(t, p->t_far)));
@@ -94,7 +79,7 @@ SIMD_INLINE void kernel_occlusion_tet(kernel_packet *p, const kernel_occlusion *
     if (vm_any(change)) kernel_occlusion_take(p, o, change, kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out));
 }
 
-/* Every root of the interval in turn, of each ray until one counts. */
+/* Takes the roots of the interval in turn, until one counts on each ray. */
 SIMD_INLINE void kernel_occlusion_roots(kernel_packet *p, const kernel_occlusion *o, const kernel_poly *poly,
                                         const kernel_interval *i, vm rays)
 {
@@ -184,7 +169,7 @@ SIMD_INLINE void kernel_occlusion_place(const kernel_packet *p, kernel_cell *c, 
     c->has_lines = c->has_normal = false;
 }
 
-/* The rays of the packet that the cell's surface blocks end. */
+/* Ends the rays of the packet that the cell's surface blocks. */
 static void kernel_occlusion_cell(kernel_packet *p, kernel_occlusion *o, const kernel_occluder *occluder)
 {
     const render_surface_layer *layer = o->surface->layer;

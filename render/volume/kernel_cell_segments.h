@@ -626,16 +626,6 @@ static __attribute__((noinline)) void kernel_poly_segments(kernel_packet *p, ker
 
 /* Volumes in polyhedra: samples on the profile. */
 
-SIMD_INLINE bool kernel_polyhedron_shows(const polyhedron *c, const kernel_transfer *t)
-{
-    double low = c->values[0], high = low;
-    for (int i = 1; i < c->vertex_count; i++) {
-        low = c->values[i] < low ? c->values[i] : low;
-        high = c->values[i] > high ? c->values[i] : high;
-    }
-    return kernel_interest_meets(&t->interest, kernel_hold(low, 3e38), kernel_hold(high, 3e38));
-}
-
 SIMD_INLINE void kernel_polyhedron_domain(polyhedron *c, const kernel_transfer *t)
 {
     for (int i = 0; i <= c->vertex_count; i++) c->f[i] = kernel_hold((c->values[i] - t->low) * t->inverse_width, 1e18);
@@ -689,7 +679,7 @@ static polyhedron *kernel_polyhedron_ready(kernel_packet *p, int volume, int par
     polyhedron *c = p->thread->find_polyhedron(p->thread->polyhedra, p->frame->job->parts[part].cells, field, part,
                                                p->frame->surface_count + volume, index);
     if (!c) p->thread->out_of_memory = true;
-    if (!c || !c->is_finite || !kernel_polyhedron_shows(c, transfer)) return NULL;
+    if (!c || !c->is_finite || !kernel_values_show(c->values, c->vertex_count, transfer)) return NULL;
     if (!c->is_placed) {
         kernel_polyhedron_place(c, p);
         kernel_polyhedron_domain(c, transfer);

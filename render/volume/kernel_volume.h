@@ -25,25 +25,36 @@
 #include "render.h"
 #include "simd.h"
 
+/* Returns a cell that packets on their own meet. Layers of volumes are counted on from those of surfaces. */
+SIMD_INLINE kernel_cell *kernel_volume_cell(const kernel_packet *p, int volume, int part, uint32_t index)
+{
+    const grid_field *field = &p->frame->job->volumes[volume].field.fields[part];
+    return kernel_cell_find(p, p->frame->surface_count + volume, part, field, index);
+}
+
+/* Makes a cell other than a polyhedron ready for rays; false where it does not show. */
+SIMD_INLINE bool kernel_volume_ready(kernel_cell *c, const kernel_packet *p, const kernel_transfer *transfer)
+{
+    if (!c->is_finite || !kernel_cell_shows(c, transfer)) return false;
+    if (!c->is_placed) {
+        kernel_cell_place(c, p, p->frame->job->parts[c->part].cells);
+        kernel_cell_domain(c, transfer);
+    }
+    return true;
+}
+
 static void kernel_volume_leaf(kernel_packet *p, void *opaque_state, int part, const uint32_t *cells, int count,
                                vm rays)
 {
     kernel_volume_state *state = opaque_state;
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
-    const grid_field *field = &p->frame->job->volumes[state->volume].field.fields[part];
-    const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
-        /* Layers of volumes are counted on from those of surfaces. */
-        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count + state->volume, part, field, cells[n]);
+        kernel_cell *c = kernel_volume_cell(p, state->volume, part, cells[n]);
         if (c->type == GRID_POLYHEDRON) {
             kernel_polyhedron_volume(p, state, part, cells[n], rays);
             continue;
         }
-        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
-        if (!c->is_placed) {
-            kernel_cell_place(c, p, g);
-            kernel_cell_domain(c, transfer);
-        }
+        if (!kernel_volume_ready(c, p, transfer)) continue;
         if (c->type == GRID_TET) {
             kernel_interval i;
             kernel_tet_interval(p, c, rays, false, &i);
@@ -119,19 +130,13 @@ static void kernel_segment_leaf(kernel_packet *p, void *opaque_state, int part, 
 {
     kernel_segment_state *state = opaque_state;
     const kernel_transfer *transfer = &p->frame->volumes[state->volume];
-    const grid_field *field = &p->frame->job->volumes[state->volume].field.fields[part];
-    const grid *g = p->frame->job->parts[part].cells;
     for (int n = 0; n < count; n++) {
-        kernel_cell *c = kernel_cell_find(p, p->frame->surface_count + state->volume, part, field, cells[n]);
+        kernel_cell *c = kernel_volume_cell(p, state->volume, part, cells[n]);
         if (c->type == GRID_POLYHEDRON) {
             kernel_polyhedron_segments(p, state, part, cells[n], rays);
             continue;
         }
-        if (!c->is_finite || !kernel_cell_shows(c, transfer)) continue;
-        if (!c->is_placed) {
-            kernel_cell_place(c, p, g);
-            kernel_cell_domain(c, transfer);
-        }
+        if (!kernel_volume_ready(c, p, transfer)) continue;
         if (c->type == GRID_TET) {
             kernel_double_cell precise;
             if (state->list->is_double) kernel_double_begin(p->frame, p->tile, c, transfer, &precise);

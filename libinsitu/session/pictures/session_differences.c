@@ -32,7 +32,7 @@ typedef struct differing {
     int near_count;
     int *near;
     render_box *boxes;
-    /* Of a round. */
+    /* The round's hits, their samples, and the hits that other ranks are asked about. */
     int64_t first, count;
     render_samples_about *samples;
     int64_t *asked; /* the hits that are asked about, in the order of the mail */
@@ -40,7 +40,7 @@ typedef struct differing {
 
 /* ---- what ranks know of each other --------------------------------------------------------------------------- */
 
-/* Greatest ends of the surfaces' fields, the lower ones negated; the most rounds; has any rank failed? */
+/* All are maxima over the ranks: the ends of the surfaces' fields (lower ones negated), the rounds, and a failure. */
 enum { SHARED_ROUNDS = 2 * RENDER_MAX_ISOVALUES, SHARED_FAILURE, SHARED };
 
 static insitu_status share_ranges(differing *d, base_error *error)
@@ -52,7 +52,8 @@ static insitu_status share_ranges(differing *d, base_error *error)
         shared[2 * i] = -ranges[i][0];
         shared[2 * i + 1] = ranges[i][1];
     }
-    shared[SHARED_ROUNDS] = (double)((d->list->count + d->round_hits - 1) / d->round_hits);
+    const int64_t rounds = (d->list->count + d->round_hits - 1) / d->round_hits;
+    shared[SHARED_ROUNDS] = (double)rounds;
     shared[SHARED_FAILURE] = error->status != INSITU_OK;
     insitu_status status =
         session_mpi(error, MPI_Allreduce(MPI_IN_PLACE, shared, SHARED, MPI_DOUBLE, MPI_MAX, d->comm), "MPI_Allreduce");
@@ -66,7 +67,7 @@ static insitu_status share_ranges(differing *d, base_error *error)
     return INSITU_OK;
 }
 
-/* Hits are in this rank's box, and their samples no farther from it than the farthest reach. */
+/* Hits lie in this rank's box, so their samples are no farther from it than the farthest reach. */
 static void keep_near(differing *d)
 {
     const render_box *own = &d->boxes[d->rank];
@@ -123,7 +124,7 @@ static bool write_questions(differing *d, session_mail *out)
     return true;
 }
 
-/* Makes answers of the questions, which words are aligned for. False where memory ran out. */
+/* Answers the questions, for which the words are aligned. Returns false where memory ran out. */
 static bool write_answers(const differing *d, const session_mail *in, session_mail *out, base_error *error)
 {
     const int64_t count = in->total / QUESTION_WORDS;
@@ -137,7 +138,7 @@ static bool write_answers(const differing *d, const session_mail *in, session_ma
     return true;
 }
 
-/* What failed before is told by the next delivery. */
+/* An error on any rank is passed to all ranks by the next delivery. */
 static insitu_status ask_others(differing *d, base_error *error)
 {
     session_mail asked = {0}, questions = {0}, answered = {0}, answers = {0};

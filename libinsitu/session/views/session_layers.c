@@ -83,6 +83,14 @@ static grid_field absent_field(void)
     return (grid_field){.values = {(const char *)&no_number, 0, true, false}, .component_count = 1};
 }
 
+/* A part's field; scalar: NULL where it has none. */
+static void place_scalar(session_layers *layers, ptrdiff_t at, const session_mesh *mesh, const session_scalar *scalar,
+                         bool wants_ranges)
+{
+    layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
+    if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
+}
+
 /* slot: which run of part_count fields. */
 static render_field place_field(const session_meshes *meshes, session_layers *layers, int slot,
                                 const scene_field *field, bool wants_ranges)
@@ -93,10 +101,7 @@ static render_field place_field(const session_meshes *meshes, session_layers *la
     for (int i = 0; i < session_part_slots(meshes); i++) {
         const session_mesh *mesh = session_part(meshes, i);
         if (!is_part(mesh)) continue;
-        const session_scalar *scalar = session_find_scalar(mesh, field);
-        layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
-        if (scalar && wants_ranges) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
-        at++;
+        place_scalar(layers, at++, mesh, session_find_scalar(mesh, field), wants_ranges);
     }
     return out;
 }
@@ -128,9 +133,7 @@ static render_field place_distances(const session_meshes *meshes, session_layers
         const session_mesh *mesh = session_part(meshes, i);
         if (!is_part(mesh)) continue;
         const session_scalar *scalar = session_find_scalar(mesh, field) ? session_find_distance(mesh, plane) : NULL;
-        layers->fields[at] = scalar ? session_scalar_field(mesh, scalar) : absent_field();
-        if (scalar) layers->ranges[at] = session_scalar_ranges(mesh, scalar);
-        at++;
+        place_scalar(layers, at++, mesh, scalar, true);
     }
     return out;
 }
