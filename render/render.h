@@ -132,7 +132,7 @@ typedef struct render_waiting_hit {
     float t, reach;       /* of its samples, before and behind it along each axis; scaled units */
 } render_waiting_hit;
 
-/* What it looks like: the cell's gradient in camera axes, and the colour before light falls on it. */
+/* The look of such a hit: the cell's gradient in camera axes, and the colour before light falls on it. */
 typedef struct render_waiting_look {
     float normal[3], colour[3];
 } render_waiting_look;
@@ -231,10 +231,10 @@ typedef enum render_integration { RENDER_SAMPLES, RENDER_SEGMENTS } render_integ
 
 /* The cells that isosurfaces cross, kept side by side for other pictures of the same cells and values: what a picture
  * needs of 662,000 of 12 million tets lies in 40 MiB then, in the order of the tree (docs/decisions/find.md has the
- * gain). A frame whose job has one fills it with what is not in it yet: parts of tets alone or hexes alone, with float32
- * coordinates and values at vertices, of opaque surfaces in one colour with the cells' gradients for normals (hexes: robust
- * roots), by RENDER_BINNED and all pixels, of parts most of whose box the picture has, up to 64 MiB in all. Pictures
- * are the same to the last bit. For one frame at a time. */
+ * gain). A frame whose job has one fills it with what is not in it yet: parts of tets alone or hexes alone, with
+ * float32 coordinates and values at vertices, of opaque surfaces in one colour with the cells' gradients for normals
+ * (hexes: robust roots), by RENDER_BINNED and all pixels, of parts most of whose box the picture has, up to 64 MiB in
+ * all. Pictures are the same to the last bit. For one frame at a time. */
 typedef struct render_active_cells render_active_cells;
 render_active_cells *render_active_cells_create(void); /* NULL: no memory */
 void render_active_cells_free(render_active_cells *active);
@@ -264,7 +264,7 @@ typedef enum render_paint {
                        isovalue among the job's */
 } render_paint;
 
-/* What light has to come by, of hits painted RENDER_UNLIT: render_light.h. */
+/* The shadows and ambient occlusion of hits painted RENDER_UNLIT: render_light.h. */
 typedef struct render_occlusion {
     uint32_t lights; /* those that cast shadows, a bit each */
     int samples;     /* of ambient occlusion: rays of a hit, 0 .. 64; 0: none */

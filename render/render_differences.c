@@ -1,4 +1,4 @@
-/* Threads take hits a chunk at a time, so that cells that are fetched for one of them are there for its neighbours. */
+/* Threads take hits a chunk at a time, so that cells fetched for one hit are at hand for its neighbours. */
 #include "render_differences.h"
 
 #include <math.h>
@@ -42,7 +42,7 @@ render_box render_differences_box(const render_job *job)
 /* Scaled units, of which a scene is about one: points and float32 boxes are off by less. */
 static const double box_margin = 1e-5;
 
-/* The points are on a cross of two reaches' size around the hit: does one of its bars meet the box? */
+/* Does one bar of the cross meet the box? The points are the ends of a cross that is two reaches wide about the hit. */
 bool render_differences_meet(const render_job *job, const render_waiting_hit *hit, const render_box *box)
 {
     const uint32_t width = (uint32_t)job->camera.width;
@@ -117,7 +117,7 @@ bool render_differences_sort(const render_job *job, render_waiting_list *list)
 
 /* ---- samples and light ----------------------------------------------------------------------------------------- */
 
-/* What threads do with a chunk of hits. */
+/* The work of all threads: to sample about hits, or to light them, a chunk at a time. */
 typedef struct chunk_work {
     kernel_frame frame;
     const render_waiting_hit *hits;
@@ -194,7 +194,7 @@ insitu_status render_differences_light(const render_job *job, const render_waiti
                                        const render_samples_about *samples, int64_t first, int64_t count, fragment *out,
                                        base_error *error)
 {
-    /* Hits, samples and fragments are numbered alike: from the first on. */
+    /* Hits, samples and fragments have the same numbers, from first on. */
     const render_waiting_list some = {list->items + first, list->looks + first, count, count};
     chunk_work work = {.list = &some, .merged = samples, .out = out};
     return count ? work_on_all(job, &work, 0, count, error) : INSITU_OK;

@@ -1,10 +1,10 @@
 /* Normals by central differences whose samples lie in the cells of any rank.
  *
  * A frame whose job has a waiting list is traced first: its hits by differences go to that list. Six samples about each
- * are asked of this rank's cells and of every rank whose box one of their points is in, merged, and make the normal
- * that the hit is lit by. A rank that is asked finds the hit's pixel, tile and ray by the camera, which all have, and
- * samples in that tile's space as the rank with the hit does: to the same bits as if all cells were here. A sample of
- * cells that overlap is the least of theirs, on whichever ranks they are. */
+ * are taken in this rank's cells and by every rank whose box holds one of their points. They are merged and make the
+ * normal that the hit is lit by. A rank that is asked finds the hit's pixel, tile and ray from the camera, which all
+ * ranks have, and samples in that tile's space as the rank with the hit does. So the bits are those of a rank that has
+ * all cells. Where cells overlap, the sample is the least of their values, on whichever ranks they are. */
 #ifndef RENDER_RENDER_DIFFERENCES_H
 #define RENDER_RENDER_DIFFERENCES_H
 
@@ -16,13 +16,14 @@
 /* Returns the box of all cells on this rank that may have samples. */
 render_box render_differences_box(const render_job *job);
 
-/* Is a hit of the job to wait for others? */
+/* Does a hit of the job wait for samples of other ranks? */
 bool render_has_differences(const render_job *job);
 
-/* The ends of each surface's field on this rank, by which those of all are found. */
+/* Finds the ends of each surface's field on this rank, from which those over all ranks are made. */
 void render_differences_ranges(const render_job *job, double ranges[RENDER_MAX_ISOVALUES][2]);
 
-/* Brings neighbouring pixels' hits together, for speed alone. False where memory ran out: they are as they were. */
+/* Brings neighbouring pixels' hits together, for speed alone. Returns false, and leaves their order, where memory ran
+ * out. */
 bool render_differences_sort(const render_job *job, render_waiting_list *list);
 
 /* May one of the hit's points be in the box? */

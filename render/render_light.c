@@ -1,4 +1,4 @@
-/* Hits' rays in the spaces that kernels want them in (kernel_occluders.h, kernel_bundle.h), and hits' colours. */
+/* Takes the rays of hits into the spaces of the kernels (kernel_occluders.h, kernel_bundle.h), and lights the hits. */
 #include "render_light.h"
 
 #include <math.h>
@@ -80,12 +80,13 @@ struct render_occluders {
     int threads;
 };
 
-/* Which of a chunk's rays: of a hit, into the hemisphere, or from RENDER_MAX_SAMPLES on towards a light. */
+/* A ray of a chunk: the hit's number, and the ray's: a sample of the hemisphere, or a light from RENDER_MAX_SAMPLES
+ * on. */
 typedef struct ray_name {
     int16_t hit, number;
 } ray_name;
 
-/* What a thread traces with. Its frame is a copy whose job is its own, so that the camera can be moved from space to
+/* The state of a thread. Its frame is a copy with a job of its own, so that the camera can be moved from space to
  * space. */
 typedef struct tracer {
     const render_occluders *of;
@@ -226,10 +227,10 @@ static void ask_cell(tracer *t, int32_t occluder)
     t->kernels->occlude_by_cell(&t->frame, &t->thread, &t->bundle, &t->of->trees.cells[occluder]);
 }
 
-/* A doubt whose cell has been asked, for all the rays that doubt it. */
+/* Marks a doubt whose cell has been traced for all its rays. */
 enum { ASKED = -1 };
 
-/* Asks the cells of a hit's doubts, of which there are count, of the rays into the hemisphere. */
+/* Traces a hit's rays into the hemisphere in the cells of its doubts, of which there are count. */
 static void settle_hemisphere(tracer *t, const render_hit *hit, kernel_doubt *doubts, int64_t count)
 {
     uint64_t open = 0;
@@ -433,7 +434,7 @@ static bool meets_box(const double from[3], const double direction[3], double re
         const double low = box->lower[a] - margin - from[a], high = box->upper[a] + margin - from[a];
         if (!(low <= high)) return false;
         if (fabs(direction[a]) < 1e-9) {
-            /* So little that only rays far longer than the scene would leave the slab by it. */
+            /* The slope is so small that only a ray far longer than the scene would leave the slab. */
             if (low > 0 || high < 0) return false;
             continue;
         }

@@ -30,24 +30,24 @@ typedef struct render_hit {
     float t, normal[2];
 } render_hit;
 
-/* A bit a ray: into the hemisphere; and towards lights. */
+/* A bit for each ray into the hemisphere, and for each ray towards a light. */
 typedef struct render_hit_rays {
     uint64_t samples;
     uint32_t lights, unused;
 } render_hit_rays;
 
-/* The hit of an unlit fragment of the job, with the rays it has. False: it is lit without any. */
+/* Makes the hit of an unlit fragment of the job, with its rays. Returns false where it is lit without any. */
 bool render_hit_of(const render_job *job, const fragment *f, render_hit *hit, render_hit_rays *rays);
 
-/* Where the hit's rays begin, and the directions of its samples, of unit length; scene units. */
+/* Finds where the hit's rays begin, in scene units, and the unit directions of its samples. */
 void render_hit_samples(const render_job *job, const render_hit *hit, double start[3],
                         double directions[RENDER_MAX_SAMPLES][3]);
 
-/* What may block rays of the job's hits on this rank. */
+/* This rank's occluders: the cells whose opaque surfaces may block rays of the job's hits. */
 typedef struct render_occluders render_occluders;
 
-/* Finds it, once for all hits of a frame: the cells that opaque surfaces cross. The job, without its occlusion and
- * camera, is to stay as it is until they are freed. On success *out is NULL where there is nothing. Local. */
+/* Finds them once for all hits of a frame. The job must stay as it is until they are freed, but for its occlusion and
+ * camera. On success *out is NULL where there are none. Local. */
 insitu_status render_occluders_create(const render_job *job, render_occluders **out, base_error *error);
 void render_occluders_free(render_occluders *occluders);
 
@@ -56,16 +56,15 @@ void render_occluders_free(render_occluders *occluders);
 insitu_status render_occlude(const render_occluders *occluders, const render_hit *hits, render_hit_rays *rays,
                              int64_t count, base_error *error);
 
-/* Around all cells of this rank that may block. */
+/* Returns the box around all cells of this rank that may block rays. */
 render_box render_occluder_box(const render_job *job);
 
-/* For each of count boxes that one of the hit's rays may meet: take(state, box's number, the rays that may). */
+/* Calls take(state, box's number, rays) for each of count boxes that rays of the hit may meet, with these rays. */
 typedef void render_box_taker(void *state, int box, const render_hit_rays *rays);
 void render_rays_to_boxes(const render_job *job, const render_hit *hit, const render_hit_rays *rays,
                           const render_box *boxes, int count, render_box_taker *take, void *state);
 
-/* Makes an unlit fragment what RENDER_LIGHT would have made it, by the light of the open rays; of a volume's fragment
- * nothing. */
+/* Lights an unlit fragment by its open rays, as RENDER_LIGHT would have; leaves fragments of volumes as they are. */
 void render_light_fragment(const render_job *job, const render_hit_rays *open, fragment *f);
 
 #endif

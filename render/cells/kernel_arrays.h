@@ -164,7 +164,7 @@ SIMD_INLINE void kernel_arrays_cells(const kernel_arrays *p, const uint32_t *cel
     }
 }
 
-/* Of the lanes' cells those that have a value. */
+/* Returns the lanes whose cells have a value. */
 SIMD_INLINE unsigned kernel_arrays_drawn(const kernel_arrays *p, const uint32_t *cells, unsigned lanes)
 {
     for (unsigned left = p->own ? lanes : 0; left; left &= left - 1)
@@ -208,7 +208,7 @@ SIMD_INLINE kernel_whole kernel_numbers_take(const kernel_numbers *c, vi index)
     return kernel_numbers_are_narrow(c) ? kernel_whole_widen(out.narrow) : out.wide;
 }
 
-/* Of numbers of which it is known beforehand whether all are narrow. */
+/* As above, where it is known beforehand whether all numbers are narrow. */
 SIMD_INLINE vm kernel_taken_lt(bool is_narrow, const kernel_taken *a, const kernel_taken *b)
 {
     return is_narrow ? vf_lt(a->narrow, b->narrow) : kernel_whole_lt(&a->wide, &b->wide);
@@ -257,7 +257,7 @@ SIMD_INLINE kernel_whole kernel_taken_whole(bool is_narrow, const kernel_taken *
     return is_narrow ? kernel_whole_widen(v->narrow) : v->wide;
 }
 
-/* What numbers are compared with: its value, the same as two float32, and the least float32 that is not below it. */
+/* A value to compare with: as it is, as two float32, and the least float32 that is not below it. */
 typedef struct kernel_level {
     double value;
     float middle, rest, least;

@@ -29,7 +29,7 @@
 /* The plane is left by no more than 1e-7 / KERNEL_DOUBLE_EDGE of the face's extent. */
 #define KERNEL_DOUBLE_EDGE 1e-3
 
-/* What float32 loses of an interval: its length in t, and the rests of its values. */
+/* The parts of an interval that float32 loses: its length in t, and the rests of its values. */
 typedef struct kernel_double {
     vf length, rest_in, rest_out;
 } kernel_double;

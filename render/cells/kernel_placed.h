@@ -30,7 +30,7 @@ typedef struct kernel_ordered {
     vi vertex;
 } kernel_ordered;
 
-/* In the lanes in which b is before a, they change places. */
+/* Swaps a and b in the lanes in which b is before a. */
 SIMD_INLINE void kernel_ordered_swap(bool is_narrow, kernel_ordered *a, kernel_ordered *b)
 {
     const vm before = kernel_taken_before(is_narrow, b->at, a->at);

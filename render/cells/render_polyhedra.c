@@ -79,7 +79,7 @@ void polyhedra_reset(polyhedron_store *store)
     store->bytes = 0;
 }
 
-/* In multiples of what any type needs. */
+/* Takes memory in multiples of the strictest alignment. */
 static size_t rounded(size_t bytes)
 {
     return (bytes + 63) & ~(size_t)63;

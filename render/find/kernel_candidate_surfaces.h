@@ -38,7 +38,7 @@ typedef struct kernel_poly_slab {
     vf at[8], thickness;
 } kernel_poly_slab;
 
-/* kernel_is_unfolded(). */
+/* Does what kernel_is_unfolded() does, in lanes. */
 SIMD_INLINE vm kernel_poly_lanes_unfolded(const kernel_poly_lanes *l, const kernel_differential *d, int count,
                                           vf inverse[3][3])
 {
@@ -67,7 +67,7 @@ SIMD_INLINE vm kernel_poly_lanes_unfolded(const kernel_poly_lanes *l, const kern
     return unfolded;
 }
 
-/* kernel_linearize(). Lanes whose volume is near float32's least are not usual. */
+/* Does what kernel_linearize() does, in lanes. Lanes whose volume is near float32's least are not usual. */
 SIMD_INLINE void kernel_poly_lanes_slab_of(kernel_poly_lanes *l, int type, kernel_poly_slab *out)
 {
     const kernel_differential *differential = kernel_cell_differential(type);
@@ -121,7 +121,8 @@ static __attribute__((noinline)) void kernel_poly_lanes_slab(kernel_poly_lanes *
         kernel_poly_lanes_slab_of(l, type, out);
 }
 
-/* kernel_slab_outline()'s points: vertices in the slab, and where lines between two vertices meet its sides. */
+/* Finds the points of kernel_slab_outline(): vertices in the slab, and crossings of lines between two with its
+ * sides. */
 static __attribute__((noinline)) void kernel_poly_lanes_ends(const kernel_finder *s, const kernel_poly_lanes *l,
                                                              const kernel_poly_slab *slab, kernel_ends_lanes *e)
 {
@@ -142,7 +143,7 @@ static __attribute__((noinline)) void kernel_poly_lanes_ends(const kernel_finder
     }
 }
 
-/* Of tets: where the isovalue crosses their edges. negative: their values are below the isovalue, exactly. */
+/* Finds where the isovalue crosses the edges of tets. negative has the vertices whose values are below it, exactly. */
 SIMD_INLINE void kernel_tet_lanes_ends(const kernel_finder *s, const kernel_poly_lanes *l, const vm negative[4],
                                        kernel_ends_lanes *e)
 {
@@ -170,7 +171,7 @@ SIMD_INLINE void kernel_poly_lanes_place(const kernel_finder *s, const kernel_ce
     }
 }
 
-/* Sets the values less the level, and what of usual they leave. */
+/* Sets the values less the level, and clears usual in lanes whose values are not. */
 SIMD_INLINE vf kernel_poly_lanes_values(const kernel_finder *s, const kernel_taken *v, int count,
                                         const kernel_level *level, kernel_poly_lanes *l)
 {
@@ -212,7 +213,7 @@ SIMD_INLINE void kernel_add_crossed(kernel_finder *s, const kernel_cells *c, int
 
 /* ---- tets ---- */
 
-/* Most of a leaf's are crossed where one is, so that all are placed. */
+/* All tets of a leaf are placed, because most are crossed where one is. */
 static __attribute__((noinline)) void kernel_find_tets(kernel_finder *s, const kernel_cells *c)
 {
     const unsigned all = (1u << c->count) - 1;
@@ -277,7 +278,7 @@ static void kernel_find_all_crossed(kernel_finder *s)
     for (int i = 0; i < KERNEL_FOUND_TETS; i++) kernel_find_crossed(s, &s->crossed[i]);
 }
 
-/* Puts these lanes' cells, which the isovalue crosses, to the crossed ones, all of which one isovalue crosses. */
+/* Adds these lanes' cells, which the isovalue crosses, to the crossed ones. One isovalue crosses all of those. */
 SIMD_INLINE void kernel_crossed_add(kernel_finder *s, const kernel_cells *from, int vertices, int value, unsigned lanes)
 {
     kernel_crossed *h = &s->crossed[kernel_found_number(from->type)];

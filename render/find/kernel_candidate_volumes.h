@@ -17,7 +17,7 @@ SIMD_INLINE void kernel_found_fetch(kernel_finder *s, uint32_t cell)
     kernel_cell_fetch(&s->cell, s->frame->job->parts[s->part].cells, &s->field->fields[s->part], cell);
 }
 
-/* All that a volume shows of cells of one type. */
+/* Finds all cells of one type that show in the volume. */
 static __attribute__((noinline)) void kernel_find_volumes(kernel_finder *s, const kernel_cells *c)
 {
     kernel_ends_lanes e = kernel_no_ends();

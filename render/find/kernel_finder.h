@@ -125,7 +125,7 @@ static inline void kernel_finder_begin(kernel_finder *s, const kernel_frame *f, 
     s->row_0 = (float)(-f->slope_y0 / f->slope_dy);
 }
 
-/* Least and largest. */
+/* Finds the least and the largest number. */
 typedef struct kernel_extent {
     float low, high;
 } kernel_extent;
@@ -275,7 +275,7 @@ static void kernel_find_alone(kernel_finder *s, kernel_cell *c, int value)
     if (kernel_outline_candidate(s, &o, &candidate)) kernel_add_candidate(s, &candidate);
 }
 
-/* Adds all of the fetched cell, where it shows in the volume. */
+/* Adds the whole fetched cell if it shows in the volume. */
 static void kernel_find_volume(kernel_finder *s)
 {
     kernel_cell *c = &s->cell;
@@ -306,7 +306,7 @@ SIMD_INLINE void kernel_found_place(const kernel_finder *s, vi vertex, vf out[3]
     }
 }
 
-/* Are the numbers of usual sizes? Others are for the cell alone. */
+/* Are the numbers of usual sizes? Cells with others are handled one by one. */
 SIMD_INLINE vm kernel_usual_place(vm usual, const vf place[3])
 {
     for (int a = 0; a < 3; a++) usual = vm_and(usual, vf_lt(vf_abs(place[a]), vf_set(1e15f)));
@@ -379,7 +379,7 @@ static void kernel_add_lanes(kernel_finder *s, const kernel_ends_lanes *e, unsig
         memcpy(ends[2 * a], &from, sizeof from);
         memcpy(ends[2 * a + 1], &to, sizeof to);
     }
-    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* not a number: that */
+    vf_store(near, vf_max((e->near + s->t_near) - pad, vf_set(-INFINITY))); /* -inf where that is not a number */
     vf_store(far, -vf_max(-((e->far + s->t_near) + pad), vf_set(-INFINITY)));
     if (list->capacity - list->count < SIMD_WIDTH && !s->grow(list)) return;
     for (; lanes; lanes &= lanes - 1) {

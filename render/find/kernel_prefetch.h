@@ -1,4 +1,4 @@
-/* Prefetches: the vertices of cells are asked of memory before they are read. */
+/* Prefetches cells' indices and vertices, so that they are in the cache when they are read. */
 #ifndef RENDER_KERNEL_PREFETCH_H
 #define RENDER_KERNEL_PREFETCH_H
 
@@ -12,7 +12,7 @@ SIMD_INLINE void kernel_prefetch_vertex(const grid *g, const grid_field *field, 
     for (int a = 0; a < 3; a++) __builtin_prefetch(g->coordinates[a].data + v * g->coordinates[a].stride);
 }
 
-/* Prefetches a cell's indices and its type. An offset is read now: no more waits for it than the prefetch. */
+/* Prefetches a cell's indices and its type. An offset is read at once, as only the prefetch waits for it. */
 SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
 {
     const int64_t first = kernel_arrays_first(g, cell, grid_type_vertices(g->cell_type));
@@ -20,7 +20,7 @@ SIMD_INLINE void kernel_prefetch_indices(const grid *g, uint32_t cell)
     if (g->cell_types) __builtin_prefetch(g->cell_types + cell * g->cell_types_stride);
 }
 
-/* But for those of polyhedra. */
+/* Prefetches a cell's vertices; a polyhedron's are left out. */
 SIMD_INLINE void kernel_prefetch_vertices(const grid *g, const grid_field *field, uint32_t cell)
 {
     const int vertices = grid_type_vertices(grid_cell_type(g, cell));

@@ -21,7 +21,7 @@ enum {
     MOST_FLOATS = 1 << 24 /* of all that is kept: 64 MiB */
 };
 
-/* A layer's isovalues in a part's field; records NULL: they are not kept. */
+/* The records of a layer's isovalues in a part's field; records is NULL where they are not kept. */
 typedef struct kept_cells {
     const grid *cells;
     const mmbvh *tree;
@@ -63,7 +63,7 @@ int64_t render_active_cells_bytes(const render_active_cells *active)
 
 /* ---- filling -------------------------------------------------------------------------------------------------- */
 
-/* Room for records, which threads take block by block. */
+/* An array of records, which threads take block by block. */
 typedef struct kernel_room {
     float *floats;
     int64_t blocks, taken;
@@ -139,7 +139,7 @@ static bool is_usual(const kernel_frame *frame, const kernel_surface *surface)
     return is_tets;
 }
 
-/* Along the camera's axes, from the eye, of a point of the tree's box that is given by its shares. */
+/* Finds a point of the tree's box, given by its shares, along the camera's axes from the eye. */
 static void place_in_box(const kernel_frame *frame, const mmbvh *tree, const double share[3], double at[3])
 {
     const render_camera *camera = &frame->job->camera;
@@ -163,8 +163,8 @@ static bool is_in_picture(const kernel_frame *frame, const double at[3])
     return column >= -0.5 && column < camera->width - 0.5 && row >= -0.5 && row < camera->height - 0.5;
 }
 
-/* Do three quarters of the part's box lie in the picture, and all of it in front of the eye? What shows of others the
- * tree finds sooner than all that is kept is gone through, let alone kept. */
+/* Do three quarters of the part's box lie in the picture, and all of it in front of the eye? For other
+ * parts the tree is faster than to go through all active cells, let alone to keep them. */
 static bool is_in_view(const kernel_frame *frame, const mmbvh *tree)
 {
     enum { SIDE = 4, POINTS = SIDE * SIDE * SIDE };
@@ -241,7 +241,7 @@ static bool is_of(const kept_cells *k, const kernel_frame *frame, int surface, i
            !memcmp(k->values, layer->values, (size_t)layer->value_count * sizeof *layer->values);
 }
 
-/* A place for the layer's cells on the part; NULL where there is no memory. */
+/* Returns a place for the layer's cells on the part; NULL where there is no memory. */
 static kept_cells *place(render_active_cells *active, const kernel_frame *frame, int surface, int part)
 {
     const render_part *p = &frame->job->parts[part];

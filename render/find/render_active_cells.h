@@ -5,8 +5,8 @@
 
 #include "kernel_types.h"
 
-/* Set frame->kept to what the job's kept cells have of it, which is put there first where it can be; thread_of is one
- * state a thread. Without memory nothing is kept. */
+/* Sets frame->active to the job's active cells, after adding those of this frame that may be kept. thread_of has a
+ * state for each thread. Without memory nothing is kept. */
 void render_active_cells_begin(kernel_frame *frame, kernel_thread *thread_of, int threads);
 void render_active_cells_end(kernel_frame *frame);
 

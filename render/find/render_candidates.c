@@ -32,7 +32,7 @@ static bool cut_trees(const kernel_frame *f, bool is_volume, render_subtrees *li
 
 /* ---- cells ---------------------------------------------------------------------------------------------------- */
 
-/* Another chunk. A list that is full stays so: cells that found no room are missing from it. */
+/* Adds a chunk. A list that is full stays so, because cells that found no room are missing from it. */
 static bool grow(kernel_candidate_list *list)
 {
     if (list->is_full) return false;
@@ -75,7 +75,7 @@ static int64_t tile_count(const kernel_frame *f)
     return tiles_across(f) * ((f->job->camera.height + KERNEL_TILE - 1) / KERNEL_TILE);
 }
 
-/* Pixels first .. last of a row or column, within its n-th tile. */
+/* Cuts pixels first .. last of a row or column to its n-th tile. */
 typedef struct within {
     unsigned first, last;
 } within;
@@ -86,7 +86,7 @@ static within within_tile(int first, int last, int tile)
     return (within){(unsigned)(from > 0 ? from : 0), (unsigned)(to < KERNEL_TILE - 1 ? to : KERNEL_TILE - 1)};
 }
 
-/* Their blocks, as bits. */
+/* Returns the pixels' blocks as bits. */
 static unsigned bits_of(within w)
 {
     return ~0u << w.first / KERNEL_BLOCK & ((2u << w.last / KERNEL_BLOCK) - 1);
@@ -106,7 +106,7 @@ static kernel_tile_candidate shown_within(const kernel_candidate *s, within colu
         .box = (uint16_t)(columns.first | columns.last << 4 | rows.first << 8 | rows.last << 12)};
 }
 
-/* at: where each tile's next one goes. */
+/* Bins the cells; at[tile] is the place of the tile's next one. */
 static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint32_t *at, kernel_tile_candidate *out)
 {
     for (const kernel_candidate *s = chunk->items, *end = s + chunk->count; s < end; s++)
@@ -117,7 +117,7 @@ static void bin_tiles(const kernel_candidate_chunk *chunk, int64_t across, uint3
         }
 }
 
-/* counts: threads × tiles, to where each thread's ones of each tile go. Returns how many they are in all. */
+/* Replaces counts (threads × tiles) by the places where each thread's cells of each tile begin. Returns their sum. */
 static uint64_t place_tiles(uint32_t *counts, int threads, int64_t tiles, uint32_t *starts)
 {
     uint64_t sum = 0;

@@ -4,8 +4,8 @@
 
 #include "kernel_types.h"
 
-/* Fill frame->shown, which render_candidates_free() frees; thread_of is one state a thread. Where more cells show than
- * pay, or there is no memory for them, it stays NULL, and tiles go down the trees themselves. */
+/* Fills frame->candidates, which render_candidates_free() frees; thread_of has a state for each thread. It stays NULL,
+ * and tiles go down the trees themselves, where more cells show than pay or memory runs out. */
 void render_candidates_find(kernel_frame *frame, kernel_thread *thread_of, int threads);
 /* As above, for the only volume's cells: fills frame->volume_candidates. */
 void render_candidates_find_volume(kernel_frame *frame, kernel_thread *thread_of, int threads);

@@ -14,7 +14,7 @@ bool render_subtrees_begin(render_subtrees *list, int64_t trees)
     return list->items;
 }
 
-/* The tree cut below its top, some SUBTREES of it. */
+/* Cuts the tree below its top into some SUBTREES subtrees. */
 static void add_tree(render_subtrees *list, const mmbvh *tree, int surface, int part)
 {
     const int64_t first = list->count;

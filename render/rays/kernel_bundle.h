@@ -1,10 +1,10 @@
 /* Rays that begin at hits: towards lights, and into the hemisphere above a surface.
  *
- * What such a ray meets must not depend on the partition. All cells are asked by the functions that primary rays ask
- * them by, which decide everything about a face from its vertices alone once they are in tile space. So the tile space
- * of a ray is made of the ray alone: of a hit's hemisphere the hit is the eye, and depth is along its normal; of a
- * light depth is along its direction, and tiles are those of a lattice across it, of which a ray takes the one that it
- * lies in. Rays of one space are a bundle; which of them are traced together changes nothing. */
+ * The cells that such a ray meets must not depend on the partition. Rays are traced in cells by the functions for
+ * primary rays, which decide everything about a face from its vertices alone once they are in tile space. So the tile
+ * space must depend on the ray alone. For a hit's hemisphere the hit is the eye, and depth is along its normal. For a
+ * light depth is along its direction, and tiles form a lattice across it; a ray takes the tile that it lies in. Rays of
+ * one space are a bundle, and it does not matter which of them are traced together. */
 #ifndef RENDER_KERNEL_BUNDLE_H
 #define RENDER_KERNEL_BUNDLE_H
 
@@ -34,7 +34,7 @@ SIMD_INLINE vf kernel_bundle_load(const float *list, int count)
     return vf_load(lanes);
 }
 
-/* Makes a packet of the rays from number first on, of those that are open. */
+/* Makes a packet of the open rays from number first on. */
 static inline void kernel_bundle_packet(kernel_packet *p, const kernel_frame *f, kernel_thread *thread,
                                         const kernel_bundle *b, int first)
 {

@@ -131,7 +131,7 @@ static inline void kernel_packet_tree_rays(kernel_packet *p, kernel_lanes *l)
     p->pad = 16 * 6e-8f * ((float)size + 2);
 }
 
-/* Before kernel_shade(). */
+/* Finds the directions to the eye; called before kernel_shade(). */
 static inline void kernel_packet_view(kernel_packet *p)
 {
     if (p->has_view) return;

@@ -1,4 +1,4 @@
-/* A hit's place in the scene, the directions of its rays into the hemisphere above it, and the box of what they may
+/* Finds a hit's position in the scene, the directions of its rays into the hemisphere, and the box that they may
  * meet. */
 #ifndef RENDER_RENDER_HITS_H
 #define RENDER_RENDER_HITS_H
@@ -9,7 +9,7 @@ typedef struct hit_axes {
     double right[3], up[3], forward[3];
 } hit_axes;
 
-/* Where the hit's rays begin, the way to the eye, and the normal with two directions across it. */
+/* The point where a hit's rays begin, the direction to the eye, and the normal with two directions across it. */
 typedef struct hit_place {
     double start[3], view[3];
     hit_axes a;
@@ -26,10 +26,10 @@ render_box hit_box(const render_job *job, bool (*is_wanted)(const render_surface
 /* Finds two unit vectors across a third, which is forward. */
 hit_axes hit_axes_around(const double n[3]);
 
-/* The unit normal that a fragment has in two numbers. */
+/* Unpacks the unit normal of an unlit fragment. */
 void hit_normal(const float folded[2], double n[3]);
 
-/* Of a hit at depth t of the pixel's ray; its rays begin lift scaled units above it. */
+/* Finds the frame of a hit at depth t on the pixel's ray. Its rays begin lift scaled units above it. */
 hit_place hit_place_of(const render_job *job, uint32_t pixel, float t, const float normal[2], double lift);
 
 /* The directions of the job's samples of the pixel, occlusion->samples of unit length: with z along the normal, */

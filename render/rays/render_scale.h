@@ -6,7 +6,7 @@
 
 /* Finds where the transfer's domain begins, and 1 / its width (kernel_types.h). */
 void render_transfer_domain(const render_transfer *t, double *low, double *inverse_width);
-/* In the domain: where a value is, and where entry i of the colours is. */
+/* Return the place in the domain of a value, and of entry i of the colours. */
 double render_domain_of(const render_transfer *t, double value);
 double render_entry_place(const render_transfer *t, int i);
 

@@ -20,9 +20,8 @@
 /* Normals out of gradients at the vertices: the three components are interpolated in the hit's cell just as values are,
  * so that they go on from cell to cell without a jump, and so does the light on the surface.
  *
- * Only what is seen gets one: a hit keeps its cell, and in the place of its normal where it lies in that, until no
- * nearer one can come. Then rays are taken one by one; those of a packet that hit the same cell share its
- * coefficients. */
+ * Only visible hits get one. Until no nearer hit can come, a hit keeps its cell, and its coordinates in the cell in the
+ * normal's place. Then rays are taken one by one, and those that hit the same cell share its coefficients. */
 
 /* A cell's gradients, in camera axes. */
 typedef struct kernel_smooth_cell {
@@ -33,7 +32,7 @@ typedef struct kernel_smooth_cell {
     double polynomial[3][8]; /* of all but tets */
 } kernel_smooth_cell;
 
-/* The gradient at a vertex, in camera axes; 0 where it has none. */
+/* Fetches the gradient at a vertex, in camera axes; 0 where it has none. */
 SIMD_INLINE void kernel_vertex_gradient(const kernel_frame *f, const render_vertex_gradients *gradients, int64_t vertex,
                                         double out[3])
 {
@@ -63,7 +62,7 @@ static void kernel_smooth_setup(const kernel_packet *p, const render_surface_lay
         kernel_polynomial_fit(out->polynomial[k], c->type, out->gradient[k]);
 }
 
-/* A point's barycentric coordinates in a tet of four corners; 1/4 each where the tet has no volume. */
+/* Computes a point's barycentric coordinates in a tet; 1/4 each where the tet has no volume. */
 SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double point[3], double out[4])
 {
     double d[4][3], sum = 0;
@@ -82,7 +81,7 @@ SIMD_INLINE void kernel_barycentric(const double corner[4][3], const double poin
     }
 }
 
-/* kernel_value_of() in double. */
+/* Does what kernel_value_of() does, in double. */
 SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, const double r[3])
 {
     double m = r[0] * r[1];
@@ -94,7 +93,7 @@ SIMD_INLINE double kernel_polynomial_at(const double c[8], bool is_pyramid, cons
     return is_pyramid ? v : v + r[2] * ((r[0] * c[5] + r[1] * c[6]) + m * c[7]);
 }
 
-/* place: the cell's own coordinates, or of a tet the point in tile space. */
+/* Interpolates the gradient. place has the cell's own coordinates; in a tet, the point in tile space. */
 SIMD_INLINE void kernel_smooth_at(const kernel_smooth_cell *s, const double place[3], float out[3])
 {
     const kernel_cell *c = &s->cell;
@@ -124,7 +123,8 @@ SIMD_INLINE void kernel_ray_point(const kernel_packet *p, int ray, float t, doub
     out[2] = (double)t;
 }
 
-/* Turn what hits have in the place of their normals into normals, in camera axes. Hits of no cell have theirs. */
+/* Replaces the coordinates in the normals' place by normals, in camera axes. Hits without a cell have theirs
+ * already. */
 static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet *p, const kernel_surface *s, vm rays,
                                                             vf t, const kernel_hit_cells *cells, vf normal[3])
 {
@@ -147,7 +147,7 @@ static __attribute__((noinline)) void kernel_vertex_normals(const kernel_packet 
     }
 }
 
-/* The gradient of a tet's field, by Cramer's rule in double; its length and sign do not matter. */
+/* Computes the gradient of a tet's field by Cramer's rule in double, up to its length and sign. */
 SIMD_INLINE void kernel_tet_normal(const kernel_packet *p, const kernel_cell *c, vf out[3])
 {
     double d[3][3], df[3], g[3];
@@ -182,13 +182,13 @@ typedef struct kernel_surface_state {
     bool is_opaque;
 } kernel_surface_state;
 
-/* Gradients in tile space to camera axes: undo the shear. */
+/* Takes gradients from tile space to camera axes by undoing the shear. */
 SIMD_INLINE void kernel_unshear(const kernel_packet *p, vf g[3])
 {
     g[2] -= g[0] * p->tile->shear_x + g[1] * p->tile->shear_y;
 }
 
-/* The unit normal that kernel_shade() lights by, in world axes. */
+/* Computes the unit normal that kernel_shade() lights by, in world axes. */
 SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3], vf out[3])
 {
     const render_camera *c = &p->frame->job->camera;
@@ -203,7 +203,7 @@ SIMD_INLINE void kernel_world_normal(const kernel_packet *p, const vf normal[3],
         out[a] = turn * ((unit[0] * (float)c->right[a] + unit[1] * (float)c->up[a]) + unit[2] * (float)c->forward[a]);
 }
 
-/* RENDER_NORMALS, as kernel_shade() finds it; and of RENDER_VALUES the isovalue's number. */
+/* Writes the normal of RENDER_NORMALS, as kernel_shade() finds it, or for RENDER_VALUES the isovalue's number. */
 static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_packet *p, const vf normal[3], vf kind,
                                                                  vf colour[3])
 {
@@ -215,8 +215,8 @@ static __attribute__((noinline, cold)) void kernel_paint_numbers(const kernel_pa
     kernel_world_normal(p, normal, colour);
 }
 
-/* RENDER_UNLIT: the normal on the octahedron |x| + |y| + |z| = 1, whose lower half is folded over the upper one (Meyer
- * et al. 2010). */
+/* Packs the normal of RENDER_UNLIT: as a point of the octahedron |x| + |y| + |z| = 1 whose lower half is folded over
+ * the upper one (Meyer et al. 2010). */
 static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p, const vf normal[3],
                                                          kernel_fragments *f)
 {
@@ -230,7 +230,7 @@ static __attribute__((noinline)) void kernel_paint_unlit(const kernel_packet *p,
     f->transmittance = vf_select(is_below, (1.0f - vf_abs(u)) * side_v, v);
 }
 
-/* Hits as the job paints them; kind: that of the fragments. */
+/* Paints hits as the job asks; kind is that of the fragments. */
 SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const vf normal[3], vf kind,
                               kernel_fragments *f)
 {
@@ -243,8 +243,8 @@ SIMD_INLINE void kernel_paint(kernel_packet *p, const kernel_surface *s, const v
         kernel_paint_numbers(p, normal, kind, f->colour);
 }
 
-/* A hit in the place of the nearest, as folded cells may have them: compositing decides, by bits that do not know which
- * cell came first. */
+/* Writes hits as deep as the nearest ones, which folded cells may have. Compositing decides between them by their bits,
+ * which do not depend on the order of cells. */
 static __attribute__((noinline, cold)) void kernel_emit_tied(kernel_packet *p, const kernel_surface *s, int value,
                                                              vm tied, vf t, const vf normal[3], const vf colour[3])
 {
@@ -286,8 +286,8 @@ static __attribute__((noinline, cold)) vm kernel_wait(kernel_packet *p, const ke
     return vm_andnot(hit, waits);
 }
 
-/* The places of hits: the depth, a vector along the normal (or the coordinates that kernel_vertex_normals() makes one
- * of), and the value that the surface is coloured by. */
+/* Hits: the depth, a vector along the normal (or the coordinates from which kernel_vertex_normals() makes one), and the
+ * value that the surface is coloured by. */
 typedef struct kernel_hit_places {
     vf t, normal[3], w;
 } kernel_hit_places;
@@ -300,19 +300,19 @@ SIMD_INLINE vf kernel_surface_value(const kernel_surface *s, int value, vf w)
     return w * (float)(1 / s->colour.inverse_width) + (float)s->colour.low;
 }
 
-/* Rays on which the sign changes between the interval's faces. */
+/* Returns the rays on which the sign changes between the interval's faces. */
 SIMD_INLINE vm kernel_changes_sign(const kernel_interval *i)
 {
     return vm_xor(vf_lt(i->v_in, vf_set(0)), vf_lt(i->v_out, vf_set(0)));
 }
 
-/* Rays whose interval is in front of the eye and of what is known. */
+/* Returns the rays whose interval is in front of the eye and of the nearest hit. */
 SIMD_INLINE vm kernel_is_near(const kernel_packet *p, const kernel_interval *i)
 {
     return vm_and(i->mask, vm_and(vf_le(i->t_in, p->t_far), vf_le(p->t_near, i->t_out)));
 }
 
-/* The hits that clips leave. */
+/* Returns the hits that clips keep. */
 static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *p, uint32_t clips, vm hit, vf t)
 {
     kernel_lanes l;
@@ -328,7 +328,7 @@ static __attribute__((noinline, cold)) vm kernel_clip_hits(const kernel_packet *
     return vm_from_bits(kept);
 }
 
-/* Hits in front of the eye that the surface's clips leave. */
+/* Returns the hits in front of the eye that the surface's clips keep. */
 SIMD_INLINE vm kernel_kept(const kernel_packet *p, const kernel_surface *s, vm hit, vf t)
 {
     const vm in_front = vm_and(hit, vf_le(p->t_near, t));
@@ -352,7 +352,7 @@ typedef struct kernel_ray_hit {
     float colour[3]; /* not lit */
 } kernel_ray_hit;
 
-/* Takes a hit of one ray in the place of the nearest. */
+/* Writes one ray's hit that is as deep as the nearest. */
 static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, const kernel_surface *s, int ray,
                                                             const kernel_ray_hit *hit)
 {
@@ -365,7 +365,8 @@ static __attribute__((noinline, cold)) void kernel_ray_tied(kernel_packet *p, co
     kernel_emit_tied(p, s, hit->value, tied, depth, normal, colour);
 }
 
-/* kernel_accept() of one ray, for two of a packet may be of one pixel. Returns its block, where something is nearer. */
+/* Does what kernel_accept() does for one ray, as two lanes may be of one pixel. Returns its block where the hit is
+ * nearer. */
 SIMD_INLINE unsigned kernel_ray_accept(kernel_tile_trace *t, int at, const kernel_ray_hit *hit)
 {
     const kernel_surface *s = t->surface;

@@ -1,11 +1,13 @@
-/* What opaque surfaces of this rank may block rays from hits with: the cells that an isovalue crosses, put once a frame
- * into trees of their own, with as many children to a node as a vector has lanes. A ray goes down alone, and asks all
- * children of a node, and all that is in a leaf, at once: so rays need nothing in common, and any root ends one.
+/* Occluders: the cells that an isovalue of this rank's opaque surfaces crosses, by which rays from hits may be blocked.
+ * Once a frame they are put into trees of their own, whose nodes have as many children as a vector has lanes. A ray
+ * goes down alone and tests all children of a node, or all pieces of a leaf, at once. So rays need nothing in common,
+ * and a ray ends at the first root that is found on it.
  *
  *     tets              their pieces of the surface as triangles, which a ray meets or not
- *     other cells       a box, and two planes that the surface lies between: most rays pass beside; of what is left,
- *     hexes             faces and the values there decide, a ray and its hex a lane (kernel_occlusion.h);
- *     what is in doubt  goes to the cell, as primary rays do
+ *     other cells       a box, and two planes that the surface lies between: most rays pass beside
+ *     hexes             the faces and the values there then decide, a ray and its hex a lane
+ *                       (kernel_occlusion_hexes.h)
+ *     rays in doubt     are traced in the cell, as primary rays are (kernel_occlusion.h)
  *
  * Everything is in tree space in float32, moved to the ray's origin and sheared along its largest axis (Woop, Benthin
  * and Wald 2013). A triangle's vertices lie on edges of the mesh and are computed from the edge alone; an edge function
@@ -13,8 +15,8 @@
  * between two. In tree space a place rounds by 6e-8 at most where coordinates are below 1: so do vertices, and the
  * ray's origin, which the lift of 4e-6 (render_light.h) outweighs.
  *
- * Boxes may be met too often, never too seldom; all else decides about a ray by the ray and the cell alone. So answers
- * do not depend on the trees, on the order in them, or on who holds which cell. */
+ * A box test may let a ray in that misses the box, but never the reverse. Everything else depends on the ray and the
+ * cell alone. So answers do not depend on the trees, on the order in them, or on which rank holds a cell. */
 #ifndef RENDER_KERNEL_OCCLUDERS_H
 #define RENDER_KERNEL_OCCLUDERS_H
 
@@ -75,7 +77,7 @@ typedef struct kernel_straight {
     bool is_open;
 } kernel_straight;
 
-/* A ray that a cell is to be asked of. */
+/* A ray that must be traced in a cell. */
 typedef struct kernel_doubt {
     int32_t ray, occluder;
 } kernel_doubt;
@@ -111,7 +113,7 @@ SIMD_INLINE void kernel_plumb_axes(const kernel_straight *ray, kernel_plumb *p)
     p->shear_y = ray->direction[p->ky] * p->stretch;
 }
 
-/* Two products and a difference round by 3 units of the places' size at most, the inverse by one more. */
+/* Two products and a difference round by at most 3 units of the positions' size, the inverse by one more. */
 SIMD_INLINE void kernel_plumb_begin(const kernel_straight *ray, float tree_size, kernel_plumb *p)
 {
     float size = tree_size;
@@ -131,7 +133,7 @@ SIMD_INLINE void kernel_plumb_begin(const kernel_straight *ray, float tree_size,
     kernel_plumb_axes(ray, p);
 }
 
-/* Boxes, in six rows, that the ray meets; between which distances. */
+/* Returns the boxes, given in six rows, that the ray meets, and the distances between which it is in them. */
 SIMD_INLINE vm kernel_plumb_boxes(const kernel_plumb *p, const float *rows, vf *low, vf *high)
 {
     *low = vf_set(0);
@@ -145,7 +147,7 @@ SIMD_INLINE vm kernel_plumb_boxes(const kernel_plumb *p, const float *rows, vf *
 
 /* ---- triangles ---- */
 
-/* The leaf's triangles that the ray meets; where. */
+/* Returns the leaf's triangles that the ray meets, and where. */
 SIMD_INLINE vm kernel_plumb_triangles(const kernel_plumb *p, const float *rows, vf *t)
 {
     const float *o = p->ray->origin;
@@ -182,7 +184,7 @@ SIMD_INLINE void kernel_plumb_level(const kernel_plumb *p, const float *rows, vf
         vf_load(rows + KERNEL_SLAB_BLUR * SIMD_WIDTH) * p->size + vf_load(rows + KERNEL_SLAB_THICKNESS * SIMD_WIDTH);
 }
 
-/* The leaf's cells that the ray may meet the surface in. */
+/* Returns the leaf's cells in which the ray may meet the surface. */
 SIMD_INLINE vm kernel_plumb_slabs(const kernel_plumb *p, const float *rows, vf *level, vf *rise, vf *thickness)
 {
     vf low, high;

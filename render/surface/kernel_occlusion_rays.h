@@ -10,8 +10,8 @@
 #include "render.h"
 #include "simd.h"
 
-/* Nodes, and leaves as ~leaf, that a ray is still to go to: a node has all its children there but the one gone to, and
- * is no deeper than a binary tree's leaf that is divided once more. */
+/* The stack of nodes, and of leaves as ~leaf, that a ray has yet to visit. Each node on the way down leaves all its
+ * children but one on it, and the tree is no deeper than a binary tree whose leaves are divided once more. */
 enum { KERNEL_PATH_STACK = (MMBVH_MAX_DEPTH + 1) * (SIMD_WIDTH - 1) + 1 };
 
 typedef struct kernel_path {
@@ -41,7 +41,7 @@ SIMD_INLINE int32_t kernel_path_next(kernel_path *path, const kernel_plumb *p)
     return -1;
 }
 
-/* Does a clip leave any of the places on the ray? */
+/* Do the clips keep the ray's crossing of any of the surfaces? */
 static __attribute__((noinline, cold)) bool kernel_straight_kept(const kernel_frame *f, const kernel_straight *ray,
                                                                  const int32_t *surfaces, unsigned met, vf t)
 {
@@ -76,13 +76,13 @@ static bool kernel_meets_triangles(const kernel_frame *f, const kernel_occluder_
 
 /* ---- slabs --------------------------------------------------------------------------------------------------- */
 
-/* What the leaf's cells know in lanes, of one ray. */
+/* The results of one ray for the leaf's cells, a cell a lane. */
 typedef struct kernel_leaf_lanes {
     int ray;
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
 } kernel_leaf_lanes;
 
-/* The cell in lane i. */
+/* Queues the ray for the cell in lane i: with other hexes, or as a doubt. Returns false where memory ran out. */
 static bool kernel_meets_slab(const kernel_occluders *o, kernel_straights *s, kernel_hex_pairs *pairs,
                               const kernel_leaf_lanes *lanes, int i, int32_t occluder)
 {
@@ -125,7 +125,7 @@ static bool kernel_meets_slabs(const kernel_occluders *o, kernel_straights *s, k
     return is_well;
 }
 
-/* Closes the rays that something blocks for certain, and notes the cells that the others are to be asked of. */
+/* Closes the rays that are blocked for certain, and notes the cells in which the others must be traced. */
 static void kernel_occlude(const kernel_frame *f, kernel_thread *thread, const kernel_occluders *o, kernel_straights *s)
 {
     kernel_hex_pairs pairs;

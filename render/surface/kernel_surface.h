@@ -34,8 +34,8 @@
 #include "render_polyhedra.h"
 #include "simd.h"
 
-/* Gives hits their normals by differences, of cells that are all here; or returns those alone that have theirs, and
- * lets the others wait. */
+/* Finds the hits' normals by differences and returns the hits; or, where other ranks may have samples, lets hits wait
+ * and returns the others. */
 SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int value, vm hit, vf t, vf reach,
                              kernel_look *look)
 {
@@ -44,7 +44,7 @@ SIMD_INLINE vm kernel_differ(kernel_packet *p, const kernel_surface *s, int valu
     return hit;
 }
 
-/* Hits of one isovalue in one cell (none given of polyhedra). */
+/* Hits of one isovalue in one cell. */
 typedef struct kernel_accepted {
     int value;
     vf t, reach;
@@ -52,7 +52,7 @@ typedef struct kernel_accepted {
     kernel_hit_cells cells;
 } kernel_accepted;
 
-/* Hits in the place of the nearest. */
+/* Writes hits at the same depth as the nearest ones as fragments of their own. */
 static __attribute__((noinline, cold)) void kernel_accept_tied(kernel_packet *p, const kernel_surface *s, vm tied,
                                                                const kernel_accepted *h)
 {
@@ -125,7 +125,7 @@ SIMD_INLINE void kernel_accept(kernel_packet *p, kernel_surface_state *state, co
         kernel_accept_transparent(p, state, hit, &h);
 }
 
-/* A function of its own, so that its vectors stay in registers beside the larger one of other cells. */
+/* This is a function of its own so that its vectors stay in registers; the one for other cells needs more. */
 static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kernel_surface_state *state,
                                                          const kernel_cell *c, int value, vm rays)
 {
@@ -152,7 +152,7 @@ SIMD_INLINE kernel_poly *kernel_poly_find(const kernel_packet *p, const kernel_c
     return &p->thread->polys[c - p->thread->cells->cells];
 }
 
-/* The crossings at the places that are visible; returns these. */
+/* Takes the crossings that are visible, and returns them. */
 SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                   const kernel_poly *poly, vm found, const kernel_point *at)
 {
@@ -170,7 +170,7 @@ SIMD_INLINE vm kernel_poly_accept(kernel_packet *p, kernel_surface_state *state,
     return hit;
 }
 
-/* Every crossing of the interval in turn; an opaque surface's first visible one is a ray's last. */
+/* Takes the crossings of the interval in turn. A ray ends at an opaque surface's first visible one. */
 SIMD_INLINE void kernel_poly_robust(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                     const kernel_poly *poly, const kernel_interval *i, vm rays)
 {
@@ -210,7 +210,7 @@ static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kern
     }
 }
 
-/* In a cell that is neither a polyhedron nor without finite values: its surface of an isovalue. The cell is in the
+/* Traces an isovalue's surface in a cell with finite values that is no polyhedron. The cell is in the
  * frame's coordinates. */
 SIMD_INLINE void kernel_cell_surface(kernel_packet *p, kernel_surface_state *state, const kernel_cell *c,
                                      kernel_poly *poly, int value, vm rays)
@@ -272,7 +272,7 @@ static void kernel_polyhedron_colours(polyhedron *c, const kernel_surface *s, in
     c->g[c->vertex_count] = (float)sum;
 }
 
-/* The gradient of a field that changes by df along d, by Cramer's rule. */
+/* Solves for the gradient of a field that changes by df along d, by Cramer's rule. */
 SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], double g[3])
 {
     double n[3][3];
@@ -284,7 +284,7 @@ SIMD_INLINE void kernel_gradient(const double d[3][3], const double df[3], doubl
     for (int a = 0; a < 3; a++) g[a] = (df[0] * n[0][a] + df[1] * n[1][a] + df[2] * n[2][a]) / volume;
 }
 
-/* The gradient of the field in a tet, in camera axes, in double. */
+/* Computes the gradient of the field in a tet, in camera axes and in double. */
 static void kernel_polyhedron_gradient(const kernel_packet *p, const polyhedron *c, int facet, double out[3])
 {
     const int *vertex = c->facets[facet].vertex, centre = c->vertex_count;
@@ -319,7 +319,7 @@ static vm kernel_polyhedron_sum_normals(const kernel_packet *p, const polyhedron
     return vm_and(hit, vf_eq(cover, vf_set(1)));
 }
 
-/* The gradient at the hits: of the positive tet that holds them, or is nearest to that. */
+/* Finds the gradient at the hits: that of the positive tet that holds a hit or comes nearest to holding it. */
 static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c, const kernel_passage *r, vm hit, vf t,
                                      vf out[3])
 {
@@ -340,7 +340,7 @@ static void kernel_polyhedron_normal(const kernel_packet *p, const polyhedron *c
 
 /* ---- gradients at vertices ---- */
 
-/* The mean of the vertices' gradients, in camera axes, as the centre has the mean of their values. */
+/* Computes the mean of the vertices' gradients, in camera axes. It is the centre's, as the mean of values is. */
 static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhedron *c,
                                             const render_vertex_gradients *gradients, double out[3])
 {
@@ -352,7 +352,7 @@ static void kernel_polyhedron_mean_gradient(const kernel_frame *f, const polyhed
     }
 }
 
-/* The tet that holds the hit, or is nearest to it, of those that do not lie outside; -1: none. */
+/* Returns the tet that holds the hit or is nearest to it, among those that do not lie outside; -1: there is none. */
 static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int32_t out[SIMD_WIDTH])
 {
     vf nearest = vf_set(INFINITY);
@@ -368,7 +368,7 @@ static void kernel_polyhedron_facets(const kernel_passage *r, vm hit, vf t, int3
     memcpy(out, &facet, sizeof facet);
 }
 
-/* Normals of RENDER_VERTEX. */
+/* Finds the normals of RENDER_VERTEX. */
 static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_packet *p, const polyhedron *c,
                                                                const render_surface_layer *layer,
                                                                const kernel_passage *r, vm hit, vf t, vf out[3])
@@ -402,7 +402,7 @@ static __attribute__((noinline)) void kernel_polyhedron_smooth(const kernel_pack
 
 /* ---- which rays to follow ---- */
 
-/* The steepest that the tet's field falls and rises along rays of the tile, a unit of depth. */
+/* Widens fall and rise by the steepest slopes of the tet's field along rays of the tile, per unit of depth. */
 static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet, double spread, double *fall,
                               double *rise)
 {
@@ -421,7 +421,7 @@ static void kernel_tet_slopes(const polyhedron *c, const polyhedron_facet *facet
     *rise = aside + g[2];
 }
 
-/* Bounds the slopes of all tets. Those without a volume have any slope. */
+/* Bounds the slopes of all tets. A tet without a volume may have any slope. */
 static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, const kernel_packet *p)
 {
     const double spread = p->frame->job->camera.is_orthographic ? 0 : (double)p->tile->radius;
@@ -435,15 +435,15 @@ static __attribute__((noinline)) void kernel_polyhedron_slopes(polyhedron *c, co
     }
 }
 
-/* In the values' scale, and such that products of two are numbers. */
+/* Scales the bound as the values are scaled, and holds it so that products of two are finite. */
 SIMD_INLINE vf kernel_slope_of(const polyhedron *c, double slope)
 {
     const double scaled = slope * c->scale;
     return vf_set(scaled <= 1e15 ? (float)scaled : 1e15f);
 }
 
-/* Rays with one sign at both faces that may have another between. Where tets overlap, or a quad's patch and its
- * triangles are not met by the same rays, the bound does not hold. */
+/* Returns the rays that have one sign at both faces and may have the other between. The bound does not hold where tets
+ * overlap, or where a ray meets a quad's triangles and not its patch, or the reverse. */
 SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, const kernel_passage *r,
                                        const kernel_stay *stay)
 {
@@ -467,8 +467,8 @@ SIMD_INLINE vm kernel_polyhedron_turns(const kernel_packet *p, polyhedron *c, co
  */
 typedef struct kernel_walk {
     vm open;                    /* rays whose profile goes on */
-    vm below;                   /* who is below the isovalue at the end of the piece */
-    vm jump_in, jump_out;       /* rays of which the face's value is on the other side than the profile's end */
+    vm below;                   /* rays below the isovalue at the end of the piece */
+    vm jump_in, jump_out;       /* rays whose face value and profile's end are on different sides */
     kernel_profile_piece piece; /* each ray's own */
     vf t, w;                    /* of the crossing that was found, and the colour field there */
 } kernel_walk;
@@ -495,7 +495,8 @@ SIMD_INLINE void kernel_piece_take(vm rays, const kernel_profile_piece *from, ke
     to->w1 = vf_select(rays, from->w1, to->w1);
 }
 
-/* To the next piece; returns rays of left whose profile goes on behind it. The jump at the last face is a piece too. */
+/* Goes to the next piece. Returns the rays of left whose profile goes on behind it; a jump at the last face is a
+ * piece. */
 SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, vm left, kernel_walk *walk)
 {
     kernel_profile_piece next = walk->piece;
@@ -505,13 +506,13 @@ SIMD_INLINE vm kernel_walk_on(const kernel_passage *r, const kernel_stay *stay, 
     return vm_and(inside, vm_or(walk->jump_out, kernel_profile_open(stay, &next, inside)));
 }
 
-/* A little more than t, by one or two roundings. */
+/* Returns a number that is one or two roundings above t. */
 SIMD_INLINE vf kernel_just_behind(vf t)
 {
     return t + (vf_abs(t) * 2.4e-7f + 1e-30f);
 }
 
-/* The next crossing of every open ray; returns who has one. */
+/* Finds the next crossing of each open ray; returns the rays that have one. */
 static vm kernel_walk_next(const kernel_passage *r, const kernel_stay *stay, kernel_walk *walk)
 {
     const vm jump = walk->jump_in;
@@ -547,7 +548,7 @@ static void kernel_polyhedron_accept(kernel_packet *p, kernel_surface_state *sta
     kernel_accept(p, state, NULL, value, hit, &at);
 }
 
-/* The crossings of a stay. An opaque surface's first before the eye is the ray's last. */
+/* Takes the crossings of a stay. A ray ends at an opaque surface's first one in front of the eye. */
 static void kernel_polyhedron_cross(kernel_packet *p, kernel_surface_state *state, int value, vm wanted,
                                     kernel_passage *r, kernel_stay *stay)
 {
@@ -600,7 +601,7 @@ static void kernel_polyhedron_surfaces(kernel_packet *p, kernel_surface_state *s
 
 /* ---- the blocks of a tile that a cell may show in ---- */
 
-/* cell: NULL for a polyhedron, all of whose surfaces are meant. */
+/* Traces the cell on the block's rays; cell is NULL for a polyhedron, of which all surfaces are traced. */
 SIMD_INLINE void kernel_block_meet(kernel_tile_trace *t, int block, int part, uint32_t index, const kernel_cell *cell,
                                    int value)
 {

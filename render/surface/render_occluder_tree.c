@@ -67,7 +67,7 @@ static float area_of(const float box[6])
     return x * y + y * z + z * x;
 }
 
-/* Pieces that stand side by side in the binary tree's order: all below a node, or some of a leaf. */
+/* A run of pieces in the binary tree's order: all below a node, or some of a leaf. */
 typedef struct span {
     int64_t node; /* -1: some of a leaf */
     int64_t first, count;
@@ -104,7 +104,7 @@ static void divide(const widening *w, const span *whole, span out[2])
     memcpy(out, both, sizeof both);
 }
 
-/* Divides the largest until there are as many as there are lanes. */
+/* Divides the largest span until there are as many spans as lanes. */
 static int divide_all(const widening *w, const span *whole, span *out)
 {
     int count = 1;
@@ -159,7 +159,7 @@ static int32_t make_node(widening *w, const span *of)
     return node;
 }
 
-/* Room for what the binary tree may become at most; what is not used is not there. */
+/* Reserves address space for the largest wide tree that the binary tree may become; unused pages take no memory. */
 static bool reserve(const widening *w, size_t nodes, size_t leaves)
 {
     const size_t width = (size_t)w->width;

@@ -8,7 +8,7 @@
 #include "insitu/status.h"
 #include "kernel_occluders.h"
 
-/* Triangles or slabs: of each its rows, one after the other, from first on, stride bytes apart. */
+/* Triangles or slabs. Each has its rows one after the other; the next one is stride bytes on. */
 typedef struct occluder_pieces {
     const void *first;
     size_t stride;
@@ -16,7 +16,8 @@ typedef struct occluder_pieces {
     int rows; /* KERNEL_TRIANGLE_ROWS or KERNEL_SLAB_ROWS */
 } occluder_pieces;
 
-/* For kernels of so many lanes, at most 16. Sources are the pieces' numbers. Parallel. To be freed in any case. */
+/* Builds the tree for kernels of this many lanes, at most 16. Its sources are the pieces' numbers. The caller frees it,
+ * after an error too. Parallel. */
 insitu_status occluder_tree_build(const occluder_pieces *pieces, int width, int threads, kernel_occluder_tree *out,
                                   base_error *error);
 void occluder_tree_free(kernel_occluder_tree *tree);

@@ -1,9 +1,9 @@
-/* Threads go through the subtrees of the meshes' trees, and each gathers what its cells hold; the lists are joined, and
- * render_occluder_tree.c makes trees of them. The order in these is of no consequence (kernel_occluders.h).
+/* Threads go through the subtrees of the meshes' trees, and each gathers the occluders in its cells. The lists are
+ * joined, and render_occluder_tree.c makes trees of them. Their order does not matter (kernel_occluders.h).
  *
- * A plane between which and its like a cell's surface lies: L is the linear function that is nearest to the values at
- * the vertices. Place and value of any point of the cell are means of the vertices' with the same weights, so that
- * nowhere in it they differ from L by more than at some vertex. */
+ * A slab holds the part of the surface in a cell: it lies between two planes on which a linear function L is constant.
+ * L is the one nearest to the values at the vertices. The position and the value of any point of the cell are means of
+ * the vertices' with the same weights, so the field differs from L nowhere by more than at some vertex. */
 #include "render_occluders.h"
 
 #include <math.h>
@@ -40,13 +40,13 @@ typedef struct list {
     void *items;
 } list;
 
-/* What one thread finds, or all of them. */
+/* The occluders that one thread has found, or all threads. */
 typedef struct finds {
     list triangles, slabs, hexes;
     bool out_of_memory;
 } finds;
 
-/* A place for one more; NULL where memory ran out. */
+/* Makes room for one more occluder and returns it; NULL where memory ran out. */
 static void *add(finds *f, list *l, size_t size)
 {
     if (l->count == l->room) {
@@ -71,7 +71,7 @@ static void free_finds(finds *f)
 
 /* ---- a cell --------------------------------------------------------------------------------------------------- */
 
-/* The cell that is looked at, and which of its isovalues. */
+/* The current cell, and the isovalue that is looked for in it. */
 typedef struct subject {
     finds *into;
     const kernel_frame *frame;
@@ -102,7 +102,7 @@ static void bounds_of(const subject *s, double low[3], double high[3])
         }
 }
 
-/* How near to the hit the cell hides nothing: kernel_occlusion_size(), in tree space. */
+/* Returns the distance from a hit within which the cell hides nothing (kernel_occlusion_beyond()), in tree space. */
 static double reach_of(const subject *s, double contact)
 {
     double low[3], high[3], volume = 1, longest = 0;
@@ -138,7 +138,7 @@ static bool straddles(const subject *s, double isovalue)
 
 /* ---- tets ------------------------------------------------------------------------------------------------------ */
 
-/* Where the surface crosses the edge between two vertices, the first one first in the order of coordinates. */
+/* Finds where the surface crosses the edge between two vertices, given in the order of coordinates. */
 static void cross_edge(const subject *s, double isovalue, int i, int j, float out[3])
 {
     const double *a = place_of(s, i), *b = place_of(s, j);
@@ -167,7 +167,7 @@ static void add_tet(subject *s, double isovalue)
             below[belows++] = i;
         else
             above[aboves++] = i;
-    /* Around the piece: the second vertex below takes those above from the last on. */
+    /* The corners go around the piece, so the second vertex below takes those above in reverse. */
     for (int i = 0; i < belows; i++)
         for (int k = 0; k < aboves; k++) {
             const int j = i % 2 ? aboves - 1 - k : k, p = below[i], q = above[j];
@@ -179,7 +179,7 @@ static void add_tet(subject *s, double isovalue)
 
 /* ---- slabs ----------------------------------------------------------------------------------------------------- */
 
-/* Solves m x = b, m symmetric; zero where it is nearly singular, which leaves the whole cell to the slab. */
+/* Solves m x = b for a symmetric m. x is 0 where m is nearly singular; the slab is then the whole cell. */
 static void solve(double m[3][3], const double b[3], double x[3])
 {
     double inverse[3][3];
@@ -197,7 +197,7 @@ static void solve(double m[3][3], const double b[3], double x[3])
     }
 }
 
-/* L's gradient; where L is off by the least at the mean of the vertices. Values are less the isovalue, times scale. */
+/* Finds L's gradient by least squares about the mean of the vertices. The values are less the isovalue, times scale. */
 static void fit(const subject *s, double isovalue, double scale, double gradient[3], double *level)
 {
     double mean[3] = {0, 0, 0}, value = 0, m[3][3] = {{0}}, b[3] = {0, 0, 0};
@@ -244,7 +244,7 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
         out->rows[KERNEL_SLAB_GRADIENT + a] = (float)gradient[a];
     }
     out->rows[KERNEL_SLAB_LEVEL] = (float)level;
-    /* Values round to 6e-8 of the largest, and roots may be off by KERNEL_ROOT_BAND and what places round by. */
+    /* Values round to 6e-8 of the largest. Roots may be off by KERNEL_ROOT_BAND and by the rounding of positions. */
     out->rows[KERNEL_SLAB_THICKNESS] = (float)(off * 1.0001 + 1e-5);
     out->rows[KERNEL_SLAB_BLUR] = (float)(16 * 6e-8 * steep);
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
@@ -276,7 +276,7 @@ static bool collapses(const kernel_cell *c)
     return false;
 }
 
-/* Returns the number of the hex's record, or -1 where it is for the cell alone. */
+/* Returns the number of the hex's record, or -1 where the hex must be traced on its own. */
 static int32_t add_hex(subject *s, const kernel_cell *c, double isovalue)
 {
     const double scale = scale_of(s, isovalue);
@@ -302,7 +302,7 @@ static void add_slab(subject *s, const kernel_cell *c, double isovalue)
 
 /* ---- finding --------------------------------------------------------------------------------------------------- */
 
-/* The vertices of a cell that is no polyhedron, in the order that kernels have them in. */
+/* Lists the vertices of a cell other than a polyhedron in the order in which kernels have them. */
 static bool take_vertices(subject *s, kernel_cell *c, const grid *g)
 {
     for (int i = 0; i < c->count; i++) grid_vertex(g, c->vertices[i], c->world[i]);

@@ -7,7 +7,8 @@
 #include "kernel_occluders.h"
 #include "kernel_types.h"
 
-/* Finds what the frame's opaque surfaces cross, for kernels of so many lanes. To be freed in any case. Parallel. */
+/* Finds the cells that the frame's opaque surfaces cross, for kernels of this many lanes. The caller frees the result,
+ * after an error too. Parallel. */
 insitu_status occluders_build(const kernel_frame *frame, int width, int threads, kernel_occluders *out,
                               base_error *error);
 void occluders_free(kernel_occluders *occluders);

@@ -19,7 +19,7 @@ typedef struct kernel_spmd {
     float lower[3][SIMD_WIDTH], upper[3][SIMD_WIDTH];
 } kernel_spmd;
 
-/* Each ray's next node; returns the rays that have one. */
+/* Pops each ray's next node; returns the rays that have one. */
 SIMD_INLINE vm kernel_spmd_pop(kernel_spmd *s, const mmbvh *tree)
 {
     unsigned bits = 0;
@@ -47,7 +47,7 @@ SIMD_INLINE vm kernel_spmd_boxes(const kernel_packet *p, const kernel_spmd *s)
     return vf_le(low, high);
 }
 
-/* The children of ray i's node that show, the nearer one on top. */
+/* Pushes the children of ray i's node that show, the nearer one on top. */
 SIMD_INLINE void kernel_spmd_push(kernel_spmd *s, const kernel_packet *p, const mmbvh *tree, const mmbvh_ranges *ranges,
                                   const kernel_interest *interest, int i)
 {

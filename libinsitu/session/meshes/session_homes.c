@@ -12,7 +12,7 @@
 
 enum { MOST_SAMPLES = 1024 };
 
-/* What ranks tell each other. */
+/* The message of a rank to all others. */
 typedef struct rank_part {
     session_box box;
     int64_t first; /* where this rank's share of the ids begins */
@@ -34,7 +34,7 @@ static int compare_ids(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Which of evenly chosen samples of the ids it is does not matter, as long as all ranks know the same. */
+/* Any evenly chosen samples of the ids will do, as long as all ranks know the same ones. */
 static int64_t quantile(const session_mesh *mesh, const session_team *team)
 {
     const grid_array ids = session_grid_array(&mesh->given.vertex_ids);

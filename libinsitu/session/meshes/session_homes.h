@@ -22,16 +22,16 @@ typedef struct session_box {
     double lower[3], upper[3];
 } session_box;
 
-/* What a rank knows of a mesh's parts on all ranks. */
+/* A rank's knowledge of a mesh's parts on all ranks. */
 typedef struct session_homes {
     bool is_known, by_id;
     int rank;
-    /* Ranks, this one among them, whose drawn cells' box meets that of this one's, in their order. Each is one of the
-     * others' too. None where there are no cells here. Boxes are widened a little where there are ids. */
+    /* The ranks whose drawn cells' box meets this rank's, itself among them, in ascending order. If a rank is near
+     * another, that one is near it. A rank without cells has none. With ids, boxes are widened a little. */
     int near_count;
     int *near;
     session_box *boxes;
-    /* By id: where shares begin, and whose they are. */
+    /* By id: the first id of each share, and the rank that owns it. */
     int share_count;
     int64_t *firsts;
     int *owners;
@@ -46,8 +46,8 @@ insitu_status session_homes_find(session_homes *homes, const struct session_mesh
 /* Does the point lie in another rank's box? */
 bool session_homes_share(const session_homes *homes, const double point[3]);
 
-/* The home of what has vertices at so many points, at least one, in this rank's box. id: the least of its vertices', of
- * which hash is made without ids. */
+/* Returns the home of a thing whose vertices are at these points, at least one, in this rank's box. id is the least of
+ * its vertices' ids; without ids the home follows from hash. */
 int session_home(const session_homes *homes, const double (*points)[3], int count, uint64_t hash, int64_t id);
 
 #endif
