@@ -227,7 +227,11 @@ std::vector<named_file> files_of(const std::string &case_path)
         if (key == "model" && !words.empty()) files.push_back({words[0]});
         const int components = components_of(key);
         if (components == 0) continue;
-        if (words.size() < 2) throw std::runtime_error(case_path + ": \"" + line + "\" names no file");
+        if (words.size() < 2) {
+            std::string what = case_path;
+            what.append(": \"").append(line).append("\" names no file");
+            throw std::runtime_error(what);
+        }
         files.push_back({words[1], components, key.find("per node") != std::string::npos});
     }
     if (!is_gold) throw std::runtime_error(case_path + ": is no case of EnSight Gold");

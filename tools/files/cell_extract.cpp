@@ -33,14 +33,16 @@ class renumbering
     vtkIdType of(vtkIdType point)
     {
         vtkIdType &number = numbers_[static_cast<size_t>(point)];
-        if (number < 0) number = used->InsertNextId(point);
+        if (number < 0) number = used_->InsertNextId(point);
         return number;
     }
 
-    vtkNew<vtkIdList> used; // the old numbers
+    /* The old numbers. */
+    vtkIdList *used() { return used_.Get(); }
 
   private:
     std::vector<vtkIdType> numbers_;
+    vtkNew<vtkIdList> used_;
 };
 
 /* The faces of polyhedra. Each one's place is where its [number of faces, number of the first one's points, its points,
@@ -51,23 +53,26 @@ class face_streams
     void add(vtkUnstructuredGrid *grid, vtkIdType cell, renumbering &points)
     {
         const vtkIdType length = length_of(grid, cell, points);
-        places->InsertNextValue(length > 0 ? stream->GetNumberOfValues() : -1);
+        places_->InsertNextValue(length > 0 ? stream_->GetNumberOfValues() : -1);
         if (length == 0) return;
         const vtkIdType *from = grid->GetFaces()->GetPointer(grid->GetFaceLocations()->GetValue(cell));
         const vtkIdType *const end = from + length;
-        stream->InsertNextValue(*from++);
+        stream_->InsertNextValue(*from++);
         while (from < end) {
             const vtkIdType count = *from++;
-            stream->InsertNextValue(count);
-            for (vtkIdType k = 0; k < count; k++) stream->InsertNextValue(points.of(*from++));
+            stream_->InsertNextValue(count);
+            for (vtkIdType k = 0; k < count; k++) stream_->InsertNextValue(points.of(*from++));
         }
     }
-    void add_none() { places->InsertNextValue(-1); }
-    bool is_empty() const { return stream->GetNumberOfValues() == 0; }
+    void add_none() { places_->InsertNextValue(-1); }
+    bool is_empty() const { return stream_->GetNumberOfValues() == 0; }
 
-    vtkNew<vtkIdTypeArray> stream, places;
+    vtkIdTypeArray *stream() { return stream_.Get(); }
+    vtkIdTypeArray *places() { return places_.Get(); }
 
   private:
+    vtkNew<vtkIdTypeArray> stream_, places_;
+
     /* The length of a cell's faces; 0 where they do not lie within the stream, or name a point that does not exist. */
     static vtkIdType length_of(vtkUnstructuredGrid *grid, vtkIdType cell, const renumbering &points)
     {
@@ -136,8 +141,8 @@ vtkSmartPointer<vtkIdList> pick_cells(vtkUnstructuredGrid *grid, const std::vect
     if (faces.is_empty())
         part->SetCells(types, list);
     else
-        part->SetCells(types, list, faces.places, faces.stream);
-    return points.used.Get();
+        part->SetCells(types, list, faces.places(), faces.stream());
+    return points.used();
 }
 
 } // namespace

@@ -73,7 +73,8 @@ std::string file_named_by(vtkXMLDataElement *element, const char *attribute, con
 {
     const char *name = element->GetAttribute(attribute);
     if (!name || !name[0]) refuse(path, "a " + std::string(element->GetName()) + " names no file");
-    const std::string file = beside(path, name), why_not = why_not_data(file);
+    std::string file = beside(path, name);
+    const std::string why_not = why_not_data(file);
     if (!why_not.empty()) refuse(path, why_not);
     return file;
 }
