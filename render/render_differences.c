@@ -120,6 +120,7 @@ bool render_differences_sort(const render_job *job, render_waiting_list *list)
 /* The work of all threads: to sample about hits, or to light them, a chunk at a time. */
 typedef struct chunk_work {
     kernel_frame frame;
+    int threads;
     const render_waiting_hit *hits;
     render_samples_about *samples;
     const render_waiting_list *list; /* to light; NULL: to sample */
@@ -147,14 +148,14 @@ static void work_on(chunk_work *work, kernel_thread *thread, int64_t first, int6
 static insitu_status work_on_all(const render_job *job, chunk_work *work, int64_t first, int64_t count,
                                  base_error *error)
 {
-    const int threads = job->threads > 0 ? job->threads : omp_get_max_threads();
+    work->threads = job->threads > 0 ? job->threads : omp_get_max_threads();
     render_job surfaces = *job;
     bool has_memory = true;
     surfaces.volume_count = 0;
     surfaces.separate_samples = surfaces.reproducible = false;
     insitu_status status = render_prepare(&surfaces, &work->frame, error);
     if (status != INSITU_OK) return status;
-#pragma omp parallel num_threads(threads) reduction(&& : has_memory)
+#pragma omp parallel num_threads(work->threads) reduction(&& : has_memory)
     {
         kernel_thread thread;
         has_memory = thread_begin(&thread);

@@ -1,4 +1,4 @@
-/* Where a job's clips (render.h) have a ray, in double: functions of the ray alone, so the same on all ranks.
+/* Finds the parts of a ray that a job's clips (render.h) keep, in double. They depend on the ray alone, on all ranks.
  *
  * The half spaces, boxes and spheres that cut every layer leave one stretch of a ray, which packets begin and end with.
  * Surfaces that are cut by more are asked hit by hit. Volumes that are cut by more are traced in turns, a stretch of
@@ -29,7 +29,7 @@ static inline double kernel_clip_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* The scaled distance that is left to the plane at t = 0. */
+/* Returns the scaled distance from the ray's point at t = 0 to the plane. */
 static inline double kernel_clip_left(const render_clip *c, const render_space *s, const kernel_clip_ray *ray)
 {
     return (c->distance - kernel_clip_dot(c->normal, s->origin)) * s->scale - kernel_clip_dot(c->normal, ray->base);
@@ -92,7 +92,7 @@ static inline int kernel_clip_add_hole(kernel_ray_part *holes, int count, kernel
     return count + 1;
 }
 
-/* The stretch of the number, from 0, that a set of clips leaves of a ray behind the depth begin. */
+/* Returns the n-th stretch, from 0, that a set of clips leaves of a ray behind the depth begin. */
 static inline kernel_ray_part kernel_clip_part(const render_job *job, uint32_t clips, const kernel_clip_ray *ray,
                                                double begin, int number)
 {

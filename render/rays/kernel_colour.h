@@ -39,7 +39,7 @@ SIMD_INLINE vf kernel_transmittance(vf opacity, float exponent, vf *absorbed)
     return vf_select(small, 1.0f - series, power);
 }
 
-/* The place in the colour table, by a scale that is not linear: render_scaled(), to 3e-7 of its value. */
+/* Returns the place in the colour table by a scale that is not linear: render_scaled(), to 3e-7 of its value. */
 static __attribute__((noinline)) vf kernel_scaled_place(const kernel_scale *s, vf x)
 {
     const vf threshold = vf_set(s->threshold), size = vf_max(vf_abs(x), threshold);
@@ -123,7 +123,7 @@ SIMD_INLINE void kernel_shade(const kernel_packet *p, const render_material *m, 
     for (int a = 0; a < 3; a++) colour[a] = colour[a] * diffuse[a] + specular[a];
 }
 
-/* A fragment a ray; a ray's kind is what is added to the kind that all of them have. */
+/* A fragment for each ray. kind is added to the kind that all of them have in common. */
 typedef struct kernel_fragments {
     vf t_in, t_out, colour[3], transmittance, kind;
 } kernel_fragments;

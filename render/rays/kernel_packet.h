@@ -82,7 +82,8 @@ static inline void kernel_packet_lanes(const kernel_packet *p, kernel_lanes *l)
 {
     for (int i = 0; i < SIMD_WIDTH; i++) {
         l->px[i] = kernel_column(p->frame, p->x0 + i % KERNEL_PACKET_COLUMNS);
-        l->py[i] = kernel_row(p->frame, p->y0 + i / KERNEL_PACKET_COLUMNS);
+        const int row = p->y0 + i / KERNEL_PACKET_COLUMNS;
+        l->py[i] = kernel_row(p->frame, row);
     }
 }
 
@@ -155,7 +156,7 @@ static inline void kernel_packet_view(kernel_packet *p)
     for (int a = 0; a < 3; a++) p->view[a] = vf_load(view[a]);
 }
 
-/* Number the samples from one near the depth origin, so that float32 holds their places well; the number depends on
+/* Numbers the samples from one near the depth origin, so that float32 holds their places well; the number depends on
  * the camera alone. sample_first <= 0 is the sample at the eye. */
 static inline int kernel_sample_first(const kernel_frame *f)
 {

@@ -120,7 +120,7 @@ static inline void kernel_tile_borders(kernel_borders *b, const kernel_frame *f,
     b->centre_y = tile->centre_y;
 }
 
-/* The picture's borders: what lies in its first block lies in the picture. */
+/* Sets the borders so that a body in the first block lies in the picture. */
 static inline void kernel_picture_borders(kernel_borders *b, const kernel_frame *f)
 {
     for (int n = 0; n <= KERNEL_BLOCKS_ACROSS; n++) {
@@ -214,7 +214,7 @@ static inline void kernel_tile_planes(kernel_planes *q, const kernel_frame *f, c
     }
 }
 
-/* Blocks between borders of which the body is on both inner sides. */
+/* Returns the blocks for which the body is on the inner side of all borders. */
 SIMD_INLINE unsigned kernel_blocks_of(kernel_sides s)
 {
     static const uint16_t spread[KERNEL_BLOCKS] = {0x0000, 0x0001, 0x0010, 0x0011, 0x0100, 0x0101, 0x0110, 0x0111,
@@ -223,7 +223,7 @@ SIMD_INLINE unsigned kernel_blocks_of(kernel_sides s)
     return (inner & 15) * spread[inner >> KERNEL_ROWS_LANE & 15];
 }
 
-/* Bits of the lanes where low <= 0, and where high >= 0. */
+/* Adds the bits of the lanes where low <= 0, and where high >= 0. */
 SIMD_INLINE void kernel_sides_add(kernel_sides *s, int v, vf low, vf high)
 {
     s->below |= vm_bits(vf_le(low, vf_set(0))) << v * SIMD_WIDTH;

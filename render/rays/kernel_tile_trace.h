@@ -1,4 +1,4 @@
-/* A tile under way: its rays, and what its blocks know. Packets are set up when the first cell comes to their block. */
+/* The tile being traced: its rays, and its blocks' nearest hits. Packets are set up when a cell meets their block. */
 #ifndef RENDER_KERNEL_TILE_TRACE_H
 #define RENDER_KERNEL_TILE_TRACE_H
 
@@ -185,7 +185,7 @@ typedef struct kernel_hex_rays {
     uint8_t pixel[KERNEL_HEX_ROOM], lane[KERNEL_HEX_ROOM];
 } kernel_hex_rays;
 
-/* The pixels of a box, row by row, of the cell in the lane. */
+/* Lists a ray for each pixel of a box, row by row, for the cell in the lane. */
 SIMD_INLINE void kernel_hex_rays_of(kernel_hex_rays *rays, unsigned box, int lane)
 {
     static const uint8_t ramp[KERNEL_TILE] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
@@ -202,7 +202,7 @@ SIMD_INLINE void kernel_hex_rays_of(kernel_hex_rays *rays, unsigned box, int lan
     }
 }
 
-/* So that whole vectors may be read. */
+/* Pads the list so that whole vectors may be read. */
 SIMD_INLINE void kernel_hex_rays_close(kernel_hex_rays *rays)
 {
     memset(rays->pixel + rays->count, 0, SIMD_WIDTH);
@@ -217,7 +217,7 @@ SIMD_INLINE vi kernel_bytes(const uint8_t *bytes)
     return __builtin_convertvector(lanes, vi);
 }
 
-/* A tile's entry by column or row. */
+/* Looks up a tile's entries by column or row. */
 SIMD_INLINE vf kernel_batch_of_tile(const float entries[KERNEL_TILE], vi index)
 {
     return SIMD_WIDTH == KERNEL_TILE ? vf_permute(vf_load(entries), index) : vf_gather(entries, index);

@@ -19,7 +19,7 @@ enum {
 
 /* A transfer function as pieces on which opacity and colour are linear (render_pieces.c), and bounds of its slopes. */
 
-/* KERNEL_BLACK: what is behind so little light is left out of a segment. KERNEL_SHORT: kernel_integral.h. */
+/* KERNEL_BLACK: light below which the rest of a segment is left out. KERNEL_SHORT: kernel_integral.h. */
 #if defined(KERNEL_REAL_IS_DOUBLE)
 typedef double kernel_real;
 #define KERNEL_BLACK 1e-16
@@ -200,7 +200,7 @@ typedef struct kernel_candidate_list {
     int64_t *bound; /* how many more all lists together may have room for */
 } kernel_candidate_list;
 
-/* A subtree to look for them in, or so many records that are kept, from the first on. */
+/* A piece of the search for candidates: a subtree, or count active records from first on. */
 typedef struct kernel_subtree {
     int surface, part;          /* surface -1: cells of the first volume */
     int64_t node, first, count; /* count 0: the node's subtree */
@@ -214,15 +214,15 @@ typedef struct kernel_active {
     int vertices; /* of a cell */
 } kernel_active;
 
-/* No larger are a kept cell's values; nor its coordinates and the eye's times the space's scale. */
+/* Bounds of an active cell's values, and of its coordinates and the eye's times the space's scale. */
 #define KERNEL_ACTIVE_VALUE 4e29f
 #define KERNEL_ACTIVE_PLACE 4e14f
 
-/* One thread's share of them while they are put there. */
+/* One thread's share of the records while they are written. */
 typedef struct kernel_active_writer {
     float *at, *end;        /* of its room */
     int vertices;           /* of a cell */
-    bool is_refused;        /* none are to be kept: of another mesh, with odd numbers, or too many */
+    bool is_refused;        /* nothing is kept: another mesh, unusual numbers, or too many cells */
     struct kernel_room *of; /* render_active_cells.c */
 } kernel_active_writer;
 
@@ -261,8 +261,8 @@ typedef struct kernel_frame {
     bool is_double;     /* their ends are taken in double (kernel_double.h) */
     kernel_pieces pieces[RENDER_MAX_VOLUMES];
     float allowance, mixing, reach[RENDER_MAX_VOLUMES]; /* kernel_segment_list.h */
-    bool needs_contact; /* volume fragments end where the rank's cells do not touch: other ranks may have surfaces there
-                         */
+    bool needs_contact; /* volume fragments end at gaps between this rank's cells, because other ranks may have surfaces
+                           there */
 } kernel_frame;
 
 /* One thread's state. */

@@ -69,8 +69,8 @@ static double part_of(double x)
 
 static hemisphere hemisphere_of(const render_job *job, uint32_t pixel)
 {
-    const uint32_t width = (uint32_t)job->camera.width;
-    const double x = pixel % width + 5.588238 * job->frame, y = pixel / width + 5.588238 * job->frame;
+    const uint32_t width = (uint32_t)job->camera.width, column = pixel % width, row = pixel / width;
+    const double x = column + 5.588238 * job->frame, y = row + 5.588238 * job->frame;
     const double turn = part_of(52.9829189 * part_of(0.06711056 * x + 0.00583715 * y)) * 6.283185307179586;
     return (hemisphere){cos(turn), sin(turn), render_jitter(pixel, (uint32_t)job->frame)};
 }

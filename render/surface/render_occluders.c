@@ -459,7 +459,7 @@ insitu_status occluders_build(const kernel_frame *frame, int width, int threads,
         status = base_fail(error, INSITU_ERROR_MEMORY, "no memory for what blocks rays from hits");
     if (!status && (all.triangles.count > INT32_MAX / 2 || all.slabs.count > INT32_MAX / 64))
         status = base_fail(error, INSITU_ERROR_MEMORY, "shadows: %lld pieces of surfaces on a rank are too many",
-                           (long long)(all.triangles.count + all.slabs.count));
+                           (long long)all.triangles.count + (long long)all.slabs.count);
     if (!status) status = build_trees(&all, threads, out, error);
     out->hexes = all.hexes.items;
     all.hexes.items = NULL;
