@@ -43,6 +43,11 @@ typedef struct kernel_local_cells {
     float blur[SIMD_WIDTH]; /* a point nearer than that to the border may be on either side of it */
 } kernel_local_cells;
 
+/* An end of a ray's stretch in its cell. r is counted from the middle. */
+typedef struct kernel_local_crossing {
+    vf t, v, r[3];
+} kernel_local_crossing;
+
 SIMD_INLINE int kernel_bent_terms(int type)
 {
     return type == GRID_HEX ? 4 : type == GRID_WEDGE ? 2 : type == GRID_PYRAMID ? 1 : 0;

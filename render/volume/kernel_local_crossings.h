@@ -158,11 +158,6 @@ SIMD_INLINE void kernel_local_quad_of(const kernel_local_faces *f, const kernel_
     q->e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
 }
 
-/* An end of a ray's stretch in its cell. r is counted from the middle. */
-typedef struct kernel_local_crossing {
-    vf t, v, r[3];
-} kernel_local_crossing;
-
 SIMD_INLINE void kernel_local_crossing_select(vm m, const kernel_local_crossing *a, const kernel_local_crossing *b,
                                               kernel_local_crossing *out)
 {
