@@ -1,18 +1,18 @@
 /* The three phases of compositing: fragments go to the owners of their pixels, are merged there, and pixels go to rank
- * 0. Before these phases all ranks agree that everyone has the memory for them, and afterwards whether they succeeded:
- * a rank that runs out of memory on the way takes part to the end without it, so that nobody waits, and then reports
- * the error. Memory is given back as soon as its phase is over: at the peak a rank holds its own fragments twice, or
- * those of the pixels it owns and the bytes that they came in. One rank alone merges its list where it lies (or has
- * none: comp_tiles.h). */
+ * 0. Before these phases all ranks agree that everyone has the memory for them, and on who owns what; afterwards on
+ * whether they succeeded: a rank that runs out of memory on the way takes part to the end without it, so that nobody
+ * waits, and then reports the error. Memory is given back as soon as its phase is over: at the peak a rank holds its
+ * own fragments, and the bytes that those of others came in. One rank alone merges its list where it lies (or has none:
+ * comp_tiles.h). */
 #include "comp.h"
 
 #include <omp.h>
 
 #include "comp_agree.h"
-#include "comp_bucket.h"
 #include "comp_cost.h"
 #include "comp_exchange.h"
 #include "comp_gather.h"
+#include "comp_owned.h"
 #include "memory.h"
 
 /* A picture that is being composited, on this rank. */
@@ -23,8 +23,10 @@ typedef struct composition {
     comp_statistics *statistics;
     comp_mailroom room;
     comp_route route;
-    comp_layout layout;
-    comp_windows windows;
+    comp_grid grid;
+    comp_strips strips;
+    int32_t votes[COMP_MOST_BLOCKS + 2];
+    comp_owners owners;
 } composition;
 
 static composition composition_of(const comp_group *group, const float background[4], image *out,
@@ -36,19 +38,14 @@ static composition composition_of(const comp_group *group, const float backgroun
                          .statistics = statistics};
 }
 
+static int64_t pixel_count(const composition *c)
+{
+    return (int64_t)c->out->width * c->out->height;
+}
+
 static double milliseconds_since(double start)
 {
     return 1e3 * (MPI_Wtime() - start);
-}
-
-static insitu_status merge_alone(composition *c, fragment_list *items, base_error *error)
-{
-    const double start = MPI_Wtime();
-    comp_pixels_clear(&c->layout, c->out, c->merged.background);
-    c->merged.out = c->out;
-    const insitu_status status = comp_pixels_merge(&c->layout, items, &c->merged, error);
-    c->statistics->merge_ms = milliseconds_since(start);
-    return status;
 }
 
 /* Bytes that a fragment takes on its way: in most pictures 10 for a hit, 11 for a stretch of volume. */
@@ -63,54 +60,77 @@ static void choose_route(composition *c, int64_t fragments)
     c->route = g->schedule == COMP_AUTOMATIC ? comp_cheapest_route(c->route.ranks, g->nodes, &load, &comp_usual_machine)
                                              : comp_route_of(g->schedule, c->route.ranks, g->nodes, USUAL_RADIX);
     if (g->longest_dense) c->route.longest_dense = g->longest_dense;
-    const int threads = c->layout.threads;
-    c->layout = comp_layout_of(c->layout.pixel_count, c->route.owners);
-    c->layout.threads = threads;
     c->statistics->schedule = c->route.schedule;
+}
+
+/* A rank beyond the owners leaves what it would own to its partner. */
+static void choose_owners(composition *c)
+{
+    c->owners.count = c->route.owners;
+    for (uint32_t b = 0; b < c->grid.blocks; b++) {
+        const int place = c->votes[b] ? comp_route_place(&c->route, comp_vote_rank(c->votes[b])) : -1;
+        c->owners.places[b] = place < c->route.owners ? place : place - c->route.owners;
+    }
+}
+
+/* Votes for each block by how many fragments this rank has there. */
+static void vote(composition *c)
+{
+    int64_t counts[COMP_MOST_BLOCKS] = {0};
+    for (uint32_t s = 0; s < c->grid.strips; s++)
+        counts[comp_grid_block(&c->grid, s)] += comp_strips_count(&c->strips, s);
+    for (uint32_t b = 0; b < c->grid.blocks; b++) c->votes[b] = comp_vote(b, c->room.rank, counts[b]);
 }
 
 /* Allocates what the three phases need. */
 static insitu_status prepare(composition *c, fragment_list *items, base_error *error)
 {
     if (error && error->status) return error->status;
-    if (!comp_bucket_fits(&c->layout, items->items, items->count))
-        return base_fail(error, INSITU_ERROR_INTERNAL, "compositing: a fragment's pixel is not in the image");
-    if (c->out->deep) c->merged.deep = base_calloc((size_t)c->layout.threads, sizeof *c->merged.deep);
+    if (c->out->deep) c->merged.deep = base_calloc((size_t)c->grid.threads, sizeof *c->merged.deep);
     if (c->out->deep && !c->merged.deep)
         return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a deep image");
-    if (c->layout.ranks == 1) return INSITU_OK;
-    return comp_mailroom_open(c->group->comm, &c->room, error);
+    insitu_status status = c->route.ranks > 1 ? comp_mailroom_open(c->group->comm, &c->room, error) : INSITU_OK;
+    if (!status) status = comp_strips_make(&c->grid, items, &c->strips, error);
+    if (!status) vote(c);
+    return status;
 }
 
-/* Merged pixels of this rank: on rank 0 in the picture, elsewhere in *finished. */
-static insitu_status merge_owned(composition *c, comp_owned *owned, comp_pixel_list *finished, insitu_status status,
-                                 base_error *error)
+/* Merges the pixels of this rank: on rank 0 into the picture, elsewhere to *finished. */
+static insitu_status merge_owned(composition *c, const comp_messages *held, comp_messages *finished,
+                                 insitu_status status, base_error *error)
 {
     const double start = MPI_Wtime();
     const int place = comp_route_place(&c->route, c->room.rank);
+    comp_owned owned = {.own = &c->strips, .owners = &c->owners, .place = place};
     c->merged.out = place == 0 ? c->out : NULL;
-    c->merged.finished = finished;
-    if (c->merged.out) comp_pixels_clear(&c->layout, c->out, c->merged.background);
-    if (!status && place < c->route.owners)
-        status = comp_pixels_blend(&c->layout, (uint32_t)place, owned, &c->merged, error);
-    base_free(owned->items);
-    base_free(owned->starts);
+    if (!status && place < c->route.owners) {
+        const int parent = place ? comp_route_rank(&c->route, comp_gather_parent(&c->route, place)) : 0;
+        status = comp_arrivals_find(&c->grid, place, held, &owned.arrivals, error);
+        if (!status) status = comp_owned_merge(&owned, &c->merged, parent, finished, error);
+        comp_arrivals_free(&owned.arrivals);
+    }
     c->statistics->merge_ms = milliseconds_since(start);
     return status;
+}
+
+static insitu_status merge_alone(composition *c, base_error *error)
+{
+    return merge_owned(c, &(comp_messages){NULL, NULL}, &(comp_messages){NULL, NULL}, INSITU_OK, error);
 }
 
 static insitu_status run_phases(composition *c, fragment_list *items, base_error *error)
 {
     const double start = MPI_Wtime();
-    comp_owned owned = {NULL, NULL};
-    comp_pixel_list finished = {NULL, 0};
-    insitu_status status = comp_windows_make(&c->layout, items, &c->windows, error);
-    status = comp_exchange(&c->room, &c->route, &c->windows, &owned, status, error);
+    comp_messages held = {NULL, NULL}, finished = {NULL, NULL};
+    const comp_canvas canvas = {&c->grid, c->merged.background, c->out};
+    insitu_status status = comp_exchange(&c->room, &c->route, &c->strips, &c->owners, &held, INSITU_OK, error);
     c->statistics->exchange_ms = milliseconds_since(start);
-    status = merge_owned(c, &owned, &finished, status, error);
+    status = merge_owned(c, &held, &finished, status, error);
+    comp_messages_free(&held);
+    base_free(items->items);
+    *items = (fragment_list){NULL, 0, 0};
     const double gather_start = MPI_Wtime();
-    status = comp_gather(&c->room, &c->route, &c->layout, &finished, c->out, status, error);
-    base_free(finished.items);
+    status = comp_gather(&c->room, &c->route, &canvas, &finished, status, error);
     c->statistics->gather_ms = milliseconds_since(gather_start);
     c->statistics->sent_bytes = c->room.sent_bytes;
     c->statistics->sent_messages = c->room.sent_messages;
@@ -125,8 +145,8 @@ static insitu_status begin(composition *c, int threads, base_error *error)
     c->statistics->has_failed = status != INSITU_OK;
     if (status) return status;
     c->route = comp_route_of(COMP_DIRECT, ranks, c->group->nodes, 0);
-    c->layout = comp_layout_of((uint32_t)((int64_t)c->out->width * c->out->height), c->route.owners);
-    c->layout.threads = threads > 0 ? threads : omp_get_max_threads();
+    c->grid = comp_grid_of((uint32_t)c->out->width, (uint32_t)c->out->height);
+    c->grid.threads = threads > 0 ? threads : omp_get_max_threads();
     return INSITU_OK;
 }
 
@@ -135,11 +155,11 @@ static insitu_status gather_deep(composition *c, insitu_status status, base_erro
 {
     comp_deep_list *const lists = c->merged.deep;
     if (!status) {
-        status = comp_deep_gather(c->group->comm, lists, c->layout.threads, c->out->deep, &c->statistics->sent_bytes,
-                                  error);
+        status =
+            comp_deep_gather(c->group->comm, lists, c->grid.threads, c->out->deep, &c->statistics->sent_bytes, error);
         c->statistics->has_failed = status != INSITU_OK; /* *error says why, to be reported */
     } else if (lists) {
-        comp_deep_free(lists, c->layout.threads);
+        comp_deep_free(lists, c->grid.threads);
     }
     base_free(lists);
     return status;
@@ -153,15 +173,16 @@ static insitu_status composite(composition *c, fragment_list *items, int64_t *ha
     statistics->sent_fragments = items->count;
     int64_t most = items->count;
     insitu_status own = prepare(c, items, error), status = own;
-    if (c->route.ranks > 1) status = comp_agree(comm, own, &most, error);
+    if (c->route.ranks > 1) status = comp_agree_votes(comm, own, &most, c->votes, (int)c->grid.blocks, error);
     if (!status) {
         if (c->route.ranks > 1) choose_route(c, most);
-        own = c->route.ranks > 1 ? run_phases(c, items, error) : merge_alone(c, items, error);
-        *has_overlaps = c->merged.overlaps && pixel_set_count(c->merged.overlaps, c->layout.pixel_count) > 0;
+        choose_owners(c);
+        own = c->route.ranks > 1 ? run_phases(c, items, error) : merge_alone(c, error);
+        *has_overlaps = c->merged.overlaps && pixel_set_count(c->merged.overlaps, pixel_count(c)) > 0;
         status = c->route.ranks > 1 ? comp_agree(comm, own, has_overlaps, error) : own;
     }
     statistics->has_failed = own != INSITU_OK || status == INSITU_ERROR_MPI;
-    comp_windows_free(&c->windows);
+    comp_strips_free(&c->strips);
     comp_mailroom_close(&c->room);
     base_free(items->items);
     *items = (fragment_list){NULL, 0, 0};
@@ -185,12 +206,11 @@ insitu_status comp_composite(const comp_group *group, fragment_list *items, cons
 /* Tells all ranks the pixels in which owners found overlaps. */
 static insitu_status share_overlaps(const composition *c, comp_overlaps *overlaps, base_error *error)
 {
-    const int bytes = (int)pixel_set_bytes(c->layout.pixel_count);
+    const int bytes = (int)pixel_set_bytes(pixel_count(c));
     const MPI_Comm comm = c->group->comm;
     const insitu_status status =
         comp_mpi_status(MPI_Allreduce(MPI_IN_PLACE, c->merged.overlaps, bytes, MPI_BYTE, MPI_BOR, comm), error);
-    if (!status)
-        *overlaps = (comp_overlaps){pixel_set_count(c->merged.overlaps, c->layout.pixel_count), c->merged.overlaps};
+    if (!status) *overlaps = (comp_overlaps){pixel_set_count(c->merged.overlaps, pixel_count(c)), c->merged.overlaps};
     return status;
 }
 
@@ -207,10 +227,10 @@ insitu_status comp_composite_overlaps(const comp_group *group, fragment_list *it
     if (!error) error = &here;
     insitu_status status = begin(&c, threads, error);
     if (status) return status;
-    c.merged.overlaps = base_calloc(pixel_set_bytes(c.layout.pixel_count), 1);
+    c.merged.overlaps = base_calloc(pixel_set_bytes(pixel_count(&c)), 1);
     if (!c.merged.overlaps && !error->status)
         base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for a set of %lld pixels",
-                  (long long)c.layout.pixel_count);
+                  (long long)pixel_count(&c));
     int64_t has_overlaps = 0;
     status = composite(&c, items, &has_overlaps, error);
     if (!status && has_overlaps) status = share_overlaps(&c, overlaps, error);

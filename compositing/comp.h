@@ -1,6 +1,6 @@
 /* Compositing: fragments of many ranks to one image on rank 0. Knows no cells, no trees, no scene.
  *
- * Pixels are owned in turn by ranks (comp_owner: plain arithmetic). Every rank sends each pixel owner its fragments (on
+ * Blocks of pixels are owned by ranks that have much there (comp_grid.h). Every rank sends each owner its fragments (on
  * the ways of comp_route.h), owners sort them by t and blend front to back, and rank 0 gathers the finished pixels.
  * Fragments need not be sorted; none is ever dropped; a rank may have any number in a pixel, or none. The result
  * depends on the set of fragments alone, not on ranks, order of arrival or threads.
@@ -29,10 +29,6 @@ typedef struct comp_group {
     comp_schedule schedule; /* COMP_AUTOMATIC: chosen for each picture */
     int longest_dense;      /* rounds of more partners are sparse (comp_mail.h); 0: as comp_route.h has it */
 } comp_group;
-
-/* Returns which of the ranks owns pixel (of pixel_count pixels) where all ranks are owners. Ranks own runs of
- * consecutive pixels in turn, so that an object in the middle of the image is shared by all. */
-int comp_owner(uint32_t pixel, uint32_t pixel_count, int ranks);
 
 /* Blend one pixel's fragments in place: sorted by (t_in, surface before volume, then bits), blended front to back over
  * background (linear premultiplied RGBA). out_rgba gets 4 floats, out_depth the nearest surface's t_in or +infinity.

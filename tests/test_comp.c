@@ -1,5 +1,5 @@
-/* Compositing without MPI: the rule of merging against a reference in double and closed forms, the owners' arithmetic
- * for many more ranks than a machine has, and the sort that both rest on. */
+/* Compositing without MPI: the rule of merging against a reference in double and closed forms, who owns what for more
+ * ranks than a machine has, and the strips of the picture that both rest on. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,8 +14,8 @@
 #include <omp.h>
 
 #include "comp.h"
-#include "comp_bucket.h"
-#include "comp_schedule.h"
+#include "comp_grid.h"
+#include "comp_strips.h"
 #include "comp_tiles.h"
 #include "memory.h"
 
@@ -256,41 +256,77 @@ static void permutations_give_the_same_bits(void **context)
     }
 }
 
-static void check_layout(uint32_t pixel_count, int ranks)
+/* ---- who owns what ------------------------------------------------------------------------------------------- */
+
+/* Every pixel has one number in one strip, and strips lie in the picture; blocks are few and hold all strips. */
+static void check_grid(uint32_t width, uint32_t height)
 {
-    const comp_layout layout = comp_layout_of(pixel_count, ranks);
-    const uint32_t run = 1u << layout.run_shift;
-    uint32_t *owned = calloc((size_t)ranks, sizeof *owned);
-    assert_non_null(owned);
-    for (uint32_t pixel = 0; pixel < pixel_count; pixel++) {
-        const int owner = comp_owner(pixel, pixel_count, ranks);
-        assert_in_range(owner, 0, ranks - 1);
-        assert_int_equal(comp_layout_index(&layout, pixel), owned[owner]);
-        owned[owner]++;
+    const comp_grid grid = comp_grid_of(width, height);
+    uint64_t area = 0;
+    assert_true(grid.blocks >= 1 && grid.blocks <= COMP_MOST_BLOCKS);
+    for (uint32_t s = 0; s < grid.strips; s++) {
+        const comp_area strip = comp_grid_area(&grid, s);
+        assert_true(strip.width >= 1 && strip.height >= 1);
+        assert_true(strip.x + strip.width <= width && strip.y + strip.height <= height);
+        assert_true(comp_grid_block(&grid, s) < grid.blocks);
+        area += (uint64_t)strip.width * strip.height;
     }
-    uint32_t least = UINT32_MAX, most = 0;
-    for (int rank = 0; rank < ranks; rank++) {
-        assert_int_equal(comp_layout_owned(&layout, rank), owned[rank]);
-        if (owned[rank] < least) least = owned[rank];
-        if (owned[rank] > most) most = owned[rank];
+    assert_true(area == (uint64_t)width * height);
+    for (int trial = 0; trial < 2000; trial++) {
+        const uint32_t last = (uint32_t)((uint64_t)width * height - 1);
+        const uint32_t pixel = trial == 0 ? last : next_random() % (last + (last < UINT32_MAX));
+        const uint32_t strip = comp_grid_strip(&grid, pixel), at = comp_grid_at(&grid, pixel);
+        const comp_area its = comp_grid_area(&grid, strip);
+        assert_int_equal(comp_grid_y(&grid, pixel), pixel / width);
+        assert_true(strip < grid.strips && at < COMP_STRIP_PIXELS);
+        assert_true(at % COMP_LANES < its.width && at / COMP_LANES < its.height);
+        assert_int_equal(comp_grid_pixel(&grid, strip, at), pixel);
     }
-    assert_true(run <= 64);
-    assert_true(most - least <= run);
-    if (pixel_count >= (uint32_t)ranks) assert_true(least > 0);
-    free(owned);
 }
 
-static void owners_share_all_pixels_evenly(void **context)
+static void strips_share_all_pixels(void **context)
 {
     (void)context;
-    const int ranks[] = {1, 2, 3, 4, 7, 64, 1000, 4096, 65537, 100000};
-    const uint32_t pixels[] = {1, 2, 63, 64, 65, 333, 640 * 480, 1021 * 769};
-    for (size_t r = 0; r < sizeof ranks / sizeof *ranks; r++)
-        for (size_t p = 0; p < sizeof pixels / sizeof *pixels; p++) check_layout(pixels[p], ranks[r]);
+    const uint32_t sizes[][2] = {{1, 1},         {1, 7},           {16, 32},        {17, 33},
+                                 {640, 480},     {1021, 769},      {1920, 1080},    {7680, 4320},
+                                 {65535, 65537}, {4294967295u, 1}, {1, 4294967295u}};
+    state = 4;
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+        if ((uint64_t)sizes[i][0] * sizes[i][1] <= 100000000) check_grid(sizes[i][0], sizes[i][1]);
 }
 
-/* Tells whether a place of the picture is covered. */
-typedef bool seen_function(double x, double y);
+/* The number of lots for a block that ranks with so many fragments each draw, and who wins. */
+static int winner_of(uint32_t block, const int64_t *fragments, int ranks)
+{
+    int32_t greatest = 0;
+    for (int r = 0; r < ranks; r++) {
+        const int32_t vote = comp_vote(block, r, fragments[r]);
+        assert_true(fragments[r] ? comp_vote_rank(vote) == r && vote > 0 : vote == 0);
+        if (vote > greatest) greatest = vote;
+    }
+    return comp_vote_rank(greatest);
+}
+
+/* A rank owns a block with a chance as the fourth power of its fragments. Of n draws with chance p a rank wins pn,
+ * within five standard deviations sqrt(n p (1 - p)) in all but one of a million cases, and of 1/16 of what is drawn, by
+ * which votes are rounded. */
+static void owners_are_drawn_by_what_they_have(void **context)
+{
+    (void)context;
+    enum { DRAWS = 20000, RANKS = 5 };
+    static const int64_t cases[][RANKS] = {
+        {1, 1, 0, 0, 0}, {7, 7, 7, 7, 7}, {300, 100, 0, 200, 250}, {2000000000, 1500000000, 1, 0, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        int won[RANKS] = {0};
+        double all = 0;
+        for (int r = 0; r < RANKS; r++) all += pow((double)cases[i][r], 4);
+        for (uint32_t block = 0; block < DRAWS; block++) won[winner_of(block, cases[i], RANKS)]++;
+        for (int r = 0; r < RANKS; r++) {
+            const double p = pow((double)cases[i][r], 4) / all;
+            assert_true(fabs(won[r] - p * DRAWS) <= 5 * sqrt(DRAWS * p * (1 - p)) + DRAWS * p * (1 - p) / 16);
+        }
+    }
+}
 
 static bool is_in_disc(double x, double y)
 {
@@ -311,133 +347,122 @@ static bool is_in_band(double x, double y)
     return fabs(y) < 0.15;
 }
 
-/* Most of what one rank owns of it, over the mean. */
-static double skew_of(int width, int height, int ranks, seen_function *is_seen)
+/* Tells whether a place of the picture is covered. */
+typedef bool seen_function(double x, double y);
+
+/* Counts the fragments that each of several ranks has in each block, if each has one in every covered pixel. */
+static void count_seen(const comp_grid *grid, seen_function *is_seen, int64_t *counts)
 {
-    const comp_layout layout = comp_layout_of((uint32_t)width * (uint32_t)height, ranks);
-    int64_t *owned = calloc((size_t)ranks, sizeof *owned), most = 0, all = 0;
-    assert_non_null(owned);
-    for (int y = 0; y < height; y++)
-        for (int x = 0; x < width; x++) {
-            if (!is_seen((x + 0.5 - 0.5 * width) / height, (y + 0.5) / height - 0.5)) continue;
-            const int64_t here = ++owned[comp_layout_owner(&layout, (uint32_t)(y * width + x))];
-            most = here > most ? here : most;
-            all++;
-        }
-    free(owned);
-    return (double)most * ranks / (double)all;
+    memset(counts, 0, grid->blocks * sizeof *counts);
+    for (uint32_t y = 0; y < grid->height; y++)
+        for (uint32_t x = 0; x < grid->width; x++)
+            if (is_seen((x + 0.5 - 0.5 * grid->width) / grid->height, (y + 0.5) / grid->height - 0.5))
+                counts[comp_grid_block(grid, comp_grid_strip(grid, y * grid->width + x))]++;
 }
 
-/* Tested for widths that rounds of runs divide and for others. In the smaller pictures a thousand ranks have a hundred
- * covered pixels each, which cannot be shared as evenly: there the bound is 1.2. */
-static void owners_share_what_is_seen(void **context)
+/* Where all ranks have the same, each should own the same. What one owns is a sum of n blocks' pixels a_i, each with
+ * the chance 1 / ranks: the deviation is sqrt(sum a_i^2 / ranks). Five of them are exceeded in one of a million cases.
+ */
+static void owners_share_what_all_have(void **context)
 {
     (void)context;
     static seen_function *const shapes[] = {is_in_disc, is_in_ring, is_in_column, is_in_band};
-    const int sizes[][2] = {{1000, 1000}, {1024, 1024}, {1280, 720}, {1920, 1080}, {2048, 1024}, {4096, 2304}};
-    const int ranks[] = {2, 3, 16, 64, 100, 256, 1000};
+    static const uint32_t sizes[][2] = {{1000, 1000}, {1024, 1024}, {1280, 720},
+                                        {1920, 1080}, {2048, 1024}, {4096, 2304}};
+    static const int ranks[] = {2, 3, 16, 64, 100};
+    static int64_t counts[COMP_MOST_BLOCKS];
     for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
-        for (size_t r = 0; r < sizeof ranks / sizeof *ranks; r++)
-            for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
-                const double skew = skew_of(sizes[s][0], sizes[s][1], ranks[r], shapes[k]);
-                const double most = ranks[r] == 1000 && sizes[s][1] < 2000 ? 1.2 : 1.1;
-                if (skew > most)
-                    fprintf(stderr, "%d x %d, %d ranks, shape %d: %g\n", sizes[s][0], sizes[s][1], ranks[r], (int)k,
-                            skew);
-                assert_true(skew <= most);
+        for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
+            const comp_grid grid = comp_grid_of(sizes[s][0], sizes[s][1]);
+            count_seen(&grid, shapes[k], counts);
+            for (size_t n = 0; n < sizeof ranks / sizeof *ranks; n++) {
+                int64_t owned[100] = {0}, have[100];
+                double all = 0, squares = 0;
+                for (uint32_t b = 0; b < grid.blocks; b++) {
+                    for (int r = 0; r < ranks[n]; r++) have[r] = counts[b];
+                    if (counts[b]) owned[winner_of(b, have, ranks[n])] += counts[b];
+                    all += (double)counts[b];
+                    squares += (double)counts[b] * (double)counts[b];
+                }
+                for (int r = 0; r < ranks[n]; r++)
+                    assert_true(fabs((double)owned[r] - all / ranks[n]) <= 5 * sqrt(squares / ranks[n]));
             }
+        }
 }
 
-static void owners_of_the_largest_image_add_up(void **context)
+/* ---- strips -------------------------------------------------------------------------------------------------- */
+
+/* The fragments that sheets have handed over. */
+typedef struct handed {
+    const comp_grid *grid;
+    fragment *items;
+    int64_t count, sheets;
+} handed;
+
+static bool take_sheet(void *state_of, const comp_sheet *sheet, int count)
+{
+    handed *h = state_of;
+    assert_int_equal(comp_sheet_count(sheet), count);
+    for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
+        if (comp_sheet_has(sheet, k))
+            h->items[h->count++] = comp_sheet_get(sheet, k, comp_grid_pixel(h->grid, sheet->strip, k));
+    h->sheets++;
+    return true;
+}
+
+static int by_all_bits(const void *a, const void *b)
+{
+    return memcmp(a, b, sizeof(fragment));
+}
+
+/* All fragments of a list come in sheets of their strips, for any number of threads: those of most are as many as the
+ * fullest pixel has. */
+static void strips_hand_over_all(void **context)
 {
     (void)context;
-    const int ranks[] = {1, 2, 3, 7, 99999, 100000};
-    for (size_t r = 0; r < sizeof ranks / sizeof *ranks; r++) {
-        const comp_layout layout = comp_layout_of(UINT32_MAX, ranks[r]);
-        uint64_t sum = 0;
-        for (int rank = 0; rank < ranks[r]; rank++) sum += comp_layout_owned(&layout, rank);
-        assert_true(sum == UINT32_MAX);
-        const uint32_t last = UINT32_MAX - 1;
-        const int owner = comp_owner(last, UINT32_MAX, ranks[r]);
-        assert_true(comp_layout_index(&layout, last) == comp_layout_owned(&layout, owner) - 1);
-    }
-}
-
-/* Fragments of the pixels of one owner, or of all with owner -1, numbered in t_out. */
-static int fill_pixels(fragment *items, int count, const comp_layout *layout, int owner)
-{
-    int filled = 0;
-    while (filled < count) {
-        const uint32_t pixel = next_random() % layout->pixel_count;
-        if (owner >= 0 && (int)comp_layout_owner(layout, pixel) != owner) continue;
-        items[filled] = (fragment){.pixel = pixel, .t_in = (float)pixel, .t_out = (float)filled};
-        filled++;
-    }
-    return filled;
-}
-
-static void check_same_set(const fragment *items, int count)
-{
-    char *met = calloc((size_t)count, 1);
-    assert_non_null(met);
-    for (int i = 0; i < count; i++) {
-        const int number = (int)items[i].t_out;
-        assert_false(met[number]);
-        met[number] = 1;
-        assert_true((uint32_t)items[i].t_in == items[i].pixel);
-    }
-    free(met);
-}
-
-static void bucket_by_owner_keeps_the_set(void **context)
-{
-    (void)context;
-    enum { count = 5000 };
-    static fragment items[count];
-    state = 5;
-    for (int ranks = 1; ranks < 20; ranks++) {
-        const comp_layout layout = comp_layout_of(10007, ranks);
-        int64_t starts[21];
-        fill_pixels(items, count, &layout, -1);
-        comp_bucket_by_owner(&layout, items, count, starts);
-        assert_int_equal(starts[0], 0);
-        assert_int_equal(starts[ranks], count);
-        for (int rank = 0; rank < ranks; rank++)
-            for (int64_t i = starts[rank]; i < starts[rank + 1]; i++)
-                assert_int_equal(comp_layout_owner(&layout, items[i].pixel), rank);
-        check_same_set(items, count);
-    }
+    enum { COUNT = 40000 };
+    static fragment items[COUNT], back[COUNT];
+    comp_layers *layers = base_calloc(1, sizeof *layers);
+    assert_non_null(layers);
+    state = 11;
+    for (int threads = 1; threads <= 4; threads += 3)
+        for (int spread = 1; spread <= 1000; spread *= 10) {
+            comp_grid grid = comp_grid_of(101, 67);
+            comp_strips strips;
+            handed h = {&grid, back, 0, 0};
+            grid.threads = threads;
+            for (int i = 0; i < COUNT; i++) {
+                items[i] = random_fragment();
+                items[i].pixel =
+                    spread == 1 ? (uint32_t)i * 7 % (101 * 67) : next_random() % (101 * 67) / (uint32_t)spread;
+            }
+            assert_int_equal(comp_strips_make(&grid, &(fragment_list){items, COUNT, COUNT}, &strips, NULL), INSITU_OK);
+            for (uint32_t s = 0; s < grid.strips; s++) {
+                const int64_t before = h.count;
+                assert_true(comp_strips_sheets(&strips, s, layers, take_sheet, &h));
+                assert_int_equal(h.count - before, comp_strips_count(&strips, s));
+            }
+            assert_int_equal(h.count, COUNT);
+            qsort(items, COUNT, sizeof *items, by_all_bits);
+            qsort(back, COUNT, sizeof *back, by_all_bits);
+            assert_memory_equal(items, back, sizeof items);
+            comp_strips_free(&strips);
+        }
+    comp_layers_free(layers);
+    base_free(layers);
 }
 
 static void pixels_beyond_the_image_are_seen(void **context)
 {
     (void)context;
-    const comp_layout layout = comp_layout_of(100, 2);
-    const fragment items[3] = {{.pixel = 99}, {.pixel = 0}, {.pixel = 100}};
-    assert_true(comp_bucket_fits(&layout, items, 0));
-    assert_true(comp_bucket_fits(&layout, items, 2));
-    assert_false(comp_bucket_fits(&layout, items, 3));
-}
-
-static void bucket_by_slice_sorts_by_owned_index(void **context)
-{
-    (void)context;
-    enum { count = 20000, shift = 10, most_slices = 64 };
-    static fragment items[count];
-    state = 6;
-    for (int ranks = 1; ranks <= 3; ranks++) {
-        const comp_layout layout = comp_layout_of(60013, ranks);
-        const int owner = ranks - 1;
-        const int64_t slices = ((comp_layout_owned(&layout, owner) - 1) >> shift) + 1;
-        int64_t starts[most_slices + 1];
-        fill_pixels(items, count, &layout, owner);
-        comp_bucket_by_slice(&layout, shift, items, count, starts, slices);
-        assert_int_equal(starts[0], 0);
-        assert_int_equal(starts[slices], count);
-        for (int64_t s = 0; s < slices; s++)
-            for (int64_t i = starts[s]; i < starts[s + 1]; i++)
-                assert_int_equal(comp_layout_index(&layout, items[i].pixel) >> shift, s);
-        check_same_set(items, count);
+    const comp_grid grid = comp_grid_of(10, 10);
+    fragment items[3] = {{.pixel = 99}, {.pixel = 0}, {.pixel = 100}};
+    comp_strips strips;
+    for (int count = 0; count <= 3; count++) {
+        base_error error = {INSITU_OK, ""};
+        const insitu_status status = comp_strips_make(&grid, &(fragment_list){items, count, 3}, &strips, &error);
+        assert_int_equal(status, count < 3 ? INSITU_OK : INSITU_ERROR_INTERNAL);
+        if (!status) comp_strips_free(&strips);
     }
 }
 
@@ -808,12 +833,11 @@ int main(void)
         cmocka_unit_test(many_short_stretches_under_a_long_one_take_no_time),
         cmocka_unit_test(samples_of_neighbours_count_once),
         cmocka_unit_test(overlaps_are_where_a_volume_has_not_ended),
-        cmocka_unit_test(owners_share_all_pixels_evenly),
-        cmocka_unit_test(owners_share_what_is_seen),
-        cmocka_unit_test(owners_of_the_largest_image_add_up),
-        cmocka_unit_test(bucket_by_owner_keeps_the_set),
+        cmocka_unit_test(strips_share_all_pixels),
+        cmocka_unit_test(owners_are_drawn_by_what_they_have),
+        cmocka_unit_test(owners_share_what_all_have),
+        cmocka_unit_test(strips_hand_over_all),
         cmocka_unit_test(pixels_beyond_the_image_are_seen),
-        cmocka_unit_test(bucket_by_slice_sorts_by_owned_index),
         cmocka_unit_test(tiles_are_merged_to_the_bit),
         cmocka_unit_test(tiles_without_memory_are_refused),
     };

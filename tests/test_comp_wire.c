@@ -1,4 +1,4 @@
-/* Messages without MPI: whole numbers and blocks of any contents come back bit for bit; routes lead every fragment from
+/* Messages without MPI: sheets of any contents come back bit for bit; routes lead every fragment from
  * every rank to its owner, and every pixel to rank 0, for more ranks than any machine at hand has. */
 #include <math.h>
 #include <setjmp.h>
@@ -10,12 +10,11 @@
 
 #include <cmocka.h>
 
-#include "comp_block.h"
 #include "comp_cost.h"
 #include "comp_gather.h"
 #include "comp_route.h"
-#include "comp_schedule.h"
-#include "comp_words.h"
+#include "comp_sheet.h"
+#include "fragment_order.h"
 #include "memory.h"
 
 static uint64_t state = 1;
@@ -24,32 +23,6 @@ static uint32_t next_random(void)
 {
     state = state * 6364136223846793005u + 1442695040888963407u;
     return (uint32_t)(state >> 32);
-}
-
-/* Numbers of all lengths, 0 and the greatest of each length among them. */
-static uint32_t random_word(void)
-{
-    const uint32_t bytes = next_random() % 4, top = 0xffffffffu >> 8 * bytes;
-    return next_random() % 8 == 0 ? top : next_random() & top;
-}
-
-static void words_come_back(void **context)
-{
-    (void)context;
-    for (size_t count = 0; count < 300; count++) {
-        uint32_t words[304], back[304];
-        unsigned char bytes[2048], plain[2048];
-        for (size_t i = 0; i < count; i++) words[i] = random_word();
-        unsigned char *const end = comp_words_write(words, count, bytes);
-        unsigned char *const plain_end = comp_words_write_plain(words, count, plain);
-        const size_t length = (size_t)(end - bytes);
-        assert_true(length <= comp_words_bound(count) && length == (size_t)(plain_end - plain));
-        assert_memory_equal(bytes, plain, length);
-        assert_ptr_equal(comp_words_read(bytes, count, back), end);
-        assert_memory_equal(back, words, count * sizeof *words);
-        assert_ptr_equal(comp_words_read_plain(bytes, count, back), end);
-        assert_memory_equal(back, words, count * sizeof *words);
-    }
 }
 
 /* Ways to fill a word of a record. */
@@ -74,76 +47,134 @@ static uint32_t filled(enum filling how, int i, int k, uint32_t before)
     }
 }
 
-/* Indices that go on, leap, and fall back, as layers of windows do. */
-static void fill_block(comp_block *block, int count)
+/* Masks of full rows, of rows with gaps, and empty ones; those of a sparse sheet have few pixels. */
+static void fill_masks(comp_sheet *sheet)
 {
-    enum filling how[COMP_RECORD_WORDS];
-    uint32_t index = next_random() % 1000;
-    block->count = count;
-    for (int k = 0; k < COMP_RECORD_WORDS; k++) how[k] = (enum filling)(next_random() % FILLING_COUNT);
-    for (int i = 0; i < count; i++) {
-        const uint32_t leap = next_random() % 40;
-        index = leap == 0 ? next_random() : leap == 1 ? index - next_random() % 70 : index + 1;
-        block->records[i][0] = index;
-        for (int k = 1; k < COMP_RECORD_WORDS; k++)
-            block->records[i][k] = filled(how[k], i, k, block->records[i][k - 1]);
+    const uint32_t how = next_random() % 4;
+    for (int r = 0; r < COMP_ROWS; r++) {
+        const uint32_t bits = next_random();
+        const uint32_t some[] = {0xffff, bits & (bits >> 16), bits % 3 ? 0xffff : bits, bits % 3 ? 0 : bits};
+        sheet->masks[r] = (uint16_t)some[how];
+    }
+    if (!comp_sheet_count(sheet)) sheet->masks[next_random() % COMP_ROWS] = 1;
+}
+
+static void fill_sheet(comp_sheet *sheet)
+{
+    comp_sheet_begin(sheet, next_random());
+    fill_masks(sheet);
+    sheet->is_opaque = next_random() % 2;
+    for (int w = 0; w < COMP_WORDS; w++) {
+        const enum filling how = (enum filling)(next_random() % FILLING_COUNT);
+        for (int k = 0; k < COMP_STRIP_PIXELS; k++)
+            sheet->words[w][k] = filled(how, k, w + 1, w ? sheet->words[w - 1][k] : 0);
     }
 }
 
-typedef struct run_check {
-    const comp_block *block;
-    int at;
-} run_check;
-
-static void check_run(void *of, uint32_t index, uint32_t length)
+/* What pixels of the first so many words differ? */
+static int count_differences(const comp_sheet *a, const comp_sheet *b, int words)
 {
-    run_check *check = of;
-    for (uint32_t j = 0; j < length; j++) assert_int_equal(check->block->records[check->at++][0], index + j);
+    int count = memcmp(a->masks, b->masks, sizeof a->masks) != 0;
+    for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
+        for (int w = 0; w < words && comp_sheet_has(a, k); w++) count += a->words[w][k] != b->words[w][k];
+    return count;
 }
 
-static void blocks_come_back(void **context)
+typedef struct sheet_pair {
+    comp_sheet *sheet, *back;
+    unsigned char *bytes;
+} sheet_pair;
+
+static sheet_pair make_pair(void)
+{
+    const sheet_pair p = {base_calloc(1, sizeof *p.sheet), base_calloc(1, sizeof *p.back),
+                          base_alloc(comp_sheet_bound(COMP_STRIP_PIXELS, COMP_WORDS))};
+    assert_true(p.sheet && p.back && p.bytes);
+    return p;
+}
+
+static void free_pair(sheet_pair *p)
+{
+    base_free(p->sheet);
+    base_free(p->back);
+    base_free(p->bytes);
+}
+
+/* Sheets of any contents come back to the bit by each instruction set, whichever wrote them, in the same bytes. */
+static void sheets_come_back(void **context)
 {
     (void)context;
-    comp_block *block = base_alloc(sizeof *block), *back = base_alloc(sizeof *back);
-    unsigned char *bytes = base_alloc(comp_block_bound(COMP_BLOCK_RECORDS));
-    assert_true(block && back && bytes);
+    sheet_pair p = make_pair();
+    static unsigned char plain[1 << 15];
     for (int trial = 0; trial < 3000; trial++) {
-        const int count = trial % 7 == 0 ? COMP_BLOCK_RECORDS : 1 + (int)(next_random() % COMP_BLOCK_RECORDS);
-        fill_block(block, count);
-        memset(bytes, 0xa5, comp_block_bound(COMP_BLOCK_RECORDS));
-        unsigned char *const end = comp_block_write(block, bytes);
-        assert_true((size_t)(end - bytes) + COMP_WORDS_SLACK <= comp_block_bound(count));
-        assert_ptr_equal(comp_block_read(bytes, back), end);
-        assert_int_equal(back->count, count);
-        assert_memory_equal(back->records, block->records, (size_t)count * sizeof *block->records);
-        run_check check = {block, 0};
-        assert_ptr_equal(comp_block_runs(bytes, check_run, &check), end);
-        assert_int_equal(check.at, count);
+        const int words = trial % 2 ? COMP_WORDS : COMP_PIXEL_WORDS;
+        fill_sheet(p.sheet);
+        const int count = comp_sheet_count(p.sheet);
+        const size_t length = (size_t)(comp_sheet_write_by(CPU_PLAIN, p.sheet, words, plain) - plain);
+        for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
+            comp_sheet_head head;
+            uint16_t masks[COMP_ROWS];
+            const unsigned char *const end = comp_sheet_write_by(isa, p.sheet, words, p.bytes);
+            assert_true((size_t)(end - p.bytes) == length &&
+                        length + COMP_SHEET_SLACK <= comp_sheet_bound(count, words));
+            assert_memory_equal(p.bytes, plain, length);
+            assert_ptr_equal(comp_sheet_read_by(isa, p.bytes, words, p.back), end);
+            assert_int_equal(count_differences(p.sheet, p.back, words), 0);
+            assert_true(p.back->strip == p.sheet->strip && p.back->is_opaque == p.sheet->is_opaque);
+            assert_ptr_equal(comp_sheet_look(p.bytes, &head, masks), end);
+            assert_true(head.count == count && !memcmp(masks, p.sheet->masks, sizeof masks));
+        }
     }
-    base_free(block);
-    base_free(back);
-    base_free(bytes);
+    free_pair(&p);
 }
 
-/* A row of a plane's depths, exact in float32, has no remains but its first two: its words are a byte each. */
-static void straight_lines_are_a_byte_a_word(void **context)
+/* Columns of a plane's depths, exact in float32, have no remains but in their first two rows: with half a byte for each
+ * row and word, what is left is small. */
+static void straight_lines_take_half_a_byte_a_row(void **context)
 {
     (void)context;
-    comp_block *block = base_alloc(sizeof *block);
-    unsigned char *bytes = base_alloc(comp_block_bound(COMP_BLOCK_RECORDS));
-    assert_true(block && bytes);
-    block->count = 1 << COMP_RUN_SHIFT;
-    for (int i = 0; i < block->count; i++) {
-        block->records[i][0] = (uint32_t)i;
-        for (int k = 1; k < COMP_RECORD_WORDS; k++)
-            block->records[i][k] = bits_of(1 + (float)k * 0x1p-10f * (float)(i + k));
+    sheet_pair p = make_pair();
+    comp_sheet_begin(p.sheet, 0);
+    memset(p.sheet->masks, 0xff, sizeof p.sheet->masks);
+    for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
+        for (int w = 0; w < COMP_WORDS; w++)
+            p.sheet->words[w][k] =
+                bits_of(1 + (float)(w + 1) * 0x1p-12f * (float)(k / COMP_LANES + 2 * k % COMP_LANES));
+    const int64_t length = comp_sheet_write(p.sheet, COMP_WORDS, p.bytes) - p.bytes;
+    /* The head; of each word its first value, half a byte a row, and two rows of at most four bytes a pixel. */
+    assert_true(length <= COMP_SHEET_HEAD + COMP_WORDS * (4 + COMP_ROWS / 2 + 2 * 4 * COMP_LANES));
+    free_pair(&p);
+}
+
+/* Sheets of opaque hits, some of which tie: the nearest stay, as the rule of merging has it. */
+static void nearest_hits_stay(void **context)
+{
+    (void)context;
+    sheet_pair p = make_pair();
+    for (int trial = 0; trial < 300; trial++) {
+        uint16_t left[COMP_ROWS];
+        comp_sheet expected;
+        comp_sheet *const both[2] = {p.sheet, p.back};
+        for (int i = 0; i < 2; i++) {
+            comp_sheet_begin(both[i], 7);
+            for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++) {
+                fragment f = {.t_in = (float)(next_random() % 4), .kind = FRAGMENT_SURFACE + next_random() % 2};
+                if (next_random() % 16 == 0) f.t_in = NAN;
+                f.colour[0] = (float)(next_random() % 3);
+                if (next_random() % 3) comp_sheet_put(both[i], k, &f);
+            }
+        }
+        expected = *p.sheet;
+        for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++) {
+            if (!comp_sheet_has(p.back, k)) continue;
+            const fragment a = comp_sheet_get(p.sheet, k, 0), b = comp_sheet_get(p.back, k, 0);
+            if (!comp_sheet_has(p.sheet, k) || fragment_compare(&b, &a) < 0) comp_sheet_put(&expected, k, &b);
+        }
+        comp_sheet_join(p.sheet, p.back, left);
+        assert_int_equal(count_differences(&expected, p.sheet, COMP_WORDS), 0);
+        for (int r = 0; r < COMP_ROWS; r++) assert_int_equal(left[r], 0);
     }
-    const int64_t length = comp_block_write(block, bytes) - bytes;
-    const int64_t words = (COMP_RECORD_WORDS - 1) * block->count;
-    /* Bytes and lengths of all, 3 more bytes of the first and the second of each word at most, the head, and a run. */
-    assert_true(length <= words + words / 4 + 6 * (COMP_RECORD_WORDS - 1) + COMP_BLOCK_HEAD + 2);
-    base_free(block);
-    base_free(bytes);
+    free_pair(&p);
 }
 
 /* ---- routes -------------------------------------------------------------------------------------------------- */
@@ -257,35 +288,16 @@ static void costs_are_those_of_the_model(void **context)
     assert_int_equal(comp_route_messages(&route, 3), 7);
 }
 
-/* Owned index and pixel are one to one, for any number of ranks: the division by a product is a division. */
-static void indices_and_pixels_are_one_to_one(void **context)
-{
-    (void)context;
-    const int counts[] = {1, 2, 3, 5, 7, 16, 63, 64, 65, 1000, 97336, 100000};
-    const uint32_t pixels[] = {1, 63, 64, 65, 1920 * 1080, 4294967295u};
-    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-        for (size_t k = 0; k < sizeof pixels / sizeof *pixels; k++) {
-            const comp_layout layout = comp_layout_of(pixels[k], counts[i]);
-            for (int trial = 0; trial < 2000; trial++) {
-                const uint32_t pixel = trial == 0 ? pixels[k] - 1 : next_random() % pixels[k];
-                const uint32_t run = pixel >> layout.run_shift, owner = comp_layout_owner(&layout, pixel);
-                assert_int_equal(comp_layout_round(&layout, run), run / (uint32_t)counts[i]);
-                assert_int_equal(comp_layout_pixel(&layout, owner, comp_layout_index(&layout, pixel)), pixel);
-            }
-        }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(words_come_back),
-        cmocka_unit_test(blocks_come_back),
-        cmocka_unit_test(straight_lines_are_a_byte_a_word),
+        cmocka_unit_test(sheets_come_back),
+        cmocka_unit_test(straight_lines_take_half_a_byte_a_row),
+        cmocka_unit_test(nearest_hits_stay),
         cmocka_unit_test(routes_lead_to_owners),
         cmocka_unit_test(gathering_is_a_tree),
         cmocka_unit_test(the_cheapest_route_is_chosen),
         cmocka_unit_test(costs_are_those_of_the_model),
-        cmocka_unit_test(indices_and_pixels_are_one_to_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

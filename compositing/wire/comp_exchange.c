@@ -6,7 +6,6 @@
 #include "comp_exchange.h"
 
 #include "comp_pack.h"
-#include "memory.h"
 
 /* Each round after the first forwards what came in those before. */
 static insitu_status run_rounds(comp_mailroom *room, const comp_route *route, comp_messages *out, comp_messages *held,
@@ -21,22 +20,15 @@ static insitu_status run_rounds(comp_mailroom *room, const comp_route *route, co
     return status;
 }
 
-insitu_status comp_exchange(comp_mailroom *room, const comp_route *route, comp_windows *windows, comp_owned *owned,
-                            insitu_status status, base_error *error)
+insitu_status comp_exchange(comp_mailroom *room, const comp_route *route, const comp_strips *strips,
+                            const comp_owners *owners, comp_messages *held, insitu_status status, base_error *error)
 {
-    const int place = comp_route_place(route, room->rank);
-    const bool is_owner = place < route->owners;
-    comp_messages out = {NULL, NULL}, held = {NULL, NULL};
-    *owned = (comp_owned){NULL, NULL};
-    if (!status) status = comp_pack(windows, route, room->rank, &out, &held, error);
-    status = comp_mail_fold(room, route, is_owner ? &(comp_messages){NULL, NULL} : &out, &held, status, error);
-    status = run_rounds(room, route, &out, &held, status, error);
-    if (!status && is_owner) {
-        const int64_t first = comp_windows_first(windows, (uint32_t)place);
-        const int64_t count = comp_windows_first(windows, (uint32_t)place + 1) - first;
-        status = comp_unpack(windows->layout, (uint32_t)place, &held, windows->items + first, count, owned, error);
-    }
-    comp_messages_free(&held);
-    comp_windows_free(windows);
+    const bool is_owner = comp_route_place(route, room->rank) < route->owners;
+    comp_messages out = {NULL, NULL};
+    *held = (comp_messages){NULL, NULL};
+    if (!status) status = comp_pack(strips, owners, route, room->rank, &out, held, error);
+    status = comp_mail_fold(room, route, is_owner ? &(comp_messages){NULL, NULL} : &out, held, status, error);
+    status = run_rounds(room, route, &out, held, status, error);
+    if (status) comp_messages_free(held);
     return status;
 }

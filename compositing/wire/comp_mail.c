@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "comp_agree.h"
-#include "comp_words.h"
 #include "memory.h"
 
 enum { TAG_ROUND = 32, TAG_FOLD = 8, NO_MORE_BYTES = COMP_MESSAGE_HEAD };
@@ -49,7 +48,7 @@ bool comp_next_parcel(const comp_message *message, size_t *offset, comp_parcel *
 
 static bool add_message(comp_writer *w, size_t bytes)
 {
-    comp_message *m = base_alloc(sizeof *m + bytes + COMP_WORDS_SLACK);
+    comp_message *m = base_alloc(sizeof *m + bytes + COMP_SHEET_SLACK);
     if (!m) return false;
     *m = (comp_message){NULL, w->rank, COMP_MESSAGE_HEAD};
     memset(m->data, 0, COMP_MESSAGE_HEAD);
@@ -102,11 +101,10 @@ insitu_status comp_mailroom_open(MPI_Comm comm, comp_mailroom *out, base_error *
 {
     *out = (comp_mailroom){.comm = comm};
     MPI_Comm_rank(comm, &out->rank);
-    out->waste = base_alloc(COMP_MESSAGE_BYTES + COMP_WORDS_SLACK);
+    out->waste = base_alloc(COMP_MESSAGE_BYTES + COMP_SHEET_SLACK);
     out->reserve = base_alloc(COMP_LONGEST_DENSE * sizeof(MPI_Request));
-    out->block = base_alloc(sizeof *out->block);
-    for (int i = 0; i < 2; i++) out->outgoing[i] = base_alloc(COMP_MESSAGE_BYTES + COMP_WORDS_SLACK);
-    if (out->waste && out->reserve && out->block && out->outgoing[0] && out->outgoing[1]) return INSITU_OK;
+    out->sheet = base_alloc(sizeof *out->sheet);
+    if (out->waste && out->reserve && out->sheet) return INSITU_OK;
     comp_mailroom_close(out);
     return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for messages (%d bytes)", COMP_MESSAGE_BYTES);
 }
@@ -115,8 +113,7 @@ void comp_mailroom_close(comp_mailroom *room)
 {
     base_free(room->waste);
     base_free(room->reserve);
-    base_free(room->block);
-    for (int i = 0; i < 2; i++) base_free(room->outgoing[i]);
+    base_free(room->sheet);
     *room = (comp_mailroom){0};
 }
 
@@ -173,7 +170,7 @@ static void receive(round *r, MPI_Message *found, const MPI_Status *status)
     MPI_Get_count(status, MPI_BYTE, &bytes);
     comp_message *m = NULL;
     if (bytes > COMP_MESSAGE_HEAD && r->status == INSITU_OK) {
-        m = base_alloc(sizeof *m + (size_t)bytes + COMP_WORDS_SLACK);
+        m = base_alloc(sizeof *m + (size_t)bytes + COMP_SHEET_SLACK);
         if (!m) fail_memory(r, bytes);
     }
     unsigned char *const data = m ? m->data : r->room->waste;

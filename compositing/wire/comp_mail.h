@@ -1,6 +1,6 @@
-/* Messages between ranks: parcels of blocks (comp_block.h), each for one owner.
+/* Messages between ranks: parcels of sheets (comp_sheet.h), each for one owner.
  *
- *     message | are there more? | parcel | parcel | ...          parcel | owner, records, bytes | block | block | ...
+ *     message | are there more? | parcel | parcel | ...          parcel | owner, records, bytes | sheet | sheet | ...
  *
  * A message is at most COMP_MESSAGE_BYTES long. So a rank that runs out of memory can still receive it, in room that
  * was made before, and throw it away: nobody waits for that rank. */
@@ -11,8 +11,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "comp_block.h"
 #include "comp_route.h"
+#include "comp_sheet.h"
 #include "error.h"
 
 enum { COMP_MESSAGE_BYTES = 1 << 17, COMP_MESSAGE_HEAD = 4, COMP_PARCEL_HEAD = 12 };
@@ -63,8 +63,7 @@ typedef struct comp_mailroom {
     int rank;
     unsigned char *waste; /* COMP_MESSAGE_BYTES: receives messages that there is no memory for */
     MPI_Request *reserve; /* a request for each partner of the longest dense round */
-    comp_block *block;
-    unsigned char *outgoing[2]; /* COMP_MESSAGE_BYTES each: for pixels on their way to rank 0 */
+    comp_sheet *sheet;    /* for pixels that come to rank 0 */
     int64_t sent_bytes, sent_messages;
 } comp_mailroom;
 

@@ -2,7 +2,6 @@
 
 #include <string.h>
 
-#include "comp_block.h"
 #include "memory.h"
 
 /* Bytes of a fragment, from which the room for a message is first guessed. In most pictures fragments take fewer. */
@@ -15,69 +14,113 @@ static insitu_status no_memory(base_error *error, const char *what)
 
 /* ---- fragments into messages --------------------------------------------------------------------------------- */
 
-typedef struct packing {
-    comp_writer *writer;
-    uint32_t owner;
-    int64_t left; /* fragments for the owner that are not written yet */
-} packing;
+/* The strips in which a rank has something, by owner. */
+typedef struct cargo {
+    const comp_strips *strips;
+    uint32_t *order;  /* strips */
+    uint32_t *starts; /* where each owner's begin, and one more */
+} cargo;
 
-static bool take_block(void *state, comp_block *block)
+static bool sort_strips(const comp_owners *owners, cargo *c)
 {
-    packing *p = state;
-    const size_t bound = comp_block_bound(block->count);
-    unsigned char *at = comp_writer_room(p->writer, p->owner, bound, (size_t)p->left * EXPECTED_BYTES + bound);
-    if (!at) return false;
-    comp_writer_commit(p->writer, comp_block_write(block, at), (uint32_t)block->count);
-    p->left -= block->count;
+    const uint32_t *const ranges = c->strips->starts;
+    const comp_grid *const grid = c->strips->grid;
+    const uint32_t strips = grid->strips;
+    uint32_t sum = 0;
+    c->order = base_alloc((size_t)strips * sizeof *c->order);
+    c->starts = base_calloc((size_t)owners->count + 1, sizeof *c->starts);
+    if (!c->order || !c->starts) return false;
+    for (uint32_t s = 0; s < strips; s++)
+        if (ranges[s + 1] > ranges[s]) c->starts[owners->places[comp_grid_block(grid, s)]]++;
+    for (int k = 0; k < owners->count; k++) c->starts[k] = sum += c->starts[k];
+    c->starts[owners->count] = sum;
+    for (uint32_t s = strips; s-- > 0;)
+        if (ranges[s + 1] > ranges[s]) c->order[--c->starts[owners->places[comp_grid_block(grid, s)]]] = s;
     return true;
 }
 
-static bool pack_owner(const comp_windows *w, uint32_t owner, comp_block *block, comp_writer *writer)
+typedef struct packing {
+    comp_writer *writer;
+    uint32_t owner;
+    int64_t left; /* fragments for the owner that are not written yet, about */
+} packing;
+
+static bool take_sheet(void *state, const comp_sheet *sheet, int count)
 {
-    packing p = {writer, owner, comp_windows_first(w, owner + 1) - comp_windows_first(w, owner)};
-    return p.left == 0 || comp_windows_walk(w, owner, block, take_block, &p);
+    packing *p = state;
+    const size_t bound = comp_sheet_bound(count, COMP_WORDS);
+    const size_t left = (size_t)(p->left > 0 ? p->left : 0);
+    unsigned char *at = comp_writer_room(p->writer, p->owner, bound, left * EXPECTED_BYTES + bound);
+    if (!at) return false;
+    comp_writer_commit(p->writer, comp_sheet_write(sheet, COMP_WORDS, at), (uint32_t)count);
+    p->left -= count;
+    return true;
 }
 
-/* Packs what goes to the partner with the digit: the fragments of all owners with it, except this place. */
-static bool pack_digit(const comp_windows *w, int radix, int digit, int place, comp_block *block, comp_writer *writer)
+/* One of several threads' share of what goes to the owner. */
+static bool pack_owner(const cargo *c, uint32_t owner, int share, int shares, comp_layers *layers, comp_writer *writer)
 {
+    const uint32_t begin = c->starts[owner], count = c->starts[owner + 1] - begin;
+    const uint32_t first = begin + (uint32_t)((uint64_t)count * (uint32_t)share / (uint32_t)shares);
+    const uint32_t end = begin + (uint32_t)((uint64_t)count * ((uint32_t)share + 1) / (uint32_t)shares);
+    packing p = {writer, owner, 0};
     bool is_well = true;
-    for (int owner = digit; owner < (int)w->layout->ranks && is_well; owner += radix)
-        is_well = owner == place || pack_owner(w, (uint32_t)owner, block, writer);
+    for (uint32_t i = first; i < end; i++) p.left += comp_strips_count(c->strips, c->order[i]);
+    for (uint32_t i = first; i < end && is_well; i++)
+        is_well = comp_strips_sheets(c->strips, c->order[i], layers, take_sheet, &p);
     return is_well;
 }
 
-static bool pack_digits(const comp_windows *w, const comp_route *route, int place, comp_messages *out,
-                        comp_messages *kept)
+/* What goes to the partner with a digit: the fragments of all owners with it, except this place. */
+typedef struct batch {
+    int digit, radix, place;
+    int share, shares;
+} batch;
+
+static bool pack_batch(const cargo *c, int owners, const batch *b, comp_layers *layers, comp_writer *writer)
 {
-    const int radix = route->round_count ? route->radix[0] : 1;
+    bool is_well = true;
+    for (int owner = b->digit; owner < owners && is_well; owner += b->radix)
+        is_well = owner == b->place || pack_owner(c, (uint32_t)owner, b->share, b->shares, layers, writer);
+    return is_well;
+}
+
+static bool pack_all(const cargo *c, const comp_route *route, int place, comp_messages *out, comp_messages *kept)
+{
+    const int radix = route->round_count ? route->radix[0] : 1, threads = c->strips->grid->threads;
     const bool is_beyond = place >= route->owners;
     const int own = is_beyond ? -1 : comp_route_digit(route, 0, 1, place);
+    const int shares = (threads + radix - 1) / radix;
     bool is_well = true;
-#pragma omp parallel num_threads(w->layout->threads) reduction(&& : is_well)
+#pragma omp parallel num_threads(threads) reduction(&& : is_well)
     {
-        comp_block *const block = base_alloc(sizeof *block);
-        is_well = block != NULL;
+        comp_layers *const layers = base_calloc(1, sizeof *layers);
+        is_well = layers != NULL;
 #pragma omp for schedule(dynamic, 1)
-        for (int i = 0; i < radix; i++) {
-            const int digit = is_beyond ? i : (own + i) % radix;
+        for (int i = 0; i < radix * shares; i++) {
+            const int digit = is_beyond ? i / shares : (own + i / shares) % radix;
+            const batch b = {digit, radix, place, i % shares, shares};
             comp_writer writer = {.rank = comp_route_rank(route, is_beyond
                                                                      ? place - route->owners
                                                                      : comp_route_partner(route, 0, 1, place, digit))};
-            if (is_well) is_well = pack_digit(w, radix, digit, place, block, &writer);
+            if (is_well) is_well = pack_batch(c, route->owners, &b, layers, &writer);
 #pragma omp critical(comp_pack)
             comp_messages_append(digit == own ? kept : out, &writer.messages);
         }
-        base_free(block);
+        if (layers) comp_layers_free(layers);
+        base_free(layers);
     }
     return is_well;
 }
 
-insitu_status comp_pack(const comp_windows *windows, const comp_route *route, int rank, comp_messages *out,
-                        comp_messages *kept, base_error *error)
+insitu_status comp_pack(const comp_strips *strips, const comp_owners *owners, const comp_route *route, int rank,
+                        comp_messages *out, comp_messages *kept, base_error *error)
 {
-    const int place = comp_route_place(route, rank);
-    if (pack_digits(windows, route, place, out, kept)) return INSITU_OK;
+    cargo c = {.strips = strips};
+    const bool is_well = sort_strips(owners, &c) && pack_all(&c, route, comp_route_place(route, rank), out, kept);
+    base_free(c.order);
+    base_free(c.starts);
+    if (is_well) return INSITU_OK;
     comp_messages_free(out);
     comp_messages_free(kept);
     return no_memory(error, "send");
@@ -123,105 +166,50 @@ insitu_status comp_forward(const comp_messages *in, const comp_route *route, int
     return INSITU_OK;
 }
 
-/* ---- out of messages -----------------------------------------------------------------------------------------
- *
- * A counting sort by pixel: the blocks' runs tell how many fragments each pixel has before any is unpacked, so each
- * goes straight to its place. starts[k] is at first the count of pixel k, then the end of its fragments, and falls to
- * their begin as they are placed. */
+/* ---- out of messages ----------------------------------------------------------------------------------------- */
 
-typedef struct unpacking {
-    const comp_layout *layout;
-    comp_parcel *parcels;
-    int64_t parcel_count;
-    comp_owned *out;
-} unpacking;
-
-static int64_t find_parcels(const comp_messages *in, uint32_t owner, comp_parcel *out, int64_t *fragments)
+/* Counts the sheets of each strip, or, where sheets is given, puts each before the last of its strip. */
+static void visit_sheets(const comp_messages *in, int owner, uint32_t *starts, const unsigned char **sheets)
 {
-    int64_t count = 0;
     for (const comp_message *m = in->first; m; m = m->next) {
         comp_parcel parcel;
         for (size_t at = COMP_MESSAGE_HEAD; comp_next_parcel(m, &at, &parcel);) {
-            if (parcel.owner != owner) continue;
-            if (out) out[count] = parcel;
-            *fragments += parcel.records;
-            count++;
+            if ((int)parcel.owner != owner) continue;
+            comp_sheet_head head;
+            for (const unsigned char *sheet = parcel.data, *end = sheet + parcel.bytes; sheet < end;
+                 sheet += head.bytes) {
+                memcpy(&head, sheet, sizeof head);
+                if (sheets)
+                    sheets[--starts[head.strip]] = sheet;
+                else
+                    starts[head.strip]++;
+            }
         }
     }
-    return count;
 }
 
-static void count_run(void *starts, uint32_t index, uint32_t length)
+insitu_status comp_arrivals_find(const comp_grid *grid, int owner, const comp_messages *in, comp_arrivals *out,
+                                 base_error *error)
 {
-    for (uint32_t k = index; k < index + length; k++) ((uint32_t *)starts)[k]++;
-}
-
-static void count_all(const unpacking *u, const fragment *own, int64_t own_count, uint32_t pixels)
-{
-    uint32_t *const starts = u->out->starts, sum = 0;
-    for (int64_t i = 0; i < own_count; i++) starts[comp_layout_index(u->layout, own[i].pixel)]++;
-    for (int64_t i = 0; i < u->parcel_count; i++)
-        for (const unsigned char *at = u->parcels[i].data, *end = at + u->parcels[i].bytes; at < end;)
-            at = comp_block_runs(at, count_run, starts);
-    for (uint32_t k = 0; k < pixels; k++) starts[k] = sum += starts[k];
-    starts[pixels] = sum;
-}
-
-/* is_shared tells that other threads place fragments of the same pixels. */
-static inline void place(comp_owned *out, const void *item, uint32_t index, bool is_shared)
-{
-    const uint32_t to = is_shared ? __atomic_sub_fetch(&out->starts[index], 1, __ATOMIC_RELAXED) : --out->starts[index];
-    memcpy(&out->items[to], item, sizeof *out->items);
-    out->items[to].pixel = index;
-}
-
-static void place_parcel(const unpacking *u, const comp_parcel *parcel, comp_block *block, bool is_shared)
-{
-    for (const unsigned char *at = parcel->data, *end = at + parcel->bytes; at < end;) {
-        at = comp_block_read(at, block);
-        for (int i = 0; i < block->count; i++) place(u->out, block->records[i], block->records[i][0], is_shared);
+    uint32_t sum = 0;
+    *out = (comp_arrivals){NULL, base_calloc((size_t)grid->strips + 1, sizeof *out->starts)};
+    if (out->starts) {
+        visit_sheets(in, owner, out->starts, NULL);
+        for (uint32_t s = 0; s < grid->strips; s++) out->starts[s] = sum += out->starts[s];
+        out->starts[grid->strips] = sum;
+        out->sheets = base_alloc((size_t)sum * sizeof *out->sheets);
     }
+    if (out->sheets) {
+        visit_sheets(in, owner, out->starts, out->sheets);
+        return INSITU_OK;
+    }
+    comp_arrivals_free(out);
+    return no_memory(error, "receive");
 }
 
-static bool place_all(const unpacking *u, const fragment *own, int64_t own_count)
+void comp_arrivals_free(comp_arrivals *arrivals)
 {
-    bool is_well = true;
-    const int threads = u->layout->threads;
-#pragma omp parallel num_threads(threads) reduction(&& : is_well)
-    {
-        comp_block *const block = base_alloc(sizeof *block);
-        is_well = block != NULL;
-#pragma omp for schedule(dynamic, 1)
-        for (int64_t i = -1; i < u->parcel_count; i++) {
-            for (int64_t k = 0; i < 0 && k < own_count; k++)
-                place(u->out, &own[k], comp_layout_index(u->layout, own[k].pixel), threads > 1);
-            if (i >= 0 && block) place_parcel(u, &u->parcels[i], block, threads > 1);
-        }
-        base_free(block);
-    }
-    return is_well;
-}
-
-insitu_status comp_unpack(const comp_layout *layout, uint32_t owner, const comp_messages *in, const fragment *own,
-                          int64_t own_count, comp_owned *out, base_error *error)
-{
-    const uint32_t pixels = comp_layout_owned(layout, (int)owner);
-    int64_t total = own_count;
-    unpacking u = {.layout = layout, .out = out, .parcel_count = find_parcels(in, owner, NULL, &total)};
-    u.parcels = base_alloc((size_t)u.parcel_count * sizeof *u.parcels);
-    out->items = base_alloc((size_t)total * sizeof *out->items);
-    out->starts = base_calloc((size_t)pixels + 1, sizeof *out->starts);
-    bool is_well = u.parcels && out->items && out->starts && total <= UINT32_MAX;
-    if (is_well) {
-        find_parcels(in, owner, u.parcels, &(int64_t){0});
-        count_all(&u, own, own_count, pixels);
-        is_well = place_all(&u, own, own_count);
-    }
-    base_free(u.parcels);
-    if (is_well) return INSITU_OK;
-    base_free(out->items);
-    base_free(out->starts);
-    *out = (comp_owned){NULL, NULL};
-    return base_fail(error, INSITU_ERROR_MEMORY, "compositing: no memory for received fragments (%lld bytes)",
-                     (long long)total * (long long)sizeof(fragment));
+    base_free(arrivals->sheets);
+    base_free(arrivals->starts);
+    *arrivals = (comp_arrivals){NULL, NULL};
 }

@@ -1,0 +1,152 @@
+#include "comp_sheet.h"
+
+#include "comp_sheet_loops.h"
+#include "cpu.h"
+
+enum { OPAQUE_BIT = 31 };
+
+_Static_assert(sizeof(comp_sheet_head) == COMP_SHEET_HEAD, "heads have no padding");
+
+static const comp_sheet_loops *loops_of(cpu_isa isa)
+{
+#if defined(__x86_64__)
+    if (isa == CPU_AVX512) return &comp_sheet_avx512;
+    if (isa >= CPU_SSE42) return &comp_sheet_sse42;
+#endif
+    (void)isa;
+    return &comp_sheet_plain;
+}
+
+/* Rows that are mostly gaps are closed up: vectors of few values take the time of full ones. */
+static bool is_sparse(const sheet_plan *plan)
+{
+    return 2 * plan->count < plan->rows * COMP_LANES;
+}
+
+static void plan_closed(const comp_sheet_loops *loops, sheet_plan *plan)
+{
+    uint16_t masks[COMP_ROWS];
+    for (int r = 0; r < COMP_ROWS; r++) {
+        const int left = plan->count - r * COMP_LANES;
+        masks[r] = (uint16_t)(left >= COMP_LANES ? 0xffff : left > 0 ? (1u << left) - 1 : 0);
+    }
+    loops->plan(masks, plan);
+}
+
+size_t comp_sheet_bound(int pixels, int words)
+{
+    return COMP_SHEET_HEAD + COMP_ROWS * sizeof(uint16_t) +
+           (size_t)words * (sizeof(uint32_t) * (size_t)(pixels + 1) + COMP_ROWS / 2) + COMP_SHEET_SLACK;
+}
+
+int comp_sheet_count(const comp_sheet *sheet)
+{
+    uint64_t masks[COMP_ROWS / 4];
+    int count = 0;
+    memcpy(masks, sheet->masks, sizeof masks);
+    for (int i = 0; i < COMP_ROWS / 4; i++) count += __builtin_popcountll(masks[i]);
+    return count;
+}
+
+unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int words, unsigned char *out)
+{
+    const comp_sheet_loops *const loops = loops_of(isa);
+    sheet_plan plan;
+    unsigned char *at = out + COMP_SHEET_HEAD;
+    comp_sheet_head head = {.strip = sheet->strip};
+    loops->plan(sheet->masks, &plan);
+    for (int i = 0; i < plan.rows; i++) {
+        head.rows |= 1u << plan.row[i];
+        if (plan.mask[i] == 0xffff) {
+            head.full |= 1u << plan.row[i];
+        } else {
+            memcpy(at, &plan.mask[i], sizeof plan.mask[i]);
+            at += sizeof plan.mask[i];
+        }
+    }
+    head.count = (uint16_t)plan.count;
+    if (is_sparse(&plan)) {
+        comp_sheet closed;
+        loops->close(sheet, &plan, words, &closed);
+        plan_closed(loops, &plan);
+        at = loops->write(&closed, &plan, words, &head.kinds, at);
+    } else {
+        at = loops->write(sheet, &plan, words, &head.kinds, at);
+    }
+    head.kinds |= (uint32_t)sheet->is_opaque << OPAQUE_BIT;
+    head.bytes = (uint16_t)(at - out);
+    memcpy(out, &head, sizeof head);
+    return at;
+}
+
+/* Reads the head and the masks; returns where the words begin. */
+static const unsigned char *read_masks(const unsigned char *in, comp_sheet_head *head, uint16_t masks[COMP_ROWS])
+{
+    memcpy(head, in, sizeof *head);
+    in += COMP_SHEET_HEAD;
+    for (int r = 0; r < COMP_ROWS; r++) {
+        masks[r] = head->full >> r & 1 ? 0xffff : 0;
+        if (!((head->rows & ~head->full) >> r & 1)) continue;
+        memcpy(&masks[r], in, sizeof masks[r]);
+        in += sizeof masks[r];
+    }
+    return in;
+}
+
+const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head, uint16_t masks[COMP_ROWS])
+{
+    read_masks(in, head, masks);
+    return in + head->bytes;
+}
+
+bool comp_sheet_is_opaque(const comp_sheet_head *head)
+{
+    return head->kinds >> OPAQUE_BIT;
+}
+
+const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, int words, comp_sheet *sheet)
+{
+    const comp_sheet_loops *const loops = loops_of(isa);
+    comp_sheet_head head;
+    sheet_plan plan;
+    const unsigned char *const at = read_masks(in, &head, sheet->masks);
+    sheet->strip = head.strip;
+    sheet->is_opaque = comp_sheet_is_opaque(&head);
+    loops->plan(sheet->masks, &plan);
+    if (is_sparse(&plan)) {
+        comp_sheet closed;
+        sheet_plan closed_plan = plan;
+        plan_closed(loops, &closed_plan);
+        loops->read(at, &closed_plan, head.kinds, words, &closed);
+        loops->open(&closed, &plan, words, sheet);
+    } else {
+        loops->read(at, &plan, head.kinds, words, sheet);
+    }
+    return in + head.bytes;
+}
+
+unsigned char *comp_sheet_write(const comp_sheet *sheet, int words, unsigned char *out)
+{
+    return comp_sheet_write_by(cpu_best_isa(), sheet, words, out);
+}
+
+const unsigned char *comp_sheet_read(const unsigned char *in, int words, comp_sheet *sheet)
+{
+    return comp_sheet_read_by(cpu_best_isa(), in, words, sheet);
+}
+
+void comp_sheet_join(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS])
+{
+    loops_of(cpu_best_isa())->join(all, other, left);
+}
+
+void comp_sheet_finish(const comp_sheet *fragments, const float background[4], comp_sheet *pixels)
+{
+    loops_of(cpu_best_isa())->finish(fragments, background, pixels);
+}
+
+void comp_sheet_store(const comp_sheet *pixels, const comp_grid *grid, const float background[4], image *out)
+{
+    const comp_area area = comp_grid_area(grid, pixels->strip);
+    loops_of(cpu_best_isa())->store(pixels, &area, background, out);
+}

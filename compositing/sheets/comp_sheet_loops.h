@@ -1,0 +1,33 @@
+/* The loops over the rows of a sheet (comp_sheet_rows.h), compiled once an instruction set. Only static inline code may
+ * be shared by these: see tests/house_kernels.sh. */
+#ifndef COMP_COMP_SHEET_LOOPS_H
+#define COMP_COMP_SHEET_LOOPS_H
+
+#include "comp_sheet.h"
+
+/* Closed sheets have the pixels of a sheet with many gaps one behind the other, row by row.
+ *
+ * The rows of a sheet that have pixels, and the lane whose value stands above a lane that has none above it yet. */
+typedef struct sheet_plan {
+    int rows, count;
+    uint8_t row[COMP_ROWS], number[COMP_ROWS]; /* of its pixels */
+    uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
+    uint8_t source[COMP_ROWS][COMP_LANES]; /* of fresh lanes */
+} sheet_plan;
+
+typedef struct comp_sheet_loops {
+    void (*plan)(const uint16_t masks[COMP_ROWS], sheet_plan *plan);
+    void (*close)(const comp_sheet *sheet, const sheet_plan *plan, int words, comp_sheet *closed);
+    void (*open)(const comp_sheet *closed, const sheet_plan *plan, int words, comp_sheet *sheet);
+    unsigned char *(*write)(const comp_sheet *sheet, const sheet_plan *plan, int words, uint32_t *kinds,
+                            unsigned char *out);
+    const unsigned char *(*read)(const unsigned char *in, const sheet_plan *plan, uint32_t kinds, int words,
+                                 comp_sheet *out);
+    void (*join)(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS]);
+    void (*finish)(const comp_sheet *fragments, const float background[4], comp_sheet *pixels);
+    void (*store)(const comp_sheet *pixels, const comp_area *area, const float background[4], image *out);
+} comp_sheet_loops;
+
+extern const comp_sheet_loops comp_sheet_plain, comp_sheet_sse42, comp_sheet_avx512;
+
+#endif

@@ -1,0 +1,366 @@
+/* Packs the rows of sheets: inline code that is compiled once an instruction set. */
+#ifndef COMP_COMP_SHEET_ROWS_H
+#define COMP_COMP_SHEET_ROWS_H
+
+#include "comp_lanes.h"
+#include "comp_sheet_loops.h"
+
+/* A word is foretold in a straight line from the two above it, or from the one above. */
+enum word_kind { WORD_LINE, WORD_ABOVE, WORD_SAME, WORD_AS_BEFORE };
+
+/* The nearest lane of known, to the left if there is one. */
+static uint8_t nearest_lane(unsigned known, int lane)
+{
+    const unsigned left = known & ((1u << lane) - 1);
+    return (uint8_t)(left ? 31 - __builtin_clz(left) : __builtin_ctz(known));
+}
+
+static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
+{
+    unsigned known = 0;
+    plan->rows = plan->count = 0;
+    for (int r = 0; r < COMP_ROWS; r++) {
+        if (!masks[r]) continue;
+        const int i = plan->rows++;
+        plan->row[i] = (uint8_t)r;
+        plan->mask[i] = masks[r];
+        plan->number[i] = (uint8_t)__builtin_popcount(masks[r]);
+        plan->count += plan->number[i];
+        plan->fresh[i] = (uint16_t)(i ? masks[r] & ~known : 0);
+        for (unsigned left = plan->fresh[i]; left; left &= left - 1) {
+            const int lane = __builtin_ctz(left);
+            plan->source[i][lane] = nearest_lane(known, lane);
+        }
+        known |= masks[r];
+    }
+}
+
+/* What the rows so far foretell. */
+typedef struct forecast {
+    lanes last, slope;
+} forecast;
+
+ROWS_INLINE void begin_fresh(const sheet_plan *plan, int i, forecast *f)
+{
+    for (unsigned left = plan->fresh[i]; left; left &= left - 1) {
+        const int lane = __builtin_ctz(left);
+        f->last[lane] = f->last[plan->source[i][lane]];
+        f->slope[lane] = 0;
+    }
+}
+
+/* Maps values near 0, of either sign, to small ones. */
+ROWS_INLINE lanes fold(lanes value)
+{
+    return value << 1 ^ (lanes)((signed_lanes)value >> 31);
+}
+
+ROWS_INLINE lanes unfold(lanes value)
+{
+    return value >> 1 ^ -(value & 1);
+}
+
+/* The forecast learns the row's values. Straight lines begin level. */
+ROWS_INLINE void learn(forecast *f, lanes values, unsigned mask, unsigned fresh)
+{
+    const lanes step = values - f->last;
+    if (mask == 0xffff && !fresh) {
+        f->slope = step;
+        f->last = values;
+        return;
+    }
+    f->slope = select_lanes(mask_lanes(mask & ~fresh), step, f->slope);
+    f->last = select_lanes(mask_lanes(mask), values, f->last);
+}
+
+ROWS_INLINE void learn_first(forecast *f, lanes values)
+{
+    f->last = values;
+    f->slope = (lanes){0};
+}
+
+/* ---- half bytes ---------------------------------------------------------------------------------------------- */
+
+static inline unsigned half_bytes(uint32_t greatest)
+{
+    return greatest ? (35 - (unsigned)__builtin_clz(greatest)) / 4 : 0;
+}
+
+/* Bytes of count remains of so many half bytes each: two bytes, one byte and half a byte of each, as many of these as
+ * there are. Of half bytes the first eight lanes share bytes with the last eight. */
+static inline size_t packed_bytes(unsigned halves, int count)
+{
+    const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
+    if (halves == 8) return 4 * (size_t)count;
+    return (halves & 4) / 2 * (size_t)count + (halves & 2) / 2 * (size_t)count + (halves & 1) * (size_t)pairs;
+}
+
+/* Writes count remains; those behind are 0. */
+ROWS_INLINE unsigned char *pack(lanes remains, unsigned halves, int count, unsigned char *out)
+{
+    if (halves == 8) {
+        memcpy(out, &remains, sizeof remains);
+        return out + 4 * (size_t)count;
+    }
+    const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
+    const two_byte_lanes twos = __builtin_convertvector(remains, two_byte_lanes);
+    const lanes behind_twos = remains >> (halves & 4) * 4;
+    const byte_lanes ones = __builtin_convertvector(behind_twos, byte_lanes);
+    const byte_lanes half = __builtin_convertvector(behind_twos >> (halves & 2) * 4, byte_lanes);
+    uint64_t low, high;
+    memcpy(&low, &half, sizeof low);
+    memcpy(&high, (const unsigned char *)&half + sizeof low, sizeof high);
+    low |= high << 4; /* what is behind count is 0 */
+    memcpy(out, &twos, sizeof twos);
+    out += (halves & 4) / 2 * (size_t)count;
+    memcpy(out, &ones, sizeof ones);
+    out += (halves & 2) / 2 * (size_t)count;
+    memcpy(out, &low, sizeof low);
+    return out + (halves & 1) * (size_t)pairs;
+}
+
+/* Reads count remains; those behind mean nothing. */
+ROWS_INLINE const unsigned char *unpack(const unsigned char *in, unsigned halves, int count, lanes *remains)
+{
+    if (halves == 8) {
+        memcpy(remains, in, sizeof *remains);
+        return in + 4 * (size_t)count;
+    }
+    const int pairs = count < COMP_LANES / 2 ? count : COMP_LANES / 2;
+    const unsigned behind_twos = (halves & 4) * 4, behind_ones = behind_twos + (halves & 2) * 4;
+    two_byte_lanes twos;
+    byte_lanes ones, half;
+    uint64_t pair[2];
+    memcpy(&twos, in, sizeof twos);
+    in += (halves & 4) / 2 * (size_t)count;
+    memcpy(&ones, in, sizeof ones);
+    in += (halves & 2) / 2 * (size_t)count;
+    memcpy(&pair[0], in, sizeof pair[0]);
+    pair[1] = pair[0] >> 4 & 0x0f0f0f0f0f0f0f0fu;
+    pair[0] &= 0x0f0f0f0f0f0f0f0fu;
+    memcpy(&half, pair, sizeof half);
+    *remains = (__builtin_convertvector(twos, lanes) & (halves & 4 ? 0xffffu : 0)) |
+               (__builtin_convertvector(ones, lanes) & (halves & 2 ? 0xffu : 0)) << behind_twos |
+               (__builtin_convertvector(half, lanes) & (halves & 1 ? 15u : 0)) << behind_ones;
+    return in + (halves & 1) * (size_t)pairs;
+}
+
+/* Closes the gaps of a row; behind the values are zeros. */
+ROWS_INLINE lanes close_gaps(lanes from, unsigned mask)
+{
+#if defined(__AVX512F__)
+    return (lanes)_mm512_maskz_compress_epi32((__mmask16)mask, (__m512i)from);
+#endif
+    uint32_t gapped[COMP_LANES], closed[COMP_LANES] = {0};
+    store_lanes(gapped, from);
+    for (int n = 0; mask; mask &= mask - 1) closed[n++] = gapped[__builtin_ctz(mask)];
+    return load_lanes(closed);
+}
+
+ROWS_INLINE lanes open_gaps(lanes from, unsigned mask)
+{
+#if defined(__AVX512F__)
+    return (lanes)_mm512_maskz_expand_epi32((__mmask16)mask, (__m512i)from);
+#endif
+    uint32_t gapped[COMP_LANES] = {0}, closed[COMP_LANES];
+    store_lanes(closed, from);
+    for (int n = 0; mask; mask &= mask - 1) gapped[__builtin_ctz(mask)] = closed[n++];
+    return load_lanes(gapped);
+}
+
+/* The same from and to memory, which may be written and read for a whole row. */
+ROWS_INLINE void close_row(const uint32_t *row, unsigned mask, uint32_t *to)
+{
+#if defined(__AVX512F__)
+    store_lanes(to, close_gaps(load_lanes(row), mask));
+#else
+    for (; mask; mask &= mask - 1) *to++ = row[__builtin_ctz(mask)];
+#endif
+}
+
+ROWS_INLINE void open_row(const uint32_t *from, unsigned mask, uint32_t *row)
+{
+#if defined(__AVX512F__)
+    store_lanes(row, open_gaps(load_lanes(from), mask));
+#else
+    for (; mask; mask &= mask - 1) row[__builtin_ctz(mask)] = *from++;
+#endif
+}
+
+static void close_sheet(const comp_sheet *sheet, const sheet_plan *plan, int words, comp_sheet *closed)
+{
+    for (int w = 0; w < words; w++) {
+        uint32_t gathered[COMP_STRIP_PIXELS + COMP_LANES], *to = gathered;
+        for (int i = 0; i < plan->rows; i++) {
+            close_row(&sheet->words[w][plan->row[i] * COMP_LANES], plan->mask[i], to);
+            to += plan->number[i];
+        }
+        memcpy(closed->words[w], gathered, (size_t)plan->count * sizeof *gathered);
+    }
+}
+
+static void open_sheet(const comp_sheet *closed, const sheet_plan *plan, int words, comp_sheet *sheet)
+{
+    for (int w = 0; w < words; w++) {
+        const uint32_t *from = closed->words[w];
+        for (int i = 0; i < plan->rows; i++) {
+            open_row(from, plan->mask[i], &sheet->words[w][plan->row[i] * COMP_LANES]);
+            from += plan->number[i];
+        }
+    }
+}
+
+/* ---- writing ------------------------------------------------------------------------------------------------- */
+
+/* A word's remains, of both ways to foretell it. */
+typedef struct word_remains {
+    lanes of[2][COMP_ROWS];
+    uint8_t halves[2][COMP_ROWS];
+} word_remains;
+
+/* The first row goes from left to right. */
+ROWS_INLINE lanes remains_of_first(lanes values, unsigned mask)
+{
+    uint32_t own[COMP_LANES + 1];
+    const lanes closed = mask == 0xffff ? values : close_gaps(values, mask);
+    own[0] = closed[0];
+    store_lanes(own + 1, closed);
+    return fold(closed - load_lanes(own)) & mask_lanes((1u << __builtin_popcount(mask)) - 1);
+}
+
+/* Foretells a word both ways; returns the way that takes fewer bytes. */
+ROWS_INLINE enum word_kind foretell(const uint32_t *words, const sheet_plan *plan, word_remains *out)
+{
+    forecast f;
+    size_t bytes[2] = {0, 0};
+    for (int i = 0; i < plan->rows; i++) {
+        const lanes values = load_lanes(words + plan->row[i] * COMP_LANES);
+        const unsigned mask = plan->mask[i];
+        lanes above, line;
+        if (i) {
+            if (plan->fresh[i]) begin_fresh(plan, i, &f);
+            above = fold(values - f.last);
+            line = fold(values - f.last - f.slope);
+            if (mask != 0xffff) above = close_gaps(above, mask);
+            if (mask != 0xffff) line = close_gaps(line, mask);
+            learn(&f, values, mask, plan->fresh[i]);
+        } else {
+            above = line = remains_of_first(values, mask);
+            learn_first(&f, values);
+        }
+        out->of[WORD_ABOVE][i] = above;
+        out->of[WORD_LINE][i] = line;
+        for (int way = 0; way < 2; way++) {
+            out->halves[way][i] = (uint8_t)half_bytes(any_bits(out->of[way][i]));
+            bytes[way] += packed_bytes(out->halves[way][i], plan->number[i]);
+        }
+    }
+    return bytes[WORD_ABOVE] < bytes[WORD_LINE] ? WORD_ABOVE : WORD_LINE;
+}
+
+ROWS_INLINE unsigned char *write_word(const uint32_t *words, const sheet_plan *plan, enum word_kind *kind,
+                                      unsigned char *out)
+{
+    word_remains remains;
+    *kind = foretell(words, plan, &remains);
+    const uint8_t *halves = remains.halves[*kind];
+    for (int i = 0; i < plan->rows; i += 2)
+        *out++ = (unsigned char)(halves[i] | (i + 1 < plan->rows ? halves[i + 1] : 0) << 4);
+    for (int i = 0; i < plan->rows; i++) out = pack(remains.of[*kind][i], halves[i], plan->number[i], out);
+    return out;
+}
+
+/* Bits in which any pixel's word differs from the first pixel's, and from its own word before. */
+ROWS_INLINE enum word_kind find_kind(const comp_sheet *sheet, const sheet_plan *plan, int word, uint32_t first)
+{
+    const uint32_t *own = sheet->words[word], *before = sheet->words[word ? word - 1 : 0];
+    lanes others = {0}, next = {0};
+    for (int i = 0; i < plan->rows; i++) {
+        const lanes values = load_lanes(own + plan->row[i] * COMP_LANES), is_there = mask_lanes(plan->mask[i]);
+        others |= (values ^ first) & is_there;
+        next |= (values ^ load_lanes(before + plan->row[i] * COMP_LANES)) & is_there;
+    }
+    if (!any_bits(others)) return WORD_SAME;
+    return word && !any_bits(next) ? WORD_AS_BEFORE : WORD_LINE;
+}
+
+static unsigned char *write_words(const comp_sheet *sheet, const sheet_plan *plan, int words, uint32_t *kinds,
+                                  unsigned char *out)
+{
+    const int first = plan->row[0] * COMP_LANES + __builtin_ctz(plan->mask[0]);
+    *kinds = 0;
+    for (int w = 0; w < words; w++) {
+        enum word_kind kind = find_kind(sheet, plan, w, sheet->words[w][first]);
+        if (kind != WORD_AS_BEFORE) {
+            memcpy(out, &sheet->words[w][first], sizeof(uint32_t));
+            out += sizeof(uint32_t);
+        }
+        if (kind == WORD_LINE) out = write_word(sheet->words[w], plan, &kind, out);
+        *kinds |= (uint32_t)kind << 2 * w;
+    }
+    return out;
+}
+
+/* ---- reading ------------------------------------------------------------------------------------------------- */
+
+ROWS_INLINE lanes read_first(lanes remains, unsigned mask, uint32_t value)
+{
+    uint32_t steps[COMP_LANES];
+    const int count = __builtin_popcount(mask);
+    store_lanes(steps, unfold(remains));
+    for (int n = 0; n < count; n++) steps[n] = value += steps[n];
+    return mask == 0xffff ? load_lanes(steps) : open_gaps(load_lanes(steps), mask);
+}
+
+ROWS_INLINE const unsigned char *read_word(const unsigned char *in, const sheet_plan *plan, bool has_slope,
+                                           uint32_t value, uint32_t *words)
+{
+    forecast f;
+    const unsigned char *const halves = in;
+    const uint32_t slopes = has_slope ? 0xffffffffu : 0;
+    in += (plan->rows + 1) / 2;
+    for (int i = 0; i < plan->rows; i++) {
+        const unsigned mask = plan->mask[i];
+        lanes remains, values;
+        in = unpack(in, halves[i / 2] >> (i & 1) * 4 & 15, plan->number[i], &remains);
+        if (i) {
+            if (mask != 0xffff) remains = open_gaps(remains, mask);
+            if (plan->fresh[i]) begin_fresh(plan, i, &f);
+            values = f.last + (f.slope & slopes) + unfold(remains);
+            learn(&f, values, mask, plan->fresh[i]);
+        } else {
+            values = read_first(remains, mask, value);
+            learn_first(&f, values);
+        }
+        store_lanes(words + plan->row[i] * COMP_LANES, values);
+    }
+    return in;
+}
+
+ROWS_INLINE void fill_word(const sheet_plan *plan, uint32_t value, uint32_t *words)
+{
+    const lanes values = (lanes){0} + value;
+    for (int i = 0; i < plan->rows; i++) store_lanes(words + plan->row[i] * COMP_LANES, values);
+}
+
+static const unsigned char *read_words(const unsigned char *in, const sheet_plan *plan, uint32_t kinds, int words,
+                                       comp_sheet *out)
+{
+    for (int w = 0; w < words; w++) {
+        const enum word_kind kind = (enum word_kind)(kinds >> 2 * w & 3);
+        uint32_t value;
+        if (kind == WORD_AS_BEFORE) {
+            memcpy(out->words[w], out->words[w - 1], sizeof out->words[w]);
+            continue;
+        }
+        memcpy(&value, in, sizeof value);
+        in += sizeof value;
+        if (kind == WORD_SAME)
+            fill_word(plan, value, out->words[w]);
+        else
+            in = read_word(in, plan, kind == WORD_LINE, value, out->words[w]);
+    }
+    return in;
+}
+
+#endif

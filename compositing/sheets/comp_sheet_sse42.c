@@ -1,0 +1,11 @@
+#include "comp_sheet_blend.h"
+#include "comp_sheet_rows.h"
+
+const comp_sheet_loops comp_sheet_sse42 = {.plan = make_plan,
+                                           .close = close_sheet,
+                                           .open = open_sheet,
+                                           .write = write_words,
+                                           .read = read_words,
+                                           .join = join_sheets,
+                                           .finish = finish_pixels,
+                                           .store = store_pixels};
