@@ -21,7 +21,7 @@ extern const comp_machine comp_usual_machine;
 /* The load of the busiest rank. */
 typedef struct comp_load {
     int64_t fragments;
-    double bytes; /* that a fragment takes on its way (comp_block.h) */
+    double bytes; /* that a fragment takes on its way (comp_sheet.h) */
 } comp_load;
 
 /* The cost of a route for the busiest rank. */

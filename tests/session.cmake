@@ -36,6 +36,11 @@ add_executable(test_homes test_homes.c)
 target_link_libraries(test_homes PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA)
 add_test(NAME homes COMMAND test_homes)
 
+# Ranks are not bound, so that all may run on all cores.
+add_executable(test_session_cores test_session_cores.c)
+target_link_libraries(test_session_cores PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA OpenMP::OpenMP_C)
+insitu_add_mpi_test(session_cores test_session_cores 1 2 3)
+
 insitu_session_program(test_session_collectives)
 insitu_add_mpi_test(session_collectives test_session_collectives 2 5 ARGS ${CMAKE_CURRENT_BINARY_DIR})
 insitu_session_program(test_session_smooth)

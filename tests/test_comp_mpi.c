@@ -57,6 +57,17 @@ static fragment make_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
     return f;
 }
 
+/* The same, but by seed all, every second or none is a hit of an opaque surface. */
+static fragment make_some_fragment(uint32_t i, uint32_t seed, uint32_t pixel_count)
+{
+    fragment f = make_fragment(i, seed, pixel_count);
+    if (seed % 3 == 0 || (seed % 3 == 1 && i % 2)) return f;
+    if (f.kind < FRAGMENT_SURFACE) f.kind += FRAGMENT_SURFACE;
+    f.t_out = f.t_in;
+    f.transmittance = 0;
+    return f;
+}
+
 static int dealt_to(dealing how, uint32_t i, const fragment *f, int width, uint32_t count)
 {
     const uint32_t x = f->pixel % (uint32_t)width, y = f->pixel / (uint32_t)width, ranks = (uint32_t)rank_count;
@@ -116,7 +127,10 @@ typedef struct setting {
     int64_t count;       /* of all ranks */
 } setting;
 
-static setting make_setting(int width, int height, uint32_t count, dealing how, uint32_t seed)
+/* Makes the i-th fragment of all. */
+typedef fragment fragment_maker(uint32_t i, uint32_t seed, uint32_t pixel_count);
+
+static setting make_setting_of(fragment_maker *make, int width, int height, uint32_t count, dealing how, uint32_t seed)
 {
     setting s = {.count = count, .expected = make_image(width, height), .out = {width, height, NULL, NULL, NULL}};
     if (own_rank == 0) s.out = make_image(width, height);
@@ -124,13 +138,18 @@ static setting make_setting(int width, int height, uint32_t count, dealing how, 
     s.own.items = count ? base_alloc(count * sizeof *all) : NULL;
     assert_true(!count || (all && s.own.items));
     for (uint32_t i = 0; i < count; i++) {
-        all[i] = make_fragment(i, seed, (uint32_t)width * (uint32_t)height);
+        all[i] = make(i, seed, (uint32_t)width * (uint32_t)height);
         if (dealt_to(how, i, &all[i], width, count) == own_rank) s.own.items[s.own.count++] = all[i];
     }
     s.own.capacity = count;
     serial_merge(all, count, &s.expected);
     base_free(all);
     return s;
+}
+
+static setting make_setting(int width, int height, uint32_t count, dealing how, uint32_t seed)
+{
+    return make_setting_of(make_fragment, width, height, count, how, seed);
 }
 
 static void free_setting(setting *s)
@@ -159,7 +178,7 @@ static int64_t held_by(const fragment_list *list)
 
 static void check_composite(int width, int height, uint32_t count, dealing how, uint32_t seed)
 {
-    setting s = make_setting(width, height, count, how, seed);
+    setting s = make_setting_of(make_some_fragment, width, height, count, how, seed);
     comp_statistics statistics;
     base_error error = {INSITU_OK, ""};
     const int64_t own_count = s.own.count;

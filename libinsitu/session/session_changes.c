@@ -64,7 +64,7 @@ static void fill_words(const insitu_session *session, int64_t cycle, double time
     words[NAMES_HIGH] = names;
     words[NAMES_LOW] = ~names;
     words[SCENE_CHANGED] = session_is_scene_edited(file, team->rank);
-    words[THREADS_LACKING] = session_lacks_threads(&session->threads, file->scene.threads, team->node_ranks);
+    words[THREADS_LACKING] = session_lacks_threads(&session->threads, file->scene.threads, team->cores);
     words[UNWRITTEN] = session->writer.failures;
     words[FILLED] = has_filled_field(meshes);
     words[WRITES_AT_ONCE] = team->rank == 0 && !session_writer_is_behind(&session->writer, &file->scene);

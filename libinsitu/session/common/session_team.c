@@ -1,6 +1,7 @@
 #include "session_team.h"
 
 #include "session_agree.h"
+#include "session_cores.h"
 
 static insitu_status duplicate(MPI_Comm comm, MPI_Comm *out, base_error *error)
 {
@@ -11,7 +12,7 @@ static insitu_status duplicate(MPI_Comm comm, MPI_Comm *out, base_error *error)
 
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error)
 {
-    *out = (session_team){.comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1, .each_node_ranks = 1};
+    *out = (session_team){.comm = MPI_COMM_NULL, .compositing_comm = MPI_COMM_NULL, .node_ranks = 1, .cores = 1, .each_node_ranks = 1};
     insitu_status status = duplicate(comm, &out->comm, error);
     if (!status) status = duplicate(out->comm, &out->compositing_comm, error);
     if (status) return status;
@@ -43,6 +44,7 @@ void session_team_count_node(session_team *team)
     team->node_ranks = 1;
     if (MPI_Comm_split_type(team->comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node) != MPI_SUCCESS) return;
     MPI_Comm_size(node, &team->node_ranks);
+    team->cores = session_cores_of_rank(node);
     find_placing(team, node);
     MPI_Comm_free(&node);
 }

@@ -13,6 +13,7 @@ typedef struct session_team {
     MPI_Comm compositing_comm; /* on which compositing alone talks */
     int rank, ranks;
     int node_ranks; /* ranks on this rank's node, itself among them */
+    int cores;      /* this rank's share of the node's (session_cores.h) */
     int each_node_ranks; /* ranks on every node, where these lie one node after the other or round them; else 1 */
     bool is_round_nodes; /* round them: neighbours in rank are on different nodes */
     int threads;    /* of this rank in this step; 0 before the first */
@@ -22,7 +23,7 @@ typedef struct session_team {
  * Collective. */
 insitu_status session_team_create(MPI_Comm comm, session_team *out, base_error *error);
 
-/* Counts the ranks of this rank's node, and finds how ranks lie on nodes. Collective. */
+/* Counts the ranks of this rank's node and its share of the cores, and finds how ranks lie on nodes. Collective. */
 void session_team_count_node(session_team *team);
 
 /* Frees the communicators. Collective, while MPI is running. */

@@ -18,7 +18,6 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "memory.h"
 #include "session_agree.h"
@@ -45,17 +44,10 @@ static team_cap cap_of_team(void)
     return (team_cap){cores > 1 ? cores : 1, "this rank may run on no more cores"};
 }
 
-/* A rank bound to some cores has them for itself; one that is bound to none shares the node's. */
-static int usual_threads(int node_ranks)
+static int wanted_threads(int asked, int cores)
 {
-    int cores = omp_get_num_procs();
-    if (cores >= (int)sysconf(_SC_NPROCESSORS_ONLN)) cores /= node_ranks;
-    return cores < omp_get_max_threads() ? cores : omp_get_max_threads();
-}
-
-static int wanted_threads(int asked, int node_ranks)
-{
-    const int wanted = asked > 0 ? asked : usual_threads(node_ranks);
+    const int most = omp_get_max_threads(), usual = cores < most ? cores : most;
+    const int wanted = asked > 0 ? asked : usual;
     const int cap = cap_of_team().threads;
     return wanted > cap ? cap : wanted > 1 ? wanted : 1;
 }
@@ -85,9 +77,9 @@ static int living_threads(const session_threads *threads)
     return is_same && threads->ended == atomic_load(&ended_count) ? threads->count : 1;
 }
 
-bool session_lacks_threads(const session_threads *threads, int asked, int node_ranks)
+bool session_lacks_threads(const session_threads *threads, int asked, int cores)
 {
-    return wanted_threads(asked, node_ranks) > threads->count || !pthread_equal(threads->caller, pthread_self()) ||
+    return wanted_threads(asked, cores) > threads->count || !pthread_equal(threads->caller, pthread_self()) ||
            threads->ended != atomic_load(&ended_count);
 }
 
@@ -241,7 +233,7 @@ static insitu_status check_stacks(session_threads *threads, const session_team *
 insitu_status session_begin_threads(session_threads *threads, session_team *team, int asked, bool is_new,
                                     const session_guard *guard, session_report *report, base_error *error)
 {
-    const int wanted = wanted_threads(asked, team->node_ranks);
+    const int wanted = wanted_threads(asked, team->cores);
     insitu_status status = is_new ? try_threads(threads, wanted, team->comm, error) : INSITU_OK;
     if (status) return status;
     team->threads = choose_threads(threads, asked, wanted, report);

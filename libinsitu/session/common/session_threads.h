@@ -23,8 +23,8 @@ typedef struct session_threads {
 } session_threads;
 
 /* Tells whether this rank wants more threads than it is known to be able to start. asked is the scene's number, 0 where
- * it names none. Local. */
-bool session_lacks_threads(const session_threads *threads, int asked, int node_ranks);
+ * it names none: then it wants its share of the cores, or fewer if OpenMP would take fewer. Local. */
+bool session_lacks_threads(const session_threads *threads, int asked, int cores);
 
 /* Find out how many threads can be started, set team->threads, and give the threads the environment of the library
  * until session_guard_end_team(). The report says so if there are fewer than asked for. If is_new (some rank lacks

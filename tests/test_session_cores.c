@@ -1,0 +1,76 @@
+/* A rank's share of the cores, however ranks are bound: by arithmetic, and of this machine's. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <mpi.h>
+#include <omp.h>
+
+#include "session_cores.h"
+
+enum { MOST_CORES = 128, MOST_RANKS = 16 };
+
+/* A rank that may run on the cores from first on. */
+typedef struct binding {
+    int first, count;
+} binding;
+
+static void check_shares(const binding *ranks, int rank_count, const int *expected)
+{
+    int32_t counts[MOST_CORES] = {0}, own[MOST_RANKS][MOST_CORES] = {{0}};
+    for (int r = 0; r < rank_count; r++)
+        for (int k = ranks[r].first; k < ranks[r].first + ranks[r].count; k++) {
+            own[r][k] = 1;
+            counts[k]++;
+        }
+    for (int r = 0; r < rank_count; r++)
+        assert_int_equal(session_share_of_cores(own[r], counts, MOST_CORES), expected[r]);
+}
+
+/* All ranks alike. */
+static void check_alike(binding one, int rank_count, int expected)
+{
+    binding ranks[MOST_RANKS];
+    int shares[MOST_RANKS];
+    for (int r = 0; r < rank_count; r++) {
+        ranks[r] = one;
+        shares[r] = expected;
+    }
+    check_shares(ranks, rank_count, shares);
+}
+
+static void ranks_share_what_they_may_run_on(void **context)
+{
+    (void)context;
+    check_alike((binding){0, 64}, 1, 64);
+    check_alike((binding){0, 64}, 8, 8);
+    check_alike((binding){0, 64}, 7, 9);
+    check_alike((binding){0, 2}, 8, 1);
+    check_alike((binding){40, 12}, 3, 4); /* a container's cores */
+    check_shares((const binding[]){{0, 32}, {32, 32}, {0, 32}, {32, 32}}, 4, (const int[]){16, 16, 16, 16});
+    check_shares((const binding[]){{0, 4}, {4, 4}, {8, 4}}, 3, (const int[]){4, 4, 4});
+    check_shares((const binding[]){{0, 1}, {0, 4}}, 2, (const int[]){1, 3});
+}
+
+static void ranks_of_this_node_share_its_cores(void **context)
+{
+    (void)context;
+    int ranks = 1;
+    MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+    const int share = omp_get_num_procs() / ranks;
+    assert_int_equal(session_cores_of_rank(MPI_COMM_WORLD), share > 1 ? share : 1);
+}
+
+int main(int argc, char **argv)
+{
+    MPI_Init(&argc, &argv);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ranks_share_what_they_may_run_on),
+        cmocka_unit_test(ranks_of_this_node_share_its_cores),
+    };
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    MPI_Finalize();
+    return failed;
+}
