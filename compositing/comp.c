@@ -77,8 +77,8 @@ static void choose_owners(composition *c)
 static void vote(composition *c)
 {
     int64_t counts[COMP_MOST_BLOCKS] = {0};
-    for (uint32_t s = 0; s < c->grid.strips; s++)
-        counts[comp_grid_block(&c->grid, s)] += comp_strips_count(&c->strips, s);
+    for (uint32_t r = 0; r < c->strips.starts[c->grid.strips]; r++)
+        counts[comp_grid_block(&c->grid, c->strips.ranges[r].strip)] += c->strips.ranges[r].count;
     for (uint32_t b = 0; b < c->grid.blocks; b++) c->votes[b] = comp_vote(b, c->room.rank, counts[b]);
 }
 

@@ -20,8 +20,9 @@ typedef struct pile {
 /* A thread's memory. */
 typedef struct merge_scratch {
     comp_sheet all, other, pixels;
-    pile left, listed;                    /* left: .pixel is the number in the strip */
-    uint32_t ends[COMP_STRIP_PIXELS + 1]; /* of each pixel's fragments in the list */
+    pile left, listed;                                           /* left: .pixel is the number in the strip */
+    uint16_t mixed[COMP_ROWS];                                   /* pixels that have something left */
+    uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS]; /* of such a pixel's fragments in the list */
     comp_writer writer;
 } merge_scratch;
 
@@ -38,32 +39,47 @@ static bool reserve(pile *p, int64_t count)
 
 /* ---- joined -------------------------------------------------------------------------------------------------- */
 
-static bool leave(pile *left, const fragment *item, uint32_t at)
+/* Counts a pixel as one whose fragments are listed: that in the sheet first. */
+static void mix(merge_scratch *m, uint32_t at)
 {
+    const unsigned bit = 1u << at % COMP_LANES;
+    if (m->mixed[at / COMP_LANES] & bit) return;
+    m->mixed[at / COMP_LANES] = (uint16_t)(m->mixed[at / COMP_LANES] | bit);
+    m->counts[at] = 1;
+}
+
+static bool leave(merge_scratch *m, const fragment *item, uint32_t at)
+{
+    pile *const left = &m->left;
     if (left->count == left->capacity && !reserve(left, left->count + 256)) return false;
     left->items[left->count] = *item;
     left->items[left->count++].pixel = at;
+    mix(m, at);
+    m->counts[at]++;
     return true;
 }
 
 /* Joins one that is in a pixel where there is another. */
-static bool join_second(const fragment *item, uint32_t at, comp_sheet *all, pile *left)
+static bool join_second(merge_scratch *m, const fragment *item, uint32_t at)
 {
-    const fragment other = comp_sheet_get(all, at, item->pixel);
-    if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return leave(left, item, at);
-    if (fragment_compare(item, &other) < 0) comp_sheet_put(all, at, item);
+    const fragment other = comp_sheet_get(&m->all, at, item->pixel);
+    if (!comp_is_opaque(item) || !comp_is_opaque(&other)) return leave(m, item, at);
+    if (fragment_compare(item, &other) < 0) comp_sheet_put(&m->all, at, item);
     return true;
 }
 
-static bool join_own(const comp_strips *own, uint32_t strip, comp_sheet *all, pile *left)
+static bool join_own(const comp_strips *own, uint32_t strip, merge_scratch *m)
 {
+    enum { AHEAD = 16 };
+    const comp_grid grid = *own->grid;
     for (uint32_t r = own->starts[strip]; r < own->starts[strip + 1]; r++) {
         const fragment *item = own->items + own->ranges[r].first;
         for (const fragment *end = item + own->ranges[r].count; item < end; item++) {
-            const uint32_t at = comp_grid_at(own->grid, item->pixel);
-            if (!comp_sheet_has(all, at))
-                comp_sheet_put(all, at, item);
-            else if (!join_second(item, at, all, left))
+            const uint32_t at = comp_grid_at(&grid, item->pixel);
+            __builtin_prefetch(item + AHEAD);
+            if (!comp_sheet_has(&m->all, at))
+                comp_sheet_put(&m->all, at, item);
+            else if (!join_second(m, item, at))
                 return false;
         }
     }
@@ -78,7 +94,7 @@ static bool join_other(merge_scratch *m)
         for (unsigned bits = left[r]; bits; bits &= bits - 1) {
             const uint32_t at = r * COMP_LANES + (uint32_t)__builtin_ctz(bits);
             const fragment item = comp_sheet_get(&m->other, at, at);
-            if (!leave(&m->left, &item, at)) return false;
+            if (!leave(m, &item, at)) return false;
         }
     return true;
 }
@@ -89,8 +105,9 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
     const uint32_t first = come->starts[strip];
     const bool has_own = owned->own->starts[strip] < owned->own->starts[strip + 1];
     m->left.count = 0;
+    memset(m->mixed, 0, sizeof m->mixed);
     comp_sheet_begin(&m->all, strip);
-    if (!join_own(owned->own, strip, &m->all, &m->left)) return false;
+    if (!join_own(owned->own, strip, m)) return false;
     for (uint32_t i = first; i < come->starts[strip + 1]; i++) {
         comp_sheet_read(come->sheets[i], COMP_WORDS, i > first || has_own ? &m->other : &m->all);
         if ((i > first || has_own) && !join_other(m)) return false;
@@ -100,19 +117,36 @@ static bool join_all(const comp_owned *owned, uint32_t strip, merge_scratch *m)
 
 /* ---- listed -------------------------------------------------------------------------------------------------- */
 
-/* Lists what is left with what it has to be blended with, or all there is; that of pixel k then begins at ends[k]. */
-static bool list_pixels(bool has_all, merge_scratch *m)
+/* The next pixel that is mixed, from a number on; COMP_STRIP_PIXELS: there is none. */
+static uint32_t next_mixed(const merge_scratch *m, uint32_t from)
 {
-    uint32_t *const ends = m->ends;
-    memset(ends, 0, sizeof m->ends);
-    for (int64_t i = 0; i < m->left.count; i++) ends[m->left.items[i].pixel]++;
-    for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++) ends[k] += ends[k] || (has_all && comp_sheet_has(&m->all, k));
-    for (uint32_t k = 1; k <= COMP_STRIP_PIXELS; k++) ends[k] += ends[k - 1];
-    if (!reserve(&m->listed, ends[COMP_STRIP_PIXELS])) return false;
-    for (uint32_t k = COMP_STRIP_PIXELS; k-- > 0;)
-        if (ends[k] > (k ? ends[k - 1] : 0)) m->listed.items[--ends[k]] = comp_sheet_get(&m->all, k, k);
-    for (int64_t i = 0; i < m->left.count; i++) m->listed.items[--ends[m->left.items[i].pixel]] = m->left.items[i];
+    for (uint32_t r = from / COMP_LANES; r < COMP_ROWS; r++) {
+        const unsigned bits = m->mixed[r] & (r == from / COMP_LANES ? 0xffffu << from % COMP_LANES : 0xffffu);
+        if (bits) return r * COMP_LANES + (uint32_t)__builtin_ctz(bits);
+    }
+    return COMP_STRIP_PIXELS;
+}
+
+/* Lists what is left with what it has to be blended with; that of pixel k then begins at ends[k]. */
+static bool list_pixels(merge_scratch *m)
+{
+    uint32_t sum = 0;
+    for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1)) {
+        sum += m->counts[k];
+        m->ends[k] = sum;
+    }
+    if (!reserve(&m->listed, sum)) return false;
+    for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1))
+        m->listed.items[--m->ends[k]] = comp_sheet_get(&m->all, k, k);
+    for (int64_t i = 0; i < m->left.count; i++) m->listed.items[--m->ends[m->left.items[i].pixel]] = m->left.items[i];
     return true;
+}
+
+/* Deep pictures want all pixels. */
+static void mix_all(merge_scratch *m)
+{
+    for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++)
+        if (comp_sheet_has(&m->all, k)) mix(m, k);
 }
 
 static void put_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
@@ -125,17 +159,16 @@ static void put_pixel(comp_sheet *pixels, uint32_t at, const comp_pixel *pixel)
 
 static void blend_listed(const comp_grid *grid, const comp_merged *merged, merge_scratch *m)
 {
-    for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++) {
-        const uint32_t count = m->ends[k + 1] - m->ends[k];
-        if (!count) continue;
-        const comp_pixel pixel =
-            comp_pixels_blend(merged, m->listed.items + m->ends[k], count, comp_grid_pixel(grid, m->all.strip, k));
+    for (uint32_t k = next_mixed(m, 0); k < COMP_STRIP_PIXELS; k = next_mixed(m, k + 1)) {
+        const comp_pixel pixel = comp_pixels_blend(merged, m->listed.items + m->ends[k], m->counts[k],
+                                                   comp_grid_pixel(grid, m->all.strip, k));
         put_pixel(&m->pixels, k, &pixel);
     }
 }
 
 /* ---- strips -------------------------------------------------------------------------------------------------- */
 
+/* Strips without pixels are sent too, a few bytes: rank 0 learns so that they are background. */
 static bool write_pixels(const comp_owned *owned, merge_scratch *m)
 {
     const int count = comp_sheet_count(&m->pixels);
@@ -150,10 +183,9 @@ static bool merge_strip(const comp_owned *owned, uint32_t strip, const comp_merg
 {
     if (!join_all(owned, strip, m)) return false;
     comp_sheet_finish(&m->all, merged->background, &m->pixels);
-    if (m->left.count || merged->deep) {
-        if (!list_pixels(merged->deep != NULL, m)) return false;
-        blend_listed(owned->own->grid, merged, m);
-    }
+    if (merged->deep) mix_all(m);
+    if (!list_pixels(m)) return false;
+    blend_listed(owned->own->grid, merged, m);
     if (!merged->out) return write_pixels(owned, m);
     comp_sheet_store(&m->pixels, owned->own->grid, merged->background, merged->out);
     return true;

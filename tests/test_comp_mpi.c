@@ -263,11 +263,13 @@ static void overlaps_are_told_to_all(void **context)
                 check_overlaps(sizes[s][0], sizes[s][1], counts[c], how, seed++);
 }
 
-/* More pixels than 512 slices of 256 a rank, so that slices grow, and fewer fragments than pixels. */
+/* More strips than blocks. With few fragments, an owner has strips in which nobody has anything. */
 static void large_image_equals_serial_merge(void **context)
 {
     (void)context;
     check_composite(601, 401 * rank_count, 40000, deal_random, 1001);
+    check_composite(1921, 1081, 1500, deal_random, 1002);
+    check_composite(5003, 3, 700, deal_blocks, 1003);
 }
 
 /* Fragments of a curved surface, each in the pixels of one row, as in a tile of a picture. */

@@ -18,19 +18,17 @@ static const comp_sheet_loops *loops_of(cpu_isa isa)
 }
 
 /* Rows that are mostly gaps are closed up: vectors of few values take the time of full ones. */
-static bool is_sparse(const sheet_plan *plan)
+static void plan_closed(int count, sheet_plan *plan)
 {
-    return 2 * plan->count < plan->rows * COMP_LANES;
-}
-
-static void plan_closed(const comp_sheet_loops *loops, sheet_plan *plan)
-{
-    uint16_t masks[COMP_ROWS];
-    for (int r = 0; r < COMP_ROWS; r++) {
-        const int left = plan->count - r * COMP_LANES;
-        masks[r] = (uint16_t)(left >= COMP_LANES ? 0xffff : left > 0 ? (1u << left) - 1 : 0);
+    plan->rows = (count + COMP_LANES - 1) / COMP_LANES;
+    plan->count = count;
+    for (int i = 0; i < plan->rows; i++) {
+        const int left = count - i * COMP_LANES;
+        plan->row[i] = (uint8_t)i;
+        plan->number[i] = (uint8_t)(left < COMP_LANES ? left : COMP_LANES);
+        plan->mask[i] = (uint16_t)((1u << plan->number[i]) - 1);
+        plan->fresh[i] = 0;
     }
-    loops->plan(masks, plan);
 }
 
 size_t comp_sheet_bound(int pixels, int words)
@@ -65,12 +63,13 @@ unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int wor
         }
     }
     head.count = (uint16_t)plan.count;
-    if (is_sparse(&plan)) {
+    if (plan.is_sparse) {
         comp_sheet closed;
+        sheet_plan closed_plan;
         loops->close(sheet, &plan, words, &closed);
-        plan_closed(loops, &plan);
-        at = loops->write(&closed, &plan, words, &head.kinds, at);
-    } else {
+        plan_closed(plan.count, &closed_plan);
+        at = loops->write(&closed, &closed_plan, words, &head.kinds, at);
+    } else if (plan.count) {
         at = loops->write(sheet, &plan, words, &head.kinds, at);
     }
     head.kinds |= (uint32_t)sheet->is_opaque << OPAQUE_BIT;
@@ -113,13 +112,13 @@ const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, in
     sheet->strip = head.strip;
     sheet->is_opaque = comp_sheet_is_opaque(&head);
     loops->plan(sheet->masks, &plan);
-    if (is_sparse(&plan)) {
+    if (plan.is_sparse) {
         comp_sheet closed;
-        sheet_plan closed_plan = plan;
-        plan_closed(loops, &closed_plan);
+        sheet_plan closed_plan;
+        plan_closed(plan.count, &closed_plan);
         loops->read(at, &closed_plan, head.kinds, words, &closed);
         loops->open(&closed, &plan, words, sheet);
-    } else {
+    } else if (plan.count) {
         loops->read(at, &plan, head.kinds, words, sheet);
     }
     return in + head.bytes;

@@ -52,12 +52,11 @@ static inline bool comp_is_opaque(const fragment *item)
     return transmittance == 0 && item->kind >= FRAGMENT_SURFACE;
 }
 
-/* Puts a fragment into the sheet, in the place of one that is there. */
+/* Puts a fragment into the sheet, in the place of one that is there. Word by word, which is faster than by a copy. */
 static inline void comp_sheet_put(comp_sheet *sheet, uint32_t at, const fragment *item)
 {
-    uint32_t record[1 + COMP_WORDS];
-    memcpy(record, item, sizeof record);
-    for (int w = 0; w < COMP_WORDS; w++) sheet->words[w][at] = record[1 + w];
+    const unsigned char *const words = (const unsigned char *)item + sizeof item->pixel;
+    for (int w = 0; w < COMP_WORDS; w++) memcpy(&sheet->words[w][at], words + 4 * w, sizeof(uint32_t));
     sheet->masks[at / COMP_LANES] = (uint16_t)(sheet->masks[at / COMP_LANES] | 1u << at % COMP_LANES);
     sheet->is_opaque = sheet->is_opaque && comp_is_opaque(item);
 }
@@ -85,7 +84,7 @@ size_t comp_sheet_bound(int pixels, int words);
 
 int comp_sheet_count(const comp_sheet *sheet);
 
-/* Writes the first so many words of a sheet that has pixels; returns the end. Local, as all here. */
+/* Writes the first so many words of a sheet; returns the end. Local, as all here. */
 unsigned char *comp_sheet_write(const comp_sheet *sheet, int words, unsigned char *out);
 
 /* Reads the head and the masks; returns the sheet's end. */

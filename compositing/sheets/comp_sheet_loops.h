@@ -10,6 +10,7 @@
  * The rows of a sheet that have pixels, and the lane whose value stands above a lane that has none above it yet. */
 typedef struct sheet_plan {
     int rows, count;
+    bool is_sparse;                            /* such sheets are closed first; fresh lanes are those of others */
     uint8_t row[COMP_ROWS], number[COMP_ROWS]; /* of its pixels */
     uint16_t mask[COMP_ROWS], fresh[COMP_ROWS];
     uint8_t source[COMP_ROWS][COMP_LANES]; /* of fresh lanes */

@@ -15,24 +15,34 @@ static uint8_t nearest_lane(unsigned known, int lane)
     return (uint8_t)(left ? 31 - __builtin_clz(left) : __builtin_ctz(known));
 }
 
-static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
+/* Finds the lanes that have no pixel above them. */
+static void find_fresh(sheet_plan *plan)
 {
-    unsigned known = 0;
-    plan->rows = plan->count = 0;
-    for (int r = 0; r < COMP_ROWS; r++) {
-        if (!masks[r]) continue;
-        const int i = plan->rows++;
-        plan->row[i] = (uint8_t)r;
-        plan->mask[i] = masks[r];
-        plan->number[i] = (uint8_t)__builtin_popcount(masks[r]);
-        plan->count += plan->number[i];
-        plan->fresh[i] = (uint16_t)(i ? masks[r] & ~known : 0);
+    unsigned known = plan->mask[0];
+    plan->fresh[0] = 0;
+    for (int i = 1; i < plan->rows; i++) {
+        plan->fresh[i] = (uint16_t)(plan->mask[i] & ~known);
         for (unsigned left = plan->fresh[i]; left; left &= left - 1) {
             const int lane = __builtin_ctz(left);
             plan->source[i][lane] = nearest_lane(known, lane);
         }
-        known |= masks[r];
+        known |= plan->mask[i];
     }
+}
+
+static void make_plan(const uint16_t masks[COMP_ROWS], sheet_plan *plan)
+{
+    plan->rows = plan->count = 0;
+    for (int r = 0; r < COMP_ROWS; r++) {
+        const int i = plan->rows;
+        plan->row[i] = (uint8_t)r;
+        plan->mask[i] = masks[r];
+        plan->number[i] = (uint8_t)__builtin_popcount(masks[r]);
+        plan->count += plan->number[i];
+        plan->rows += masks[r] != 0;
+    }
+    plan->is_sparse = 2 * plan->count < plan->rows * COMP_LANES;
+    if (plan->rows && !plan->is_sparse) find_fresh(plan);
 }
 
 /* What the rows so far foretell. */
