@@ -43,11 +43,21 @@ static void pass_up(upward *up, const unsigned char *message, int bytes)
     up->room->sent_messages++;
 }
 
+/* The reserve has room for so many sends at once. */
 static void send_own(upward *up, const comp_messages *finished)
 {
-    for (comp_message *m = finished->first; m; m = m->next) {
-        m->data[0] = 1;
-        pass_up(up, m->data, m->bytes);
+    MPI_Request *const requests = up->room->reserve;
+    for (comp_message *m = finished->first; m && up->code == MPI_SUCCESS;) {
+        int count = 0;
+        for (; m && count < COMP_LONGEST_DENSE && up->code == MPI_SUCCESS; m = m->next) {
+            m->data[0] = 1;
+            up->code = MPI_Isend(m->data, m->bytes, MPI_BYTE, up->parent, TAG_PIXELS, up->room->comm, &requests[count]);
+            count += up->code == MPI_SUCCESS;
+            up->room->sent_bytes += m->bytes;
+            up->room->sent_messages++;
+        }
+        const int code = MPI_Waitall(count, requests, MPI_STATUSES_IGNORE);
+        if (up->code == MPI_SUCCESS) up->code = code;
     }
 }
 
