@@ -17,8 +17,8 @@
 #include "session_layers.h"
 #include "session_view.h"
 
-/* Fragments that all ranks together hold at once for pixels in which cells overlap: 128 MiB. */
-enum { overlap_fragments = 1 << 22 };
+/* Fragments that a rank makes at once for pixels in which cells overlap: 64 MiB. */
+enum { overlap_fragments = 1 << 21 };
 
 /* Rank 0's pictures: the frame at hand, and the sum of frames where there are several. On other ranks a size alone. */
 typedef struct canvas {

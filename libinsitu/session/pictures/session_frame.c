@@ -4,10 +4,11 @@
  * take: where each sample stood. So these pixels, which compositing finds and tells all ranks, are traced once more
  * with every sample on its own (render.h), composited beside the picture, and take their place in it. In a mesh whose
  * cells overlap here and there that is a few pixels more. Two meshes that fill the same space may make a thousand
- * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as all ranks together hold the
+ * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as the busiest rank may hold the
  * fragments of. Segments of several volumes are drawn so on all pixels from the first. */
 #include "session_frame.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "comp_tiles.h"
@@ -102,9 +103,9 @@ static insitu_status draw(const session_frame_target *t, const render_job *job, 
 
 /* ---- overlaps ------------------------------------------------------------------------------------------------ */
 
-/* Fragments that a ray may have: of samples, by the scene's extent, which is near 1 in scaled units, and at most
- * sqrt(3) times that; of segments by experience. */
-static int64_t turn_pixels(const render_job *job, int64_t fragment_limit)
+/* Estimates how many pixels make so many fragments: of samples, by the scene's extent, which is near 1 in scaled units,
+ * and at most sqrt(3) times that; of segments by experience. */
+static int64_t first_turn(const render_job *job, int64_t fragment_limit)
 {
     enum { SEGMENTS = 500, CUT_BY_SURFACES = 5000 };
     const bool is_sampled = job->integration == RENDER_SAMPLES;
@@ -115,25 +116,68 @@ static int64_t turn_pixels(const render_job *job, int64_t fragment_limit)
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* The k-th pixel of an image in bands of rows, each taken column by column, so that the pixels of a turn are
- * neighbours, as rays of a packet are. */
-static int64_t banded_pixel(const image *out, int64_t k)
+/* Finds how many pixels the next turn takes, from what the last one made on the busiest rank. It grows by bounded steps,
+ * as few pixels tell little about the others. Collective; the same on all ranks. */
+static insitu_status next_turn(const session_frame_target *t, int64_t fragments, int64_t *pixels, base_error *error)
 {
-    enum { BAND = 16 };
-    const int64_t top = k / ((int64_t)BAND * out->width) * BAND, within = k - top * out->width;
-    const int64_t rows = out->height - top < BAND ? out->height - top : BAND;
-    return (top + within % rows) * out->width + within / rows;
+    enum { MOST_GROWTH = 8 };
+    int64_t most = 0;
+    const int code = MPI_Allreduce(&fragments, &most, 1, MPI_INT64_T, MPI_MAX, t->comm);
+    if (code != MPI_SUCCESS) return session_mpi(error, code, "MPI_Allreduce");
+    const double growth = (double)t->fragment_limit / (double)(most > 0 ? most : 1);
+    *pixels = (int64_t)((double)*pixels * fmin(growth, MOST_GROWTH));
+    if (*pixels < 1) *pixels = 1;
+    return INSITU_OK;
 }
 
-/* The next pixels of a set, at most so many; returns where to go on. */
+/* A picture's pixels in the order of turns: by squares, whose pixels are neighbours as the rays of a packet are.
+ * Squares that follow each other are far apart, by the golden ratio of their number, so that each turn has its share
+ * of what is dense. */
+typedef struct turn_order {
+    int width, height, across;
+    int64_t squares, stride;
+} turn_order;
+
+enum { SQUARE = 16 };
+
+static int64_t greatest_divisor(int64_t a, int64_t b)
+{
+    while (b) {
+        const int64_t rest = a % b;
+        a = b;
+        b = rest;
+    }
+    return a;
+}
+
+static turn_order turn_order_of(const image *out)
+{
+    turn_order order = {out->width, out->height, (out->width + SQUARE - 1) / SQUARE, 0, 0};
+    order.squares = (int64_t)order.across * ((out->height + SQUARE - 1) / SQUARE);
+    order.stride = (int64_t)(0.618 * (double)order.squares) + 1;
+    while (greatest_divisor(order.stride, order.squares) > 1) order.stride++;
+    return order;
+}
+
+/* Returns the k-th place's pixel, or -1 where a square goes beyond the picture. */
+static int64_t turn_pixel(const turn_order *order, int64_t k)
+{
+    const int64_t square = k / (SQUARE * SQUARE) % order->squares * order->stride % order->squares;
+    const int64_t x = square % order->across * SQUARE + k % SQUARE;
+    const int64_t y = square / order->across * SQUARE + k / SQUARE % SQUARE;
+    return x < order->width && y < order->height ? y * order->width + x : -1;
+}
+
+/* Takes the next pixels of a set, at most so many; returns where to go on. */
 static int64_t take_pixels(const image *out, const unsigned char *from, int64_t first, int64_t most,
                            unsigned char *taken)
 {
-    const int64_t end = (int64_t)out->width * out->height;
-    memset(taken, 0, pixel_set_bytes(end));
+    const turn_order order = turn_order_of(out);
+    const int64_t end = order.squares * SQUARE * SQUARE;
+    memset(taken, 0, pixel_set_bytes((int64_t)out->width * out->height));
     for (; first < end && most > 0; first++) {
-        const int64_t pixel = banded_pixel(out, first);
-        if (!pixel_set_has(from, pixel)) continue;
+        const int64_t pixel = turn_pixel(&order, first);
+        if (pixel < 0 || !pixel_set_has(from, pixel)) continue;
         pixel_set_add(taken, pixel);
         most--;
     }
@@ -193,22 +237,26 @@ static void second_free(second_picture *second)
 static insitu_status redraw(const session_frame_target *t, const render_job *job, const comp_overlaps *overlaps,
                             second_picture *second, image *out, session_frame *frame, base_error *error)
 {
-    const int64_t most = turn_pixels(job, t->fragment_limit);
     const bool is_sampled = job->integration == RENDER_SAMPLES;
-    int64_t doubled = 0;
+    int64_t doubled = 0, most = first_turn(job, t->fragment_limit);
     render_job again = *job;
     again.pixels = second->turn;
     again.separate_samples = true;
     again.reproducible = false;
-    for (int64_t left = overlaps->count, at = 0; left > 0; left -= most) {
+    for (int64_t left = overlaps->count, at = 0; left > 0;) {
+        const int64_t before = frame->fragments;
         comp_overlaps found = {0};
         at = take_pixels(out, overlaps->pixels, at, most, second->turn);
         if (out->deep && out->deep->counts) forget_samples(second->turn, out);
-        const insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
+        insitu_status status = draw(t, &again, &second->picture, frame, is_sampled ? &found : NULL, error);
         doubled += found.count;
         base_free(found.pixels);
         if (status) return status;
         if (second->picture.rgba) copy_pixels(second->turn, &second->picture, out);
+        frame->turns++;
+        left -= most;
+        if (left > 0) status = next_turn(t, frame->fragments - before, &most, error);
+        if (status) return status;
     }
     if (doubled) frame->overlaps = overlaps->count;
     return INSITU_OK;

@@ -5,11 +5,12 @@
 #include "comp.h"
 #include "render.h"
 
-/* Cost of a frame on this rank; overlaps alone are the same number on every rank. */
+/* Cost of a frame on this rank; overlaps and turns alone are the same on every rank. */
 typedef struct session_frame {
     int64_t rays, map_failures, fragments;
     double surface_ms, volume_ms, composite_ms;
     int64_t overlaps; /* pixels in which cells overlap */
+    int turns;        /* in which these pixels are drawn */
     int64_t sent_bytes;
     comp_schedule schedule; /* COMP_AUTOMATIC: nothing went to other ranks */
     struct render_occluders *occluders; /* made by the first drawing that needs them; NULL once the frame is drawn */
@@ -20,7 +21,7 @@ typedef struct session_frame_target {
     MPI_Comm comm;
     comp_group compositing;
     const float *background; /* 4; borrowed */
-    int64_t fragment_limit;  /* for all ranks together: more pixels in which cells overlap than make so many fragments
+    int64_t fragment_limit;  /* of a rank: more pixels in which cells overlap than make so many fragments on the busiest
                                 are drawn in turns; the same on every rank */
 } session_frame_target;
 
