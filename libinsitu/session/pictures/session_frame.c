@@ -4,8 +4,8 @@
  * take: where each sample stood. So these pixels, which compositing finds and tells all ranks, are traced once more
  * with every sample on its own (render.h), composited beside the picture, and take their place in it. In a mesh whose
  * cells overlap here and there that is a few pixels more. Two meshes that fill the same space may make a thousand
- * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as the busiest rank may hold the
- * fragments of. Segments of several volumes are drawn so on all pixels from the first. */
+ * fragments in each of a million pixels: they are drawn in turns, so many pixels at once as the busiest rank may hold
+ * the fragments of. Segments of several volumes are drawn so on all pixels from the first. */
 #include "session_frame.h"
 
 #include <math.h>
@@ -116,8 +116,8 @@ static int64_t first_turn(const render_job *job, int64_t fragment_limit)
     return pixels > 1 ? (int64_t)pixels : 1;
 }
 
-/* Finds how many pixels the next turn takes, from what the last one made on the busiest rank. It grows by bounded steps,
- * as few pixels tell little about the others. Collective; the same on all ranks. */
+/* Finds how many pixels the next turn takes, from what the last one made on the busiest rank. It grows by bounded
+ * steps, as few pixels tell little about the others. Collective; the same on all ranks. */
 static insitu_status next_turn(const session_frame_target *t, int64_t fragments, int64_t *pixels, base_error *error)
 {
     enum { MOST_GROWTH = 8 };
