@@ -15,9 +15,9 @@
  *              at the apex
  *     tet      from the middle                ρ, σ, κ >= -1/4, ρ + σ + κ <= 1/4
  *
- * The derivative of n at every corner is less than 0.78 by Frobenius' norm, or the cell is not for lanes: the norm is
- * convex along each coordinate, so it is nowhere in the cell more, and so r -> r + n(r) takes no two points of the cell
- * to one. Where the middle's coordinates are counted from does not matter to a point's place. */
+ * The derivative of n at every corner is less than 0.78 or 0.89 by Frobenius' norm, or the cell is not for lanes: the
+ * norm is convex along each coordinate, so it is nowhere in the cell more, and so r -> r + n(r) takes no two points of
+ * the cell to one. Where the middle's coordinates are counted from does not matter to a point's place. */
 #ifndef RENDER_KERNEL_LOCAL_H
 #define RENDER_KERNEL_LOCAL_H
 
@@ -29,8 +29,9 @@
 
 enum { KERNEL_BENT_TERMS = 4, KERNEL_LOCAL_STEPS = 4 };
 
-/* The square of 0.78. */
+/* The squares of 0.78 and, for users who bound what is wrong of r themselves, of 0.89. */
 #define KERNEL_LOCAL_BENT 0.6f
+#define KERNEL_LOCAL_BENT_MOST 0.8f
 
 /* Lane by lane. The field's terms are its value in the middle, its slopes along r, and its bent terms. */
 typedef struct kernel_local_cells {
@@ -348,9 +349,10 @@ SIMD_INLINE void kernel_local_blur(int count, const vf places[3][8], const vf in
     vf_store(out->blur, 4e-6f + 1.2e-7f * most);
 }
 
-/* Cells of one type with vertices placed in tile space and the field at them. Returns the lanes that are not bent too
- * much; what other lanes have is not to be used. */
-SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], kernel_local_cells *out)
+/* Cells of one type with vertices placed in tile space and the field at them. Returns the lanes that are bent by
+ * less than most_bent, a square; what other lanes have is not to be used. */
+SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf values[8], float most_bent,
+                                  kernel_local_cells *out)
 {
     const int count = grid_type_vertices(type), bends = kernel_bent_terms(type);
     vf at[3][8], terms[3][8], field[8], inverse[3][3], offset[3], bent[KERNEL_BENT_TERMS][3];
@@ -378,7 +380,7 @@ SIMD_INLINE vm kernel_local_setup(int type, const vf places[3][8], const vf valu
     if (!bends) return sharp;
     const vf bend = kernel_local_bent(type, (const vf(*)[3])bent);
     vf_store(out->bend, bend);
-    return vm_and(sharp, vf_lt(bend, vf_set(KERNEL_LOCAL_BENT)));
+    return vm_and(sharp, vf_lt(bend, vf_set(most_bent)));
 }
 
 /* ---- points ---- */

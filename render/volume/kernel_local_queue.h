@@ -163,7 +163,7 @@ SIMD_INLINE bool kernel_local_cut(int32_t ends[4][SIMD_WIDTH], int lane, unsigne
 /* Places the cells that are fetched: lists gets the vertices' places and the field there, and whatever else it has of
  * the vertices is turned with these. Returns the cells that show, and in lanes those of them that are for lanes. */
 SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local_lanes *l, int type, vf (*lists)[8],
-                                        int list_count, unsigned *lanes)
+                                        int list_count, float most_bent, unsigned *lanes)
 {
     const int count = grid_type_vertices(type);
     const vm shows = kernel_local_domain(&t->frame->volumes[l->volume], l->scalars, count, lists[3]);
@@ -178,7 +178,7 @@ SIMD_INLINE unsigned kernel_local_place(const kernel_tile_trace *t, kernel_local
     }
     kernel_local_turn(type, lists, list_count);
     kernel_local_pixels(t, count, (const vf(*)[8])lists, l->ends);
-    *lanes = vm_bits(vm_and(shows, kernel_local_setup(type, (const vf(*)[8])lists, lists[3], &l->cells)));
+    *lanes = vm_bits(vm_and(shows, kernel_local_setup(type, (const vf(*)[8])lists, lists[3], most_bent, &l->cells)));
     return vm_bits(shows);
 }
 

@@ -213,9 +213,9 @@ static __attribute__((noinline)) unsigned kernel_local_place_any(kernel_tile_tra
                                                                  unsigned *lanes)
 {
     vf lists[4][8];
-    if (type == GRID_HEX) return kernel_local_place(t, &b->lanes, GRID_HEX, lists, 4, lanes);
-    if (type == GRID_WEDGE) return kernel_local_place(t, &b->lanes, GRID_WEDGE, lists, 4, lanes);
-    return kernel_local_place(t, &b->lanes, GRID_PYRAMID, lists, 4, lanes);
+    if (type == GRID_HEX) return kernel_local_place(t, &b->lanes, GRID_HEX, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    if (type == GRID_WEDGE) return kernel_local_place(t, &b->lanes, GRID_WEDGE, lists, 4, KERNEL_LOCAL_BENT, lanes);
+    return kernel_local_place(t, &b->lanes, GRID_PYRAMID, lists, 4, KERNEL_LOCAL_BENT, lanes);
 }
 
 /* The cells that wait in a queue. */

@@ -3,15 +3,13 @@
  *     cells                    where are they, and what map have they?     kernel_local.h
  *     pixels of their boxes    may the ray meet the cell in the window?    by planes about it
  *     rays in cells            where do they come in and go out?           kernel_local_crossings.h
- *     and                      what is the field between?                  Newton's method at three places
+ *     and                      what is the field between?                  kernel_local_course.h
  *
  * Rays that cross not just two faces once each, or are cut by clips or surfaces, and cells among whose values opacity
  * steps or rises steeply, go the way of other cells (kernel_cell_segments.h).
  *
- * The field along the ray. Along it y of kernel_local.h, y = r + n(r), goes in a line between its values at the two
- * faces, where r is known. So r is found at the middle and the quarters from there, and by how much the field there is
- * off the chord between its values at the faces: d1, d2 and d3. The field is then taken for the polynomial through all
- * five values, for u from -1/2 to 1/2
+ * The field along the ray. At the first quarter, the middle and the third quarter it is off the chord between its
+ * values at the faces by d1, d2 and d3. It is taken for the polynomial through all five values, for u from -1/2 to 1/2
  *
  *     d = (1/4 - u^2) (a + b u + c u^2),   a = 4 d2,   b = 32/3 (d3 - d1),   c = 16 (8/3 (d1 + d3) - a),
  *
@@ -29,8 +27,8 @@
  * No more than twice g's own bound R |s'| + s |c'|. The mean of |v - f| is 0.26 of a parabola's most at the middle,
  * P = |d2|; of the cubic's part, A = |d3 - d1| / 2 at the quarters, 1.09 (0.67 of one chord, which crosses it in the
  * middle; 1.082 at most, times n^2, of n >= 2); and of the quartic's no more than four times
- * E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2. What the polynomial itself is off is not of mean zero: 2 E, and what
- * Newton's method leaves, count whole. */
+ * E = |(d1 + d3) / 2 - 3/4 d2|. In n equal segments all are divided by n^2. What the polynomial itself is off is not of
+ * mean zero: 2 E, and what Newton's method leaves, count whole. */
 #ifndef RENDER_KERNEL_LOCAL_SEGMENTS_H
 #define RENDER_KERNEL_LOCAL_SEGMENTS_H
 
@@ -43,6 +41,7 @@
 #include "kernel_hex_rays.h"
 #include "kernel_integral.h"
 #include "kernel_local.h"
+#include "kernel_local_course.h"
 #include "kernel_local_crossings.h"
 #include "kernel_local_queue.h"
 #include "kernel_map.h"
@@ -74,7 +73,6 @@ typedef struct kernel_local_bounds {
     float fade[SIMD_WIDTH]; /* 2 R |s'| + s |c'| */
     float extinction[SIMD_WIDTH];
     float low[SIMD_WIDTH], high[SIMD_WIDTH]; /* the bounds hold between these values */
-    float slip[SIMD_WIDTH]; /* what the field may be off by where r does not solve for y, by how far it does not */
 } kernel_local_bounds;
 
 /* Adds the cell's segments on the packet's active rays. map is NULL for a constant field. */
@@ -89,6 +87,7 @@ typedef struct kernel_local_stretches {
     kernel_local_lanes lanes;
     kernel_local_faces faces;
     kernel_local_bounds bounds;
+    kernel_local_bow bow;
     kernel_hex_rays rays, met;
     /* By packet and lane: where the window begins and ends, side by side; the same of the ray; unit distances per t. */
     float window[2 * KERNEL_LOCAL_PIXELS], reach[2 * KERNEL_LOCAL_PIXELS], per_t[KERNEL_LOCAL_PIXELS];
@@ -131,15 +130,6 @@ static void kernel_local_segments_begin(const kernel_tile_trace *t, kernel_local
 
 /* ---- cells ---- */
 
-/* By what the field may be off where y - (r + n(r)) is not zero: r is off by that over 1 - |n'| at most, and the field
- * by its slope along the coordinates together. */
-SIMD_INLINE float kernel_local_slip(const kernel_local_cells *c, int n)
-{
-    float slope = 0;
-    for (int i = 1; i < 8; i++) slope += fabsf(c->field[i][n]);
-    return slope / (1 - sqrtf(c->bend[n]));
-}
-
 /* The lane's bounds; false where its values are for bisection. Chords end beyond the cell's values: one chord by no
  * more than three sixteenths of their range (kernel_local_strays()), several by a sixth of the parabola's most, which
  * is less than that range. */
@@ -156,6 +146,8 @@ SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_lo
     if (span.step_count || span.is_steep) return false;
     const kernel_bound s = kernel_bound_between(t, ends[0], ends[1]);
     const float steep = t->contrast * s.extinction_slope, tinted = s.extinction_high * s.colour_slope;
+    /* A fifth of what the ray's length alone allows. */
+    const float slack = 0.2f * state->allowance / (state->reach * span.cost * b->bow.slip[n]);
     b->bounds.cost[n] = span.cost;
     b->bounds.sway[n] = simd_min(t->contrast * (s.rise - s.fall) + 2 * tinted, 1e30f);
     b->bounds.tint[n] = simd_min(s.extinction_slope * s.colour_slope, 1e30f);
@@ -163,79 +155,8 @@ SIMD_INLINE bool kernel_local_bound(const kernel_segment_state *state, kernel_lo
     b->bounds.extinction[n] = s.extinction_high;
     b->bounds.low[n] = ends[0];
     b->bounds.high[n] = ends[1];
-    b->bounds.slip[n] = kernel_local_slip(&b->lanes.cells, n);
+    b->bow.slack[n] = simd_min(simd_max(slack, 2e-5f), b->bow.most[n]);
     return true;
-}
-
-/* ---- the field between two faces ---- */
-
-typedef struct kernel_local_course {
-    vf deviation[3]; /* of the field off its chord, at the quarters and the middle */
-    vf slip;         /* how far r does not solve for y, at the one of them where that is most */
-} kernel_local_course;
-
-/* The bent terms' sum at r. */
-SIMD_INLINE void kernel_local_bent_sum(const kernel_local_points *p, const kernel_bend *bend, vf out[3])
-{
-    for (int a = 0; a < 3; a++) {
-        out[a] = p->bent[0][a] * bend->term[0];
-        for (int k = 1; k < 4; k++) out[a] = vf_muladd(p->bent[k][a], bend->term[k], out[a]);
-    }
-}
-
-SIMD_INLINE vf kernel_local_slip_at(const kernel_local_points *p)
-{
-    vf left[3];
-    kernel_local_left(GRID_HEX, p, left);
-    return (vf_abs(left[0]) + vf_abs(left[1])) + vf_abs(left[2]);
-}
-
-/* A step, and others where one was not enough. Returns what is left. */
-SIMD_INLINE vf kernel_local_settle(kernel_local_points *p)
-{
-    vf left = vf_set(0);
-    vm open = vm_all_lanes();
-    for (int n = 0; n < KERNEL_LOCAL_STEPS && vm_any(open); n++) {
-        kernel_local_step(GRID_HEX, p, open);
-        left = kernel_local_slip_at(p);
-        open = vm_not(vf_le(left, vf_set(2e-5f)));
-    }
-    return left;
-}
-
-SIMD_INLINE void kernel_local_course_of(const kernel_local_cells *cells, vi lane, const kernel_local_crossing ends[2],
-                                        kernel_local_course *out)
-{
-    kernel_local_points p;
-    vf y[2][3], middle[3];
-    for (int k = 0; k < 4; k++)
-        for (int a = 0; a < 3; a++) p.bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
-    for (int e = 0; e < 2; e++) {
-        vf n[3];
-        kernel_bend_at(GRID_HEX, ends[e].r, &p.bend);
-        kernel_local_bent_sum(&p, &p.bend, n);
-        for (int a = 0; a < 3; a++) y[e][a] = ends[e].r[a] + n[a];
-    }
-    for (int a = 0; a < 3; a++) {
-        p.y[a] = 0.5f * (y[0][a] + y[1][a]);
-        p.r[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
-    }
-    kernel_bend_at(GRID_HEX, p.r, &p.bend);
-    kernel_local_derive(GRID_HEX, &p);
-    out->slip = kernel_local_settle(&p);
-    const vf rise = ends[1].v - ends[0].v;
-    out->deviation[1] = kernel_local_value(GRID_HEX, cells, lane, &p) - (ends[0].v + 0.5f * rise);
-    memcpy(middle, p.r, sizeof middle);
-    for (int q = 0; q < 2; q++) {
-        const float share = q ? 0.75f : 0.25f, own = q ? -0.125f : 0.375f, other = q ? 0.375f : -0.125f;
-        for (int a = 0; a < 3; a++) {
-            p.y[a] = y[0][a] + share * (y[1][a] - y[0][a]);
-            p.r[a] = (own * ends[0].r[a] + other * ends[1].r[a]) + 0.75f * middle[a];
-        }
-        kernel_bend_at(GRID_HEX, p.r, &p.bend);
-        out->slip = vf_max(kernel_local_settle(&p), out->slip);
-        out->deviation[2 * q] = kernel_local_value(GRID_HEX, cells, lane, &p) - (ends[0].v + share * rise);
-    }
 }
 
 /* ---- rays in cells ---- */
@@ -246,6 +167,7 @@ typedef struct kernel_local_pairs {
     kernel_local_crossing ends[2];
     kernel_local_course course;
     vm active;
+    vf begin; /* of the window */
     vf count; /* of segments */
 } kernel_local_pairs;
 
@@ -259,46 +181,77 @@ SIMD_INLINE vm kernel_local_strays(const kernel_local_stretches *b, const kernel
                  vf_lt(kernel_local_take(b->bounds.high, p->rays.lane), high));
 }
 
-/* Into how many segments, and the rays for which no number will do. */
-SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_stretches *b, kernel_local_pairs *p)
+/* What one segment for all of a ray's way through its cell makes wrong of the light. */
+typedef struct kernel_local_wrong {
+    vf made;   /* falls with the square of their number, if there are more */
+    vf rest;   /* does not */
+    vf length; /* unit distances */
+} kernel_local_wrong;
+
+SIMD_INLINE void kernel_local_wrong_of(const kernel_local_stretches *b, const kernel_local_pairs *p,
+                                       kernel_local_wrong *out)
 {
-    const kernel_segment_state *state = &b->state;
-    const kernel_transfer *transfer = &t->frame->volumes[0];
-    const kernel_local_course *course = &p->course;
     const vi lane = p->rays.lane;
-    const vf *d = course->deviation, one = vf_set(1), v0 = p->ends[0].v, v1 = p->ends[1].v;
-    const vf length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
-    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
-    for (int i = 0; i < 3; i++) {
-        const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + d[i];
-        opacities += 0.25f * kernel_opacity(transfer, value);
-    }
-    const vf seen = length * opacities;
-    const vf allowed = state->allowance * (length * (1 / state->reach) + seen / (1.0f + seen));
+    const vf *d = p->course.deviation, length = (p->ends[1].t - p->ends[0].t) * vf_gather(b->per_t, p->rays.at);
     const vf parabola = vf_abs(d[1]), cubic = 0.5f * vf_abs(d[2] - d[0]);
     const vf quartic = vf_abs(0.5f * (d[0] + d[2]) - 0.75f * d[1]);
-    const vf change = vf_abs(v1 - v0) + 3.0f * (parabola + cubic);
+    const vf change = vf_abs(p->ends[1].v - p->ends[0].v) + 3.0f * (parabola + cubic);
     const vf cost = kernel_local_take(b->bounds.cost, lane);
-    const vf depth = vf_min(kernel_local_take(b->bounds.extinction, lane) * length, one);
+    const vf depth = vf_min(kernel_local_take(b->bounds.extinction, lane) * length, vf_set(1));
     const vf sway =
         vf_muladd(kernel_local_take(b->bounds.tint, lane), change,
                   vf_muladd(kernel_local_take(b->bounds.fade, lane), depth, kernel_local_take(b->bounds.sway, lane)));
     const vf mean = 0.26f * parabola + (1.09f * cubic + 4.0f * quartic);
-    const vf made = (0.5f * vf_min(sway, 2.0f * cost)) * (mean * length);
-    const vf rest = cost * length * (2.0f * quartic + kernel_local_take(b->bounds.slip, lane) * course->slip);
-    const vf left = allowed - rest;
-    const vf wanted = -vf_floor(-vf_sqrt(made / vf_max(left, vf_set(1e-30f))));
-    p->count = vf_clamp(wanted, vf_select(kernel_local_strays(b, p), 2.0f * one, one), vf_set(KERNEL_LOCAL_PIECES + 1));
-    return vm_or(vm_not(vf_lt(rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));
+    out->made = (0.5f * vf_min(sway, 2.0f * cost)) * (mean * length);
+    out->rest = cost * length * (2.0f * quartic + kernel_local_take(b->bow.slip, lane) * p->course.slip);
+    out->length = length;
 }
 
-/* One of the lane's rays has a segment. */
+/* Into how many segments, and the rays for which no number will do. */
+static __attribute__((noinline)) vm kernel_local_count_by_depth(const kernel_tile_trace *t,
+                                                                const kernel_segment_state *state,
+                                                                const kernel_local_wrong *wrong, vf least,
+                                                                kernel_local_pairs *p)
+{
+    const kernel_transfer *transfer = &t->frame->volumes[0];
+    const vf v0 = p->ends[0].v, v1 = p->ends[1].v;
+    vf opacities = 0.125f * (kernel_opacity(transfer, v0) + kernel_opacity(transfer, v1));
+    for (int i = 0; i < 3; i++) {
+        const vf value = v0 + (float)(i + 1) * 0.25f * (v1 - v0) + p->course.deviation[i];
+        opacities += 0.25f * kernel_opacity(transfer, value);
+    }
+    const vf seen = wrong->length * opacities;
+    const vf allowed = state->allowance * (wrong->length * (1 / state->reach) + seen / (1.0f + seen));
+    const vf left = allowed - wrong->rest;
+    const vf wanted = -vf_floor(-vf_sqrt(wrong->made / vf_max(left, vf_set(1e-30f))));
+    p->count = vf_clamp(wanted, least, vf_set(KERNEL_LOCAL_PIECES + 1));
+    return vm_or(vm_not(vf_lt(wrong->rest, 0.9f * allowed)), vf_lt(vf_set(KERNEL_LOCAL_PIECES), p->count));
+}
+
+/* The same. Whether one segment is enough is asked first of its length alone, and only then of how much of it is seen.
+ */
+SIMD_INLINE vm kernel_local_count(const kernel_tile_trace *t, const kernel_local_stretches *b, kernel_local_pairs *p)
+{
+    kernel_local_wrong wrong;
+    kernel_local_wrong_of(b, p, &wrong);
+    const vf one = vf_set(1), allowed = wrong.length * (b->state.allowance * (1 / b->state.reach));
+    const vm strays = kernel_local_strays(b, p);
+    const vm few = vm_and(vf_le(wrong.made, allowed - wrong.rest), vf_lt(wrong.rest, 0.9f * allowed));
+    const vm enough = vm_andnot(few, strays);
+    p->count = one;
+    if (!vm_any(vm_andnot(p->active, enough))) return vm_none();
+    const vm none = kernel_local_count_by_depth(t, &b->state, &wrong, vf_select(strays, 2.0f * one, one), p);
+    p->count = vf_select(enough, one, p->count);
+    return vm_andnot(none, enough);
+}
+
+/* One of the lane's rays has a segment, which does not begin before the window. */
 SIMD_INLINE void kernel_local_put(const kernel_local_stretches *b, int at, const kernel_segment *s)
 {
     kernel_tile_ray_segments *r = &b->packets[at / SIMD_WIDTH];
     kernel_segments *list = &r->list;
     const int lane = at % SIMD_WIDTH;
-    if (!(list->t_begin[lane] <= s->t_in && s->t_in < list->t_end[lane] && s->t_in < s->t_out)) return;
+    if (!(s->t_in < list->t_end[lane])) return;
     if (__builtin_expect(kernel_segments_put(list, lane, s, NULL), 1)) return;
     const kernel_run run = kernel_run_of((vf_set(s->t_out) - s->t_in) * list->per_t, vf_set(s->v_in), vf_set(s->v_out));
     kernel_integrate_apart(r->state.pieces, vm_from_bits(1u << lane), &run, &list->heap);
@@ -344,7 +297,8 @@ SIMD_INLINE void kernel_local_emit(const kernel_local_stretches *b, const kernel
         vf_store(lanes[1], to);
         vf_store(lanes[2], in);
         vf_store(lanes[3], out);
-        for (unsigned bits = vm_bits(open); bits; bits &= bits - 1) {
+        const vm kept = vm_and(open, vm_and(vf_le(p->begin, from), vf_lt(from, to)));
+        for (unsigned bits = vm_bits(kept); bits; bits &= bits - 1) {
             const int i = __builtin_ctz(bits);
             const kernel_segment s = {lanes[0][i], lanes[1][i], lanes[2][i], lanes[3][i]};
             kernel_local_put(b, at[i], &s);
@@ -396,7 +350,7 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     kernel_local_pairs p;
     kernel_local_seen seen;
     kernel_hex_crossed crossed;
-    vf begin, end, near, far;
+    vf end, near, far;
     kernel_local_rays_of(&p.rays, &t->tile, kernel_bytes(b->met.pixel + n), kernel_bytes(b->met.lane + n));
     kernel_local_see(&b->faces, &p.rays, &seen);
     kernel_local_find_faces(&seen, all, &crossed);
@@ -404,12 +358,12 @@ SIMD_INLINE void kernel_local_segments_lanes(kernel_tile_trace *t, kernel_local_
     p.active = crossed.two;
     if (vm_any(p.active)) {
         kernel_local_cross(&b->faces, &seen, p.rays.lane, &crossed, p.ends);
-        vf_gather_pair(b->window, 2 * p.rays.at, &begin, &end);
+        vf_gather_pair(b->window, 2 * p.rays.at, &p.begin, &end);
         vf_gather_pair(b->reach, 2 * p.rays.at, &near, &far);
-        p.active = vm_and(p.active, vm_and(vf_lt(begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
+        p.active = vm_and(p.active, vm_and(vf_lt(p.begin, p.ends[1].t), vf_lt(p.ends[0].t, end)));
         const vm cut = vm_or(vf_lt(p.ends[0].t, near), vf_lt(far, p.ends[1].t));
-        kernel_local_course_of(&b->lanes.cells, p.rays.lane, p.ends, &p.course);
-        const vm odd = vm_and(p.active, vm_or(cut, kernel_local_count(t, b, &p)));
+        kernel_local_course_of(&b->lanes.cells, &b->bow, p.rays.lane, p.active, p.ends, &p.course);
+        const vm odd = vm_and(p.active, vm_or(vm_or(cut, p.course.is_lost), kernel_local_count(t, b, &p)));
         p.active = vm_andnot(p.active, odd);
         alone = vm_or(alone, odd);
         kernel_local_emit(b, &p);
@@ -452,9 +406,10 @@ static __attribute__((noinline)) unsigned kernel_local_segments_place(kernel_til
 {
     vf lists[5][8];
     kernel_local_rank((double(*const)[8][SIMD_WIDTH])b->lanes.world, 8, lists[4]);
-    const unsigned showing = kernel_local_place(t, &b->lanes, GRID_HEX, lists, 5, lanes) & all;
+    const unsigned showing = kernel_local_place(t, &b->lanes, GRID_HEX, lists, 5, KERNEL_LOCAL_BENT_MOST, lanes) & all;
     *lanes &= all;
     kernel_local_faces_of(lists, &b->faces);
+    kernel_local_bow_of(&b->lanes.cells, &b->bow);
     for (unsigned more = *lanes; more; more &= more - 1) {
         const int n = __builtin_ctz(more);
         if (!kernel_local_bound(&b->state, b, n)) *lanes &= ~(1u << n);
