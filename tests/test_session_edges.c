@@ -292,11 +292,70 @@ static void lines_fade_on_small_faces(void **state)
     input_free(&in);
 }
 
+/* ---- rays exactly through edges --------------------------------------------------------------------------------- */
+
+enum { ACROSS = 65 };
+
+/* Draws along an axis with rays on lines of the lattice, all numbers exact: pixels of 1/32, the middle one at 0.
+ * Surfaces are half opaque, so that a front and a back that are hit once each leave a quarter. Pixels on the rim are
+ * half open. */
+static bool is_closed_along(const session_input *in, int axis, int side, const char *edges)
+{
+    char text[512];
+    double eye[3] = {0};
+    eye[axis] = 4 * side;
+    snprintf(text, sizeof text,
+             "images:\n  - name: a\n    size: [65, 65]\n    background: [0, 0, 0, 0]\n"
+             "    camera: {position: [%g, %g, %g], focal: [0, 0, 0], up: %s, projection: orthographic,\n"
+             "             height: 2.03125}\n"
+             "    layers:\n      - surface: {opacity: 0.5, material: {ambient: 1, diffuse: 0, specular: 0}%s}\n"
+             "    outputs: [{path: a.exr}]\n",
+             eye[0], eye[1], eye[2], axis == 1 ? "[0, 0, 1]" : "[0, 1, 0]", edges);
+    caught_picture picture = draw(MPI_COMM_WORLD, write_scene(text), in, NULL);
+    int holes = 0;
+    for (int i = 0; own_rank == 0 && i < ACROSS * ACROSS; i++) {
+        const int x = i % ACROSS, y = i / ACROSS;
+        const bool is_rim = x == 0 || y == 0 || x == ACROSS - 1 || y == ACROSS - 1;
+        holes += !is_rim && (picture.rgba[4 * i + 3] != 0.75f || picture.depth[i] != 3);
+    }
+    free_caught(&picture);
+    return holes == 0;
+}
+
+/* This rank's part of a lattice that is not jittered. */
+static void make_exact_part(test_mesh_kind kind, session_input *in)
+{
+    test_mesh whole;
+    test_mesh_lattice(kind, 4, 0, test_linear, &whole);
+    int *owners = test_calloc((size_t)whole.cell_count, sizeof *owners);
+    test_partition(&whole, TEST_RANDOM, 4, rank_count, owners);
+    test_mesh_part(&whole, owners, own_rank, &in->part);
+    test_free(owners);
+    test_mesh_free(&whole);
+    input_describe(in);
+}
+
+static void rays_through_edges_hit_one_face(void **state)
+{
+    (void)state;
+    for (test_mesh_kind kind = 0; kind < TEST_KIND_COUNT; kind++) {
+        session_input in = {0};
+        make_exact_part(kind, &in);
+        for (int axis = 0; axis < 3; axis++)
+            for (int side = -1; side <= 1; side += 2) {
+                everywhere(is_closed_along(&in, axis, side, ""));
+                everywhere(is_closed_along(&in, axis, side, ", edges: {width: 1}"));
+            }
+        input_free(&in);
+    }
+}
+
 static int run(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lines_are_where_edges_are), cmocka_unit_test(faces_of_many_corners_have_no_other_lines),
-        cmocka_unit_test(any_ranks_draw_one_picture), cmocka_unit_test(lines_fade_on_small_faces)};
+        cmocka_unit_test(any_ranks_draw_one_picture), cmocka_unit_test(lines_fade_on_small_faces),
+        cmocka_unit_test(rays_through_edges_hit_one_face)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
 

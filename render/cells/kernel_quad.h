@@ -412,8 +412,8 @@ SIMD_INLINE vm kernel_quad_bends(const kernel_quad *q, vm rays)
     return vm_and(rays, vm_and(a, b));
 }
 
-/* Of rays that may meet a quad's patch twice those that may do so yet when the discriminant is known (kernel_quad.h):
- * all but where that is below zero by more than float32's roundings, which are less than a millionth of its terms. */
+/* Returns the rays that may still meet a quad's patch twice once the discriminant is known: all of them but where it is
+ * below zero by more than float32's roundings, which are less than a millionth of its terms. */
 static __attribute__((noinline)) vm kernel_hex_bends_yet(const vf x[8], const vf y[8], const signed char *loop, vm rays,
                                                          vf across, vf other)
 {
