@@ -12,12 +12,12 @@
 #include "kernel_cell_values.h"
 #include "kernel_differences.h"
 #include "kernel_finder.h"
-#include "kernel_hexes.h"
 #include "kernel_hits.h"
 #include "kernel_occlusion.h"
 #include "kernel_occlusion_rays.h"
 #include "kernel_packet.h"
 #include "kernel_packet_surface.h"
+#include "kernel_polys.h"
 #include "kernel_prefetch.h"
 #include "kernel_surface.h"
 #include "kernel_tile.h"
@@ -91,19 +91,30 @@ SIMD_INLINE unsigned kernel_candidate_blocks(const kernel_tile_trace *t, const k
     return candidate->blocks & t->wanted & kernel_blocks_beyond(t, candidate->near);
 }
 
-/* Is the cell, of the batch's layer and part, put into a batch? */
-SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b, uint32_t cell)
+/* Is the cell, of the batch's layer and part, put into a batch of hexes, wedges or pyramids? Where types are mixed a
+ * tile has few large wedges or pyramids of one type, and what is in front is known sooner if they are traced alone. */
+SIMD_INLINE bool kernel_is_for_polys(const kernel_tile_trace *t, const kernel_batch *b,
+                                     const kernel_tile_candidate *candidate, int type)
 {
-    const int type = kernel_arrays_type(&b->arrays, cell);
-    return type == GRID_TET ? b->takes_batches : type == GRID_HEX && kernel_hexes_fit(t, &b->arrays);
+    if (type == GRID_TET || type == GRID_POLYHEDRON || !kernel_polys_fit(t, &b->arrays)) return false;
+    return type == GRID_HEX || b->arrays.type != GRID_NO_TYPE ||
+           kernel_box_pixels(candidate->box) <= KERNEL_POLY_PIXELS;
+}
+
+/* Is it put into any batch? */
+SIMD_INLINE bool kernel_is_for_batch(const kernel_tile_trace *t, const kernel_batch *b,
+                                     const kernel_tile_candidate *candidate)
+{
+    const int type = kernel_arrays_type(&b->arrays, candidate->cell);
+    return type == GRID_TET ? b->takes_batches : kernel_is_for_polys(t, b, candidate, type);
 }
 
 /* Traces the cells that are for no batch. What came before them in batches is traced first, for it may hide them. */
-static void kernel_tile_meet_others(kernel_tile_trace *t, kernel_batch *b, kernel_hexes *h, kernel_pending *others)
+static void kernel_tile_meet_others(kernel_tile_trace *t, kernel_batch *b, kernel_polys *h, kernel_pending *others)
 {
     if (!others->count) return;
     kernel_batch_end(t, b);
-    kernel_hexes_end(t, h);
+    kernel_polys_end(t, h);
     for (int n = 0; n < others->count; n++) {
         int part;
         const int value = kernel_tile_source(t, others->items[n]->source, &part);
@@ -115,7 +126,7 @@ static void kernel_tile_meet_others(kernel_tile_trace *t, kernel_batch *b, kerne
 }
 
 /* Prefetches the vertices of all pending cells, then traces them. */
-static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_batch *b, kernel_hexes *h,
+static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace *t, kernel_batch *b, kernel_polys *h,
                                                                kernel_pending *w, kernel_pending *others)
 {
     for (int n = 0; n < w->count; n++) {
@@ -123,7 +134,7 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
         kernel_tile_source(t, w->items[n]->source, &part);
         if (!b->count) kernel_batch_turn(t, b, part);
         if (kernel_active_of(t->frame, t->layer, part)) continue; /* all of it was asked for */
-        if (b->layer == t->layer && b->part == part && kernel_is_for_batch(t, b, w->items[n]->cell))
+        if (b->layer == t->layer && b->part == part && kernel_is_for_batch(t, b, w->items[n]))
             continue; /* batches ask for theirs */
         kernel_prefetch_vertices(t->frame->job->parts[part].cells, &t->surface->layer->field.fields[part],
                                  w->items[n]->cell);
@@ -137,9 +148,9 @@ static __attribute__((noinline)) void kernel_tile_meet_pending(kernel_tile_trace
         const int type = kernel_arrays_type(&b->arrays, w->items[n]->cell);
         if (type == GRID_TET && b->takes_batches) {
             kernel_batch_add(t, b, w->items[n], value);
-        } else if (type == GRID_HEX && kernel_hexes_fit(t, &b->arrays)) {
-            kernel_hexes_turn(t, h, &b->arrays, part);
-            kernel_hexes_wait(t, h, w->items[n], value);
+        } else if (kernel_is_for_polys(t, b, w->items[n], type)) {
+            kernel_polys_turn(t, h, &b->arrays, part);
+            kernel_polys_wait(t, h, type, w->items[n], value);
         } else {
             if (others->count == SIMD_WIDTH) kernel_tile_meet_others(t, b, h, others);
             others->items[others->count++] = w->items[n];
@@ -153,10 +164,10 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
                                                                    bool transparent)
 {
     kernel_batch batch;
-    kernel_hexes hexes;
+    kernel_polys polys;
     kernel_pending pending = {0}, others = {0};
     kernel_batch_begin(&batch);
-    kernel_hexes_begin(&hexes);
+    kernel_polys_begin(&polys);
     for (int bin = 0; bin < KERNEL_DEPTHS && bin <= kernel_depth_bin(q, kernel_tile_far(t)); bin++)
         for (int i = q->first[bin]; i >= 0; i = q->items[i].next) {
             const kernel_tile_candidate *candidate = &q->items[i];
@@ -166,12 +177,12 @@ static __attribute__((noinline)) void kernel_tile_trace_candidates(kernel_tile_t
             if (is_transparent != transparent || !kernel_candidate_blocks(t, candidate)) continue;
             kernel_candidate_prefetch(t->frame, candidate);
             pending.items[pending.count++] = candidate;
-            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &batch, &hexes, &pending, &others);
+            if (pending.count == SIMD_WIDTH) kernel_tile_meet_pending(t, &batch, &polys, &pending, &others);
         }
-    kernel_tile_meet_pending(t, &batch, &hexes, &pending, &others);
-    kernel_tile_meet_others(t, &batch, &hexes, &others);
+    kernel_tile_meet_pending(t, &batch, &polys, &pending, &others);
+    kernel_tile_meet_others(t, &batch, &polys, &others);
     kernel_batch_end(t, &batch);
-    kernel_hexes_end(t, &hexes);
+    kernel_polys_end(t, &polys);
 }
 
 SIMD_INLINE void kernel_tile_surface_candidates(kernel_tile_trace *t)
@@ -385,13 +396,7 @@ static void begin(kernel_thread *thread)
     m->segments.depth = 0;
 }
 
-const kernel_table KERNEL_TABLE = {SIMD_WIDTH,
-                                   sizeof(kernel_memory),
-                                   begin,
-                                   trace_tile,
-                                   find_candidates,
-                                   write_active,
-                                   kernel_occlude,
-                                   kernel_occlude_by_cell,
-                                   kernel_sample_waiting,
+const kernel_table KERNEL_TABLE = {SIMD_WIDTH,          sizeof(kernel_memory),  begin,
+                                   trace_tile,          find_candidates,        write_active,
+                                   kernel_occlude,      kernel_occlude_by_cell, kernel_sample_waiting,
                                    kernel_light_waiting};

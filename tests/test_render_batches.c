@@ -1,6 +1,7 @@
-/* Tets of plain meshes and hexes, which tiles trace as many at once as there are lanes (kernel_batch.h,
- * kernel_hexes.h), against the same cells in traversals that take them one by one: the same bits. Cells are of some
- * pixels, of many and of one; the last ones lie beside each other in one vector, and may hit one pixel. */
+/* Tets of plain meshes, hexes, wedges and pyramids, which tiles trace as many at once as there are lanes
+ * (kernel_batch.h, kernel_polys.h), against the same cells in traversals that take them one by one: the same bits.
+ * Cells are of some pixels, of many and of one; the last ones lie beside each other in one vector, and may hit one
+ * pixel. */
 #include "test_render_fixture.h"
 
 #include <math.h>
@@ -47,14 +48,14 @@ static void compare(render_fixture *f)
 static void batches_draw_what_single_cells_do(void **state)
 {
     (void)state;
-    static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES};
+    static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
     static const struct {
         int n;
         test_function *field;
     } lattices[] = {{2, test_wave}, {4, test_wave}, {7, test_wave}, {13, test_wave}, {16, test_linear}};
     for (size_t i = 0; i < sizeof lattices / sizeof *lattices; i++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++)
-            for (int turn = 0; turn < 4; turn++) {
+            for (int turn = 0; turn < 2 * (int)(sizeof kinds / sizeof *kinds); turn++) {
                 const int jittered = turn % 2;
                 render_fixture f;
                 test_mesh mesh;
@@ -66,22 +67,24 @@ static void batches_draw_what_single_cells_do(void **state)
             }
 }
 
-/* Hexes with any order of vertices are placed together, or one by one where coordinates or indices are wide; some have
- * an edge without length, so that two of their faces are triangles. */
-static void hexes_are_numbered_anyhow(void **state)
+/* Cells with any order of vertices, in arrays of all layouts; some have an edge without length, so that quads of theirs
+ * are triangles and triangles nothing. */
+static void cells_are_numbered_anyhow(void **state)
 {
+    static const test_mesh_kind kinds[] = {TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS, TEST_MIXED};
     (void)state;
-    for (int turn = 0; turn < 6; turn++)
+    for (int turn = 0; turn < 6 * (int)(sizeof kinds / sizeof *kinds); turn++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             const int n = turn / 2 % 2 ? 12 : 5;
             render_fixture f;
             test_mesh mesh;
-            test_mesh_lattice(TEST_HEXES, n, 0.2, test_wave, &mesh);
-            for (int64_t c = 0; turn < 4 && c < mesh.cell_count; c += 7)
-                mesh.connectivity[8 * c + 1] = mesh.connectivity[8 * c];
+            test_mesh_lattice(kinds[turn / 6], n, 0.2, test_wave, &mesh);
+            for (int64_t c = 0; turn % 6 < 4 && c < mesh.cell_count; c += 7)
+                mesh.connectivity[mesh.offsets[c] + 1] = mesh.connectivity[mesh.offsets[c]];
             test_mesh_turn(&mesh, (uint64_t)turn);
-            create_as(&f, &mesh, 1, n, camera,
-                      (test_layout){.wide_coordinates = turn % 2, .wide_indices = turn == 4, .is_interleaved = true});
+            create_as(
+                &f, &mesh, 1, n, camera,
+                (test_layout){.wide_coordinates = turn % 2, .wide_indices = turn % 6 == 4, .is_interleaved = true});
             fixture_add_surface(&f, values, 2, 1);
             compare(&f);
             test_mesh_free(&mesh);
@@ -92,15 +95,17 @@ static void hexes_are_numbered_anyhow(void **state)
 static void meshes_and_layers_take_turns(void **state)
 {
     (void)state;
-    for (int kind = 0; kind < 2; kind++)
+    static const test_mesh_kind kinds[][2] = {
+        {TEST_TETS, TEST_HEXES}, {TEST_TETS, TEST_TETS}, {TEST_WEDGES, TEST_PYRAMIDS}, {TEST_MIXED, TEST_WEDGES}};
+    for (size_t kind = 0; kind < sizeof kinds / sizeof *kinds; kind++)
         for (fixture_camera camera = 0; camera < CAMERA_COUNT; camera++) {
             render_fixture f;
             test_mesh meshes[2];
-            test_mesh_lattice(TEST_TETS, 7, 0.2, test_wave, &meshes[0]);
-            test_mesh_lattice(kind ? TEST_TETS : TEST_HEXES, 8, 0.1, test_linear, &meshes[1]);
+            test_mesh_lattice(kinds[kind][0], 7, 0.2, test_wave, &meshes[0]);
+            test_mesh_lattice(kinds[kind][1], 8, 0.1, test_linear, &meshes[1]);
             create(&f, meshes, 2, 7, camera);
             fixture_add_surface(&f, values, 2, 1);
-            fixture_add_surface(&f, values + 2, 2, kind ? 1 : 0.4f);
+            fixture_add_surface(&f, values + 2, 2, kind % 2 ? 1 : 0.4f);
             f.surfaces[1].colours = other_colours[0];
             compare(&f);
             for (int i = 0; i < 2; i++) test_mesh_free(&meshes[i]);
@@ -111,12 +116,12 @@ static void meshes_and_layers_take_turns(void **state)
 static void ties_are_kept(void **state)
 {
     (void)state;
-    for (int turn = 0; turn < 4; turn++) {
+    static const test_mesh_kind kinds[] = {TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS};
+    for (int turn = 0; turn < 2 * (int)(sizeof kinds / sizeof *kinds); turn++) {
         const int n = turn % 2 ? 16 : 4;
         render_fixture f;
         test_mesh meshes[2];
-        for (int i = 0; i < 2; i++)
-            test_mesh_lattice(turn / 2 ? TEST_HEXES : TEST_TETS, n, 0.2, test_linear, &meshes[i]);
+        for (int i = 0; i < 2; i++) test_mesh_lattice(kinds[turn / 2], n, 0.2, test_linear, &meshes[i]);
         create(&f, meshes, 2, n, CAMERA_OUTSIDE);
         fixture_add_surface(&f, values, 1, 1);
         compare(&f);
@@ -130,11 +135,12 @@ static void odd_values_are_found_one_by_one(void **state)
     static const float opacity[1] = {0.3f};
     static const double odd[] = {3e31, -3e31, 1e-41, (double)INFINITY, (double)NAN, 3e38};
     (void)state;
-    for (int turn = 0; turn < 3; turn++) {
+    static const test_mesh_kind kinds[] = {TEST_TETS, TEST_TETS, TEST_HEXES, TEST_WEDGES, TEST_PYRAMIDS};
+    for (size_t turn = 0; turn < sizeof kinds / sizeof *kinds; turn++) {
         const bool as_volume = turn == 1;
         render_fixture f;
         test_mesh mesh;
-        test_mesh_lattice(turn == 2 ? TEST_HEXES : TEST_TETS, 7, 0.2, test_wave, &mesh);
+        test_mesh_lattice(kinds[turn], 7, 0.2, test_wave, &mesh);
         for (int64_t v = 5; v < mesh.vertex_count; v += 37)
             mesh.values[v] = odd[v / 37 % (int64_t)(sizeof odd / sizeof *odd)];
         create(&f, &mesh, 1, 7, CAMERA_OUTSIDE);
@@ -154,7 +160,7 @@ int main(void)
 {
     if (fixture_lacks_set()) return 77;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(hexes_are_numbered_anyhow),
+        cmocka_unit_test(batches_draw_what_single_cells_do), cmocka_unit_test(cells_are_numbered_anyhow),
         cmocka_unit_test(meshes_and_layers_take_turns),      cmocka_unit_test(ties_are_kept),
         cmocka_unit_test(odd_values_are_found_one_by_one),
     };

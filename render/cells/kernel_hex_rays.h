@@ -1,11 +1,12 @@
-/* Rays of several hexes side by side (kernel_hexes.h): which two faces of its cell a ray crosses, and where. A lane
- * takes its cell's numbers out of the batch's vectors. */
+/* Rays of several hexes, wedges or pyramids side by side (kernel_polys.h): which two faces of its cell a ray crosses,
+ * and where. A lane takes its cell's numbers out of the batch's vectors. */
 #ifndef RENDER_KERNEL_HEX_RAYS_H
 #define RENDER_KERNEL_HEX_RAYS_H
 
 #include <math.h>
 #include <string.h>
 
+#include "kernel_crossings.h"
 #include "kernel_packet.h"
 #include "kernel_placed_hexes.h"
 #include "kernel_quad.h"
@@ -55,40 +56,86 @@ SIMD_INLINE void kernel_hex_ray_add(kernel_hex_rays *to, const kernel_hex_rays *
     to->count++;
 }
 
-SIMD_INLINE void kernel_hex_faces(const kernel_placed_hexes *h, const kernel_hex_packet *p, kernel_hex_crossed *out)
+/* A cell's lines on the rays: the sides of each, and the least of all. */
+typedef struct kernel_poly_sides {
+    vm negative[KERNEL_MAX_LINES];
+    vf least;
+} kernel_poly_sides;
+
+SIMD_INLINE void kernel_poly_side(const kernel_placed_polys *h, const kernel_hex_packet *p, int n, kernel_poly_sides *s)
 {
-    vm negative[KERNEL_HEX_LINES], one = vm_none(), two = one, bends = one;
-    vf least = vf_set(INFINITY), x[8], y[8];
-    for (int n = 0; n < KERNEL_HEX_LINES; n++) {
-        const vf e = vf_muladd(kernel_hex_take(h->cv[n], p->lane), p->v,
-                               vf_muladd(kernel_hex_take(h->cu[n], p->lane), p->u, kernel_hex_take(h->c[n], p->lane)));
-        least = vf_min(vf_abs(e), least);
-        negative[n] = vm_sign(vi_from_bits(e));
+    const vf e = vf_muladd(kernel_hex_take(h->cv[n], p->lane), p->v,
+                           vf_muladd(kernel_hex_take(h->cu[n], p->lane), p->u, kernel_hex_take(h->c[n], p->lane)));
+    s->least = vf_min(vf_abs(e), s->least);
+    s->negative[n] = vm_sign(vi_from_bits(e));
+}
+
+SIMD_INLINE void kernel_poly_sides_of(const kernel_placed_polys *h, const kernel_hex_packet *p, int type,
+                                      kernel_poly_sides *s)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    s->least = vf_set(INFINITY);
+    for (int n = 0; n < shape->edge_count; n++) kernel_poly_side(h, p, n, s);
+    for (int face = 0; face < shape->face_count; face++)
+        if (shape->faces[face].count == 4) kernel_poly_side(h, p, shape->edge_count + face, s);
+}
+
+/* Are the sides of a face's edges around negative? */
+SIMD_INLINE void kernel_face_sides(const kernel_shape *shape, int face, const kernel_poly_sides *s, vm around[4])
+{
+    for (int i = 0; i < shape->faces[face].count; i++) {
+        const signed char *edge = shape->faces[face].sides[i];
+        around[i] = edge[1] ? vm_not(s->negative[(int)edge[0]]) : s->negative[(int)edge[0]];
     }
-    out->alone = vm_not(vf_lt(kernel_hex_take(h->doubt, p->lane), least));
-    for (int i = 0; i < 8; i++) {
+}
+
+/* Rays that cross one of a quad's two triangles. side is that of its diagonal, which is from the loop's vertex 1 where
+ * turn is set. */
+SIMD_INLINE vm kernel_quad_once_of(const vm around[4], vm turn, vm side)
+{
+    /* From the diagonal's begin. */
+    vm from[4];
+    for (int i = 0; i < 4; i++) from[i] = vm_or(vm_and(turn, around[(i + 1) & 3]), vm_andnot(around[i], turn));
+    const vm half0 = vm_andnot(vm_xor(from[1], side), vm_xor(from[0], from[1]));
+    const vm half1 = vm_not(vm_or(vm_xor(side, from[2]), vm_xor(from[2], from[3])));
+    return vm_xor(half0, half1);
+}
+
+/* Vertices as rays see them. */
+SIMD_INLINE void kernel_poly_project(const kernel_placed_polys *h, const kernel_hex_packet *p, int count, vf x[8],
+                                     vf y[8])
+{
+    for (int i = 0; i < count; i++) {
         const vf z = kernel_hex_take(h->at[2][i], p->lane);
         x[i] = (kernel_hex_take(h->at[0][i], p->lane) - p->rays.origin_x) - p->rays.slope_x * z;
         y[i] = (kernel_hex_take(h->at[1][i], p->lane) - p->rays.origin_y) - p->rays.slope_y * z;
     }
+}
+
+SIMD_INLINE void kernel_poly_faces(const kernel_placed_polys *h, const kernel_hex_packet *p, int type,
+                                   kernel_hex_crossed *out)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
+    kernel_poly_sides sides;
+    vm one = vm_none(), two = one, bends = one;
+    vf x[8], y[8];
+    kernel_poly_sides_of(h, p, type, &sides);
+    out->alone = vm_not(vf_lt(kernel_hex_take(h->doubt, p->lane), sides.least));
+    kernel_poly_project(h, p, grid_type_vertices(type), x, y);
     const vi turned = vi_from_bits(kernel_hex_take((const float *)(const void *)h->turned, p->lane));
     vf first = vf_set(0), last = first;
-    for (int face = 0; face < KERNEL_HEX_FACES; face++) {
-        vm around[4];
-        for (int i = 0; i < 4; i++) {
-            const signed char *edge = kernel_hex_around[face][i];
-            around[i] = edge[1] ? vm_not(negative[edge[0]]) : negative[edge[0]];
+    for (int face = 0; face < shape->face_count; face++) {
+        vm around[4], once;
+        kernel_face_sides(shape, face, &sides, around);
+        if (shape->faces[face].count == 3) {
+            once = vm_andnot(p->active, vm_or(vm_xor(around[0], around[1]), vm_xor(around[1], around[2])));
+        } else {
+            const vm turn = vm_sign(turned << (31 - face));
+            const vm outside = vm_and(p->active, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
+            const signed char *loop = shape->faces[face].vertices;
+            once = vm_and(p->active, kernel_quad_once_of(around, turn, sides.negative[shape->edge_count + face]));
+            bends = vm_or(bends, kernel_hex_bends(x, y, loop, outside, around[0], around[3]));
         }
-        /* From the diagonal's begin. */
-        const vm turn = vm_sign(turned << (31 - face)), side = negative[KERNEL_HEX_EDGES + face];
-        vm from[4];
-        for (int i = 0; i < 4; i++) from[i] = vm_or(vm_and(turn, around[(i + 1) & 3]), vm_andnot(around[i], turn));
-        const vm half0 = vm_andnot(vm_xor(from[1], side), vm_xor(from[0], from[1]));
-        const vm half1 = vm_not(vm_or(vm_xor(side, from[2]), vm_xor(from[2], from[3])));
-        const vm once = vm_and(p->active, vm_xor(half0, half1));
-        const vm outside = vm_and(p->active, vm_and(vm_xor(around[0], around[2]), vm_xor(around[1], around[3])));
-        bends =
-            vm_or(bends, kernel_hex_bends(x, y, kernel_shapes[0].faces[face].vertices, outside, around[0], around[3]));
         out->alone = vm_or(out->alone, vm_and(two, once));
         two = vm_or(two, vm_and(one, once));
         first = vf_select(vm_andnot(once, one), vf_set((float)face), first);
@@ -101,7 +148,7 @@ SIMD_INLINE void kernel_hex_faces(const kernel_placed_hexes *h, const kernel_hex
     out->last = vi_from_vf(last);
 }
 
-/* The place where rays cross a face, as kernel_quad_crossings() finds it. */
+/* The place where rays cross a face, as kernel_quad_crossings() or kernel_triangle_crossing() finds it. */
 typedef struct kernel_hex_place {
     vf t, v, r[3];
 } kernel_hex_place;
@@ -112,31 +159,47 @@ typedef struct kernel_hex_quad {
     vf f[4];
 } kernel_hex_quad;
 
-/* A number of each ray's own vertex of its cell. Of 16 lanes, selections among all vertices' are faster than a gather,
- * of 8 they are slower. */
-SIMD_INLINE vf kernel_hex_pick(const float of[8][SIMD_WIDTH], vi lane, vi corner)
+/* A number of each ray's own vertex of its cell, which has count. Of 16 lanes, selections among all vertices' are
+ * faster than a gather, of 8 they are slower. */
+SIMD_INLINE vf kernel_hex_pick(const float of[8][SIMD_WIDTH], int count, vi lane, vi corner)
 {
     if (SIMD_WIDTH < 16) return vf_gather(of[0], corner * SIMD_WIDTH + lane);
     vf four[4], two[2];
     const vm odd = vm_sign(corner << 31), second = vm_sign(corner << 30), upper = vm_sign(corner << 29);
-    for (int i = 0; i < 4; i++)
-        four[i] = vf_select(odd, kernel_hex_take(of[2 * i + 1], lane), kernel_hex_take(of[2 * i], lane));
-    for (int i = 0; i < 2; i++) two[i] = vf_select(second, four[2 * i + 1], four[2 * i]);
-    return vf_select(upper, two[1], two[0]);
+    for (int i = 0; 2 * i < count; i++) {
+        four[i] = kernel_hex_take(of[2 * i], lane);
+        if (2 * i + 1 < count) four[i] = vf_select(odd, kernel_hex_take(of[2 * i + 1], lane), four[i]);
+    }
+    for (int i = 0; 4 * i < count; i++)
+        two[i] = 4 * i + 2 < count ? vf_select(second, four[2 * i + 1], four[2 * i]) : four[2 * i];
+    return count > 4 ? vf_select(upper, two[1], two[0]) : two[0];
 }
 
-SIMD_INLINE void kernel_hex_quad_take(const kernel_placed_hexes *h, const kernel_hex_packet *p, vi face, kernel_quad *q,
-                                      kernel_hex_quad *out)
+/* A vertex's own coordinate, 0 or 1, of each ray's own vertex. */
+SIMD_INLINE vf kernel_hex_own(const kernel_shape *shape, int count, int axis, vi corner)
 {
-    const float *quads = (const float *)(const void *)h->quads;
-    const vi word = vi_from_bits(vf_gather(quads, face * SIMD_WIDTH + p->lane));
+    int bits = 0;
+    for (int i = 0; i < count; i++) bits |= (shape->corners[i][axis] > 0) << i;
+    return vf_from_vi(vi_set(bits) >> corner & 1);
+}
+
+SIMD_INLINE vi kernel_face_word(const kernel_placed_polys *h, vi lane, vi face)
+{
+    return vi_from_bits(vf_gather((const float *)(const void *)h->corners, face * SIMD_WIDTH + lane));
+}
+
+SIMD_INLINE void kernel_hex_quad_take(const kernel_placed_polys *h, const kernel_hex_packet *p, int type, vi face,
+                                      kernel_quad *q, kernel_hex_quad *out)
+{
+    const int count = grid_type_vertices(type);
+    const vi word = kernel_face_word(h, p->lane, face);
     for (int i = 0; i < 4; i++) {
         const vi corner = word >> (4 * i) & 7;
         out->corner[i] = corner;
-        q->z[i] = kernel_hex_pick(h->at[2], p->lane, corner);
-        q->x[i] = (kernel_hex_pick(h->at[0], p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
-        q->y[i] = (kernel_hex_pick(h->at[1], p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
-        out->f[i] = kernel_hex_pick(h->at[3], p->lane, corner);
+        q->z[i] = kernel_hex_pick(h->at[2], count, p->lane, corner);
+        q->x[i] = (kernel_hex_pick(h->at[0], count, p->lane, corner) - p->rays.origin_x) - p->rays.slope_x * q->z[i];
+        q->y[i] = (kernel_hex_pick(h->at[1], count, p->lane, corner) - p->rays.origin_y) - p->rays.slope_y * q->z[i];
+        out->f[i] = kernel_hex_pick(h->at[3], count, p->lane, corner);
     }
     /* Not in doubt, so these have the lines' signs. */
     q->e01 = vf_diff_of_products(q->x[0], q->y[1], q->x[1], q->y[0]);
@@ -145,25 +208,78 @@ SIMD_INLINE void kernel_hex_quad_take(const kernel_placed_hexes *h, const kernel
     q->e32 = vf_diff_of_products(q->x[3], q->y[2], q->x[2], q->y[3]);
 }
 
-SIMD_INLINE void kernel_hex_cross(const kernel_placed_hexes *h, const kernel_hex_packet *p, vi faces,
-                                  kernel_hex_place out[2])
+SIMD_INLINE void kernel_hex_quad_place(int type, const kernel_hex_quad *own, const kernel_quad_place *place,
+                                       kernel_hex_place *out)
 {
-    kernel_quad quads[2];
-    kernel_hex_quad own[2];
-    kernel_quad_place places[2];
-    for (int n = 0; n < 2; n++) kernel_hex_quad_take(h, p, faces >> (3 * n) & 7, &quads[n], &own[n]);
-    kernel_quads_meet(quads, 2, p->active, places);
-    for (int n = 0; n < 2; n++) {
-        out[n].t = places[n].t;
-        out[n].v = kernel_bilinear(own[n].f, places[n].s, places[n].r);
-        for (int a = 0; a < 3; a++) {
-            vf at[4];
-            for (int i = 0; i < 4; i++) {
-                const vi bits = own[n].corner[i] ^ (own[n].corner[i] >> 1 & 1);
-                at[i] = vf_from_vi(bits >> a & 1);
-            }
-            out[n].r[a] = (at[0] + places[n].s * (at[1] - at[0])) + places[n].r * (at[3] - at[0]);
-        }
+    out->t = place->t;
+    out->v = kernel_bilinear(own->f, place->s, place->r);
+    for (int a = 0; a < 3; a++) {
+        vf at[4];
+        for (int i = 0; i < 4; i++)
+            at[i] = kernel_hex_own(kernel_cell_shape(type), grid_type_vertices(type), a, own->corner[i]);
+        out->r[a] = (at[0] + place->s * (at[1] - at[0])) + place->r * (at[3] - at[0]);
+    }
+}
+
+/* A triangle's edge functions on rays that cross it, each with its own of its cell's: ij, jk and ik. */
+typedef struct kernel_hex_triangle {
+    vi corner[3];
+    vf e[3];
+} kernel_hex_triangle;
+
+/* kernel_triangle_mend(). */
+static __attribute__((noinline, cold)) void
+kernel_hex_triangle_mend(const kernel_placed_polys *h, const kernel_hex_packet *p, vm weak, kernel_hex_triangle *own)
+{
+    vf x[3], y[3];
+    for (int i = 0; i < 3; i++) {
+        const vi at = own->corner[i] * SIMD_WIDTH + p->lane;
+        const vf z = vf_gather(h->at[2][0], at);
+        x[i] = (vf_gather(h->at[0][0], at) - p->rays.origin_x) - p->rays.slope_x * z;
+        y[i] = (vf_gather(h->at[1][0], at) - p->rays.origin_y) - p->rays.slope_y * z;
+    }
+    own->e[0] = vf_select(weak, kernel_edge_between(x[0], y[0], x[1], y[1]), own->e[0]);
+    own->e[1] = vf_select(weak, kernel_edge_between(x[1], y[1], x[2], y[2]), own->e[1]);
+    own->e[2] = vf_select(weak, kernel_edge_between(x[0], y[0], x[2], y[2]), own->e[2]);
+}
+
+/* The triangle that is the face, on the given rays; on others another. */
+SIMD_INLINE void kernel_hex_triangle_take(const kernel_placed_polys *h, const kernel_hex_packet *p, int type, vm rays,
+                                          vi face, kernel_hex_triangle *own)
+{
+    const int size = (int)(sizeof(kernel_triangle_lines) / sizeof(float));
+    const vi number = vi_select(rays, face - kernel_first_triangle(type), vi_set(0)), at = number * size + p->lane;
+    const vi word = kernel_face_word(h, p->lane, face);
+    for (int i = 0; i < 3; i++) own->corner[i] = word >> (4 * i) & 7;
+    for (int i = 0; i < 3; i++) {
+        const kernel_triangle_lines *lines = &h->triangles[0];
+        own->e[i] = vf_muladd(vf_gather(lines->cv[i], at), p->v,
+                              vf_muladd(vf_gather(lines->cu[i], at), p->u, vf_gather(lines->c[i], at)));
+    }
+    const vf weight = kernel_weight(own->e[0], own->e[1], own->e[2]);
+    const vm weak = vm_and(rays, vf_lt(vf_abs(weight), vf_gather(h->least[0], number * SIMD_WIDTH + p->lane)));
+    if (__builtin_expect(vm_any(weak), 0)) kernel_hex_triangle_mend(h, p, weak, own);
+}
+
+/* kernel_weigh(). */
+SIMD_INLINE vf kernel_hex_weigh(const kernel_hex_triangle *own, const vf v[3], vf inverse)
+{
+    return vf_muladd(own->e[0], v[2], vf_muladd(-own->e[2], v[1], own->e[1] * v[0])) * inverse;
+}
+
+SIMD_INLINE void kernel_hex_triangle_place(const kernel_placed_polys *h, int type, vi lane,
+                                           const kernel_hex_triangle *own, kernel_hex_place *out)
+{
+    const int count = grid_type_vertices(type);
+    const vf inverse = 1.0f / kernel_weight(own->e[0], own->e[1], own->e[2]);
+    vf v[3];
+    for (int i = 0; i < 3; i++) v[i] = kernel_hex_pick(h->at[2], count, lane, own->corner[i]);
+    out->t = kernel_hex_weigh(own, v, inverse);
+    for (int i = 0; i < 3; i++) v[i] = kernel_hex_pick(h->at[3], count, lane, own->corner[i]);
+    out->v = kernel_hex_weigh(own, v, inverse);
+    for (int a = 0; a < 3; a++) {
+        for (int i = 0; i < 3; i++) v[i] = kernel_hex_own(kernel_cell_shape(type), count, a, own->corner[i]);
+        out->r[a] = kernel_hex_weigh(own, v, inverse);
     }
 }
 
@@ -173,6 +289,43 @@ SIMD_INLINE void kernel_hex_place_select(vm m, const kernel_hex_place *a, const 
     out->t = vf_select(m, a->t, b->t);
     out->v = vf_select(m, a->v, b->v);
     for (int i = 0; i < 3; i++) out->r[i] = vf_select(m, a->r[i], b->r[i]);
+}
+
+/* Rays whose face of this number, the first or the last of two, is a quad. Faces are in the shape's order, so that of a
+ * wedge, whose triangles come first, the last is a quad but where both are triangles; of a pyramid none is. */
+SIMD_INLINE vm kernel_hex_on_quad(int type, int n, vi face)
+{
+    if (type == GRID_HEX) return vm_all_lanes();
+    const vf number = vf_from_vi(face);
+    if (type == GRID_WEDGE) return vf_lt(vf_set(1.5f), number);
+    return n ? vm_none() : vf_lt(number, vf_set(0.5f));
+}
+
+SIMD_INLINE void kernel_poly_cross(const kernel_placed_polys *h, const kernel_hex_packet *p, int type, vi faces,
+                                   kernel_hex_place out[2])
+{
+    const vi face[2] = {faces & 7, faces >> 3 & 7};
+    const vm on_quad[2] = {kernel_hex_on_quad(type, 0, face[0]), kernel_hex_on_quad(type, 1, face[1])};
+    const vm once[2] = {vm_and(p->active, on_quad[0]), vm_and(p->active, on_quad[1])};
+    const int quads = type == GRID_PYRAMID ? 1 : 2;
+    memset(out, 0, 2 * sizeof *out);
+    if (type == GRID_HEX || vm_any(vm_or(once[0], once[1]))) {
+        kernel_quad own[2];
+        kernel_hex_quad corners[2];
+        kernel_quad_place places[2];
+        for (int n = 0; n < quads; n++) kernel_hex_quad_take(h, p, type, face[n], &own[n], &corners[n]);
+        kernel_quads_cross(own, quads, once, places);
+        for (int n = 0; n < quads; n++) kernel_hex_quad_place(type, &corners[n], &places[n], &out[n]);
+    }
+    for (int n = 0; n < 2 && type != GRID_HEX; n++) {
+        const vm on_triangle = vm_andnot(p->active, on_quad[n]);
+        kernel_hex_triangle own;
+        kernel_hex_place place;
+        if (!vm_any(on_triangle)) continue;
+        kernel_hex_triangle_take(h, p, type, on_triangle, face[n], &own);
+        kernel_hex_triangle_place(h, type, p->lane, &own, &place);
+        kernel_hex_place_select(on_triangle, &place, &out[n], &out[n]);
+    }
 }
 
 SIMD_INLINE void kernel_hex_ends_add(const kernel_hex_rays *met, int n, const kernel_hex_place ends[2], unsigned bits,

@@ -52,26 +52,48 @@ typedef struct kernel_map {
         (c)[7] = ((v)[6] - (v)[5] - (v)[7] + (v)[4]) - (c)[4];                                                         \
     } while (0)
 
+/* Of a wedge and of a pyramid those that are not 0. */
+#define KERNEL_WEDGE_FIT(c, v)                                                                                         \
+    do {                                                                                                               \
+        (c)[0] = (v)[0];                                                                                               \
+        (c)[1] = (v)[1] - (v)[0];                                                                                      \
+        (c)[2] = (v)[2] - (v)[0];                                                                                      \
+        (c)[3] = (v)[3] - (v)[0];                                                                                      \
+        (c)[5] = (v)[4] - (v)[1] - (v)[3] + (v)[0];                                                                    \
+        (c)[6] = (v)[5] - (v)[2] - (v)[3] + (v)[0];                                                                    \
+    } while (0)
+
+#define KERNEL_PYRAMID_FIT(c, v)                                                                                       \
+    do {                                                                                                               \
+        (c)[0] = (v)[4];                                                                                               \
+        (c)[1] = (v)[1] - (v)[0];                                                                                      \
+        (c)[2] = (v)[3] - (v)[0];                                                                                      \
+        (c)[3] = (v)[0] - (v)[4];                                                                                      \
+        (c)[4] = (v)[0] - (v)[1] + (v)[2] - (v)[3];                                                                    \
+    } while (0)
+
 SIMD_INLINE void kernel_polynomial_fit(double out[8], int type, const double v[GRID_MAX_CELL_VERTICES])
 {
     double c[8] = {0};
-    if (type == GRID_HEX) {
+    if (type == GRID_HEX)
         KERNEL_HEX_FIT(c, v);
-    } else if (type == GRID_WEDGE) {
-        c[0] = v[0];
-        c[1] = v[1] - v[0];
-        c[2] = v[2] - v[0];
-        c[3] = v[3] - v[0];
-        c[5] = v[4] - v[1] - v[3] + v[0];
-        c[6] = v[5] - v[2] - v[3] + v[0];
-    } else {
-        c[0] = v[4];
-        c[1] = v[1] - v[0];
-        c[2] = v[3] - v[0];
-        c[3] = v[0] - v[4];
-        c[4] = v[0] - v[1] + v[2] - v[3];
-    }
+    else if (type == GRID_WEDGE)
+        KERNEL_WEDGE_FIT(c, v);
+    else
+        KERNEL_PYRAMID_FIT(c, v);
     memcpy(out, c, sizeof c);
+}
+
+/* The same of as many cells as there are doubles in a vector. */
+SIMD_INLINE void kernel_half_fit(int type, kernel_half c[8], const kernel_half v[8])
+{
+    if (type != GRID_HEX) memset(c, 0, 8 * sizeof *c);
+    if (type == GRID_HEX)
+        KERNEL_HEX_FIT(c, v);
+    else if (type == GRID_WEDGE)
+        KERNEL_WEDGE_FIT(c, v);
+    else
+        KERNEL_PYRAMID_FIT(c, v);
 }
 
 SIMD_INLINE void kernel_polynomial_of_floats(kernel_polynomial *p, int type, const float *v, float origin,

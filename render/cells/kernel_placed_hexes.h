@@ -1,7 +1,8 @@
-/* Hexes, one a lane, placed for a tile and given their lines: the operations of
+/* Hexes, wedges or pyramids, one a lane, placed for a tile and given their lines: the operations of
  * kernel_cell_relative(), kernel_place_in(), kernel_cell_order() and kernel_poly_lines(), and so the same bits, for as
- * many hexes at once as a vector has lanes. Vertices are turned into the order of coordinates first, so that all else
- * comes in order. What is computed in double is computed in two halves. */
+ * many cells of one type at once as a vector has lanes. Vertices are turned into the order of coordinates first, so
+ * that all else comes in order. What is computed in double is computed in two halves. A function's type is a constant
+ * where it is called from, so that its loops have known lengths. */
 #ifndef RENDER_KERNEL_PLACED_HEXES_H
 #define RENDER_KERNEL_PLACED_HEXES_H
 
@@ -19,33 +20,50 @@
 enum {
     KERNEL_HEX_EDGES = 12,
     KERNEL_HEX_FACES = 6,
-    KERNEL_HEX_LINES = KERNEL_HEX_EDGES + KERNEL_HEX_FACES,
+    KERNEL_MAX_TRIANGLES = 4, /* of a cell's faces */
 };
 
-/* Cells in lanes. A line's direction is the shape's: from an edge's first vertex to its second, and on a face from its
- * loop's vertex 0 to 2, or 1 to 3 where it is turned. */
-typedef struct kernel_placed_hexes {
+/* A triangle's lines in the order of its corners i, j, k, each from the lesser: ij, jk and ik. */
+typedef struct kernel_triangle_lines {
+    float c[3][SIMD_WIDTH], cu[3][SIMD_WIDTH], cv[3][SIMD_WIDTH];
+} kernel_triangle_lines;
+
+/* Cells of one type in lanes. A line's direction is the shape's: from an edge's first vertex to its second, and on a
+ * quad from its loop's vertex 0 to 2, or 1 to 3 where it is turned. */
+typedef struct kernel_placed_polys {
     float at[4][8][SIMD_WIDTH]; /* places in tile space, and the field less the isovalue, scaled */
-    float c[KERNEL_HEX_LINES][SIMD_WIDTH], cu[KERNEL_HEX_LINES][SIMD_WIDTH], cv[KERNEL_HEX_LINES][SIMD_WIDTH];
-    float doubt[SIMD_WIDTH];                      /* the largest of the bounds */
-    int32_t turned[SIMD_WIDTH];                   /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
-    int32_t quads[KERNEL_HEX_FACES * SIMD_WIDTH]; /* face by face: kernel_quad_corners(), four bits each */
-    /* for kernel_placed_hex_cell() */
-    float bound[KERNEL_HEX_LINES][SIMD_WIDTH];
+    float c[KERNEL_MAX_LINES][SIMD_WIDTH], cu[KERNEL_MAX_LINES][SIMD_WIDTH], cv[KERNEL_MAX_LINES][SIMD_WIDTH];
+    float doubt[SIMD_WIDTH];    /* the largest of the bounds */
+    int32_t turned[SIMD_WIDTH]; /* bits of faces whose diagonal is from the loop's vertex 1 to 3 */
+    /* face by face, four bits a corner: kernel_quad_corners() or kernel_triangle_order() */
+    int32_t corners[KERNEL_HEX_FACES * SIMD_WIDTH];
+    kernel_triangle_lines triangles[KERNEL_MAX_TRIANGLES]; /* from the shape's first triangle on, */
+    float least[KERNEL_MAX_TRIANGLES][SIMD_WIDTH];         /* and kernel_triangle_least() */
+    /* for kernel_placed_poly_cell() */
+    float bound[KERNEL_MAX_LINES][SIMD_WIDTH], least_of_all[SIMD_WIDTH];
     kernel_whole world[3][8];
     int32_t rank[8][SIMD_WIDTH], vertex[8][SIMD_WIDTH];
-} kernel_placed_hexes;
+} kernel_placed_polys;
+
+/* The number of a type's first face that is a triangle, and how many such faces there are, one after the other. */
+SIMD_INLINE int kernel_first_triangle(int type)
+{
+    return type == GRID_PYRAMID ? 1 : 0;
+}
+
+SIMD_INLINE int kernel_triangle_count(int type)
+{
+    return type == GRID_HEX ? 0 : type == GRID_WEDGE ? 2 : 4;
+}
 
 /* ---- order ---- */
 
-/* Vertices on their way into order, by the bits of x, y, z that kernel_cell_turn() has for them. */
-typedef struct kernel_turned_hexes {
+/* Vertices on their way into order. */
+typedef struct kernel_turned_polys {
     kernel_taken at[8][3];
     vf rank[8];
     vi vertex[8];
-} kernel_turned_hexes;
-
-static const signed char kernel_hex_bits[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* of a vertex; and back */
+} kernel_turned_polys;
 
 SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
 {
@@ -54,7 +72,7 @@ SIMD_INLINE void kernel_vf_swap(vm lanes, vf *a, vf *b)
     *b = vf_select(lanes, was, *b);
 }
 
-SIMD_INLINE void kernel_turned_swap(kernel_turned_hexes *h, bool is_narrow, vm lanes, int i, int j)
+SIMD_INLINE void kernel_turned_swap(kernel_turned_polys *h, bool is_narrow, vm lanes, int i, int j)
 {
     const vi was = h->vertex[i];
     for (int a = 0; a < 3; a++) kernel_taken_swap(is_narrow, lanes, &h->at[i][a], &h->at[j][a]);
@@ -64,76 +82,113 @@ SIMD_INLINE void kernel_turned_swap(kernel_turned_hexes *h, bool is_narrow, vm l
 }
 
 /* kernel_rank_positions(), of vertices as they came. */
-SIMD_INLINE void kernel_turned_rank(kernel_turned_hexes *h, bool is_narrow)
+SIMD_INLINE void kernel_turned_rank(kernel_turned_polys *h, bool is_narrow, int count)
 {
     const vf zero = vf_set(0), one = vf_set(1);
-    for (int i = 0; i < 8; i++) h->rank[kernel_hex_bits[i]] = vf_set((float)i);
-    for (int i = 0; i < 8; i++)
-        for (int j = i + 1; j < 8; j++) {
-            const int k = kernel_hex_bits[i], l = kernel_hex_bits[j];
-            const vf after = vf_select(kernel_taken_before(is_narrow, h->at[l], h->at[k]), one, zero);
-            h->rank[k] += after;
-            h->rank[l] -= after;
+    for (int i = 0; i < count; i++) h->rank[i] = vf_set((float)i);
+    for (int i = 0; i < count; i++)
+        for (int j = i + 1; j < count; j++) {
+            const vf after = vf_select(kernel_taken_before(is_narrow, h->at[j], h->at[i]), one, zero);
+            h->rank[i] += after;
+            h->rank[j] -= after;
         }
 }
 
-/* kernel_cell_turn(): the least vertex to bits 0, then the axes in the order of its neighbours. */
-SIMD_INLINE void kernel_turned_turn(kernel_turned_hexes *h, bool is_narrow)
+/* kernel_cell_turn() of a hex: the least vertex first, then the axes in the order of its neighbours. */
+SIMD_INLINE void kernel_turned_hex(kernel_turned_polys *h, bool is_narrow)
 {
+    static const signed char vertex[8] = {0, 1, 3, 2, 4, 5, 7, 6}; /* by the bits of x, y, z */
     vm turn[3] = {vm_none(), vm_none(), vm_none()};
     for (int b = 1; b < 8; b++) {
-        const vm least = vf_eq(h->rank[b], vf_set(0));
+        const vm least = vf_eq(h->rank[(int)vertex[b]], vf_set(0));
         for (int a = 0; a < 3; a++)
             if (b >> a & 1) turn[a] = vm_or(turn[a], least);
     }
     for (int a = 0; a < 3; a++)
         for (int b = 0; b < 8; b++)
-            if (!(b >> a & 1)) kernel_turned_swap(h, is_narrow, turn[a], b, b | 1 << a);
+            if (!(b >> a & 1)) kernel_turned_swap(h, is_narrow, turn[a], vertex[b], vertex[b | 1 << a]);
     for (int k = 0; k < 3; k++) {
         const int at = k == 1, low = 1 << at, high = 2 << at, other = 7 & ~(low | high); /* 0 and 1, 1 and 2, 0 and 1 */
-        const vm swap = vf_lt(h->rank[high], h->rank[low]);
-        kernel_turned_swap(h, is_narrow, swap, low, high);
-        kernel_turned_swap(h, is_narrow, swap, low | other, high | other);
+        const vm swap = vf_lt(h->rank[(int)vertex[high]], h->rank[(int)vertex[low]]);
+        kernel_turned_swap(h, is_narrow, swap, vertex[low], vertex[high]);
+        kernel_turned_swap(h, is_narrow, swap, vertex[low | other], vertex[high | other]);
     }
 }
 
-/* Lanes with two neighbouring vertices in one place: kernel_quad_collapses() of some face. */
-SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_hexes *h, bool is_narrow)
+/* Of a wedge: the triangle of the least vertex first, that vertex first in it, then its lesser neighbour there. */
+SIMD_INLINE void kernel_turned_wedge(kernel_turned_polys *h, bool is_narrow)
 {
+    vm over = vm_none();
+    for (int i = 3; i < 6; i++) over = vm_or(over, vf_eq(h->rank[i], vf_set(0)));
+    for (int i = 0; i < 3; i++) kernel_turned_swap(h, is_narrow, over, i, i + 3);
+    for (int i = 1; i < 3; i++) {
+        const vm first = vf_eq(h->rank[i], vf_set(0));
+        kernel_turned_swap(h, is_narrow, first, 0, i);
+        kernel_turned_swap(h, is_narrow, first, 3, i + 3);
+    }
+    const vm swap = vf_lt(h->rank[2], h->rank[1]);
+    kernel_turned_swap(h, is_narrow, swap, 1, 2);
+    kernel_turned_swap(h, is_narrow, swap, 4, 5);
+}
+
+/* Of a pyramid: the base's least vertex first, then its lesser neighbour there; the apex stays. */
+SIMD_INLINE void kernel_turned_pyramid(kernel_turned_polys *h, bool is_narrow)
+{
+    const vf least = vf_min(vf_min(h->rank[0], h->rank[1]), vf_min(h->rank[2], h->rank[3]));
+    const vm second = vf_eq(h->rank[1], least), third = vf_eq(h->rank[2], least), fourth = vf_eq(h->rank[3], least);
+    kernel_turned_swap(h, is_narrow, second, 0, 1);
+    kernel_turned_swap(h, is_narrow, second, 2, 3);
+    kernel_turned_swap(h, is_narrow, third, 0, 2);
+    kernel_turned_swap(h, is_narrow, fourth, 0, 3);
+    kernel_turned_swap(h, is_narrow, fourth, 1, 2);
+    kernel_turned_swap(h, is_narrow, vf_lt(h->rank[3], h->rank[1]), 1, 3);
+}
+
+SIMD_INLINE void kernel_turned_turn(kernel_turned_polys *h, bool is_narrow, int type)
+{
+    if (type == GRID_HEX)
+        kernel_turned_hex(h, is_narrow);
+    else if (type == GRID_WEDGE)
+        kernel_turned_wedge(h, is_narrow);
+    else
+        kernel_turned_pyramid(h, is_narrow);
+}
+
+/* Lanes with two neighbouring vertices in one place: kernel_quad_collapses() of some face, or a triangle's edge. */
+SIMD_INLINE vm kernel_turned_collapsed(const kernel_turned_polys *h, bool is_narrow, int type)
+{
+    const kernel_shape *shape = kernel_cell_shape(type);
     vm out = vm_none();
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 8; b++) {
-            const int c = b | 1 << a;
-            vm same = vm_all_lanes();
-            if (b == c) continue;
-            for (int axis = 0; axis < 3; axis++)
-                same = vm_and(same, kernel_taken_eq(is_narrow, &h->at[b][axis], &h->at[c][axis]));
-            out = vm_or(out, same);
-        }
+    for (int n = 0; n < shape->edge_count; n++) {
+        const int a = shape->edges[n][0], b = shape->edges[n][1];
+        vm same = vm_all_lanes();
+        for (int axis = 0; axis < 3; axis++)
+            same = vm_and(same, kernel_taken_eq(is_narrow, &h->at[a][axis], &h->at[b][axis]));
+        out = vm_or(out, same);
+    }
     return out;
 }
 
-/* Sets the vertices, their places and ranks; returns the lanes of which some face is a triangle. */
-SIMD_INLINE vm kernel_turned_fetch(kernel_placed_hexes *out, const kernel_arrays *p, bool is_narrow,
+/* Sets the vertices, their places and ranks; returns the lanes in which an edge has no length. */
+SIMD_INLINE vm kernel_turned_fetch(kernel_placed_polys *out, const kernel_arrays *p, bool is_narrow, int type,
                                    int32_t (*const vertices)[SIMD_WIDTH], vf rank[8])
 {
-    kernel_turned_hexes h;
-    for (int i = 0; i < 8; i++) {
-        const int b = kernel_hex_bits[i];
-        memcpy(&h.vertex[b], vertices[i], sizeof h.vertex[b]);
-        kernel_arrays_place(p, is_narrow, h.vertex[b], h.at[b]);
+    const int count = grid_type_vertices(type);
+    kernel_turned_polys h;
+    for (int i = 0; i < count; i++) {
+        memcpy(&h.vertex[i], vertices[i], sizeof h.vertex[i]);
+        kernel_arrays_place(p, is_narrow, h.vertex[i], h.at[i]);
     }
-    kernel_turned_rank(&h, is_narrow);
-    kernel_turned_turn(&h, is_narrow);
-    for (int i = 0; i < 8; i++) {
-        const int b = kernel_hex_bits[i];
-        const vi own_rank = vi_from_vf(h.rank[b]);
-        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &h.at[b][a]);
-        rank[i] = h.rank[b];
+    kernel_turned_rank(&h, is_narrow, count);
+    kernel_turned_turn(&h, is_narrow, type);
+    for (int i = 0; i < count; i++) {
+        const vi own_rank = vi_from_vf(h.rank[i]);
+        for (int a = 0; a < 3; a++) out->world[a][i] = kernel_taken_whole(is_narrow, &h.at[i][a]);
+        rank[i] = h.rank[i];
         memcpy(out->rank[i], &own_rank, sizeof own_rank);
-        memcpy(out->vertex[i], &h.vertex[b], sizeof h.vertex[b]);
+        memcpy(out->vertex[i], &h.vertex[i], sizeof h.vertex[i]);
     }
-    return kernel_turned_collapsed(&h, is_narrow);
+    return kernel_turned_collapsed(&h, is_narrow, type);
 }
 
 /* ---- places and values ---- */
@@ -153,13 +208,14 @@ SIMD_INLINE void kernel_half_place(const kernel_frame *f, const kernel_tile *til
     kernel_half_put(&out[2], half, at[2] - tile->depth_shift);
 }
 
-/* kernel_cell_relative() of eight values. */
-SIMD_INLINE void kernel_lanes_relative(const kernel_whole values[8], const double isovalues[SIMD_WIDTH], vf out[8])
+/* kernel_cell_relative() of count values. */
+SIMD_INLINE void kernel_lanes_relative(const kernel_whole values[8], int count, const double isovalues[SIMD_WIDTH],
+                                       vf out[8])
 {
     for (int half = 0; half < 2; half++) {
         kernel_half isovalue, v[8], largest = {0};
         memcpy(&isovalue, isovalues + half * KERNEL_HALF, sizeof isovalue);
-        for (int i = 0; i < 8; i++) {
+        for (int i = 0; i < count; i++) {
             v[i] = values[i].half[half] - isovalue;
             largest = kernel_half_max(kernel_half_abs(v[i]), largest);
         }
@@ -169,7 +225,7 @@ SIMD_INLINE void kernel_lanes_relative(const kernel_whole values[8], const doubl
         const kernel_half_mask high = exponent > 2023;
         exponent = (low & 23) | (high & 2023) | (exponent & ~(low | high));
         const kernel_half scale = (kernel_half)((2046 - exponent) << 52);
-        for (int i = 0; i < 8; i++) kernel_half_put(&out[i], half, v[i] * scale);
+        for (int i = 0; i < count; i++) kernel_half_put(&out[i], half, v[i] * scale);
     }
 }
 
@@ -188,12 +244,19 @@ SIMD_INLINE vf kernel_lanes_size(const kernel_frame *f, const kernel_tile *tile,
     return 2 * vf_max(vf_abs(at[0]), vf_abs(at[1])) + 5 * tile->radius * depth;
 }
 
-/* kernel_line_between(); which of the two is the first decides signs alone. */
-SIMD_INLINE void kernel_placed_hex_line(kernel_placed_hexes *out, const kernel_frame *f, int n,
-                                        const kernel_lanes_spot *a, const kernel_lanes_spot *b, vf *doubt)
+/* What kernel_poly_lines() has of all lines: the largest bound, and kernel_line_blur()'s. */
+typedef struct kernel_lanes_blur {
+    vf doubt, error, extent;
+} kernel_lanes_blur;
+
+/* kernel_line_between(), and of cells with triangles kernel_line_blur(); which of the two is the first decides signs
+ * alone. */
+SIMD_INLINE void kernel_placed_line_of(kernel_placed_polys *out, const kernel_frame *f, float radius, int type, int n,
+                                       const kernel_lanes_spot ends[2], kernel_lanes_blur *own)
 {
     const bool flat = f->job->camera.is_orthographic;
-    vf line[3];
+    const kernel_lanes_spot *a = &ends[0], *b = &ends[1];
+    vf line[3], apart[3];
     for (int half = 0; half < 2; half++) {
         const kernel_half ax = kernel_half_of(&a->at[0], half), ay = kernel_half_of(&a->at[1], half);
         const kernel_half bx = kernel_half_of(&b->at[0], half), by = kernel_half_of(&b->at[1], half);
@@ -204,12 +267,15 @@ SIMD_INLINE void kernel_placed_hex_line(kernel_placed_hexes *out, const kernel_f
         kernel_half_put(&line[1], half, db * ay - da * by);
         kernel_half_put(&line[2], half, da * bx - db * ax);
     }
-    const vf bound = 6 * 6e-8f * (a->size * b->size);
-    *doubt = vf_max(bound, *doubt);
+    own->doubt = 6 * 6e-8f * (a->size * b->size);
     vf_store(out->c[n], line[0]);
     vf_store(out->cu[n], line[1]);
     vf_store(out->cv[n], line[2]);
-    vf_store(out->bound[n], bound);
+    vf_store(out->bound[n], own->doubt);
+    if (type == GRID_HEX) return;
+    for (int i = 0; i < 3; i++) apart[i] = vf_abs(a->at[i] - b->at[i]);
+    own->error = 6e-8f * (3 * vf_abs(line[0]) + radius * (4 * vf_abs(line[1]) + 3 * vf_abs(line[2])));
+    own->extent = apart[2] + 0.25f * (apart[0] + apart[1]);
 }
 
 /* kernel_quad_corners() of the loop, four bits a corner; odd_lanes: where that begins at the loop's vertex 1 or 3. */
@@ -232,59 +298,133 @@ SIMD_INLINE vi kernel_hex_quad_word(const signed char *loop, const vf rank[8], v
     return word;
 }
 
-/* Of all faces the corners, and the diagonals. */
-SIMD_INLINE void kernel_placed_hex_face(kernel_placed_hexes *out, const kernel_frame *f, int face, const vf rank[8],
-                                        const kernel_lanes_spot spots[8], vi *turned, vf *doubt)
+/* A quad's corners, and its diagonal. */
+SIMD_INLINE void kernel_placed_quad(kernel_placed_polys *out, int type, int face, const vf rank[8],
+                                    const kernel_lanes_spot spots[8], kernel_lanes_spot ends[2])
 {
-    const signed char *loop = kernel_shapes[0].faces[face].vertices;
+    const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
     vm odd;
     const vi word = kernel_hex_quad_word(loop, rank, &odd);
-    memcpy(out->quads + face * SIMD_WIDTH, &word, sizeof word);
-    *turned |= vi_select(odd, vi_set(1 << face), vi_set(0));
-    kernel_lanes_spot from, to;
-    for (int a = 0; a < 3; a++) {
-        from.at[a] = vf_select(odd, spots[loop[1]].at[a], spots[loop[0]].at[a]);
-        to.at[a] = vf_select(odd, spots[loop[3]].at[a], spots[loop[2]].at[a]);
+    vi turned;
+    memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
+    memcpy(&turned, out->turned, sizeof turned);
+    turned |= vi_select(odd, vi_set(1 << face), vi_set(0));
+    memcpy(out->turned, &turned, sizeof turned);
+    for (int end = 0; end < 2; end++) {
+        const kernel_lanes_spot *even = &spots[(int)loop[2 * end]], *own = &spots[(int)loop[2 * end + 1]];
+        for (int a = 0; a < 3; a++) ends[end].at[a] = vf_select(odd, own->at[a], even->at[a]);
+        ends[end].size = vf_select(odd, own->size, even->size);
     }
-    from.size = vf_select(odd, spots[loop[1]].size, spots[loop[0]].size);
-    to.size = vf_select(odd, spots[loop[3]].size, spots[loop[2]].size);
-    kernel_placed_hex_line(out, f, KERNEL_HEX_EDGES + face, &from, &to, doubt);
+}
+
+/* A triangle's corners in the order: lanes in which the loop's vertices 0, 1, 2 are i, and are k. */
+typedef struct kernel_lanes_order {
+    vm first[3], last[3];
+} kernel_lanes_order;
+
+/* Of a triangle's three sides, by their opposite corners: those of k, i and j are ij, jk and ik. */
+SIMD_INLINE void kernel_order_sides(const kernel_lanes_order *o, const vf opposite[3], vf out[3])
+{
+    out[0] = vf_select(o->last[0], opposite[0], vf_select(o->last[1], opposite[1], opposite[2]));
+    out[1] = vf_select(o->first[0], opposite[0], vf_select(o->first[1], opposite[1], opposite[2]));
+    out[2] = opposite[2];
+    for (int i = 0; i < 2; i++) out[2] = vf_select(vm_not(vm_or(o->first[i], o->last[i])), opposite[i], out[2]);
+}
+
+/* kernel_triangle_order() and kernel_triangle_least(), and the lines of its edges, whose blurs are given. */
+SIMD_INLINE void kernel_placed_triangle(kernel_placed_polys *out, int type, int face, const vf rank[8],
+                                        const kernel_lanes_blur *blurs)
+{
+    const signed char *loop = kernel_cell_shape(type)->faces[face].vertices;
+    const signed char(*sides)[2] = kernel_cell_shape(type)->faces[face].sides;
+    kernel_triangle_lines *lines = &out->triangles[face - kernel_first_triangle(type)];
+    const vf r[3] = {rank[(int)loop[0]], rank[(int)loop[1]], rank[(int)loop[2]]};
+    const vm falls[3] = {vf_lt(r[1], r[0]), vf_lt(r[2], r[1]), vf_lt(r[0], r[2])}; /* along the sides 01, 12, 20 */
+    kernel_lanes_order o;
+    vf opposite[3], in_order[3], errors[3], extents[3];
+    vi word = vi_set(0);
+    for (int i = 0; i < 3; i++) {
+        const vm before = falls[(i + 2) % 3], behind = falls[i];
+        o.first[i] = vm_andnot(before, behind);
+        o.last[i] = vm_andnot(behind, before);
+        word |=
+            vi_select(o.first[i], vi_set(loop[i]), vi_select(o.last[i], vi_set(loop[i] << 8), vi_set(loop[i] << 4)));
+    }
+    memcpy(out->corners + face * SIMD_WIDTH, &word, sizeof word);
+    float(*const from[3])[SIMD_WIDTH] = {out->c, out->cu, out->cv};
+    float(*const to[3])[SIMD_WIDTH] = {lines->c, lines->cu, lines->cv};
+    for (int n = 0; n < 3; n++) {
+        for (int i = 0; i < 3; i++) {
+            const int side = (i + 1) % 3;
+            const vf v = vf_load(from[n][(int)sides[side][0]]), turned = -v;
+            const vm falling = sides[side][1] ? vm_not(falls[side]) : falls[side];
+            opposite[i] = vf_select(falling, turned, v);
+        }
+        kernel_order_sides(&o, opposite, in_order);
+        for (int i = 0; i < 3; i++) vf_store(to[n][i], in_order[i]);
+    }
+    for (int i = 0; i < 3; i++) opposite[i] = blurs[(int)sides[(i + 1) % 3][0]].error;
+    kernel_order_sides(&o, opposite, errors);
+    for (int i = 0; i < 3; i++) opposite[i] = blurs[(int)sides[(i + 1) % 3][0]].extent;
+    kernel_order_sides(&o, opposite, extents);
+    const vf error = (errors[0] + errors[1]) + errors[2], extent = (extents[0] + extents[1]) + extents[2];
+    vf_store(out->least[face - kernel_first_triangle(type)], error * extent * (0.5f / KERNEL_WEIGHT_ERROR));
+}
+
+SIMD_INLINE void kernel_blur_add(kernel_lanes_blur *most, int type, const kernel_lanes_blur *own)
+{
+    most->doubt = vf_max(own->doubt, most->doubt);
+    if (type == GRID_HEX) return;
+    most->error = vf_max(own->error, most->error);
+    most->extent = vf_max(own->extent, most->extent);
 }
 
 /* kernel_poly_lines(). */
-SIMD_INLINE void kernel_placed_hex_lines(kernel_placed_hexes *out, const kernel_frame *f, const kernel_tile *tile,
-                                         const vf rank[8])
+SIMD_INLINE void kernel_placed_lines_of(kernel_placed_polys *out, const kernel_frame *f, const kernel_tile *tile,
+                                        int type, const vf rank[8])
 {
-    kernel_lanes_spot spots[8];
-    vi turned = vi_set(0);
-    vf doubt = vf_set(0);
-    for (int i = 0; i < 8; i++) {
+    const kernel_shape *shape = kernel_cell_shape(type);
+    const vf zero = vf_set(0);
+    kernel_lanes_spot spots[8], ends[2];
+    kernel_lanes_blur most = {zero, zero, zero}, blurs[12], own;
+    for (int i = 0; i < grid_type_vertices(type); i++) {
         for (int a = 0; a < 3; a++) spots[i].at[a] = vf_load(out->at[a][i]);
         spots[i].size = kernel_lanes_size(f, tile, spots[i].at);
     }
-    for (int n = 0; n < KERNEL_HEX_EDGES; n++) {
-        const signed char *edge = kernel_shapes[0].edges[n];
-        kernel_placed_hex_line(out, f, n, &spots[edge[0]], &spots[edge[1]], &doubt);
+    memset(out->turned, 0, sizeof out->turned);
+    for (int n = 0; n < shape->edge_count; n++) {
+        ends[0] = spots[(int)shape->edges[n][0]];
+        ends[1] = spots[(int)shape->edges[n][1]];
+        kernel_placed_line_of(out, f, tile->radius, type, n, ends, &blurs[n]);
+        kernel_blur_add(&most, type, &blurs[n]);
     }
-    for (int face = 0; face < KERNEL_HEX_FACES; face++)
-        kernel_placed_hex_face(out, f, face, rank, spots, &turned, &doubt);
-    vf_store(out->doubt, doubt);
-    memcpy(out->turned, &turned, sizeof turned);
+    for (int face = 0; face < shape->face_count; face++) {
+        if (shape->faces[face].count == 3) {
+            kernel_placed_triangle(out, type, face, rank, blurs);
+            continue;
+        }
+        kernel_placed_quad(out, type, face, rank, spots, ends);
+        kernel_placed_line_of(out, f, tile->radius, type, shape->edge_count + face, ends, &own);
+        kernel_blur_add(&most, type, &own);
+    }
+    vf_store(out->doubt, most.doubt);
+    /* kernel_blur_least() */
+    if (type != GRID_HEX)
+        vf_store(out->least_of_all, 1.0001f * ((3 * most.error) * (3 * most.extent) * (0.5f / KERNEL_WEIGHT_ERROR)));
 }
 
 /* ---- all of it ---- */
 
-/* The eight vertices of hexes, lane by lane. Returns the lanes of which some face is a triangle. */
-static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out, const kernel_arrays *p,
-                                                       const kernel_frame *f, const kernel_tile *tile,
-                                                       int32_t vertices[8][SIMD_WIDTH],
-                                                       const double isovalues[SIMD_WIDTH])
+SIMD_INLINE vm kernel_place_polys_of(kernel_placed_polys *out, const kernel_arrays *p, const kernel_frame *f,
+                                     const kernel_tile *tile, int32_t vertices[8][SIMD_WIDTH],
+                                     const double isovalues[SIMD_WIDTH], int type)
 {
+    const int count = grid_type_vertices(type);
     kernel_whole values[8];
     vf relative[8], rank[8];
-    const vm collapsed = p->has_narrow_places ? kernel_turned_fetch(out, p, true, vertices, rank)
-                                              : kernel_turned_fetch(out, p, false, vertices, rank);
-    for (int i = 0; i < 8; i++) {
+    const vm collapsed = p->has_narrow_places ? kernel_turned_fetch(out, p, true, type, vertices, rank)
+                                              : kernel_turned_fetch(out, p, false, type, vertices, rank);
+    for (int i = 0; i < count; i++) {
         vi vertex;
         vf at[3];
         memcpy(&vertex, out->vertex[i], sizeof vertex);
@@ -296,15 +436,24 @@ static __attribute__((noinline)) vm kernel_place_hexes(kernel_placed_hexes *out,
         }
         for (int a = 0; a < 3; a++) vf_store(out->at[a][i], at[a]);
     }
-    kernel_lanes_relative(values, isovalues, relative);
-    for (int i = 0; i < 8; i++) vf_store(out->at[3][i], relative[i]);
-    kernel_placed_hex_lines(out, f, tile, rank);
+    kernel_lanes_relative(values, count, isovalues, relative);
+    for (int i = 0; i < count; i++) vf_store(out->at[3][i], relative[i]);
+    kernel_placed_lines_of(out, f, tile, type, rank);
     return collapsed;
+}
+
+/* The vertices of cells of one type, lane by lane. Returns the lanes in which an edge has no length. */
+static __attribute__((noinline)) vm kernel_place_polys(kernel_placed_polys *out, const kernel_arrays *p,
+                                                       const kernel_frame *f, const kernel_tile *tile,
+                                                       int32_t vertices[8][SIMD_WIDTH],
+                                                       const double isovalues[SIMD_WIDTH], int type)
+{
+    return KERNEL_OF_TYPE(type, kernel_place_polys_of, out, p, f, tile, vertices, isovalues);
 }
 
 /* ---- one cell ---- */
 
-SIMD_INLINE void kernel_placed_hex_flip(kernel_line *line)
+SIMD_INLINE void kernel_placed_flip(kernel_line *line)
 {
     line->c = -line->c;
     line->cu = -line->cu;
@@ -312,14 +461,15 @@ SIMD_INLINE void kernel_placed_hex_flip(kernel_line *line)
 }
 
 /* Lane n as a cell, with all that surfaces ask of it; its lines from the vertex of less rank. */
-static __attribute__((noinline)) void kernel_placed_hex_cell(const kernel_placed_hexes *h, int n, kernel_cell *c)
+static __attribute__((noinline)) void kernel_placed_poly_cell(const kernel_placed_polys *h, int type, int n,
+                                                              kernel_cell *c)
 {
-    const kernel_shape *shape = &kernel_shapes[0];
-    c->type = GRID_HEX;
-    c->count = 8;
+    const kernel_shape *shape = kernel_cell_shape(type);
+    c->type = type;
+    c->count = grid_type_vertices(type);
     c->is_finite = c->is_placed = c->has_lines = true;
     c->has_normal = false;
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < c->count; i++) {
         c->x[i] = h->at[0][i][n];
         c->y[i] = h->at[1][i][n];
         c->z[i] = h->at[2][i][n];
@@ -327,14 +477,15 @@ static __attribute__((noinline)) void kernel_placed_hex_cell(const kernel_placed
         c->rank[i] = h->rank[i][n];
         for (int a = 0; a < 3; a++) c->world[i][a] = kernel_whole_lane(&h->world[a][i], n);
     }
-    for (int i = 0; i < KERNEL_HEX_LINES; i++) {
-        const bool is_edge = i < KERNEL_HEX_EDGES;
-        const int face = is_edge ? 0 : i - KERNEL_HEX_EDGES, turn = h->turned[n] >> face & 1;
+    for (int i = 0; i < shape->edge_count + shape->face_count; i++) {
+        const bool is_edge = i < shape->edge_count;
+        const int face = is_edge ? 0 : i - shape->edge_count, turn = h->turned[n] >> face & 1;
         const signed char *ends = is_edge ? shape->edges[i] : shape->faces[face].vertices + turn;
+        if (!is_edge && shape->faces[face].count == 3) continue;
         c->lines[i] = (kernel_line){h->c[i][n], h->cu[i][n], h->cv[i][n], h->bound[i][n]};
-        if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_hex_flip(&c->lines[i]);
+        if (c->rank[ends[is_edge ? 1 : 2]] < c->rank[ends[0]]) kernel_placed_flip(&c->lines[i]);
     }
-    c->least[0] = (float)INFINITY;
+    c->least[0] = type == GRID_HEX ? (float)INFINITY : h->least_of_all[n];
 }
 
 /* A face's edges around, and whether they are the other way. */

@@ -368,9 +368,9 @@ SIMD_INLINE vf kernel_quad_between(const kernel_quad *q, int i, int j, int k, in
     return vf_select(vf_lt(vf_set(0), sum), near / sum, vf_set(0.5f));
 }
 
-/* Where rays of once, which meet the triangles once, meet the patch: count quads at once, each of whose steps waits for
- * the one before. */
-SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_place *out)
+/* Where rays of once, each quad's own, which meet the triangles once, meet the patch: count quads at once, each of
+ * whose steps waits for the one before. */
+SIMD_INLINE void kernel_quads_cross(const kernel_quad *q, int count, const vm once[2], kernel_quad_place *out)
 {
     kernel_patch patch[2];
     vf s[2], r[2];
@@ -382,10 +382,16 @@ SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, ker
     for (int step = 0; step < KERNEL_PATCH_STEPS; step++)
         for (int n = 0; n < count; n++) kernel_patch_step(&patch[n], &s[n], &r[n]);
     for (int n = 0; n < count; n++) {
-        const vm left = vm_andnot(once, kernel_patch_arrived(&patch[n], s[n], r[n]));
-        out[n] = (kernel_quad_place){once, s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
+        const vm left = vm_andnot(once[n], kernel_patch_arrived(&patch[n], s[n], r[n]));
+        out[n] = (kernel_quad_place){once[n], s[n], r[n], kernel_bilinear(q[n].z, s[n], r[n])};
         if (__builtin_expect(vm_any(left), 0)) kernel_quad_once(&q[n], left, &out[n]);
     }
+}
+
+SIMD_INLINE void kernel_quads_meet(const kernel_quad *q, int count, vm once, kernel_quad_place *out)
+{
+    const vm all[2] = {once, once};
+    kernel_quads_cross(q, count, all, out);
 }
 
 /* May rays meet the patch twice? By the signs of its sides alone: none does that meets the triangles once. */

@@ -43,7 +43,7 @@ enum {
     KERNEL_SLAB_ROWS
 };
 
-/* A hex's record: 8 vertices with their values less the isovalue, quads and turned as in kernel_placed_hexes. */
+/* A hex's record: 8 vertices with their values less the isovalue, corners and turned as in kernel_placed_polys. */
 enum { KERNEL_HEX_RECORD_QUADS = 32, KERNEL_HEX_RECORD_TURNED = 38, KERNEL_HEX_RECORD_WORDS = 40 };
 
 /* A cell with one of its isovalues. */

@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "kernel_bounds_hexes.h"
+#include "kernel_bounds_polys.h"
 #include "kernel_hex_rays.h"
 #include "kernel_map.h"
 #include "kernel_occluders.h"
@@ -20,7 +20,7 @@ typedef struct kernel_hex_pairs {
     int count;
     int32_t ray[SIMD_WIDTH], occluder[SIMD_WIDTH];
     float level[SIMD_WIDTH], rise[SIMD_WIDTH], thickness[SIMD_WIDTH], reach[SIMD_WIDTH];
-    kernel_placed_hexes placed;
+    kernel_placed_polys placed;
 } kernel_hex_pairs;
 
 SIMD_INLINE bool kernel_doubts_add(kernel_straights *s, int32_t ray, int32_t occluder)
@@ -62,7 +62,7 @@ SIMD_INLINE vi kernel_load_ints(const int32_t *from)
 SIMD_INLINE void kernel_pairs_place(kernel_hex_pairs *pairs, const float *hexes, const kernel_plumb_lanes *rays,
                                     vi record)
 {
-    kernel_placed_hexes *h = &pairs->placed;
+    kernel_placed_polys *h = &pairs->placed;
     for (int i = 0; i < 8; i++) {
         vf at[3];
         for (int a = 0; a < 3; a++)
@@ -73,13 +73,13 @@ SIMD_INLINE void kernel_pairs_place(kernel_hex_pairs *pairs, const float *hexes,
         vf_store(h->at[3][i], vf_gather(hexes, record + (4 * i + 3)));
     }
     for (int face = 0; face < KERNEL_HEX_FACES; face++)
-        vf_store((float *)(void *)(h->quads + face * SIMD_WIDTH),
+        vf_store((float *)(void *)(h->corners + face * SIMD_WIDTH),
                  vf_gather(hexes, record + (KERNEL_HEX_RECORD_QUADS + face)));
     vf_store((float *)(void *)h->turned, vf_gather(hexes, record + KERNEL_HEX_RECORD_TURNED));
 }
 
 /* The edge function of the ray itself, its sign exact: products of float32 are, in double. */
-SIMD_INLINE void kernel_pairs_line(kernel_placed_hexes *h, int n, const vf from[2], const vf to[2])
+SIMD_INLINE void kernel_pairs_line(kernel_placed_polys *h, int n, const vf from[2], const vf to[2])
 {
     vf c = vf_set(0);
     for (int half = 0; half < 2; half++)
@@ -91,7 +91,7 @@ SIMD_INLINE void kernel_pairs_line(kernel_placed_hexes *h, int n, const vf from[
     vf_store(h->cv[n], vf_set(0));
 }
 
-SIMD_INLINE void kernel_pairs_lines(kernel_placed_hexes *h)
+SIMD_INLINE void kernel_pairs_lines(kernel_placed_polys *h)
 {
     const vi turned = kernel_load_ints(h->turned);
     vf at[8][2];
@@ -135,8 +135,8 @@ SIMD_INLINE vm kernel_pairs_clear(const kernel_hex_pairs *pairs, vf from, vf to)
 static __attribute__((noinline)) vm kernel_pairs_monotone(const kernel_hex_pairs *pairs, const kernel_hex_place ends[2])
 {
     static const kernel_beam beam = {.spread = 0};
-    kernel_hexes_bounds bounds;
-    kernel_hexes_bound((const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
+    kernel_polys_bounds bounds;
+    kernel_polys_bound(GRID_HEX, (const float(*)[8][SIMD_WIDTH])pairs->placed.at, &beam, &bounds);
     const vf jump = vf_load(bounds.jump);
     return vm_and(vf_le(vf_set(0), jump), vf_lt(jump, vf_min(vf_abs(ends[0].v), vf_abs(ends[1].v))));
 }
@@ -150,11 +150,11 @@ SIMD_INLINE kernel_pair_verdict kernel_pairs_judge(const kernel_hex_pairs *pairs
     int32_t lanes[SIMD_WIDTH];
     for (int i = 0; i < SIMD_WIDTH; i++) lanes[i] = i;
     p.lane = kernel_load_ints(lanes);
-    kernel_hex_faces(&pairs->placed, &p, &crossed);
+    kernel_poly_faces(&pairs->placed, &p, GRID_HEX, &crossed);
     kernel_pair_verdict out = {vm_none(), crossed.alone};
     if (!vm_any(crossed.two)) return out;
     p.active = crossed.two;
-    kernel_hex_cross(&pairs->placed, &p, crossed.first | crossed.last << 3, face);
+    kernel_poly_cross(&pairs->placed, &p, GRID_HEX, crossed.first | crossed.last << 3, face);
     const vm swap = vf_lt(face[1].t, face[0].t);
     kernel_hex_place_select(swap, &face[1], &face[0], &ends[0]);
     kernel_hex_place_select(swap, &face[0], &face[1], &ends[1]);

@@ -250,7 +250,7 @@ static void fill_slab(const subject *s, double isovalue, slab *out)
     out->rows[KERNEL_SLAB_REACH] = (float)s->reach;
 }
 
-/* Faces' corners and diagonals as kernel_placed_hexes has them. */
+/* Faces' corners and diagonals as kernel_placed_polys has them. */
 static void fill_faces(const kernel_cell *c, hex_record *out)
 {
     int32_t turned = 0;

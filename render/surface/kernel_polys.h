@@ -1,6 +1,7 @@
-/* Hexes, as many at once as there are lanes, in a tile that traces what is binned there. A cell of a few pixels leaves
- * most of a block's packet without anything to do, and of the rays in it a half has no crossing to look for. So rays
- * of several cells are put side by side, and what goes on of them is put side by side again:
+/* Hexes, wedges and pyramids, as many of one type at once as there are lanes, in a tile that traces what is binned
+ * there. A cell of a few pixels leaves most of a block's packet without anything to do, and of the rays in it a half
+ * has no crossing to look for. So rays of several cells are put side by side, and what goes on of them is put side by
+ * side again:
  *
  *     pixels of boxes       which faces does the ray cross?         signs of edge functions
  *     rays in two faces     where, and what is the field there?     patches
@@ -12,8 +13,8 @@
  * Rays of which an edge function is in doubt, or which cross not just two of a cell's faces once each, are for the cell
  * alone (kernel_surface.h). Every operation is that of a cell alone in the same order, so that a hit has the same bits
  * however it came to be found. */
-#ifndef RENDER_KERNEL_HEXES_H
-#define RENDER_KERNEL_HEXES_H
+#ifndef RENDER_KERNEL_POLYS_H
+#define RENDER_KERNEL_POLYS_H
 
 #include <math.h>
 #include <string.h>
@@ -22,7 +23,7 @@
 #include "kernel_accept.h"
 #include "kernel_arrays.h"
 #include "kernel_bounds.h"
-#include "kernel_bounds_hexes.h"
+#include "kernel_bounds_polys.h"
 #include "kernel_cell.h"
 #include "kernel_colour.h"
 #include "kernel_hex_rays.h"
@@ -38,49 +39,63 @@
 #include "render.h"
 #include "simd.h"
 
-typedef struct kernel_hexes {
-    int count, layer, part; /* -1: of none yet */
-    kernel_arrays arrays;   /* of the layer's field on the part */
+enum { KERNEL_POLY_PIXELS = 64 }; /* of a large cell's box in the tile there are more */
+
+/* Cells of one type that wait to be placed together. */
+typedef struct kernel_polys_pending {
+    int type, count;
     uint32_t cell[SIMD_WIDTH];
-    uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH]; /* cells wait to be placed together */
+    uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
     double isovalue[SIMD_WIDTH];
     int32_t vertex[8][SIMD_WIDTH];
     int value[SIMD_WIDTH];
     float near[SIMD_WIDTH];
-    kernel_placed_hexes placed;
+} kernel_polys_pending;
+
+typedef struct kernel_polys {
+    int layer, part;                 /* -1: of none yet */
+    kernel_arrays arrays;            /* of the layer's field on the part */
+    kernel_polys_pending pending[3]; /* by kernel_shape_number() */
+    kernel_polys_pending *own;       /* those that are traced */
+    kernel_placed_polys placed;
     float colours[8][SIMD_WIDTH]; /* values of the colours' field, as kernel_cell.g; only where there is one */
-    kernel_hexes_bounds bounds;
+    kernel_polys_bounds bounds;
     unsigned ready; /* lanes that are cells on their own as well */
     kernel_cell cells[SIMD_WIDTH];
     kernel_poly polys[SIMD_WIDTH];
     kernel_hex_rays rays, met, found, others;
     uint8_t faces[KERNEL_HEX_ROOM]; /* of those met: the first, and 8 times the second */
     kernel_hex_ends found_ends, other_ends;
-} kernel_hexes;
+} kernel_polys;
 
-static void kernel_hexes_begin(kernel_hexes *h)
+static void kernel_polys_begin(kernel_polys *h)
 {
-    h->count = h->rays.count = 0;
+    static const int types[3] = {GRID_HEX, GRID_WEDGE, GRID_PYRAMID};
+    h->rays.count = 0;
     h->layer = h->part = -1;
+    for (int n = 0; n < 3; n++) {
+        h->pending[n].type = types[n];
+        h->pending[n].count = 0;
+    }
     memset(h->colours, 0, sizeof h->colours);
 }
 
 /* ---- cells alone ---- */
 
 /* The lane as a cell, whose map is not set up yet. */
-SIMD_INLINE void kernel_hex_ready(kernel_hexes *h, int n)
+SIMD_INLINE void kernel_poly_ready(kernel_polys *h, int n)
 {
     if (h->ready >> n & 1) return;
     h->ready |= 1u << n;
-    kernel_placed_hex_cell(&h->placed, n, &h->cells[n]);
+    kernel_placed_poly_cell(&h->placed, h->own->type, n, &h->cells[n]);
     h->cells[n].part = h->part;
-    h->cells[n].index = h->cell[n];
+    h->cells[n].index = h->own->cell[n];
     for (int i = 0; i < 8; i++) h->cells[n].g[i] = h->colours[i][n];
     h->polys[n].is_set_up = false;
 }
 
 /* Rays that are for the cell alone. */
-static __attribute__((noinline)) unsigned kernel_hexes_alone(kernel_tile_trace *t, kernel_hexes *h,
+static __attribute__((noinline)) unsigned kernel_polys_alone(kernel_tile_trace *t, kernel_polys *h,
                                                              const kernel_hex_rays *rays, int first, vi at_lanes,
                                                              unsigned wanted)
 {
@@ -101,8 +116,9 @@ static __attribute__((noinline)) unsigned kernel_hexes_alone(kernel_tile_trace *
         kernel_surface_state state = {
             .surface = t->surface, .layer = t->layer, .hits = &t->hits[at[i] / SIMD_WIDTH], .is_opaque = true};
         p->is_nearer = false;
-        kernel_hex_ready(h, n);
-        kernel_cell_surface(p, &state, &h->cells[n], &h->polys[n], h->value[n], vm_and(p->active, vm_from_bits(same)));
+        kernel_poly_ready(h, n);
+        kernel_cell_surface(p, &state, &h->cells[n], &h->polys[n], h->own->value[n],
+                            vm_and(p->active, vm_from_bits(same)));
         if (p->is_nearer) blocks |= 1u << at[i] / (KERNEL_BLOCK * KERNEL_BLOCK);
     }
     return blocks;
@@ -111,7 +127,7 @@ static __attribute__((noinline)) unsigned kernel_hexes_alone(kernel_tile_trace *
 /* ---- rays ---- */
 
 /* kernel_linear_at(). */
-SIMD_INLINE vf kernel_hexes_linear_at(const kernel_hexes *h, const kernel_hex_packet *p, vf t)
+SIMD_INLINE vf kernel_polys_linear_at(const kernel_polys *h, const kernel_hex_packet *p, vf t)
 {
     vf g[3], at[3];
     for (int a = 0; a < 3; a++) {
@@ -123,16 +139,16 @@ SIMD_INLINE vf kernel_hexes_linear_at(const kernel_hexes *h, const kernel_hex_pa
 }
 
 /* Rays on which L leaves the cell's slab out on one side from depth to depth. */
-SIMD_INLINE vm kernel_hexes_far(const kernel_hexes *h, const kernel_hex_packet *p, vf side, vf from, vf to)
+SIMD_INLINE vm kernel_polys_far(const kernel_polys *h, const kernel_hex_packet *p, vf side, vf from, vf to)
 {
     const vf thick = kernel_hex_take(h->bounds.thickness, p->lane);
-    return vm_and(vf_lt(thick, side * kernel_hexes_linear_at(h, p, from)),
-                  vf_lt(thick, side * kernel_hexes_linear_at(h, p, to)));
+    return vm_and(vf_lt(thick, side * kernel_polys_linear_at(h, p, from)),
+                  vf_lt(thick, side * kernel_polys_linear_at(h, p, to)));
 }
 
 /* Rays that are so between the planes that their cells lie between: a face's value has L's sign on these, and there is
  * no root. Depths are from vertex 0's on. */
-SIMD_INLINE vm kernel_hexes_beside(const kernel_hexes *h, const kernel_hex_packet *p)
+SIMD_INLINE vm kernel_polys_beside(const kernel_polys *h, const kernel_hex_packet *p)
 {
     const kernel_rays *rays = &p->rays;
     const vf z = kernel_hex_take(h->placed.at[2][0], p->lane);
@@ -156,7 +172,7 @@ SIMD_INLINE vm kernel_hexes_beside(const kernel_hexes *h, const kernel_hex_packe
 }
 
 /* The rays that cross two faces of their cells go on. Returns the blocks in which something is nearer. */
-static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t, kernel_hexes *h)
+SIMD_INLINE unsigned kernel_polys_meet_of(kernel_tile_trace *t, kernel_polys *h, int type)
 {
     unsigned nearer = 0;
     h->met.count = 0;
@@ -165,10 +181,10 @@ static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t
         kernel_hex_crossed crossed;
         uint8_t faces[SIMD_WIDTH];
         kernel_hex_packet_begin(&p, t, &h->rays, n);
-        p.active = vm_and(p.active, vf_le(kernel_hex_take(h->near, p.lane), p.far));
-        p.active = vm_andnot(p.active, kernel_hexes_beside(h, &p));
+        p.active = vm_and(p.active, vf_le(kernel_hex_take(h->own->near, p.lane), p.far));
+        p.active = vm_andnot(p.active, kernel_polys_beside(h, &p));
         if (!vm_any(p.active)) continue;
-        kernel_hex_faces(&h->placed, &p, &crossed);
+        kernel_poly_faces(&h->placed, &p, type, &crossed);
         const vi both = crossed.first | crossed.last << 3;
         for (int i = 0; i < SIMD_WIDTH; i++) faces[i] = (uint8_t)both[i];
         for (unsigned bits = vm_bits(crossed.two); bits; bits &= bits - 1) {
@@ -177,15 +193,20 @@ static __attribute__((noinline)) unsigned kernel_hexes_meet(kernel_tile_trace *t
             kernel_hex_ray_add(&h->met, &h->rays, n + i);
         }
         if (__builtin_expect(vm_any(crossed.alone), 0))
-            nearer |= kernel_hexes_alone(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
+            nearer |= kernel_polys_alone(t, h, &h->rays, n, p.at, vm_bits(crossed.alone));
     }
     kernel_hex_rays_close(&h->met);
     memset(h->faces + h->met.count, 0, SIMD_WIDTH);
     return nearer;
 }
 
+static __attribute__((noinline)) unsigned kernel_polys_meet(kernel_tile_trace *t, kernel_polys *h)
+{
+    return KERNEL_OF_TYPE(h->own->type, kernel_polys_meet_of, t, h);
+}
+
 /* kernel_poly_intervals() and the begin of kernel_poly_surface() and kernel_search_ends(). */
-static __attribute__((noinline)) void kernel_hexes_cross(const kernel_tile_trace *t, kernel_hexes *h)
+SIMD_INLINE void kernel_polys_cross_of(const kernel_tile_trace *t, kernel_polys *h, int type)
 {
     h->found.count = h->others.count = 0;
     for (int n = 0; n < h->met.count; n += SIMD_WIDTH) {
@@ -194,7 +215,7 @@ static __attribute__((noinline)) void kernel_hexes_cross(const kernel_tile_trace
         const vf zero = vf_set(0), endless = vf_set(INFINITY);
         const vi faces = kernel_bytes(h->faces + n);
         kernel_hex_packet_begin(&p, t, &h->met, n);
-        kernel_hex_cross(&h->placed, &p, faces, face);
+        kernel_poly_cross(&h->placed, &p, type, faces, face);
         const vm swap = vf_lt(face[1].t, face[0].t);
         kernel_hex_place_select(swap, &face[1], &face[0], &ends[0]);
         kernel_hex_place_select(swap, &face[0], &face[1], &ends[1]);
@@ -209,82 +230,93 @@ static __attribute__((noinline)) void kernel_hexes_cross(const kernel_tile_trace
         vm searched = vm_and(room, other);
         if (vm_any(searched))
             searched = vm_andnot(
-                searched, vm_andnot(kernel_hexes_far(h, &p, kernel_side(ends[0].v), ends[0].t, ends[1].t), change));
+                searched, vm_andnot(kernel_polys_far(h, &p, kernel_side(ends[0].v), ends[0].t, ends[1].t), change));
         kernel_hex_ends_add(&h->met, n, ends, vm_bits(vm_or(close, searched)), &h->others, &h->other_ends);
     }
 }
 
-/* kernel_map_setup() of a hex a lane. */
-SIMD_INLINE void kernel_hex_maps(const kernel_hexes *h, vi lane, kernel_map_lanes *out)
+static __attribute__((noinline)) void kernel_polys_cross(const kernel_tile_trace *t, kernel_polys *h)
 {
-    out->is_pyramid = false;
+    KERNEL_OF_TYPE(h->own->type, kernel_polys_cross_of, t, h);
+}
+
+/* kernel_map_setup() of a cell a lane. */
+SIMD_INLINE void kernel_poly_maps(const kernel_polys *h, int type, vi lane, kernel_map_lanes *out)
+{
+    const int count = grid_type_vertices(type);
+    out->is_pyramid = type == GRID_PYRAMID;
     out->tolerance = KERNEL_MAP_TOLERANCE;
     for (int n = 0; n < 4; n++) {
         vf v[8], *const c = n < 3 ? out->position[n] : out->field;
-        for (int i = 0; i < 8; i++) v[i] = kernel_hex_take(h->placed.at[n][i], lane);
+        for (int i = 0; i < count; i++) v[i] = kernel_hex_take(h->placed.at[n][i], lane);
         if (n < 3) out->origin[n] = v[0];
         for (int half = 0; half < 2; half++) {
             kernel_half d[8], *const e = out->exact[half][n];
-            for (int i = 0; i < 8; i++) d[i] = kernel_half_of(&v[i], half);
+            for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
             if (n < 3)
-                for (int i = 7; i >= 0; i--) d[i] -= d[0];
-            KERNEL_HEX_FIT(e, d);
+                for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
+            kernel_half_fit(type, e, d);
             for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
         }
     }
 }
 
-/* kernel_map_colour() of a hex a lane, and kernel_map_value() of it. */
-SIMD_INLINE vf kernel_hexes_colour_value(const kernel_hexes *h, vi lane, const vf r[3])
+/* kernel_map_colour() of a cell a lane, and kernel_map_value() of it. */
+SIMD_INLINE vf kernel_polys_colour_value(const kernel_polys *h, vi lane, const vf r[3], int type)
 {
+    const int count = grid_type_vertices(type);
     vf v[8], c[8];
-    for (int i = 0; i < 8; i++) v[i] = kernel_hex_take(h->colours[i], lane);
+    for (int i = 0; i < count; i++) v[i] = kernel_hex_take(h->colours[i], lane);
     for (int half = 0; half < 2; half++) {
         kernel_half d[8], e[8];
-        for (int i = 0; i < 8; i++) d[i] = kernel_half_of(&v[i], half);
-        KERNEL_HEX_FIT(e, d);
+        for (int i = 0; i < count; i++) d[i] = kernel_half_of(&v[i], half);
+        kernel_half_fit(type, e, d);
         for (int i = 0; i < 8; i++) kernel_half_put(&c[i], half, e[i]);
     }
-    const kernel_product m = kernel_product_at(false, r);
-    return kernel_value_of(c, false, &m, r);
+    const kernel_product m = kernel_product_at(type == GRID_PYRAMID, r);
+    return kernel_value_of(c, type == GRID_PYRAMID, &m, r);
 }
 
 /* The colours' field of the lanes' cells, in the order of their vertices. */
-static __attribute__((noinline)) void kernel_hexes_fetch_colours(const kernel_tile_trace *t, kernel_hexes *h)
+static __attribute__((noinline)) void kernel_polys_fetch_colours(const kernel_tile_trace *t, kernel_polys *h)
 {
     const kernel_surface *s = t->surface;
     const grid_field *field = &s->layer->colour_field.fields[h->part];
-    for (int n = 0; n < h->count; n++)
-        for (int i = 0; i < 8; i++) {
+    const int count = grid_type_vertices(h->own->type);
+    for (int n = 0; n < h->own->count; n++)
+        for (int i = 0; i < count; i++) {
             const int64_t vertex = h->placed.vertex[i][n];
-            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->cell[n] : vertex);
+            const double v = grid_field_value(field, field->is_cell_centred ? (int64_t)h->own->cell[n] : vertex);
             h->colours[i][n] = (float)((v - s->colour.low) * s->colour.inverse_width);
         }
 }
 
 /* The places of hits in lanes: r, in the cells' own coordinates, is used for colours; normal is as in kernel_hits. */
-typedef struct kernel_hexes_places {
+typedef struct kernel_polys_places {
     vf t, normal[3], r[3];
-} kernel_hexes_places;
+} kernel_polys_places;
 
 /* Returns the blocks in which something is nearer. */
-static __attribute__((noinline)) unsigned kernel_hexes_accept(kernel_tile_trace *t, const kernel_hexes *h,
+static __attribute__((noinline)) unsigned kernel_polys_accept(kernel_tile_trace *t, const kernel_polys *h,
                                                               const kernel_hex_rays *rays, int first,
                                                               const kernel_hex_packet *p, unsigned hit,
-                                                              const kernel_hexes_places *places)
+                                                              const kernel_polys_places *places)
 {
     const render_surface_layer *layer = t->surface->layer;
     unsigned blocks = 0;
     int32_t at[SIMD_WIDTH];
     vf colours[3];
-    if (layer->colour_map) kernel_base_colour(t->surface, 0, kernel_hexes_colour_value(h, p->lane, places->r), colours);
+    if (layer->colour_map) {
+        const vf place = KERNEL_OF_TYPE(h->own->type, kernel_polys_colour_value, h, p->lane, places->r);
+        kernel_base_colour(t->surface, 0, place, colours);
+    }
     memcpy(at, &p->at, sizeof at);
     for (; hit; hit &= hit - 1) {
-        const int i = __builtin_ctz(hit), value = h->value[rays->lane[first + i]];
+        const int i = __builtin_ctz(hit), value = h->own->value[rays->lane[first + i]];
         const float *plain = layer->colours + 3 * value;
         const kernel_ray_hit one = {.part = h->part,
                                     .value = value,
-                                    .cell = h->cell[rays->lane[first + i]],
+                                    .cell = h->own->cell[rays->lane[first + i]],
                                     .depth = places->t[i],
                                     .normal = {places->normal[0][i], places->normal[1][i], places->normal[2][i]},
                                     .colour = {layer->colour_map ? colours[0][i] : plain[0],
@@ -296,7 +328,7 @@ static __attribute__((noinline)) unsigned kernel_hexes_accept(kernel_tile_trace 
 }
 
 /* kernel_map_normal() and kernel_unshear(); or r, where kernel_vertex_normals() wants it. */
-SIMD_INLINE void kernel_hexes_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
+SIMD_INLINE void kernel_polys_normal(const kernel_tile_trace *t, const kernel_map_lanes *map, const vf r[3],
                                      vf normal[3])
 {
     if (t->surface->layer->normal == RENDER_VERTEX) {
@@ -308,35 +340,40 @@ SIMD_INLINE void kernel_hexes_normal(const kernel_tile_trace *t, const kernel_ma
 }
 
 /* kernel_polish() and kernel_poly_accept(). */
-static __attribute__((noinline)) unsigned kernel_hexes_hit(kernel_tile_trace *t, kernel_hexes *h)
+SIMD_INLINE unsigned kernel_polys_hit_of(kernel_tile_trace *t, kernel_polys *h, int type)
 {
     unsigned nearer = 0;
     for (int n = 0; n < h->found.count; n += SIMD_WIDTH) {
         kernel_hex_packet p;
         kernel_map_lanes map;
         kernel_point ends[2], at;
-        kernel_hexes_places places;
+        kernel_polys_places places;
         kernel_hex_packet_begin(&p, t, &h->found, n);
         for (int e = 0; e < 2; e++) {
             ends[e].t = vf_load(h->found_ends.t[e] + n);
             ends[e].value = vf_load(h->found_ends.v[e] + n);
             for (int a = 0; a < 3; a++) ends[e].r[a] = vf_load(h->found_ends.r[e][a] + n);
         }
-        kernel_hex_maps(h, p.lane, &map);
+        kernel_poly_maps(h, type, p.lane, &map);
         const vm open = kernel_polish_lanes(&p.rays, &map, p.active, &ends[0], &ends[1], &at);
         const vm hit = vm_and(vm_andnot(p.active, open), vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
-        if (__builtin_expect(vm_any(open), 0)) nearer |= kernel_hexes_alone(t, h, &h->found, n, p.at, vm_bits(open));
+        if (__builtin_expect(vm_any(open), 0)) nearer |= kernel_polys_alone(t, h, &h->found, n, p.at, vm_bits(open));
         if (!vm_any(hit)) continue;
-        kernel_hexes_normal(t, &map, at.r, places.normal);
+        kernel_polys_normal(t, &map, at.r, places.normal);
         places.t = at.t;
         memcpy(places.r, at.r, sizeof places.r);
-        nearer |= kernel_hexes_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
+        nearer |= kernel_polys_accept(t, h, &h->found, n, &p, vm_bits(hit), &places);
     }
     return nearer;
 }
 
+static __attribute__((noinline)) unsigned kernel_polys_hit(kernel_tile_trace *t, kernel_polys *h)
+{
+    return KERNEL_OF_TYPE(h->own->type, kernel_polys_hit_of, t, h);
+}
+
 /* kernel_limits_spread(), each lane with its own cell's. */
-SIMD_INLINE void kernel_hex_limits(const kernel_hexes *h, vi lane, kernel_limits *out)
+SIMD_INLINE void kernel_polys_limits(const kernel_polys *h, vi lane, kernel_limits *out)
 {
     const vi at = lane * (int)(sizeof(kernel_poly) / sizeof(float));
     const kernel_bounds *b = &h->polys[0].bounds;
@@ -352,15 +389,15 @@ SIMD_INLINE void kernel_hex_limits(const kernel_hexes *h, vi lane, kernel_limits
     out->is_monotone = vf_le(vf_set(0), kernel_hex_take(h->bounds.jump, lane));
 }
 
-/* kernel_poly_robust() of the others from n on, of which kernel_hexes_cross() has asked what their ends tell. */
-static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace *t, kernel_hexes *h, int n)
+/* kernel_poly_robust() of the others from n on, of which kernel_polys_cross() has asked what their ends tell. */
+SIMD_INLINE unsigned kernel_polys_search_of(kernel_tile_trace *t, kernel_polys *h, int n, int type)
 {
     const kernel_hex_ends *ends = &h->other_ends;
     kernel_hex_packet p;
     kernel_map_lanes map;
     kernel_limits limits;
     kernel_interval i = {.w_in = vf_set(0), .w_out = vf_set(0)};
-    kernel_hexes_places places = {.t = vf_set(0)};
+    kernel_polys_places places = {.t = vf_set(0)};
     vm hits = vm_none();
     kernel_hex_packet_begin(&p, t, &h->others, n);
     i.mask = p.active;
@@ -374,11 +411,11 @@ static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace 
     }
     for (int k = n; k < n + SIMD_WIDTH && k < h->others.count; k++) {
         const int lane = h->others.lane[k];
-        kernel_hex_ready(h, lane);
-        kernel_poly_setup(t->frame, &t->tile, &h->polys[lane], t->surface->layer, &h->cells[lane], h->value[lane]);
+        kernel_poly_ready(h, lane);
+        kernel_poly_setup(t->frame, &t->tile, &h->polys[lane], t->surface->layer, &h->cells[lane], h->own->value[lane]);
     }
-    kernel_hex_maps(h, p.lane, &map);
-    kernel_hex_limits(h, p.lane, &limits);
+    kernel_poly_maps(h, type, p.lane, &map);
+    kernel_polys_limits(h, p.lane, &limits);
     kernel_search s = {
         .rays = p.rays, .map = &map, .limits = &limits, .interval = &i, .failures = &t->thread->map_failures};
     kernel_search_begin(&s);
@@ -389,7 +426,7 @@ static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace 
         if (!vm_any(s.found)) continue;
         kernel_polish(&s, &at);
         const vm hit = vm_and(s.found, vm_and(vf_le(vf_set(t->t_near), at.t), vf_le(at.t, p.far)));
-        kernel_hexes_normal(t, &map, at.r, normal);
+        kernel_polys_normal(t, &map, at.r, normal);
         for (int a = 0; a < 3; a++) {
             places.normal[a] = vf_select(hit, normal[a], places.normal[a]);
             places.r[a] = vf_select(hit, at.r[a], places.r[a]);
@@ -398,21 +435,26 @@ static __attribute__((noinline)) unsigned kernel_hexes_search(kernel_tile_trace 
         hits = vm_or(hits, hit);
         kernel_search_close(&s, hit);
     } while (kernel_search_on(&s));
-    return vm_any(hits) ? kernel_hexes_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
+    return vm_any(hits) ? kernel_polys_accept(t, h, &h->others, n, &p, vm_bits(hits), &places) : 0;
+}
+
+static __attribute__((noinline)) unsigned kernel_polys_search(kernel_tile_trace *t, kernel_polys *h, int n)
+{
+    return KERNEL_OF_TYPE(h->own->type, kernel_polys_search_of, t, h, n);
 }
 
 /* ---- batches ---- */
 
 /* The rays that wait are traced. */
-static __attribute__((noinline)) void kernel_hexes_trace(kernel_tile_trace *t, kernel_hexes *h)
+static __attribute__((noinline)) void kernel_polys_trace(kernel_tile_trace *t, kernel_polys *h)
 {
     kernel_hex_rays_close(&h->rays);
-    unsigned nearer = kernel_hexes_meet(t, h);
-    kernel_hexes_cross(t, h);
+    unsigned nearer = kernel_polys_meet(t, h);
+    kernel_polys_cross(t, h);
     kernel_hex_rays_close(&h->found);
     kernel_hex_rays_close(&h->others);
-    nearer |= kernel_hexes_hit(t, h);
-    for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_hexes_search(t, h, n);
+    nearer |= kernel_polys_hit(t, h);
+    for (int n = 0; n < h->others.count; n += SIMD_WIDTH) nearer |= kernel_polys_search(t, h, n);
     for (; nearer; nearer &= nearer - 1) {
         const int block = __builtin_ctz(nearer);
         t->far[block / SIMD_WIDTH][block % SIMD_WIDTH] = kernel_block_far(t, block);
@@ -421,84 +463,96 @@ static __attribute__((noinline)) void kernel_hexes_trace(kernel_tile_trace *t, k
 }
 
 /* A lane's rays, and its blocks, of the tile's. */
-SIMD_INLINE void kernel_hexes_rays_of(kernel_tile_trace *t, kernel_hexes *h, int lane, unsigned box, unsigned blocks)
+SIMD_INLINE void kernel_polys_rays_of(kernel_tile_trace *t, kernel_polys *h, int lane, unsigned box, unsigned blocks)
 {
     kernel_hex_rays_of(&h->rays, box, lane);
     for (blocks &= ~t->begun; blocks; blocks &= blocks - 1) kernel_block_begin(t, __builtin_ctz(blocks));
-    if (h->rays.count >= KERNEL_HEX_RAYS) kernel_hexes_trace(t, h);
+    if (h->rays.count >= KERNEL_HEX_RAYS) kernel_polys_trace(t, h);
 }
 
 /* The cells that wait are placed. */
-static __attribute__((noinline)) void kernel_hexes_place(kernel_tile_trace *t, kernel_hexes *h)
+static __attribute__((noinline)) void kernel_polys_place(kernel_tile_trace *t, kernel_polys *h)
 {
     const kernel_beam beam = kernel_tile_beam(t->frame, &t->tile);
-    for (int n = h->count; n < SIMD_WIDTH; n++) {
-        for (int i = 0; i < 8; i++) h->vertex[i][n] = h->vertex[i][0];
-        h->isovalue[n] = h->isovalue[0];
+    kernel_polys_pending *own = h->own;
+    for (int n = own->count; n < SIMD_WIDTH; n++) {
+        for (int i = 0; i < 8; i++) own->vertex[i][n] = own->vertex[i][0];
+        own->isovalue[n] = own->isovalue[0];
     }
-    const vm collapsed = kernel_place_hexes(&h->placed, &h->arrays, t->frame, &t->tile, h->vertex, h->isovalue);
-    kernel_hexes_bound((const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
-    if (t->surface->layer->colour_map) kernel_hexes_fetch_colours(t, h);
+    const vm collapsed =
+        kernel_place_polys(&h->placed, &h->arrays, t->frame, &t->tile, own->vertex, own->isovalue, own->type);
+    kernel_polys_bound(own->type, (const float(*)[8][SIMD_WIDTH])h->placed.at, &beam, &h->bounds);
+    if (t->surface->layer->colour_map) kernel_polys_fetch_colours(t, h);
     h->ready = 0;
-    for (int n = 0; n < h->count; n++) {
-        const unsigned blocks = h->blocks[n] & t->wanted & kernel_blocks_beyond(t, h->near[n]);
+    for (int n = 0; n < own->count; n++) {
+        const unsigned blocks = own->blocks[n] & t->wanted & kernel_blocks_beyond(t, own->near[n]);
         if (!blocks) continue;
         if (!(vm_bits(collapsed) >> n & 1)) {
-            kernel_hexes_rays_of(t, h, n, h->box[n], h->blocks[n]);
+            kernel_polys_rays_of(t, h, n, own->box[n], own->blocks[n]);
             continue;
         }
-        kernel_hex_ready(h, n);
+        kernel_poly_ready(h, n);
         t->poly->is_set_up = false;
-        kernel_blocks_meet(t, blocks, h->part, h->cell[n], &h->cells[n], h->value[n]);
+        kernel_blocks_meet(t, blocks, h->part, own->cell[n], &h->cells[n], own->value[n]);
     }
 }
 
-static __attribute__((noinline)) void kernel_hexes_run(kernel_tile_trace *t, kernel_hexes *h)
+static __attribute__((noinline)) void kernel_polys_run(kernel_tile_trace *t, kernel_polys *h, kernel_polys_pending *own)
 {
-    kernel_hexes_place(t, h);
-    if (h->rays.count) kernel_hexes_trace(t, h);
-    h->count = 0;
+    h->own = own;
+    kernel_polys_place(t, h);
+    if (h->rays.count) kernel_polys_trace(t, h);
+    own->count = 0;
 }
 
 /* Traces the pending cells. */
-SIMD_INLINE void kernel_hexes_end(kernel_tile_trace *t, kernel_hexes *h)
+SIMD_INLINE void kernel_polys_end(kernel_tile_trace *t, kernel_polys *h)
 {
     const int layer = t->layer;
-    if (!h->count) return;
-    kernel_tile_set_layer(t, h->layer);
-    kernel_hexes_run(t, h);
-    kernel_tile_set_layer(t, layer);
+    for (int n = 0; n < 3; n++) {
+        if (!h->pending[n].count) continue;
+        kernel_tile_set_layer(t, h->layer);
+        kernel_polys_run(t, h, &h->pending[n]);
+        kernel_tile_set_layer(t, layer);
+    }
 }
 
 /* Starts a new part and layer. */
-SIMD_INLINE void kernel_hexes_turn(kernel_tile_trace *t, kernel_hexes *h, const kernel_arrays *arrays, int part)
+SIMD_INLINE void kernel_polys_turn(kernel_tile_trace *t, kernel_polys *h, const kernel_arrays *arrays, int part)
 {
     if (h->layer == t->layer && h->part == part) return;
-    kernel_hexes_end(t, h);
+    kernel_polys_end(t, h);
     h->layer = t->layer;
     h->part = part;
     h->arrays = *arrays;
 }
 
-/* Can hexes of the layer under way be traced in batches? */
-SIMD_INLINE bool kernel_hexes_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
+SIMD_INLINE int kernel_box_pixels(unsigned box)
+{
+    const int columns = (int)(box >> 4 & 15) - (int)(box & 15) + 1;
+    return columns * ((int)(box >> 12) - (int)(box >> 8 & 15) + 1);
+}
+
+/* Can hexes, wedges and pyramids of the layer under way be traced in batches? */
+SIMD_INLINE bool kernel_polys_fit(const kernel_tile_trace *t, const kernel_arrays *arrays)
 {
     return arrays->has_lanes && t->surface->layer->root == RENDER_ROBUST && kernel_tile_layer_batches(t);
 }
 
-/* Adds a hex to the pending ones. */
-SIMD_INLINE void kernel_hexes_wait(kernel_tile_trace *t, kernel_hexes *h, const kernel_tile_candidate *candidate,
-                                   int value)
+/* Adds a cell of the type to the pending ones. */
+SIMD_INLINE void kernel_polys_wait(kernel_tile_trace *t, kernel_polys *h, int type,
+                                   const kernel_tile_candidate *candidate, int value)
 {
-    if (h->count == SIMD_WIDTH) kernel_hexes_run(t, h);
-    const int n = h->count++;
-    h->cell[n] = candidate->cell;
-    h->blocks[n] = candidate->blocks;
-    h->box[n] = candidate->box;
-    h->near[n] = candidate->near;
-    h->value[n] = value;
-    h->isovalue[n] = t->surface->layer->values[value];
-    kernel_arrays_cells(&h->arrays, &candidate->cell, 1, 8, h->vertex, n);
+    kernel_polys_pending *own = &h->pending[kernel_shape_number(type)];
+    if (own->count == SIMD_WIDTH) kernel_polys_run(t, h, own);
+    const int n = own->count++;
+    own->cell[n] = candidate->cell;
+    own->blocks[n] = candidate->blocks;
+    own->box[n] = candidate->box;
+    own->near[n] = candidate->near;
+    own->value[n] = value;
+    own->isovalue[n] = t->surface->layer->values[value];
+    kernel_arrays_cells(&h->arrays, &candidate->cell, 1, grid_type_vertices(type), own->vertex, n);
 }
 
 #endif

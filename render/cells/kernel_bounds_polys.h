@@ -1,32 +1,85 @@
-/* Bounds of the field in hexes along a tile's rays, as many as there are lanes. kernel_bounds.h has what is asked,
- * with a corner of the domain a lane; here lanes are cells, and the same operations in the same order give the same
- * answers. What depends on two of a corner's three coordinates is computed for four corners. */
-#ifndef RENDER_KERNEL_BOUNDS_HEXES_H
-#define RENDER_KERNEL_BOUNDS_HEXES_H
+/* Bounds of the field in hexes, wedges or pyramids along a tile's rays, as many as there are lanes. kernel_bounds.h has
+ * what is asked, with a corner of the domain a lane; here lanes are cells, and the same operations in the same order
+ * give the same answers. A slope that does not depend on all three of a corner's coordinates is computed once for the
+ * corners that share it. */
+#ifndef RENDER_KERNEL_BOUNDS_POLYS_H
+#define RENDER_KERNEL_BOUNDS_POLYS_H
 
 #include <math.h>
 #include <string.h>
 
+#include "kernel_cell.h"
 #include "kernel_map.h"
+#include "kernel_shapes.h"
 #include "kernel_wide.h"
 #include "simd.h"
 
-/* Lane by lane what kernel_bounds has of a hex. */
-typedef struct kernel_hexes_bounds {
+/* Lane by lane what kernel_bounds has of a cell. */
+typedef struct kernel_polys_bounds {
     float jump[SIMD_WIDTH]; /* less than nothing where the field is not known to be monotone; */
     /* there L and its thickness, which is infinite where that is of no use */
     float level[SIMD_WIDTH], gradient[3][SIMD_WIDTH], thickness[SIMD_WIDTH];
     /* The cell lies between pairs of planes: low <= normal . (X - vertex 0) <= high. */
     float normal[3][3][SIMD_WIDTH], low[3][SIMD_WIDTH], high[3][SIMD_WIDTH];
-} kernel_hexes_bounds;
+} kernel_polys_bounds;
 
 /* Half of the lanes. */
 typedef struct kernel_bounds_lanes {
-    kernel_half exact[4][8], bent[3][4], inverse[3][3], reach[3];
+    kernel_half exact[4][8], apart[3][8]; /* coefficients, and places from vertex 0 on */
+    kernel_half bent[3][4], inverse[3][3], reach[3];
     kernel_half_mask is_solid;
 } kernel_bounds_lanes;
 
-/* At corners, by the bits of two coordinates. */
+/* A domain's corners (kernel_bounds.h), and which slopes there are along each axis: slope_count of them, each first met
+ * at a corner, and which one a corner has. Of a hex a slope depends on the two other coordinates; of a wedge on the
+ * last alone, and along the last on the two others; of a pyramid on the same coordinate alone. */
+typedef struct kernel_slope_table {
+    int corner_count, slope_count[3];
+    signed char first[3][4], at[3][8];
+    double centre[3], corners[8][3];
+} kernel_slope_table;
+
+static const kernel_slope_table kernel_slope_tables[3] = {
+    {8,
+     {4, 4, 4},
+     {{0, 2, 4, 6}, {0, 4, 1, 5}, {0, 1, 2, 3}},
+     {{0, 0, 1, 1, 2, 2, 3, 3}, {0, 2, 0, 2, 1, 3, 1, 3}, {0, 1, 2, 3, 0, 1, 2, 3}},
+     {0.5, 0.5, 0.5},
+     {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
+      {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
+      {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},
+      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
+      {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
+      {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
+      {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
+      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}},
+    {6,
+     {2, 2, 3},
+     {{0, 3}, {0, 3}, {0, 1, 2}},
+     {{0, 0, 0, 1, 1, 1}, {0, 0, 0, 1, 1, 1}, {0, 1, 2, 0, 1, 2}},
+     {1.0 / 3, 1.0 / 3, 0.5},
+     {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
+      {KERNEL_WIDE, KERNEL_LOW, KERNEL_LOW},
+      {KERNEL_LOW, KERNEL_WIDE, KERNEL_LOW},
+      {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
+      {KERNEL_WIDE, KERNEL_LOW, KERNEL_HIGH},
+      {KERNEL_LOW, KERNEL_WIDE, KERNEL_HIGH}}},
+    {8,
+     {2, 2, 2},
+     {{0, 1}, {0, 2}, {0, 4}},
+     {{0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}},
+     {0.5, 0.5, 0.5},
+     {{KERNEL_LOW, KERNEL_LOW, KERNEL_LOW},
+      {KERNEL_HIGH, KERNEL_LOW, KERNEL_LOW},
+      {KERNEL_LOW, KERNEL_HIGH, KERNEL_LOW},
+      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_LOW},
+      {KERNEL_LOW, KERNEL_LOW, KERNEL_HIGH},
+      {KERNEL_HIGH, KERNEL_LOW, KERNEL_HIGH},
+      {KERNEL_LOW, KERNEL_HIGH, KERNEL_HIGH},
+      {KERNEL_HIGH, KERNEL_HIGH, KERNEL_HIGH}}},
+};
+
+/* At corners, by the number of the slope. */
 typedef struct kernel_lanes_slopes {
     kernel_half bend[3][3][4], df[3][4], de[3][4];
 } kernel_lanes_slopes;
@@ -47,51 +100,59 @@ SIMD_INLINE kernel_half kernel_half_more(kernel_half v, kernel_half most)
     return kernel_half_select((kernel_half_mask)(v > most), v, most);
 }
 
-/* A number's slope along axis a: of coefficients 1 to 7, at the coordinates after a and after that. */
-SIMD_INLINE kernel_half kernel_half_slope(const kernel_half c[8], int a, double next, double last)
+/* A number's slope along axis a, of coefficients 1 to 7, at r of the domain. */
+SIMD_INLINE kernel_half kernel_half_slope(int type, const kernel_half c[8], int a, const double r[3])
 {
-    const double r[3] = {a == 0   ? 0
-                         : a == 1 ? last
-                                  : next,
-                         a == 1   ? 0
-                         : a == 2 ? last
-                                  : next,
-                         a == 2   ? 0
-                         : a == 0 ? last
-                                  : next};
+    if (type == GRID_PYRAMID) return c[1 + a] + c[4] * (a == 2 ? -r[2] : r[a]);
     kernel_half out = c[1 + a];
-    for (int j = 0; j < 3; j++)
+    for (int j = type == GRID_HEX ? 0 : 1; j < 3; j++)
         if (a != 2 - j) out += c[4 + j] * r[3 - a - (2 - j)];
-    return out + c[7] * (next * last);
+    return type == GRID_HEX ? out + c[7] * (r[(a + 1) % 3] * r[(a + 2) % 3]) : out;
+}
+
+/* kernel_bounds_setup()'s bend along axis a: how far the slope of what has these coefficients 4 to 7 is at r from that
+ * at the centre. */
+SIMD_INLINE kernel_half kernel_half_bend(int type, const kernel_half bent[4], int a, const double r[3])
+{
+    const double *centre = kernel_slope_tables[kernel_shape_number(type)].centre;
+    const int next = (a + 1) % 3, last = (a + 2) % 3;
+    kernel_half out = {0};
+    if (type == GRID_PYRAMID) return bent[0] * (a == 2 ? centre[2] - r[2] : r[a] - centre[a]);
+    for (int j = type == GRID_HEX ? 0 : 1; j < 3; j++)
+        if (a != 2 - j) out += bent[j] * (r[3 - a - (2 - j)] - centre[3 - a - (2 - j)]);
+    return type == GRID_HEX ? out + bent[3] * (r[next] * r[last] - centre[next] * centre[last]) : out;
 }
 
 /* kernel_map_setup()'s coefficients. */
-SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, const float at[4][8][SIMD_WIDTH], int half)
+SIMD_INLINE void kernel_bounds_lanes_fit(kernel_bounds_lanes *b, int type, const float at[4][8][SIMD_WIDTH], int half)
 {
+    const int count = grid_type_vertices(type);
     for (int n = 0; n < 4; n++) {
         kernel_half d[8];
         vf v[8];
-        for (int i = 0; i < 8; i++) {
+        for (int i = 0; i < count; i++) {
             v[i] = vf_load(at[n][i]);
             d[i] = kernel_half_of(&v[i], half);
         }
         if (n < 3) {
             b->reach[n] = kernel_half_abs(d[0]);
-            for (int i = 1; i < 8; i++) b->reach[n] = kernel_half_more(kernel_half_abs(d[i]), b->reach[n]);
-            for (int i = 7; i >= 0; i--) d[i] -= d[0];
+            for (int i = 1; i < count; i++) b->reach[n] = kernel_half_more(kernel_half_abs(d[i]), b->reach[n]);
+            for (int i = count - 1; i >= 0; i--) d[i] -= d[0];
+            for (int i = 0; i < count; i++) b->apart[n][i] = d[i];
         }
-        KERNEL_HEX_FIT(b->exact[n], d);
+        kernel_half_fit(type, b->exact[n], d);
     }
 }
 
 /* kernel_bounds_bend(). */
-SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b)
+SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b, int type)
 {
+    const double *centre = kernel_slope_tables[kernel_shape_number(type)].centre;
     const kernel_half zero = {0};
     kernel_half m[3][3], cofactor[3][3], position[3][8];
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 8; j++) position[i][j] = kernel_half_rounded(b->exact[i][j]);
-        for (int a = 0; a < 3; a++) m[i][a] = kernel_half_slope(position[i], a, 0.5, 0.5);
+        for (int a = 0; a < 3; a++) m[i][a] = kernel_half_slope(type, position[i], a, centre);
     }
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
@@ -117,12 +178,13 @@ SIMD_INLINE void kernel_bounds_lanes_bend(kernel_bounds_lanes *b)
 }
 
 /* L's gradient, rounded, and E; *size is of the rounding of places. */
-SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, kernel_half gradient[3], kernel_half e[8],
-                                            kernel_half *size)
+SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, int type, kernel_half gradient[3],
+                                            kernel_half e[8], kernel_half *size)
 {
+    const double *centre = kernel_slope_tables[kernel_shape_number(type)].centre;
     kernel_half df[3];
     *size = (kernel_half){0};
-    for (int a = 0; a < 3; a++) df[a] = kernel_half_slope(b->exact[3], a, 0.5, 0.5);
+    for (int a = 0; a < 3; a++) df[a] = kernel_half_slope(type, b->exact[3], a, centre);
     for (int i = 0; i < 3; i++) {
         kernel_half g = {0};
         for (int a = 0; a < 3; a++) g += df[a] * b->inverse[a][i];
@@ -136,37 +198,36 @@ SIMD_INLINE void kernel_bounds_lanes_linear(const kernel_bounds_lanes *b, kernel
 }
 
 /* kernel_bounds_error(). */
-SIMD_INLINE kernel_half kernel_half_error(const kernel_half e[8])
+SIMD_INLINE kernel_half kernel_half_error(int type, const kernel_half e[8])
 {
+    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
     kernel_half most = {0};
-    for (int n = 0; n < 8; n++) {
-        const double r[3] = {n & 1 ? KERNEL_HIGH : KERNEL_LOW, n & 2 ? KERNEL_HIGH : KERNEL_LOW,
-                             n & 4 ? KERNEL_HIGH : KERNEL_LOW};
-        const kernel_half at = ((e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3])) + r[0] * r[1] * e[4] +
-                               r[2] * ((r[0] * e[5] + r[1] * e[6]) + r[0] * r[1] * e[7]);
+    for (int n = 0; n < table->corner_count; n++) {
+        const double *corner = table->corners[n], k = type == GRID_PYRAMID ? corner[2] : 1;
+        const double r[3] = {corner[0] * k, corner[1] * k, corner[2]}, m = r[0] * r[1] / k;
+        kernel_half at = (e[0] + r[0] * e[1]) + (r[1] * e[2] + r[2] * e[3]);
+        if (type != GRID_WEDGE) at += m * e[4];
+        if (type == GRID_WEDGE) at += r[2] * (r[0] * e[5] + r[1] * e[6]);
+        if (type == GRID_HEX) at += r[2] * ((r[0] * e[5] + r[1] * e[6]) + m * e[7]);
         most = n ? kernel_half_more(at * at, most) : at * at;
     }
     return kernel_half_sqrt(most);
 }
 
 /* The gradients of the field and of E at the corners, and the bend there. */
-SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, const kernel_half e[8],
+SIMD_INLINE void kernel_bounds_lanes_slopes(const kernel_bounds_lanes *b, int type, const kernel_half e[8],
                                             kernel_lanes_slopes *out)
 {
+    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
     kernel_half field[8];
     for (int j = 0; j < 8; j++) field[j] = kernel_half_rounded(b->exact[3][j]);
-    for (int n = 0; n < 4; n++) {
-        const double next = n & 1 ? KERNEL_HIGH : KERNEL_LOW, last = n & 2 ? KERNEL_HIGH : KERNEL_LOW;
-        for (int a = 0; a < 3; a++) {
-            out->df[a][n] = kernel_half_slope(field, a, next, last);
-            out->de[a][n] = kernel_half_slope(e, a, next, last);
-            for (int i = 0; i < 3; i++) {
-                const kernel_half *bent = b->bent[i], none = {0};
-                const kernel_half c[8] = {none, none, none, none, bent[0], bent[1], bent[2], none};
-                out->bend[i][a][n] = kernel_half_slope(c, a, next - 0.5, last - 0.5) + bent[3] * (next * last - 0.25);
-            }
+    for (int a = 0; a < 3; a++)
+        for (int n = 0; n < table->slope_count[a]; n++) {
+            const double *r = table->corners[(int)table->first[a][n]];
+            out->df[a][n] = kernel_half_slope(type, field, a, r);
+            out->de[a][n] = kernel_half_slope(type, e, a, r);
+            for (int i = 0; i < 3; i++) out->bend[i][a][n] = kernel_half_bend(type, b->bent[i], a, r);
         }
-    }
 }
 
 /* The largest over the corners. */
@@ -195,12 +256,14 @@ SIMD_INLINE kernel_half kernel_half_eighth(const kernel_half m[3][3])
     return sum;
 }
 
-SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, const kernel_half w[3], kernel_lanes_most *out)
+SIMD_INLINE void kernel_lanes_corners(const kernel_lanes_slopes *s, int type, const kernel_half w[3],
+                                      kernel_lanes_most *out)
 {
-    for (int n = 0; n < 8; n++) {
+    const kernel_slope_table *table = &kernel_slope_tables[kernel_shape_number(type)];
+    for (int n = 0; n < table->corner_count; n++) {
         kernel_half bend[3][3], df[3], de[3], along = {0}, steep = {0}, bent = {0};
         for (int a = 0; a < 3; a++) {
-            const int at = (n >> (a + 1) % 3 & 1) | (n >> (a + 2) % 3 & 1) << 1;
+            const int at = table->at[a][n];
             df[a] = s->df[a][at];
             de[a] = s->de[a][at];
             for (int i = 0; i < 3; i++) bend[i][a] = s->bend[i][a][at];
@@ -228,24 +291,15 @@ SIMD_INLINE void kernel_half_store(float lanes[SIMD_WIDTH], int half, kernel_hal
 }
 
 /* The planes across J0's columns that the vertices lie between, widened by what a ray's places may be off. */
-SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int i, kernel_half pad, int half,
-                                    kernel_hexes_bounds *out)
+SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int type, int i, kernel_half pad, int half,
+                                    kernel_polys_bounds *out)
 {
-    kernel_half c[8], at[8], low, high;
-    for (int j = 1; j < 8; j++) {
-        c[j] =
-            b->inverse[i][0] * b->exact[0][j] + b->inverse[i][1] * b->exact[1][j] + b->inverse[i][2] * b->exact[2][j];
-    }
-    at[0] = (kernel_half){0};
-    at[1] = c[1];
-    at[2] = c[2];
-    at[3] = c[1] + c[2] + c[4];
-    for (int n = 0; n < 4; n++) at[4 + n] = at[n] + c[3] + (n & 1 ? c[5] : at[0]) + (n & 2 ? c[6] : at[0]);
-    at[7] += c[7];
-    low = high = at[0];
-    for (int n = 1; n < 8; n++) {
-        low = -kernel_half_more(-at[n], -low);
-        high = kernel_half_more(at[n], high);
+    kernel_half low = {0}, high = {0};
+    for (int n = 1; n < grid_type_vertices(type); n++) {
+        const kernel_half at =
+            b->inverse[i][0] * b->apart[0][n] + b->inverse[i][1] * b->apart[1][n] + b->inverse[i][2] * b->apart[2][n];
+        low = -kernel_half_more(-at, -low);
+        high = kernel_half_more(at, high);
     }
     for (int a = 0; a < 3; a++) kernel_half_store(out->normal[i][a], half, b->inverse[i][a]);
     kernel_half_store(out->low[i], half, low - pad);
@@ -254,17 +308,17 @@ SIMD_INLINE void kernel_half_planes(const kernel_bounds_lanes *b, int i, kernel_
 
 /* kernel_bounds_linear(), with kernel_bounds_jump() and kernel_bounds_rise() of rays about (0, 0, 1). */
 SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, const kernel_beam *beam,
-                                    kernel_hexes_bounds *out)
+                                    kernel_polys_bounds *out, int type)
 {
     const kernel_half zero = {0}, one = zero + 1, spread = zero + (double)beam->spread;
     kernel_bounds_lanes b;
     kernel_lanes_slopes slopes;
     kernel_lanes_most most;
     kernel_half g[3], e[8], w[3], size, length = zero, off = zero, gap = zero;
-    kernel_bounds_lanes_fit(&b, at, half);
-    kernel_bounds_lanes_bend(&b);
-    kernel_bounds_lanes_linear(&b, g, e, &size);
-    kernel_bounds_lanes_slopes(&b, e, &slopes);
+    kernel_bounds_lanes_fit(&b, type, at, half);
+    kernel_bounds_lanes_bend(&b, type);
+    kernel_bounds_lanes_linear(&b, type, g, e, &size);
+    kernel_bounds_lanes_slopes(&b, type, e, &slopes);
     const kernel_half across =
         2e-6 * (b.reach[0] + b.reach[1] + (double)beam->offset + (double)beam->spread * b.reach[2]);
     for (int i = 0; i < 3; i++) {
@@ -275,9 +329,9 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
         length += w[i] * w[i];
         off += term * term;
         gap += blur * blur;
-        kernel_half_planes(&b, i, blur + 1e-5, half, out);
+        kernel_half_planes(&b, type, i, blur + 1e-5, half, out);
     }
-    kernel_lanes_corners(&slopes, w, &most);
+    kernel_lanes_corners(&slopes, type, w, &most);
     const kernel_half theta = kernel_half_sqrt(kernel_half_sqrt(kernel_half_sqrt(most.bend)));
     const kernel_half_mask is_regular = b.is_solid & (kernel_half_mask)(theta < 0.9);
     const kernel_half stretch =
@@ -297,17 +351,17 @@ SIMD_INLINE void kernel_half_bounds(const float at[4][8][SIMD_WIDTH], int half, 
     /* L, and its thickness. */
     const kernel_half level = kernel_half_rounded(e[0]), endless = kernel_half_all((double)INFINITY);
     e[0] -= level;
-    const kernel_half thickness = kernel_half_error(e) + 1e-5 + 16 * 6e-8 * size;
+    const kernel_half thickness = kernel_half_error(type, e) + 1e-5 + 16 * 6e-8 * size;
     kernel_half_store(out->level, half, level);
     for (int a = 0; a < 3; a++) kernel_half_store(out->gradient[a], half, g[a]);
     kernel_half_store(out->thickness, half, kernel_half_select(is_regular, thickness, endless));
 }
 
 /* Lane by lane, of places in tile space and values. */
-static __attribute__((noinline)) void kernel_hexes_bound(const float at[4][8][SIMD_WIDTH], const kernel_beam *beam,
-                                                         kernel_hexes_bounds *out)
+static __attribute__((noinline)) void kernel_polys_bound(int type, const float at[4][8][SIMD_WIDTH],
+                                                         const kernel_beam *beam, kernel_polys_bounds *out)
 {
-    for (int half = 0; half < 2; half++) kernel_half_bounds(at, half, beam, out);
+    for (int half = 0; half < 2; half++) KERNEL_OF_TYPE(type, kernel_half_bounds, at, half, beam, out);
 }
 
 #endif
