@@ -183,6 +183,8 @@ typedef struct render_surface_layer {
     float edge_width; /* pixels, of lines along edges between vertices that lie in the surface; 0: none. Cells are tets
                          of three such vertices or pyramids on four */
     float edge_colour[3]; /* linear */
+    bool is_of_faces;     /* the surface is a face of each of its cells, which are below the isovalue elsewhere: a ray that
+                             meets the face in an edge alone, and so is in the cell for no length, hits it too */
     uint32_t clips;       /* of the job's, a bit each */
     float contact; /* of rays from hits (render_light.h): what is nearer to the hit than so many sizes of the cell that
                       it is met in hides nothing; 0: all of it does */

@@ -32,20 +32,30 @@ SIMD_INLINE vf kernel_project_y(const kernel_packet *p, kernel_spot a)
 /* Below this the products' errors may be too small for float32. */
 #define KERNEL_EDGE_LEAST 1e-30f
 
-/* Decides e on rays on which it is all but zero. Its sign is taken in double, where products of float32 are exact;
- * where they are zero the tie is decided as kernel_cell.h has it. Its size is too little beside that of any other edge
- * to matter, but it must not be zero: not all weights may be, and where a ray meets an edge that lies in the
- * isosurface, as those of outer faces do, it keeps the field's sign in the cell. */
+/* Decides e on rays on which it is all but zero. Its sign is taken in double, where products of float32 are exact. Its
+ * size is too little beside that of any other edge to matter, but not all weights may be zero. Where e is zero the tie
+ * is decided as kernel_cell.h has it, and the sign of the zero says how. */
 static __attribute__((noinline, cold)) vf kernel_edge_tied(vf ax, vf ay, vf bx, vf by, vf e)
 {
     for (int lane = 0; lane < SIMD_WIDTH; lane++) {
         const double x0 = (double)ax[lane], y0 = (double)ay[lane], x1 = (double)bx[lane], y1 = (double)by[lane];
         const double exact = x0 * y1 - x1 * y0;
         if (!(fabsf(e[lane]) <= KERNEL_EDGE_LEAST)) continue;
-        const bool is_left = exact != 0 ? exact > 0 : y1 < y0 || (y0 == y1 && x0 < x1);
-        e[lane] = is_left ? KERNEL_EDGE_LEAST : -KERNEL_EDGE_LEAST;
+        if (exact == 0)
+            e[lane] = y1 < y0 || (y0 == y1 && x0 < x1) ? 0.0f : -0.0f;
+        else
+            e[lane] = exact > 0 ? KERNEL_EDGE_LEAST : -KERNEL_EDGE_LEAST;
     }
     return e;
+}
+
+/* Returns the value at an interval's end. Where the surface is a face of the cell (is_of_faces of render.h) and a ray
+ * meets only an edge of it, both ends have the isovalue; the end is then taken to be in the cell, below it. */
+SIMD_INLINE vf kernel_end_in_cell(vf v_in, vf v_out, bool is_of_faces)
+{
+    if (!is_of_faces) return v_out;
+    const vm is_edge = vm_and(vf_eq(v_in, vf_set(0)), vf_eq(v_out, vf_set(0)));
+    return vf_select(is_edge, vf_set(-KERNEL_EDGE_LEAST), v_out);
 }
 
 /* Returns the edge function, with the exact sign for the projected points. */

@@ -36,6 +36,7 @@ typedef struct kernel_batch {
     int count, layer, part; /* -1: of none yet */
     kernel_arrays arrays;   /* of the layer's field on the part */
     bool takes_batches;     /* its tets may be put into batches */
+    bool is_of_faces;       /* the layer's */
     /* cell by cell */
     uint32_t cell[SIMD_WIDTH];
     uint16_t blocks[SIMD_WIDTH], box[SIMD_WIDTH];
@@ -220,7 +221,8 @@ SIMD_INLINE vm kernel_batch_hit(const kernel_batch *b, const kernel_tile *tile, 
     const vf v_a = ends.a.value * scale_a, v_b = ends.b.value * scale_b;
     const vm swap = vf_lt(t_b, t_a);
     const vf t_in = vf_select(swap, t_b, t_a), t_out = vf_select(swap, t_a, t_b);
-    const vf v_in = vf_select(swap, v_b, v_a), v_out = vf_select(swap, v_a, v_b);
+    const vf v_in = vf_select(swap, v_b, v_a);
+    const vf v_out = kernel_end_in_cell(v_in, vf_select(swap, v_a, v_b), b->is_of_faces);
     const vm near = vm_and(any_hit, vm_and(vf_le(t_in, r->far), vf_le(vf_set(t_near), t_out)));
     const vm change = vm_and(near, vm_xor(vf_lt(v_in, vf_set(0)), vf_lt(v_out, vf_set(0))));
     if (!vm_any(change)) return change;
@@ -334,6 +336,7 @@ SIMD_INLINE void kernel_batch_turn(kernel_tile_trace *t, kernel_batch *b, int pa
     }
     b->layer = layer;
     b->part = part;
+    b->is_of_faces = t->surface->layer->is_of_faces;
     kernel_arrays_surface(&b->arrays, t->frame, layer, part);
     b->takes_batches = b->arrays.has_lanes && !t->surface->layer->colour_map && kernel_tile_layer_batches(t);
 }

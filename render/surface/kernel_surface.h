@@ -132,6 +132,7 @@ static __attribute__((noinline)) void kernel_tet_surface(kernel_packet *p, kerne
     const bool has_colour = state->surface->layer->colour_map != NULL;
     kernel_interval i;
     kernel_tet_interval(p, c, rays, has_colour, &i);
+    i.v_out = kernel_end_in_cell(i.v_in, i.v_out, state->surface->layer->is_of_faces);
     const vm change = vm_and(kernel_is_near(p, &i), kernel_changes_sign(&i));
     if (!vm_any(change)) return;
     const vf t = kernel_secant(i.t_in, i.v_in, i.t_out, i.v_out);
@@ -193,7 +194,8 @@ static __attribute__((noinline)) void kernel_poly_surface(kernel_packet *p, kern
     kernel_interval list[KERNEL_MAX_CELL_INTERVALS];
     const int count = kernel_poly_intervals(p, c, rays, false, list);
     for (int n = 0; n < count; n++) {
-        const kernel_interval *i = &list[n];
+        kernel_interval *i = &list[n];
+        i->v_out = kernel_end_in_cell(i->v_in, i->v_out, layer->is_of_faces);
         const vm near = kernel_is_near(p, i);
         /* Where a ray crosses both halves of a quad but not its patch, both ends are one place beside the ray. */
         const vm room = vm_or(vf_lt(i->t_in, i->t_out), kernel_changes_sign(i));

@@ -269,6 +269,7 @@ static insitu_status fill_outer(const session_layer_basis *basis, const scene_su
                                   .root = RENDER_ROBUST,
                                   .normal = RENDER_GRADIENT,
                                   .edge_width = layer->edge_width,
+                                  .is_of_faces = true,
                                   .clips = layer->clips};
     memcpy(out->edge_colour, layer->edge_colour, sizeof out->edge_colour);
     if (!layer->has_colour_by) return INSITU_OK;
