@@ -67,6 +67,7 @@ static void choose_route(composition *c, int64_t fragments)
 static void choose_owners(composition *c)
 {
     c->owners.count = c->route.owners;
+    comp_votes_level(c->votes, c->grid.blocks);
     for (uint32_t b = 0; b < c->grid.blocks; b++) {
         const int place = c->votes[b] ? comp_route_place(&c->route, comp_vote_rank(c->votes[b])) : -1;
         c->owners.places[b] = place < c->route.owners ? place : place - c->route.owners;

@@ -4,8 +4,8 @@
 
 const comp_machine comp_usual_machine = {2e-6, 1e-6, 1e-10, 1e-6, 5e-7, 5e-11};
 
-/* Number of fragments that go to one owner together: a row of one of the renderer's tiles. */
-enum { TOGETHER = 16 };
+/* Number of fragments that go to one owner together: those of one of the renderer's tiles. */
+enum { TOGETHER = 256 };
 
 /* Number of partners in a round for which a rank has fragments. */
 static double partners_of(const comp_route *route, int round, const comp_load *load)

@@ -9,6 +9,7 @@
 #include "comp_grid.h"
 
 #include <math.h>
+#include <stddef.h>
 
 /* Blocks are the smallest that are few enough, and nearly square. */
 comp_grid comp_grid_of(uint32_t width, uint32_t height)
@@ -45,4 +46,49 @@ int32_t comp_vote(uint32_t block, int rank, int64_t fragments)
     const float chance = 4 * logf((float)fragments) - logf(-logf(u < 1 ? u : 0x1.fffffep-1f));
     const int steps = (int)(16 * (chance + 3)); /* 0 .. 1800 */
     return (int32_t)((uint32_t)(1 + (steps > 0 ? steps : 0)) << 20 | ((uint32_t)rank & 0xfffff));
+}
+
+/* How many blocks each rank owns that owns any, in a table by the rank's hash. */
+typedef struct ownership {
+    int rank;
+    uint32_t blocks;
+} ownership;
+
+enum { SLOTS = 2 * COMP_MOST_BLOCKS };
+
+static ownership *find_ownership(ownership *all, int rank)
+{
+    uint32_t slot = hash((uint32_t)rank + 1) % SLOTS;
+    while (all[slot].rank >= 0 && all[slot].rank != rank) slot = (slot + 1) % SLOTS;
+    all[slot].rank = rank;
+    return &all[slot];
+}
+
+/* Returns how many blocks the busiest rank need own. */
+static uint32_t find_share(const int32_t *votes, uint32_t blocks, ownership *all)
+{
+    uint32_t owners = 0, owned = 0;
+    for (int i = 0; i < SLOTS; i++) all[i] = (ownership){-1, 0};
+    for (uint32_t b = 0; b < blocks; b++) {
+        if (!votes[b]) continue;
+        ownership *own = find_ownership(all, comp_vote_rank(votes[b]));
+        owners += own->blocks++ == 0;
+        owned++;
+    }
+    return owners ? (owned + owners - 1) / owners : 0;
+}
+
+void comp_votes_level(int32_t *votes, uint32_t blocks)
+{
+    ownership all[SLOTS];
+    const uint32_t share = find_share(votes, blocks, all);
+    int next = 0;
+    for (uint32_t b = blocks; b-- > 0;) {
+        ownership *own = votes[b] ? find_ownership(all, comp_vote_rank(votes[b])) : NULL;
+        if (!own || own->blocks <= share) continue;
+        while (all[next].rank < 0 || all[next].blocks >= share) next++;
+        own->blocks--;
+        all[next].blocks++;
+        votes[b] = (int32_t)((uint32_t)votes[b] & ~0xfffffu) | all[next].rank;
+    }
 }

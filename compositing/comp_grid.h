@@ -80,4 +80,9 @@ static inline int comp_vote_rank(int32_t vote)
     return vote & 0xfffff;
 }
 
+/* Moves blocks from ranks that own more than their share to others that own any, until none has more than its share.
+ * votes are the greatest of each block, 0 where nobody has fragments; the same on all ranks, before and after. Ranks that
+ * own nothing stay so: where one has nearly all fragments, most need not travel. */
+void comp_votes_level(int32_t *votes, uint32_t blocks);
+
 #endif

@@ -40,6 +40,9 @@ add_test(NAME homes COMMAND test_homes)
 add_executable(test_session_cores test_session_cores.c)
 target_link_libraries(test_session_cores PRIVATE insitu_flags insitu_internal PkgConfig::CMOCKA OpenMP::OpenMP_C)
 insitu_add_mpi_test(session_cores test_session_cores 1 2 3)
+add_test(NAME session_cores_bound_by_openmp COMMAND ${CMAKE_COMMAND} -E env OMP_PROC_BIND=true
+  ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} 1 $<TARGET_FILE:test_session_cores>)
+set_tests_properties(session_cores_bound_by_openmp PROPERTIES ENVIRONMENT "${INSITU_TEST_ENVIRONMENT}")
 
 insitu_session_program(test_session_collectives)
 insitu_add_mpi_test(session_collectives test_session_collectives 2 5 ARGS ${CMAKE_CURRENT_BINARY_DIR})

@@ -6,6 +6,8 @@
 #include <omp.h>
 #include <sched.h>
 #include <stdbool.h>
+#include <string.h>
+#include <unistd.h>
 
 enum { MOST_CORES = CPU_SETSIZE };
 
@@ -18,24 +20,44 @@ int session_share_of_cores(const int32_t *may_run, const int32_t *rank_counts, i
     return share > 1 ? (int)share : 1;
 }
 
+/* Marks the cores of OpenMP's places. Where there are any, OpenMP has bound this thread to the first of them already. */
+static void find_places(int32_t may_run[MOST_CORES])
+{
+    for (int place = 0; place < omp_get_num_places(); place++) {
+        int cores[MOST_CORES];
+        const int count = omp_get_place_num_procs(place);
+        if (count > MOST_CORES) continue;
+        omp_get_place_proc_ids(place, cores);
+        for (int k = 0; k < count; k++)
+            if (cores[k] >= 0 && cores[k] < MOST_CORES) may_run[cores[k]] = 1;
+    }
+}
+
 /* False: the system does not say. */
 static bool find_cores(int32_t may_run[MOST_CORES])
 {
     cpu_set_t set;
     CPU_ZERO(&set);
-    const bool is_known = sched_getaffinity(0, sizeof set, &set) == 0;
-    for (int k = 0; k < MOST_CORES; k++) may_run[k] = is_known && CPU_ISSET((size_t)k, &set);
-    return is_known;
+    memset(may_run, 0, MOST_CORES * sizeof *may_run);
+    if (omp_get_num_places() > 0) {
+        find_places(may_run);
+        return true;
+    }
+    if (sched_getaffinity(0, sizeof set, &set)) return false;
+    for (int k = 0; k < MOST_CORES; k++) may_run[k] = CPU_ISSET((size_t)k, &set);
+    return true;
 }
 
 int session_cores_of_rank(MPI_Comm node)
 {
-    int32_t own[MOST_CORES], all[MOST_CORES];
+    int32_t own[MOST_CORES] = {0}, all[MOST_CORES];
     int ranks = 1;
     MPI_Comm_size(node, &ranks);
     const bool is_known = find_cores(own);
     if (MPI_Allreduce(own, all, MOST_CORES, MPI_INT32_T, MPI_SUM, node) == MPI_SUCCESS && is_known)
         return session_share_of_cores(own, all, MOST_CORES);
-    const int share = omp_get_num_procs() / ranks;
+    /* A rank that may not run on all cores has been bound. */
+    const int cores = omp_get_num_procs(), share = cores / ranks;
+    if (cores < sysconf(_SC_NPROCESSORS_ONLN)) return cores;
     return share > 1 ? share : 1;
 }

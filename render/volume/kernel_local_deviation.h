@@ -1,0 +1,165 @@
+/* The field along rays between two faces of their hexes, a ray and its cell a lane, from three places between them.
+ *
+ * In kernel_local.h's coordinates the field is f0 + g r + (its bent terms), and y = r + n(r) goes in a line along the
+ * ray, with the same bent terms b in n = B b. So with r = y - n(r)
+ *
+ *     field = f0 + g y + h b(r),   h = (the field's bent terms) - g B,
+ *
+ * of which the first part is linear along the ray: the field is off its chord between the faces by h times what b is
+ * off its own. That is little, so r need not be known as well as for the field itself.
+ *
+ * r is found from the line between its values at the faces. In the middle of a cell n' is zero, so that a step of
+ * Newton's method with the derivatives there adds what is left, and takes |n'| of it into the next. It has a
+ * third of the terms of a step with the derivatives at the place, and all three places take theirs side by side.
+ *
+ * How wrong it is. Let the residual be the sum over the coordinates of what y - (r + n(r)) is off zero by. The
+ * derivative of n is no more than N in the cell; r may be KERNEL_DEVIATION_MARGIN outside, where it is no more
+ * than 1.082 N, as bent terms have no more than two coordinates in their derivatives. So r is off by no more than
+ * residual / (1 - 1.082 N), if r itself is no farther outside, which is asked; else the ray goes to the cell alone. The
+ * gradients of b up to there are sqrt(2) 0.52 of two coordinates and sqrt(3) 0.52^2 of three. */
+#ifndef RENDER_KERNEL_LOCAL_DEVIATION_H
+#define RENDER_KERNEL_LOCAL_DEVIATION_H
+
+#include <math.h>
+#include <string.h>
+
+#include "grid.h"
+#include "kernel_local.h"
+#include "simd.h"
+
+enum { KERNEL_DEVIATION_STEPS = 8 };
+
+/* In r, whose cell goes from -1/2 to 1/2. */
+#define KERNEL_DEVIATION_MARGIN 0.02f
+
+/* Lane by lane. */
+typedef struct kernel_local_nonlinear {
+    float terms[KERNEL_BENT_TERMS][SIMD_WIDTH]; /* h */
+    float sensitivity[SIMD_WIDTH];              /* what the field may be off by, over the residual */
+    float residual_limit[SIMD_WIDTH];           /* a larger residual says nothing of the field */
+    float tolerance[SIMD_WIDTH];                /* a smaller one is small enough */
+} kernel_local_nonlinear;
+
+typedef struct kernel_local_deviations {
+    vf field[3];     /* off its chord, at the quarters and the middle */
+    vf residual;     /* at the one of them where that is most */
+    vm has_diverged; /* rays on which r has not been found */
+} kernel_local_deviations;
+
+/* ---- cells ---- */
+
+/* All but the tolerance. */
+SIMD_INLINE void kernel_local_nonlinear_of(const kernel_local_cells *c, kernel_local_nonlinear *out)
+{
+    vf most = vf_set(0);
+    for (int k = 0; k < KERNEL_BENT_TERMS; k++) {
+        vf own = vf_load(c->field[4 + k]);
+        for (int a = 0; a < 3; a++) own = vf_muladd(-vf_load(c->field[1 + a]), vf_load(c->bent[k][a]), own);
+        vf_store(out->terms[k], own);
+        most += vf_abs(own) * (k < 3 ? 0.74f : 0.47f);
+    }
+    const vf room = 1.0f - 1.082f * vf_sqrt(vf_load(c->bend));
+    vf_store(out->sensitivity, most / room);
+    vf_store(out->residual_limit, KERNEL_DEVIATION_MARGIN * room);
+}
+
+/* ---- rays in cells ---- */
+
+/* The lanes' rays and cells. The ray's share u goes from -1/2 to 1/2. */
+typedef struct kernel_local_chord {
+    vf middle[3], span[3];                               /* of the line between r at the faces */
+    vf mean[KERNEL_BENT_TERMS], rise[KERNEL_BENT_TERMS]; /* of the terms' chords */
+    vf bent[KERNEL_BENT_TERMS][3], own[KERNEL_BENT_TERMS];
+} kernel_local_chord;
+
+typedef struct kernel_local_iterate {
+    vf r[3], residual[3], deviation;
+} kernel_local_iterate;
+
+SIMD_INLINE void kernel_hex_bent(const vf r[3], vf out[KERNEL_BENT_TERMS])
+{
+    out[0] = r[0] * r[1];
+    out[1] = r[0] * r[2];
+    out[2] = r[1] * r[2];
+    out[3] = out[0] * r[2];
+}
+
+SIMD_INLINE void kernel_local_chord_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
+                                       vi lane, const kernel_local_crossing ends[2], kernel_local_chord *out)
+{
+    vf first[KERNEL_BENT_TERMS], last[KERNEL_BENT_TERMS];
+    kernel_hex_bent(ends[0].r, first);
+    kernel_hex_bent(ends[1].r, last);
+    for (int a = 0; a < 3; a++) {
+        out->middle[a] = 0.5f * (ends[0].r[a] + ends[1].r[a]);
+        out->span[a] = ends[1].r[a] - ends[0].r[a];
+    }
+    for (int k = 0; k < KERNEL_BENT_TERMS; k++) {
+        out->mean[k] = 0.5f * (first[k] + last[k]);
+        out->rise[k] = last[k] - first[k];
+        out->own[k] = kernel_local_take(nonlinear->terms[k], lane);
+        for (int a = 0; a < 3; a++) out->bent[k][a] = kernel_local_take(cells->bent[k][a], lane);
+    }
+}
+
+/* Finds the residual at the place u, and how far the field is off its chord. */
+SIMD_INLINE void kernel_local_iterate_at(const kernel_local_chord *c, float u, kernel_local_iterate *p)
+{
+    vf term[KERNEL_BENT_TERMS];
+    kernel_hex_bent(p->r, term);
+    for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(c->span[a], vf_set(u), c->middle[a]) - p->r[a];
+    for (int k = 0; k < KERNEL_BENT_TERMS; k++) {
+        term[k] -= vf_muladd(c->rise[k], vf_set(u), c->mean[k]);
+        for (int a = 0; a < 3; a++) p->residual[a] = vf_muladd(-c->bent[k][a], term[k], p->residual[a]);
+    }
+    p->deviation = c->own[0] * term[0];
+    for (int k = 1; k < KERNEL_BENT_TERMS; k++) p->deviation = vf_muladd(c->own[k], term[k], p->deviation);
+}
+
+SIMD_INLINE vf kernel_local_residual_of(const kernel_local_iterate *p)
+{
+    return (vf_abs(p->residual[0]) + vf_abs(p->residual[1])) + vf_abs(p->residual[2]);
+}
+
+SIMD_INLINE void kernel_local_deviations_of(const kernel_local_cells *cells, const kernel_local_nonlinear *nonlinear,
+                                            vi lane, vm rays, const kernel_local_crossing ends[2],
+                                            kernel_local_deviations *out)
+{
+    static const float places[3] = {-0.25f, 0, 0.25f};
+    kernel_local_chord chord;
+    kernel_local_iterate iterates[3];
+    kernel_local_iterate *middle = &iterates[1];
+    const vf tolerance = kernel_local_take(nonlinear->tolerance, lane);
+    kernel_local_chord_of(cells, nonlinear, lane, ends, &chord);
+    memcpy(middle->r, chord.middle, sizeof middle->r);
+    for (int n = 0; n < 2; n++) {
+        kernel_local_iterate_at(&chord, 0, middle);
+        for (int a = 0; a < 3; a++) middle->r[a] += middle->residual[a];
+    }
+    for (int q = 0; q < 3; q += 2)
+        for (int a = 0; a < 3; a++)
+            iterates[q].r[a] =
+                vf_muladd(chord.span[a], vf_set(places[q]), 0.25f * chord.middle[a]) + 0.75f * middle->r[a];
+    for (int n = 0;; n++) {
+        out->residual = vf_set(0);
+        for (int i = 0; i < 3; i++) {
+            kernel_local_iterate_at(&chord, places[i], &iterates[i]);
+            out->residual = vf_max(kernel_local_residual_of(&iterates[i]), out->residual);
+        }
+        const vm open = vm_andnot(rays, vf_le(out->residual, tolerance));
+        if (n == KERNEL_DEVIATION_STEPS || !vm_any(open)) break;
+        for (int i = 0; i < 3; i++)
+            for (int a = 0; a < 3; a++)
+                iterates[i].r[a] = vf_select(open, iterates[i].r[a] + iterates[i].residual[a], iterates[i].r[a]);
+    }
+    vf farthest = vf_set(0);
+    for (int i = 0; i < 3; i++) {
+        for (int a = 0; a < 3; a++) farthest = vf_max(vf_abs(iterates[i].r[a]), farthest);
+        out->field[i] = iterates[i].deviation;
+    }
+    const vm is_near = vf_le(farthest, vf_set(0.5f + KERNEL_DEVIATION_MARGIN));
+    out->has_diverged =
+        vm_not(vm_and(is_near, vf_le(out->residual, kernel_local_take(nonlinear->residual_limit, lane))));
+}
+
+#endif
