@@ -1,6 +1,6 @@
 /* Most pixels have one fragment, or hits of opaque surfaces, of which the nearest counts. So a strip's fragments are
  * joined in a sheet, 16 pixels at once, and blended so. What is left over, because it has to be blended with another in
- * its pixel, goes to a pile, and pixel by pixel through comp_merge_pixel().
+ * its pixel, is listed, and goes pixel by pixel through comp_merge_pixel().
  *
  * What an opaque surface hides is dropped, although volumes may come later that are in front of it: no merge looks
  * behind an opaque surface. */
@@ -11,29 +11,23 @@
 #include "fragment_order.h"
 #include "memory.h"
 
-/* A list of fragments that is kept from strip to strip. */
-typedef struct pile {
-    fragment *items;
-    int64_t count, capacity;
-} pile;
-
-/* A thread's memory. */
+/* A thread's memory, whose lists are kept from strip to strip. */
 typedef struct merge_scratch {
     comp_sheet all, other, pixels;
-    pile left, listed;                                           /* left: .pixel is the number in the strip */
+    fragment_list left, listed;                                  /* left: .pixel is the number in the strip */
     uint16_t mixed[COMP_ROWS];                                   /* pixels that have something left */
     uint32_t counts[COMP_STRIP_PIXELS], ends[COMP_STRIP_PIXELS]; /* of such a pixel's fragments in the list */
     comp_writer writer;
 } merge_scratch;
 
-/* Makes room for so many; what the pile held is kept. */
-static bool reserve(pile *p, int64_t count)
+/* Makes room for so many; what the list held is kept. */
+static bool reserve(fragment_list *list, int64_t count)
 {
-    if (count <= p->capacity) return true;
-    fragment *grown = base_realloc(p->items, (size_t)(count + count / 2) * sizeof *grown);
+    if (count <= list->capacity) return true;
+    fragment *grown = base_realloc(list->items, (size_t)(count + count / 2) * sizeof *grown);
     if (!grown) return false;
-    p->items = grown;
-    p->capacity = count + count / 2;
+    list->items = grown;
+    list->capacity = count + count / 2;
     return true;
 }
 
@@ -50,7 +44,7 @@ static void mix(merge_scratch *m, uint32_t at)
 
 static bool leave(merge_scratch *m, const fragment *item, uint32_t at)
 {
-    pile *const left = &m->left;
+    fragment_list *const left = &m->left;
     if (left->count == left->capacity && !reserve(left, left->count + 256)) return false;
     left->items[left->count] = *item;
     left->items[left->count++].pixel = at;
@@ -221,7 +215,7 @@ insitu_status comp_owned_merge(const comp_owned *owned, const comp_merged *merge
     {
         merge_scratch *const m = base_alloc(sizeof *m);
         if (m) {
-            m->left = m->listed = (pile){NULL, 0, 0};
+            m->left = m->listed = (fragment_list){NULL, 0, 0};
             m->writer = (comp_writer){.rank = parent};
         }
         is_well = merge_strips(owned, merged, m);

@@ -37,7 +37,7 @@ done | xargs -P "$(nproc)" -n 1 clang-tidy -p build/lint --quiet 2>/dev/null || 
 # shellcheck disable=SC2046,SC2086
 cppcheck --quiet --inline-suppr --error-exitcode=1 --enable=warning,performance,portability --std=c11 -j "$(nproc)" \
     --suppressions-list=tests/cppcheck.supp $(find libinsitu mmbvh render compositing -type d | sed 's/^/-I/') \
-    $(printf '%s\n' $files | grep '\.c$' | grep -v render_kernels.c) || status=1
+    $(printf '%s\n' $files | grep '\.c$' | grep -v -e render_kernels.c -e comp_sheet_table.c) || status=1
 
 [ $status = 0 ] && echo 'clang-tidy and cppcheck have nothing to say.'
 exit $status

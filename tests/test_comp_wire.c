@@ -14,6 +14,7 @@
 #include "comp_gather.h"
 #include "comp_route.h"
 #include "comp_sheet.h"
+#include "comp_sheet_loops.h"
 #include "fragment_order.h"
 #include "memory.h"
 
@@ -113,7 +114,6 @@ static void sheets_come_back(void **context)
         const size_t length = (size_t)(comp_sheet_write_by(CPU_PLAIN, p.sheet, words, plain) - plain);
         for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
             comp_sheet_head head;
-            uint16_t masks[COMP_ROWS];
             const unsigned char *const end = comp_sheet_write_by(isa, p.sheet, words, p.bytes);
             assert_true((size_t)(end - p.bytes) == length &&
                         length + COMP_SHEET_SLACK <= comp_sheet_bound(count, words));
@@ -121,8 +121,8 @@ static void sheets_come_back(void **context)
             assert_ptr_equal(comp_sheet_read_by(isa, p.bytes, words, p.back), end);
             assert_int_equal(count_differences(p.sheet, p.back, words), 0);
             assert_true(p.back->strip == p.sheet->strip && p.back->is_opaque == p.sheet->is_opaque);
-            assert_ptr_equal(comp_sheet_look(p.bytes, &head, masks), end);
-            assert_true(head.count == count && !memcmp(masks, p.sheet->masks, sizeof masks));
+            assert_ptr_equal(comp_sheet_look(p.bytes, &head), end);
+            assert_true(head.count == count && !memcmp(p.back->masks, p.sheet->masks, sizeof p.back->masks));
         }
     }
     free_pair(&p);
@@ -175,6 +175,69 @@ static void nearest_hits_stay(void **context)
         for (int r = 0; r < COMP_ROWS; r++) assert_int_equal(left[r], 0);
     }
     free_pair(&p);
+}
+
+/* A sheet of fragments that are numbers: what blending makes of others is not the same bits by each compiler's code. */
+static void fill_numbers(comp_sheet *sheet)
+{
+    comp_sheet_begin(sheet, 0);
+    fill_masks(sheet);
+    sheet->is_opaque = next_random() % 2;
+    for (uint32_t k = 0; k < COMP_STRIP_PIXELS; k++) {
+        const bool is_hit = sheet->is_opaque || next_random() % 2;
+        fragment f = {.t_in = (float)(next_random() % 4), .kind = is_hit ? FRAGMENT_SURFACE : FRAGMENT_VOLUME};
+        f.t_out = f.t_in;
+        f.transmittance = sheet->is_opaque ? 0 : (float)(next_random() % 1001) * 1e-3f;
+        for (int c = 0; c < 3; c++) f.colour[c] = (float)(next_random() % 1001) * 1e-3f;
+        for (int w = 0; w < COMP_WORDS; w++) memcpy(&sheet->words[w][k], (const char *)&f + 4 * (w + 1), 4);
+    }
+}
+
+enum { WIDE = 40, HIGH = 50 };
+
+/* A picture, colours and then depths, whose right strips and lower ones are cut. Every second strip has no depths. */
+static void store_by(const comp_sheet_loops *loops, const comp_sheet *pixels, const float background[4], float *stored)
+{
+    const comp_grid grid = comp_grid_of(WIDE, HIGH);
+    memset(stored, 0x55, 5 * WIDE * HIGH * sizeof *stored);
+    for (uint32_t strip = 0; strip < grid.strips; strip++) {
+        const comp_area area = comp_grid_area(&grid, strip);
+        float *const depths = strip % 2 ? stored + 4 * WIDE * HIGH : NULL;
+        image out = {.width = WIDE, .height = HIGH, .rgba = stored, .depth = depths};
+        loops->store(pixels, &area, background, &out);
+    }
+}
+
+/* Joining, blending and storing are the same bits by each instruction set. */
+static void sheets_are_merged_alike(void **context)
+{
+    (void)context;
+    static const float background[4] = {0.1f, 0.2f, 0.3f, 0.75f};
+    static comp_sheet first, other, expected, joined, pixels, plain_pixels;
+    static float stored[5 * WIDE * HIGH] __attribute__((aligned(64))), plain_stored[5 * WIDE * HIGH]
+        __attribute__((aligned(64)));
+    const comp_sheet_loops *const plain = comp_sheet_loops_of(CPU_PLAIN);
+    for (int trial = 0; trial < 300; trial++) {
+        uint16_t plain_left[COMP_ROWS], left[COMP_ROWS];
+        fill_numbers(&first);
+        fill_numbers(&other);
+        expected = first;
+        plain->join(&expected, &other, plain_left);
+        plain->finish(&expected, background, &plain_pixels);
+        store_by(plain, &plain_pixels, background, plain_stored);
+        for (cpu_isa isa = CPU_PLAIN; isa <= cpu_best_isa(); isa++) {
+            const comp_sheet_loops *const loops = comp_sheet_loops_of(isa);
+            joined = first;
+            loops->join(&joined, &other, left);
+            assert_memory_equal(left, plain_left, sizeof left);
+            assert_true(joined.is_opaque == expected.is_opaque);
+            assert_int_equal(count_differences(&expected, &joined, COMP_WORDS), 0);
+            loops->finish(&joined, background, &pixels);
+            assert_int_equal(count_differences(&plain_pixels, &pixels, COMP_PIXEL_WORDS), 0);
+            store_by(loops, &pixels, background, stored);
+            assert_memory_equal(stored, plain_stored, sizeof stored);
+        }
+    }
 }
 
 /* ---- routes -------------------------------------------------------------------------------------------------- */
@@ -294,6 +357,7 @@ int main(void)
         cmocka_unit_test(sheets_come_back),
         cmocka_unit_test(straight_lines_take_half_a_byte_a_row),
         cmocka_unit_test(nearest_hits_stay),
+        cmocka_unit_test(sheets_are_merged_alike),
         cmocka_unit_test(routes_lead_to_owners),
         cmocka_unit_test(gathering_is_a_tree),
         cmocka_unit_test(the_cheapest_route_is_chosen),

@@ -1,13 +1,12 @@
 #include "comp_sheet.h"
 
 #include "comp_sheet_loops.h"
-#include "cpu.h"
 
 enum { OPAQUE_BIT = 31 };
 
 _Static_assert(sizeof(comp_sheet_head) == COMP_SHEET_HEAD, "heads have no padding");
 
-static const comp_sheet_loops *loops_of(cpu_isa isa)
+const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa)
 {
 #if defined(__x86_64__)
     if (isa == CPU_AVX512) return &comp_sheet_avx512;
@@ -48,7 +47,7 @@ int comp_sheet_count(const comp_sheet *sheet)
 
 unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int words, unsigned char *out)
 {
-    const comp_sheet_loops *const loops = loops_of(isa);
+    const comp_sheet_loops *const loops = comp_sheet_loops_of(isa);
     sheet_plan plan;
     unsigned char *at = out + COMP_SHEET_HEAD;
     comp_sheet_head head = {.strip = sheet->strip};
@@ -78,10 +77,9 @@ unsigned char *comp_sheet_write_by(cpu_isa isa, const comp_sheet *sheet, int wor
     return at;
 }
 
-/* Reads the head and the masks; returns where the words begin. */
-static const unsigned char *read_masks(const unsigned char *in, comp_sheet_head *head, uint16_t masks[COMP_ROWS])
+/* Reads the masks behind the head; returns where the words begin. */
+static const unsigned char *read_masks(const unsigned char *in, const comp_sheet_head *head, uint16_t masks[COMP_ROWS])
 {
-    memcpy(head, in, sizeof *head);
     in += COMP_SHEET_HEAD;
     for (int r = 0; r < COMP_ROWS; r++) {
         masks[r] = head->full >> r & 1 ? 0xffff : 0;
@@ -92,25 +90,20 @@ static const unsigned char *read_masks(const unsigned char *in, comp_sheet_head 
     return in;
 }
 
-const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head, uint16_t masks[COMP_ROWS])
+const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head)
 {
-    read_masks(in, head, masks);
+    memcpy(head, in, sizeof *head);
     return in + head->bytes;
-}
-
-bool comp_sheet_is_opaque(const comp_sheet_head *head)
-{
-    return head->kinds >> OPAQUE_BIT;
 }
 
 const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, int words, comp_sheet *sheet)
 {
-    const comp_sheet_loops *const loops = loops_of(isa);
+    const comp_sheet_loops *const loops = comp_sheet_loops_of(isa);
     comp_sheet_head head;
     sheet_plan plan;
-    const unsigned char *const at = read_masks(in, &head, sheet->masks);
+    const unsigned char *const end = comp_sheet_look(in, &head), *const at = read_masks(in, &head, sheet->masks);
     sheet->strip = head.strip;
-    sheet->is_opaque = comp_sheet_is_opaque(&head);
+    sheet->is_opaque = head.kinds >> OPAQUE_BIT;
     loops->plan(sheet->masks, &plan);
     if (plan.is_sparse) {
         comp_sheet closed;
@@ -121,7 +114,7 @@ const unsigned char *comp_sheet_read_by(cpu_isa isa, const unsigned char *in, in
     } else if (plan.count) {
         loops->read(at, &plan, head.kinds, words, sheet);
     }
-    return in + head.bytes;
+    return end;
 }
 
 unsigned char *comp_sheet_write(const comp_sheet *sheet, int words, unsigned char *out)
@@ -136,16 +129,16 @@ const unsigned char *comp_sheet_read(const unsigned char *in, int words, comp_sh
 
 void comp_sheet_join(comp_sheet *all, const comp_sheet *other, uint16_t left[COMP_ROWS])
 {
-    loops_of(cpu_best_isa())->join(all, other, left);
+    comp_sheet_loops_of(cpu_best_isa())->join(all, other, left);
 }
 
 void comp_sheet_finish(const comp_sheet *fragments, const float background[4], comp_sheet *pixels)
 {
-    loops_of(cpu_best_isa())->finish(fragments, background, pixels);
+    comp_sheet_loops_of(cpu_best_isa())->finish(fragments, background, pixels);
 }
 
 void comp_sheet_store(const comp_sheet *pixels, const comp_grid *grid, const float background[4], image *out)
 {
     const comp_area area = comp_grid_area(grid, pixels->strip);
-    loops_of(cpu_best_isa())->store(pixels, &area, background, out);
+    comp_sheet_loops_of(cpu_best_isa())->store(pixels, &area, background, out);
 }

@@ -87,8 +87,8 @@ int comp_sheet_count(const comp_sheet *sheet);
 /* Writes the first so many words of a sheet; returns the end. Local, as all here. */
 unsigned char *comp_sheet_write(const comp_sheet *sheet, int words, unsigned char *out);
 
-/* Reads the head and the masks; returns the sheet's end. */
-const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head, uint16_t masks[COMP_ROWS]);
+/* Reads the head alone; returns the sheet's end. */
+const unsigned char *comp_sheet_look(const unsigned char *in, comp_sheet_head *head);
 
 /* Reads what comp_sheet_write() wrote, with slack behind it; returns the end. */
 const unsigned char *comp_sheet_read(const unsigned char *in, int words, comp_sheet *sheet);
@@ -106,8 +106,5 @@ void comp_sheet_finish(const comp_sheet *fragments, const float background[4], c
 
 /* Stores finished pixels in the picture, and the background in the strip's others. */
 void comp_sheet_store(const comp_sheet *pixels, const comp_grid *grid, const float background[4], image *out);
-
-/* Whether sheet->is_opaque was set. */
-bool comp_sheet_is_opaque(const comp_sheet_head *head);
 
 #endif

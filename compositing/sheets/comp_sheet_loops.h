@@ -1,5 +1,5 @@
-/* The loops over the rows of a sheet (comp_sheet_rows.h), compiled once an instruction set. Only static inline code may
- * be shared by these: see tests/house_kernels.sh. */
+/* The loops over the rows of a sheet (comp_sheet_table.c), compiled once an instruction set. Only static inline code
+ * may be shared by these: see tests/house_kernels.sh. */
 #ifndef COMP_COMP_SHEET_LOOPS_H
 #define COMP_COMP_SHEET_LOOPS_H
 
@@ -30,5 +30,8 @@ typedef struct comp_sheet_loops {
 } comp_sheet_loops;
 
 extern const comp_sheet_loops comp_sheet_plain, comp_sheet_sse42, comp_sheet_avx512;
+
+/* Returns the loops that a machine with the instruction set takes. */
+const comp_sheet_loops *comp_sheet_loops_of(cpu_isa isa);
 
 #endif

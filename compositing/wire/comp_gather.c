@@ -1,7 +1,8 @@
 /* Pixels travel as fragments do, in sheets (comp_sheet.h). Those of owned blocks are sent, strips without fragments as
- * heads alone; blocks in which nobody has any are background, which rank 0 knows. A rank with children passes their messages on as they come, in a buffer allocated
- * before, and ends with a message that says that no more follow. So rank 0 need not know how many there are, hears only
- * from its own children, and its memory grows with neither the image nor the ranks. */
+ * heads alone; blocks in which nobody has any are background, which rank 0 knows. A rank with children passes their
+ * messages on as they come, in a buffer allocated before, and ends with a message that says that no more follow. So
+ * rank 0 need not know how many there are, hears only from its own children, and its memory grows with neither the
+ * image nor the ranks. */
 #include "comp_gather.h"
 
 #include <string.h>

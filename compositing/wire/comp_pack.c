@@ -175,10 +175,10 @@ static void visit_sheets(const comp_messages *in, int owner, uint32_t *starts, c
         comp_parcel parcel;
         for (size_t at = COMP_MESSAGE_HEAD; comp_next_parcel(m, &at, &parcel);) {
             if ((int)parcel.owner != owner) continue;
-            comp_sheet_head head;
-            for (const unsigned char *sheet = parcel.data, *end = sheet + parcel.bytes; sheet < end;
-                 sheet += head.bytes) {
-                memcpy(&head, sheet, sizeof head);
+            const unsigned char *const end = parcel.data + parcel.bytes;
+            for (const unsigned char *sheet = parcel.data, *next; sheet < end; sheet = next) {
+                comp_sheet_head head;
+                next = comp_sheet_look(sheet, &head);
                 if (sheets)
                     sheets[--starts[head.strip]] = sheet;
                 else

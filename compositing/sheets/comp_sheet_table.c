@@ -1,7 +1,8 @@
+/* The loops of one instruction set, COMP_SHEET_TABLE: compiled once for each (CMakeLists.txt). */
 #include "comp_sheet_blend.h"
 #include "comp_sheet_rows.h"
 
-const comp_sheet_loops comp_sheet_plain = {.plan = make_plan,
+const comp_sheet_loops COMP_SHEET_TABLE = {.plan = make_plan,
                                            .close = close_sheet,
                                            .open = open_sheet,
                                            .write = write_words,
