@@ -262,16 +262,18 @@ static void permutations_give_the_same_bits(void **context)
 static void check_grid(uint32_t width, uint32_t height)
 {
     const comp_grid grid = comp_grid_of(width, height);
+    const uint32_t every = grid.strips / 5000000 + 1; /* of more strips a part */
     uint64_t area = 0;
     assert_true(grid.blocks >= 1 && grid.blocks <= COMP_MOST_BLOCKS);
-    for (uint32_t s = 0; s < grid.strips; s++) {
+    for (uint64_t s64 = 0; s64 < grid.strips; s64 += every) {
+        const uint32_t s = (uint32_t)s64;
         const comp_area strip = comp_grid_area(&grid, s);
         assert_true(strip.width >= 1 && strip.height >= 1);
         assert_true(strip.x + strip.width <= width && strip.y + strip.height <= height);
         assert_true(comp_grid_block(&grid, s) < grid.blocks);
         area += (uint64_t)strip.width * strip.height;
     }
-    assert_true(area == (uint64_t)width * height);
+    assert_true(every > 1 || area == (uint64_t)width * height);
     for (int trial = 0; trial < 2000; trial++) {
         const uint32_t last = (uint32_t)((uint64_t)width * height - 1);
         const uint32_t pixel = trial == 0 ? last : next_random() % (last + (last < UINT32_MAX));
@@ -289,10 +291,9 @@ static void strips_share_all_pixels(void **context)
     (void)context;
     const uint32_t sizes[][2] = {{1, 1},         {1, 7},           {16, 32},        {17, 33},
                                  {640, 480},     {1021, 769},      {1920, 1080},    {7680, 4320},
-                                 {65535, 65537}, {4294967295u, 1}, {1, 4294967295u}};
+                                 {32768, 32768}, {65535, 65537},   {4294967295u, 1}, {1, 4294967295u}};
     state = 4;
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
-        if ((uint64_t)sizes[i][0] * sizes[i][1] <= 100000000) check_grid(sizes[i][0], sizes[i][1]);
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) check_grid(sizes[i][0], sizes[i][1]);
 }
 
 /* The number of lots for a block that ranks with so many fragments each draw, and who wins. */
